@@ -1,0 +1,65 @@
+"""The one place that decides how kernels are compiled.
+
+`fastmath` is off everywhere: results must be the same bits with one thread and with two, live and in replay.
+Compiled kernels are cached in a folder named by the content of the sources, so that a changed kernel
+can never be answered by an old one that was inlined into its caller.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_PACKAGE = Path(__file__).parent
+
+
+def _source_digest() -> str:
+    """Digest of every kernel source and of the compiler, as the name of the cache folder."""
+    digest = hashlib.blake2b(f"{numba.__version__} {sys.version_info[:2]}".encode(), digest_size=8)
+    for folder in ("geometry", "broad_phase", "narrow_phase", "prediction"):
+        for path in sorted((_PACKAGE / folder).glob("*.py")):
+            digest.update(path.read_bytes())
+    for name in ("_jit.py", "tolerances.py", "records.py"):
+        digest.update((_PACKAGE / name).read_bytes())
+    return digest.hexdigest()
+
+
+def _cache_root() -> Path:
+    """Inside the environment where that can be written, else in the user's cache folder."""
+    prefix = Path(sys.prefix)
+    if sys.prefix != sys.base_prefix and os.access(prefix, os.W_OK):
+        return prefix / "var" / "cache" / "collision_monitor"
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "collision_monitor"
+
+
+if not os.environ.get("NUMBA_CACHE_DIR"):
+    numba.config.CACHE_DIR = str(_cache_root() / _source_digest())  # type: ignore[attr-defined]
+
+_OPTIONS: dict[str, Any] = {"cache": True, "fastmath": False, "error_model": "numpy", "nogil": True, "boundscheck": False}
+
+
+def kernel(function: F) -> F:
+    """Compile a kernel that Python code calls with arrays."""
+    compiled: F = numba.njit(**_OPTIONS)(function)
+    return compiled
+
+
+def device(function: F) -> F:
+    """Compile a function that only kernels call; inlined into them by LLVM where that pays."""
+    compiled: F = numba.njit(**_OPTIONS)(function)
+    return compiled
+
+
+def parallel_kernel(function: F) -> F:
+    """Compile a kernel whose `prange` loops run on all threads; each iteration must write places of its own."""
+    compiled: F = numba.njit(parallel=True, **_OPTIONS)(function)
+    return compiled

@@ -1,0 +1,1 @@
+"""Shapes, poses, bounding volumes and feature tests: pure functions on arrays."""

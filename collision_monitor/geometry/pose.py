@@ -1,0 +1,116 @@
+"""Poses and motions, and the quaternion functions that the rest is built on.
+
+Quaternions are (x, y, z, w), as in ROS. A rotation matrix R_WA takes vectors of frame A to frame W.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from collision_monitor.errors import PoseError
+from collision_monitor.tolerances import UNIT_QUATERNION
+
+Array = NDArray[np.float64]
+
+
+def vector(value: ArrayLike, name: str, length: int = 3) -> Array:
+    """A finite float64 vector of `length` numbers, read-only. Raises PoseError."""
+    try:
+        result = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise PoseError(f"{name}: expected {length} numbers, got {value!r}") from None
+    if result.shape != (length,):
+        raise PoseError(f"{name}: expected {length} numbers, got an array of shape {result.shape}")
+    if not np.isfinite(result).all():
+        raise PoseError(f"{name}: expected finite numbers, got {result.tolist()}")
+    result.setflags(write=False)
+    return result
+
+
+def unit_quaternion(value: ArrayLike) -> Array:
+    """The quaternion (x, y, z, w), normalised where it is within 1e-3 of unit length. Raises PoseError beyond."""
+    q = vector(value, "quaternion", 4)
+    norm = float(np.linalg.norm(q))
+    if abs(norm - 1.0) > UNIT_QUATERNION:
+        raise PoseError(f"quaternion: expected unit length within {UNIT_QUATERNION:g}, got {q.tolist()} of length {norm:g}")
+    q = q / norm
+    q.setflags(write=False)
+    return q
+
+
+def multiply(a: ArrayLike, b: ArrayLike) -> Array:
+    """Hamilton product of quaternions (..., 4): the rotation b, then a."""
+    ax, ay, az, aw = np.moveaxis(np.asarray(a, dtype=np.float64), -1, 0)
+    bx, by, bz, bw = np.moveaxis(np.asarray(b, dtype=np.float64), -1, 0)
+    return np.stack(
+        [
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        ],
+        axis=-1,
+    )
+
+
+def from_rotation_vector(rotation: ArrayLike) -> Array:
+    """Quaternions (..., 4) of rotation vectors (..., 3): axis times angle in rad."""
+    rotation = np.asarray(rotation, dtype=np.float64)
+    angle = np.linalg.norm(rotation, axis=-1, keepdims=True)
+    return np.concatenate([np.sinc(angle / (2 * np.pi)) * rotation / 2, np.cos(angle / 2)], axis=-1)
+
+
+def rotation_matrix(quaternion: ArrayLike) -> Array:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
+    x, y, z, w = np.moveaxis(np.asarray(quaternion, dtype=np.float64), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Where a body is: position (m) and orientation (unit quaternion x, y, z, w). Raises PoseError."""
+
+    position: Any = (0.0, 0.0, 0.0)
+    quaternion: Any = (0.0, 0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position", vector(self.position, "position"))
+        object.__setattr__(self, "quaternion", unit_quaternion(self.quaternion))
+
+    @property
+    def rotation(self) -> Array:
+        """R_WA (3, 3): takes the body's vectors to the world."""
+        return rotation_matrix(self.quaternion)
+
+    def __matmul__(self, other: Pose) -> Pose:
+        """X_WB = X_WA @ X_AB."""
+        return Pose(self.position + self.rotation @ other.position, multiply(self.quaternion, other.quaternion))
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A pose and its twist in the world frame: linear (m/s) of the body's origin, angular (rad/s). Raises PoseError."""
+
+    pose: Pose
+    linear: Any = (0.0, 0.0, 0.0)
+    angular: Any = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.pose, Pose):
+            raise PoseError(f"Motion: expected a Pose first, got {type(self.pose).__name__}")
+        object.__setattr__(self, "linear", vector(self.linear, "linear velocity"))
+        object.__setattr__(self, "angular", vector(self.angular, "angular velocity"))
+
+    def at(self, time: float) -> Pose:
+        """The pose after `time` seconds at constant twist."""
+        turn = from_rotation_vector(self.angular * time)
+        return Pose(self.pose.position + self.linear * time, multiply(turn, self.pose.quaternion))

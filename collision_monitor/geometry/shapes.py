@@ -1,0 +1,185 @@
+"""The shapes: immutable, checked when they are made, SI units, centred on the origin, axis = local z."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from collision_monitor.errors import ShapeError
+
+Array = NDArray[np.float64]
+
+
+def _positive(value: float, what: str) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise ShapeError(f"{what}: expected a positive number of metres, got {value!r}") from None
+    if not (number > 0.0 and np.isfinite(number)):
+        raise ShapeError(f"{what}: expected a positive, finite number of metres, got {number!r}")
+    return number
+
+
+def _points(value: ArrayLike, what: str, width: int, least: int) -> Array:
+    try:
+        points = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ShapeError(f"{what}: expected an array of shape (n, {width}), got {type(value).__name__}") from None
+    if points.ndim != 2 or points.shape[1] != width or len(points) < least:
+        raise ShapeError(f"{what}: expected at least {least} points, shape (n, {width}), got shape {points.shape}")
+    if not np.isfinite(points).all():
+        raise ShapeError(f"{what}: expected finite coordinates, got NaN or infinity")
+    points.setflags(write=False)
+    return points
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Base of all shapes."""
+
+
+@dataclass(frozen=True)
+class Sphere(Shape):
+    """radius in m."""
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", _positive(self.radius, "Sphere radius"))
+
+
+@dataclass(frozen=True)
+class Box(Shape):
+    """size: full extents (x, y, z) in m; zero extents are allowed (a plate, a needle) but not all three."""
+
+    size: Any
+
+    def __post_init__(self) -> None:
+        try:
+            size = tuple(float(s) for s in self.size)
+        except (TypeError, ValueError):
+            raise ShapeError(f"Box size: expected 3 full extents in metres, got {self.size!r}") from None
+        if len(size) != 3 or not all(np.isfinite(s) and s >= 0.0 for s in size) or max(size) == 0.0:
+            raise ShapeError(f"Box size: expected 3 finite extents >= 0, not all zero, got {size}")
+        object.__setattr__(self, "size", size)
+
+
+@dataclass(frozen=True)
+class Capsule(Shape):
+    """radius and length of the core segment (without the caps) in m."""
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", _positive(self.radius, "Capsule radius"))
+        object.__setattr__(self, "length", _positive(self.length, "Capsule length"))
+
+
+@dataclass(frozen=True)
+class Cylinder(Shape):
+    """radius and height (length) in m."""
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", _positive(self.radius, "Cylinder radius"))
+        object.__setattr__(self, "length", _positive(self.length, "Cylinder length"))
+
+
+@dataclass(frozen=True)
+class Cone(Shape):
+    """radius of the base and height (length) in m; the apex is at +length/2."""
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", _positive(self.radius, "Cone radius"))
+        object.__setattr__(self, "length", _positive(self.length, "Cone length"))
+
+
+@dataclass(frozen=True, eq=False)
+class ConvexHull(Shape):
+    """The convex hull of points (n, 3), n >= 4 and not all in one plane; interior points may be given."""
+
+    points: Any
+
+    def __post_init__(self) -> None:
+        points = _points(self.points, "ConvexHull points", 3, 4)
+        spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        if spread[2] <= 1e-12 * spread[0]:
+            raise ShapeError("ConvexHull points: expected a solid, got points that lie in one plane (use a Box or a Mesh)")
+        object.__setattr__(self, "points", points)
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh(Shape):
+    """A triangle surface, convex or not: vertices (n, 3) in m, faces (m, 3) of vertex indices, counter-clockwise from outside."""
+
+    vertices: Any
+    faces: Any
+
+    def __post_init__(self) -> None:
+        vertices = _points(self.vertices, "Mesh vertices", 3, 3)
+        try:
+            faces = np.array(self.faces)
+        except (TypeError, ValueError):
+            raise ShapeError(f"Mesh faces: expected an array of shape (m, 3), got {type(self.faces).__name__}") from None
+        if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0 or not np.issubdtype(faces.dtype, np.integer):
+            raise ShapeError(f"Mesh faces: expected integers of shape (m, 3), m >= 1, got {faces.dtype} {faces.shape}")
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            raise ShapeError(
+                f"Mesh faces: expected indices from 0 to {len(vertices) - 1}, got {faces.min()} to {faces.max()}"
+            )
+        faces = faces.astype(np.int32)
+        faces.setflags(write=False)
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", faces)
+
+
+@dataclass(frozen=True, eq=False)
+class HalfSpace(Shape):
+    """{x : normal . x <= offset}; the normal points out of the solid and is normalised here, the offset (m) with it."""
+
+    normal: Any
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        try:
+            normal = np.array(self.normal, dtype=np.float64)
+            offset = float(self.offset)
+        except (TypeError, ValueError):
+            raise ShapeError(f"HalfSpace: expected a normal (3) and an offset, got {self.normal!r}, {self.offset!r}") from None
+        length = float(np.linalg.norm(normal)) if normal.shape == (3,) else 0.0
+        if not (length > 0.0 and np.isfinite(length) and np.isfinite(offset)):
+            raise ShapeError(f"HalfSpace: expected a non-zero, finite normal and a finite offset, got {self.normal}, {offset}")
+        normal = normal / length
+        normal.setflags(write=False)
+        object.__setattr__(self, "normal", normal)
+        object.__setattr__(self, "offset", offset / length)
+
+
+@dataclass(frozen=True)
+class Circle(Shape):
+    """2-D, in the x-y plane: radius in m."""
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", _positive(self.radius, "Circle radius"))
+
+
+@dataclass(frozen=True, eq=False)
+class Polygon(Shape):
+    """2-D, in the x-y plane: points (n, 2) in order around the boundary of a simple polygon, convex or concave."""
+
+    points: Any
+
+    def __post_init__(self) -> None:
+        points = _points(self.points, "Polygon points", 2, 3)
+        object.__setattr__(self, "points", points)

@@ -1,0 +1,148 @@
+"""The arrays that go in and out of the monitor: structured dtypes with exactly the layout of the messages.
+
+An array of these dtypes has the bytes of the message's sequence in little-endian CDR, so it is published and
+recorded without conversion. Units, frames and signs are written in `collision_monitor_msgs/msg/*.msg`.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum, IntFlag
+
+import numpy as np
+
+STATE = np.dtype(
+    [
+        ("position", "<f8", 3),
+        ("quaternion", "<f8", 4),
+        ("linear", "<f8", 3),
+        ("angular", "<f8", 3),
+        ("acceleration", "<f8", 3),
+        ("position_stddev", "<f8"),
+        ("orientation_stddev", "<f8"),
+        ("velocity_stddev", "<f8"),
+        ("angular_velocity_stddev", "<f8"),
+        ("id", "<u4"),
+        ("flags", "<u4"),
+    ]
+)
+
+CONTACT = np.dtype(
+    [
+        ("signed_distance", "<f8"),
+        ("error_bound", "<f8"),
+        ("point_a", "<f8", 3),
+        ("point_b", "<f8", 3),
+        ("normal", "<f8", 3),
+        ("closing_speed", "<f8"),
+        ("duration", "<f8"),
+        ("id_a", "<u4"),
+        ("id_b", "<u4"),
+        ("shape_a", "<u4"),
+        ("shape_b", "<u4"),
+        ("feature_index_a", "<u4"),
+        ("feature_index_b", "<u4"),
+        ("phase", "u1"),
+        ("status", "u1"),
+        ("model_a", "u1"),
+        ("model_b", "u1"),
+        ("feature_type_a", "u1"),
+        ("feature_type_b", "u1"),
+        ("point_index", "u1"),
+        ("point_count", "u1"),
+    ]
+)
+
+PREDICTION = np.dtype(
+    [
+        ("lower", "<f8"),
+        ("upper", "<f8"),
+        ("earliest", "<f8"),
+        ("most_likely", "<f8"),
+        ("latest", "<f8"),
+        ("probability", "<f8"),
+        ("point", "<f8", 3),
+        ("normal", "<f8", 3),
+        ("closing_speed", "<f8"),
+        ("id_a", "<u4"),
+        ("id_b", "<u4"),
+        ("shape_a", "<u4"),
+        ("shape_b", "<u4"),
+        ("status", "u1"),
+        ("method", "u1"),
+        ("model_a", "u1"),
+        ("model_b", "u1"),
+        ("stale", "u1"),
+        ("reserved", "u1", 3),
+    ]
+)
+
+
+class StateFlag(IntFlag):
+    """`ObjectState.flags`."""
+
+    TWIST_UNKNOWN = 1
+    ACCELERATION_VALID = 2
+    DISCONTINUITY = 4
+
+
+class Phase(IntEnum):
+    """`Contact.phase`."""
+
+    PERSIST = 0
+    BEGIN = 1
+    END = 2
+
+
+class ContactStatus(IntEnum):
+    """`Contact.status`."""
+
+    TOUCHING = 0
+    UNRESOLVED = 1
+
+
+class PredictionStatus(IntEnum):
+    """`PredictedCollision.status`."""
+
+    HIT = 0
+    UNRESOLVED = 1
+
+
+class Method(IntEnum):
+    """`PredictedCollision.method`."""
+
+    CLOSED_FORM = 1
+    CONSERVATIVE_ADVANCEMENT = 2
+    SWEPT_SAT = 3
+    BISECTION = 4
+    BOUND = 5
+
+
+class Model(IntEnum):
+    """`ObjectDescription.model` and the `model_*` fields of answers."""
+
+    AUTO = 0
+    EXACT = 1
+    SPHERE = 2
+    AABB = 3
+    OBB = 4
+    KDOP6 = 5
+    KDOP14 = 6
+    KDOP18 = 7
+    KDOP26 = 8
+    CONVEX_HULL = 9
+    CONVEX_DECOMPOSITION = 10
+
+
+class ShapeType(IntEnum):
+    """`Shape.type`; also the shape kinds of the kernels."""
+
+    SPHERE = 1
+    BOX = 2
+    CAPSULE = 3
+    CYLINDER = 4
+    CONE = 5
+    CONVEX_HULL = 6
+    MESH = 7
+    HALF_SPACE = 8
+    CIRCLE = 9
+    POLYGON = 10
