@@ -26,3 +26,7 @@ contacts of resting boxes keep one normal instead of flickering between ties."""
 
 SAT_ROUND_OFF: Final = 64 * EPSILON
 """Relative round-off of one SAT projection: about 30 operations on numbers of the pair's size, doubled."""
+
+HULL_DROP: Final = 1e-14
+"""A point that stands out of its hull by less than this part of the hull's size is dropped with the interior ones.
+Larger: visible corners vanish. Smaller: round-off keeps points that lie in a face, and each costs time in every test."""

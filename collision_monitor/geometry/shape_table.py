@@ -1,0 +1,250 @@
+"""All shapes as one structure of arrays: what the kernels read instead of shape objects.
+
+The dtypes and the memory order never depend on the content, so that adding a shape compiles nothing.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull as Qhull  # type: ignore[import-untyped]
+from scipy.spatial import QhullError
+
+from collision_monitor._jit import device
+from collision_monitor.errors import InputError, ShapeError, UnsupportedError
+from collision_monitor.geometry import shapes
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.records import ShapeType
+from collision_monitor.tolerances import HULL_DROP
+
+Array = NDArray[np.float64]
+
+SPHERE: Final = int(ShapeType.SPHERE)
+BOX: Final = int(ShapeType.BOX)
+CAPSULE: Final = int(ShapeType.CAPSULE)
+CYLINDER: Final = int(ShapeType.CYLINDER)
+CONE: Final = int(ShapeType.CONE)
+CONVEX_HULL: Final = int(ShapeType.CONVEX_HULL)
+HALF_SPACE: Final = int(ShapeType.HALF_SPACE)
+
+SUPPORTED: Final = "Sphere, Box, Capsule, Cylinder, Cone, ConvexHull, HalfSpace"
+
+LANES: Final = 8
+"""Hull vertices come in blocks of this many, the last one repeated, so that the support scan has no tail."""
+
+
+class ShapeTable(NamedTuple):
+    """K slots of shapes and the hull vertices (m). A slot with kind 0 is free. Kernels take this as one argument.
+
+    size holds, by kind: sphere r | box half extents x, y, z | capsule r, half core length | cylinder r, half height |
+    cone r, half height | half-space normal x, y, z, offset | hull nothing.
+    """
+
+    kind: Any  # (K,) uint8, records.ShapeType
+    size: Any  # (K, 4) float64
+    margin: Any  # (K,) float64: the shape is grown by a sphere of this radius
+    radius: Any  # (K,) float64: of the sphere about the shape's origin that holds it, margin included
+    vertex_start: Any  # (K,) int32
+    vertex_count: Any  # (K,) int32, a multiple of LANES; 0 where not a hull
+    vertices: Any  # (3, V) float64: all x, all y, all z
+    vertex_index: Any  # (V,) int32: the vertex's place in the points that the user gave
+    local_position: Any  # (K, 3) float64, of the shape in its object's frame
+    local_rotation: Any  # (K, 3, 3) float64
+
+
+def _empty(slots: int, vertices: int) -> ShapeTable:
+    return ShapeTable(
+        kind=np.zeros(slots, np.uint8),
+        size=np.zeros((slots, 4)),
+        margin=np.zeros(slots),
+        radius=np.zeros(slots),
+        vertex_start=np.zeros(slots, np.int32),
+        vertex_count=np.zeros(slots, np.int32),
+        vertices=np.zeros((3, vertices)),
+        vertex_index=np.zeros(vertices, np.int32),
+        local_position=np.zeros((slots, 3)),
+        local_rotation=np.zeros((slots, 3, 3)),
+    )
+
+
+def _resized(table: ShapeTable, slots: int, vertices: int) -> ShapeTable:
+    new = _empty(slots, vertices)
+    for source, target in zip(table, new, strict=True):
+        target[tuple(slice(n) for n in source.shape)] = source
+    return new
+
+
+def hull_vertices(points: Array) -> NDArray[np.int32]:
+    """Indices of the points (n, 3) that span their convex hull, ascending; all distinct points where qhull gives up."""
+    _, first = np.unique(points, axis=0, return_index=True)
+    first = np.sort(first)
+    centred = points[first] - points[first].mean(axis=0)
+    scale = float(np.abs(centred).max())
+    try:
+        hull = Qhull(centred / scale)
+    except QhullError:
+        return first.astype(np.int32)
+    # qhull merges what is nearly coplanar; a vertex that it dropped although it sticks out stays in
+    keep = np.zeros(len(first), bool)
+    keep[hull.vertices] = True
+    outside = (centred / scale) @ hull.equations[:, :3].T + hull.equations[:, 3]
+    keep |= outside.max(axis=1) > HULL_DROP
+    return first[keep].astype(np.int32)
+
+
+class ShapeTableBuilder:
+    """Grows a ShapeTable; `table` is the current one and must be fetched again after `append`."""
+
+    def __init__(self, slots: int = 64, vertices: int = 512) -> None:
+        self.table = _empty(max(slots, 1), max(vertices, LANES))
+        self._slots = 0
+        self._vertices = 0
+        self._free_slots: list[int] = []
+        self._free_blocks: dict[int, list[int]] = {}
+        self._hulls: dict[bytes, tuple[int, int]] = {}  # the points' bytes -> start, count
+        self._users: dict[int, tuple[bytes, int]] = {}  # start -> the points' bytes, how many slots share the block
+
+    def __len__(self) -> int:
+        """How many shapes the table holds."""
+        return self._slots - len(self._free_slots)
+
+    def append(self, shape: shapes.Shape, pose: Pose | None = None, margin: float = 0.0) -> int:
+        """Put a shape at a pose in its object's frame, grown by `margin` (m); returns its slot.
+
+        Raises UnsupportedError for a kind that has no kernels, ShapeError for a bad margin.
+        """
+        if not (np.isfinite(margin) and margin >= 0.0):
+            raise ShapeError(f"margin: expected a finite number of metres >= 0, got {margin!r}")
+        start, count = 0, 0
+        size: tuple[float, ...]
+        match shape:
+            case shapes.Sphere():
+                kind, size, radius = SPHERE, (shape.radius,), shape.radius
+            case shapes.Box():
+                size = tuple(s / 2 for s in shape.size)
+                kind, radius = BOX, float(np.linalg.norm(size))
+            case shapes.Capsule():
+                kind, size, radius = CAPSULE, (shape.radius, shape.length / 2), shape.radius + shape.length / 2
+            case shapes.Cylinder():
+                kind, size = CYLINDER, (shape.radius, shape.length / 2)
+                radius = float(np.hypot(*size))
+            case shapes.Cone():
+                kind, size = CONE, (shape.radius, shape.length / 2)
+                radius = float(np.hypot(*size))
+            case shapes.HalfSpace():
+                kind, size, radius = HALF_SPACE, (*shape.normal, shape.offset), inf
+            case shapes.ConvexHull():
+                kind, size, radius = CONVEX_HULL, (), float(np.linalg.norm(shape.points, axis=1).max())
+                start, count = self._share_hull(shape.points)
+            case _:
+                raise UnsupportedError(f"{type(shape).__name__} has no narrow phase; supported are {SUPPORTED}")
+        slot = self._new_slot()
+        table = self.table
+        table.size[slot] = 0.0
+        table.size[slot, : len(size)] = size
+        table.margin[slot] = margin
+        # rounded up: the sphere must hold the shape whatever the rounding above was
+        table.radius[slot] = np.nextafter(radius * (1 + 1e-15) + margin, inf)
+        table.vertex_start[slot], table.vertex_count[slot] = start, count
+        pose = Pose() if pose is None else pose
+        table.local_position[slot] = pose.position
+        table.local_rotation[slot] = pose.rotation
+        table.kind[slot] = kind
+        return slot
+
+    def remove(self, slot: int) -> None:
+        """Free a slot for reuse. Raises InputError where there is no shape."""
+        if not (0 <= slot < self._slots and self.table.kind[slot]):
+            raise InputError(f"expected the slot of a shape in the table, got {slot!r}")
+        if self.table.kind[slot] == CONVEX_HULL:
+            start = int(self.table.vertex_start[slot])
+            key, users = self._users[start]
+            if users > 1:
+                self._users[start] = key, users - 1
+            else:
+                del self._users[start], self._hulls[key]
+                self._free_blocks.setdefault(int(self.table.vertex_count[slot]), []).append(start)
+        self.table.kind[slot] = 0
+        self.table.vertex_count[slot] = 0
+        self._free_slots.append(slot)
+
+    def _new_slot(self) -> int:
+        if self._free_slots:
+            return self._free_slots.pop()
+        capacity = len(self.table.kind)
+        if self._slots == capacity:
+            self.table = _resized(self.table, 2 * capacity, len(self.table.vertex_index))
+        self._slots += 1
+        return self._slots - 1
+
+    def _share_hull(self, points: Array) -> tuple[int, int]:
+        """Start and count of the hull's block of vertices; the same points share one block."""
+        key = points.tobytes()
+        if key in self._hulls:
+            start, count = self._hulls[key]
+            self._users[start] = key, self._users[start][1] + 1
+            return start, count
+        chosen = hull_vertices(points)
+        chosen = np.pad(chosen, (0, -len(chosen) % LANES), mode="edge")
+        count = len(chosen)
+        start = self._new_block(count)
+        self.table.vertices[:, start : start + count] = points[chosen].T
+        self.table.vertex_index[start : start + count] = chosen
+        self._hulls[key] = start, count
+        self._users[start] = key, 1
+        return start, count
+
+    def _new_block(self, count: int) -> int:
+        if self._free_blocks.get(count):
+            return self._free_blocks[count].pop()
+        needed, capacity = self._vertices + count, len(self.table.vertex_index)
+        if needed > capacity:
+            self.table = _resized(self.table, len(self.table.kind), max(needed, 2 * capacity))
+        self._vertices = needed
+        return needed - count
+
+
+@device
+def bounds(table, slot, R, out):  # type: ignore[no-untyped-def]
+    """Tight axis-aligned bounds of a shape under rotation R_WA (3, 3), about its origin and with its margin.
+
+    out[0:3] = lower, out[3:6] = upper (m). A half-space is unbounded: -inf and inf.
+    """
+    kind = table.kind[slot]
+    m = table.margin[slot]
+    s0 = table.size[slot, 0]
+    s1 = table.size[slot, 1]
+    for i in range(3):
+        x, y, z = R[i, 0], R[i, 1], R[i, 2]
+        if kind == BOX:
+            upper = abs(x) * s0 + abs(y) * s1 + abs(z) * table.size[slot, 2]
+            lower = -upper
+        elif kind == SPHERE:
+            upper = s0
+            lower = -s0
+        elif kind == CAPSULE:
+            upper = abs(z) * s1 + s0
+            lower = -upper
+        elif kind == CYLINDER:
+            upper = abs(z) * s1 + s0 * sqrt(x * x + y * y)
+            lower = -upper
+        elif kind == CONE:
+            rim = s0 * sqrt(x * x + y * y)
+            upper = max(z * s1, rim - z * s1)
+            lower = min(z * s1, -rim - z * s1)
+        elif kind == CONVEX_HULL:
+            upper = -inf
+            lower = inf
+            first = table.vertex_start[slot]
+            for k in range(first, first + table.vertex_count[slot]):
+                d = x * table.vertices[0, k] + y * table.vertices[1, k] + z * table.vertices[2, k]
+                upper = max(upper, d)
+                lower = min(lower, d)
+        else:
+            upper = inf
+            lower = -inf
+        out[i] = lower - m
+        out[3 + i] = upper + m
