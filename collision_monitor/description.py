@@ -1,0 +1,97 @@
+"""What an object is, as one checked record: the core adds it, the codec sends it, the scenes are made of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from collision_monitor.errors import InputError, ShapeError
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Shape
+from collision_monitor.records import Model
+
+ALL_GROUPS = 0xFFFFFFFF
+_UINT32_MAX = 0xFFFFFFFF
+
+
+def _uint32(value: Any, what: str) -> int:
+    if isinstance(value, bool) or not hasattr(value, "__index__") or not 0 <= value.__index__() <= _UINT32_MAX:
+        raise InputError(f"{what}: expected an integer from 0 to {_UINT32_MAX}, got {value!r}")
+    return int(value)
+
+
+def _not_negative(value: Any, what: str, unit: str) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{what}: expected a number of {unit}, got {value!r}") from None
+    if not (number >= 0.0 and math.isfinite(number)):
+        raise InputError(f"{what}: expected a finite number of {unit}, at least 0, got {number!r}")
+    return number
+
+
+def _shape_pairs(value: Any, what: str) -> tuple[tuple[Shape, Pose], ...]:
+    if isinstance(value, Shape):
+        return ((value, Pose()),)
+    pairs = tuple(tuple(item) if isinstance(item, Iterable) else item for item in value)
+    for pair in pairs:
+        if not (isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[0], Shape) and isinstance(pair[1], Pose)):
+            raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), got {pair!r} in the list")
+    if not pairs:
+        raise ShapeError(f"{what}: expected at least one shape, got none")
+    return pairs
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectDescription:
+    """One object, as in `ObjectDescription.msg`; lengths in m, accelerations in m/s^2 and rad/s^2.
+
+    `shapes` may be given as one shape and is kept as a tuple of (shape, pose in the object's frame). `pose` is where
+    a static object stands; None otherwise. What the message allows to be left out is filled in here: an empty name,
+    a group or mask of 0, an acceleration of NaN. Raises InputError, ShapeError for the shapes.
+    """
+
+    object_id: int
+    shapes: Any
+    name: str = ""
+    static: bool = False
+    pose: Pose | None = None
+    group: int = 1
+    mask: int = ALL_GROUPS
+    padding: float = 0.0
+    model: Model = Model.AUTO
+    allowed: tuple[int, ...] = ()
+    max_linear_acceleration: float = 0.0
+    max_angular_acceleration: float = 0.0
+
+    def __post_init__(self) -> None:
+        object_id = _uint32(self.object_id, "object id")
+        what = f"object {object_id}"
+        try:
+            model = Model(self.model)
+        except ValueError:
+            choices = ", ".join(f"{m.name} ({m.value})" for m in Model)
+            raise InputError(f"{what}, model: expected one of {choices}, got {self.model!r}") from None
+        if self.static and self.pose is None:
+            raise InputError(f"{what}: a static object needs the pose where it stands, got None")
+        if self.pose is not None and not isinstance(self.pose, Pose):
+            raise InputError(f"{what}, pose: expected a Pose, got {type(self.pose).__name__}")
+        checked = {
+            "object_id": object_id,
+            "shapes": _shape_pairs(self.shapes, what),
+            "name": str(self.name) or f"object_{object_id}",
+            "static": bool(self.static),
+            "group": _uint32(self.group, f"{what}, group") or 1,
+            "mask": _uint32(self.mask, f"{what}, mask") or ALL_GROUPS,
+            "padding": _not_negative(self.padding, f"{what}, padding", "metres"),
+            "model": model,
+            "allowed": tuple(_uint32(other, f"{what}, allowed") for other in self.allowed),
+        }
+        for field, unit in (("max_linear_acceleration", "m/s^2"), ("max_angular_acceleration", "rad/s^2")):
+            value = getattr(self, field)
+            unknown = isinstance(value, float) and math.isnan(value)
+            checked[field] = 0.0 if unknown else _not_negative(value, f"{what}, {field}", unit)
+        for field, value in checked.items():
+            object.__setattr__(self, field, value)

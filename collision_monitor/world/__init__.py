@@ -1,0 +1,62 @@
+"""Simulated worlds for demos, tests and benchmarks. They use the core as any user would; the core knows none of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from collision_monitor.errors import InputError
+from collision_monitor.world.fleet import Fleet
+from collision_monitor.world.scene import Scene
+
+__all__ = ["Scene", "describe", "make_scene", "scene_names"]
+
+
+@dataclass(frozen=True)
+class _Entry:
+    make: Callable[[int | None, int, float | None, Path | None], Scene]
+    description: str
+
+
+_SCENES = {
+    "fleet": _Entry(
+        lambda objects, seed, rate, path: Fleet(objects, seed, rate),
+        "robots and people in a hall with racks, pillars and walls; they do run into each other",
+    ),
+}
+
+
+def scene_names() -> list[str]:
+    """The names that `make_scene` takes."""
+    return list(_SCENES)
+
+
+def _entry(name: str) -> _Entry:
+    if name not in _SCENES:
+        raise InputError(f"scene: expected one of {', '.join(_SCENES)}, got {name!r}")
+    return _SCENES[name]
+
+
+def describe(name: str) -> str:
+    """One line for people about a scene. Raises InputError with the list of names."""
+    return _entry(name).description
+
+
+def make_scene(
+    name: str,
+    *,
+    objects: int | None = None,
+    seed: int = 1,
+    rate: float | None = None,
+    path: str | Path | None = None,
+) -> Scene:
+    """The scene of this name, at time 0.
+
+    objects: how many move (None: the scene's own number); rate: Hz (None: the scene's own); path: recorded tracks,
+    for the scene that plays them. Raises InputError for an unknown name (it lists them) and for what a scene cannot be.
+    """
+    entry = _entry(name)
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise InputError(f"seed: expected a whole number from 0, got {seed!r}")
+    return entry.make(objects, seed, rate, None if path is None else Path(path))
