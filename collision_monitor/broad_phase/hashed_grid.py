@@ -1,0 +1,223 @@
+"""Hashed uniform grid with one resolution per size class, updated object by object.
+
+Each box lies in exactly one cell: the cell of its centre, at the level whose cells are at least as wide as the box.
+A query looks at the cells that a box of the level could reach from, so mixed sizes cost one look per occupied level.
+Cells are chains in a hash table: space between far objects costs nothing.
+Source: lecture slides "Efficient collision detection: spatial partitioning" (hash tables, multiresolution grids).
+"""
+
+from __future__ import annotations
+
+from math import floor, frexp
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from collision_monitor._jit import device, kernel
+
+LEVELS: Final = 128
+LEVEL_OFFSET: Final = 64
+"""Level of cells 1 m wide; levels run from 2^-64 m to 2^63 m, sizes beyond are put in the outermost."""
+
+FARTHEST_CELL: Final = 2.0**62
+"""Cell coordinates are clipped here, so that no position overflows an int64; clipped boxes share cells."""
+
+
+class HashedGrid(NamedTuple):
+    """Capacity N boxes, B buckets (a power of two). -1 ends a chain; level -1: the box is not in the grid."""
+
+    head: Any  # (B,) int32: first box of the bucket
+    next: Any  # (N,) int32
+    previous: Any  # (N,) int32: box before, or -2 - bucket for the first
+    level: Any  # (N,) int32
+    cell: Any  # (N, 3) int64
+    centre: Any  # (N, 3) float64
+    half: Any  # (N, 3) float64: half extents
+    level_head: Any  # (LEVELS,) int32: all boxes of a level are chained too
+    level_next: Any  # (N,) int32
+    level_previous: Any  # (N,) int32: box before, or -1
+    level_count: Any  # (LEVELS,) int32
+
+
+def make_hashed_grid(capacity: int) -> HashedGrid:
+    """An empty grid for box numbers 0 … capacity - 1."""
+    buckets = 1 << max(4, (2 * capacity - 1).bit_length())
+    return HashedGrid(
+        head=np.full(buckets, -1, np.int32),
+        next=np.full(capacity, -1, np.int32),
+        previous=np.full(capacity, -1, np.int32),
+        level=np.full(capacity, -1, np.int32),
+        cell=np.zeros((capacity, 3), np.int64),
+        centre=np.zeros((capacity, 3)),
+        half=np.zeros((capacity, 3)),
+        level_head=np.full(LEVELS, -1, np.int32),
+        level_next=np.full(capacity, -1, np.int32),
+        level_previous=np.full(capacity, -1, np.int32),
+        level_count=np.zeros(LEVELS, np.int32),
+    )
+
+
+@device
+def _level_of(width):  # type: ignore[no-untyped-def]
+    """The finest level whose cells are at least `width` wide."""
+    exponent = frexp(width)[1] if width > 0.0 else -LEVEL_OFFSET
+    return min(max(exponent + LEVEL_OFFSET, 0), LEVELS - 1)
+
+
+@device
+def _coordinate(x, cell):  # type: ignore[no-untyped-def]
+    return np.int64(min(max(floor(x / cell), -FARTHEST_CELL), FARTHEST_CELL))
+
+
+@device
+def _bucket(level, x, y, z, mask):  # type: ignore[no-untyped-def]
+    h = np.uint64(x) * np.uint64(0x9E3779B97F4A7C15)
+    h = (h ^ (h >> np.uint64(29)) ^ np.uint64(y)) * np.uint64(0xBF58476D1CE4E5B9)
+    h = (h ^ (h >> np.uint64(32)) ^ np.uint64(z)) * np.uint64(0x94D049BB133111EB)
+    h = (h ^ (h >> np.uint64(29)) ^ np.uint64(level)) * np.uint64(0x9E3779B97F4A7C15)
+    return np.int64((h >> np.uint64(32)) & np.uint64(mask))
+
+
+@device
+def remove_box(grid, i):  # type: ignore[no-untyped-def]
+    """Take box i out; nothing happens where it is not in."""
+    level = grid.level[i]
+    if level < 0:
+        return
+    before, after = grid.previous[i], grid.next[i]
+    if before < -1:
+        grid.head[-2 - before] = after
+    else:
+        grid.next[before] = after
+    if after >= 0:
+        grid.previous[after] = before
+    before, after = grid.level_previous[i], grid.level_next[i]
+    if before < 0:
+        grid.level_head[level] = after
+    else:
+        grid.level_next[before] = after
+    if after >= 0:
+        grid.level_previous[after] = before
+    grid.level_count[level] -= 1
+    grid.level[i] = -1
+
+
+@device
+def put_box(grid, i, cx, cy, cz, hx, hy, hz):  # type: ignore[no-untyped-def]
+    """Put box i (centre, half extents; m) in, or move it there."""
+    remove_box(grid, i)
+    level = _level_of(2.0 * max(hx, hy, hz))
+    size = 2.0 ** (level - LEVEL_OFFSET)
+    x, y, z = _coordinate(cx, size), _coordinate(cy, size), _coordinate(cz, size)
+    bucket = _bucket(level, x, y, z, grid.head.size - 1)
+    grid.level[i] = level
+    grid.cell[i, 0], grid.cell[i, 1], grid.cell[i, 2] = x, y, z
+    grid.centre[i, 0], grid.centre[i, 1], grid.centre[i, 2] = cx, cy, cz
+    grid.half[i, 0], grid.half[i, 1], grid.half[i, 2] = hx, hy, hz
+    first = grid.head[bucket]
+    grid.next[i] = first
+    grid.previous[i] = -2 - bucket
+    if first >= 0:
+        grid.previous[first] = i
+    grid.head[bucket] = i
+    first = grid.level_head[level]
+    grid.level_next[i] = first
+    grid.level_previous[i] = -1
+    if first >= 0:
+        grid.level_previous[first] = i
+    grid.level_head[level] = i
+    grid.level_count[level] += 1
+
+
+@device
+def _overlap(grid, i, j):  # type: ignore[no-untyped-def]
+    return (
+        abs(grid.centre[i, 0] - grid.centre[j, 0]) <= grid.half[i, 0] + grid.half[j, 0]
+        and abs(grid.centre[i, 1] - grid.centre[j, 1]) <= grid.half[i, 1] + grid.half[j, 1]
+        and abs(grid.centre[i, 2] - grid.centre[j, 2]) <= grid.half[i, 2] + grid.half[j, 2]
+    )
+
+
+@device
+def query_box(grid, i, found):  # type: ignore[no-untyped-def]
+    """The boxes that overlap box i, into found[0:n], in no particular order; returns n.
+
+    n can be larger than found.size: then the rest was counted but not written.
+    """
+    n = 0
+    for level in range(LEVELS):
+        count = grid.level_count[level]
+        if count == 0:
+            continue
+        size = 2.0 ** (level - LEVEL_OFFSET)
+        # a box of this level reaches at most half a cell from its centre; the outermost level holds any size
+        reach = 0.5 * size if level < LEVELS - 1 else np.inf
+        x0 = floor((grid.centre[i, 0] - grid.half[i, 0] - reach) / size)
+        x1 = floor((grid.centre[i, 0] + grid.half[i, 0] + reach) / size)
+        y0 = floor((grid.centre[i, 1] - grid.half[i, 1] - reach) / size)
+        y1 = floor((grid.centre[i, 1] + grid.half[i, 1] + reach) / size)
+        z0 = floor((grid.centre[i, 2] - grid.half[i, 2] - reach) / size)
+        z1 = floor((grid.centre[i, 2] + grid.half[i, 2] + reach) / size)
+        cells = (x1 - x0 + 1.0) * (y1 - y0 + 1.0) * (z1 - z0 + 1.0)
+        outermost = max(abs(x0), abs(x1), abs(y0), abs(y1), abs(z0), abs(z1))
+        if not (cells <= 2.0 * count and outermost < FARTHEST_CELL):
+            j = grid.level_head[level]
+            while j >= 0:
+                if j != i and _overlap(grid, i, j):
+                    if n < found.size:
+                        found[n] = j
+                    n += 1
+                j = grid.level_next[j]
+            continue
+        for x in range(np.int64(x0), np.int64(x1) + 1):
+            for y in range(np.int64(y0), np.int64(y1) + 1):
+                for z in range(np.int64(z0), np.int64(z1) + 1):
+                    j = grid.head[_bucket(level, x, y, z, grid.head.size - 1)]
+                    while j >= 0:
+                        if (
+                            j != i
+                            and grid.level[j] == level
+                            and grid.cell[j, 0] == x
+                            and grid.cell[j, 1] == y
+                            and grid.cell[j, 2] == z
+                            and _overlap(grid, i, j)
+                        ):
+                            if n < found.size:
+                                found[n] = j
+                            n += 1
+                        j = grid.next[j]
+    return n
+
+
+@kernel
+def put_boxes(grid, which, centre, half):  # type: ignore[no-untyped-def]
+    """Put boxes `which` (M,) at centre, half (N, 3), indexed by box number."""
+    for k in range(which.size):
+        i = which[k]
+        put_box(grid, i, centre[i, 0], centre[i, 1], centre[i, 2], half[i, 0], half[i, 1], half[i, 2])
+
+
+@kernel
+def remove_boxes(grid, which):  # type: ignore[no-untyped-def]
+    """Take boxes `which` (M,) out."""
+    for k in range(which.size):
+        remove_box(grid, which[k])
+
+
+@kernel
+def query_boxes(grid, which, pairs):  # type: ignore[no-untyped-def]
+    """All (i, j) with i in `which` (M,) and j overlapping it, into pairs (P, 2); returns how many there are.
+
+    More than P: call again with a larger array.
+    """
+    found = np.empty(grid.next.size, np.int32)
+    n = 0
+    for k in range(which.size):
+        i = which[k]
+        count = query_box(grid, i, found)
+        for m in range(count):
+            if n < pairs.shape[0]:
+                pairs[n, 0] = i
+                pairs[n, 1] = found[m]
+            n += 1
+    return n
