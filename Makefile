@@ -1,0 +1,34 @@
+# The front door. Everything lives in .venv and build/; nothing needs to be exported or sourced.
+
+BIN := .venv/bin
+
+# A sourced ROS 2 install finds our messages the way it finds any overlay. The wheels look into .venv by themselves.
+ifdef AMENT_PREFIX_PATH
+export AMENT_PREFIX_PATH := $(CURDIR)/.venv:$(AMENT_PREFIX_PATH)
+export LD_LIBRARY_PATH := $(CURDIR)/.venv/lib$(if $(LD_LIBRARY_PATH),:$(LD_LIBRARY_PATH))
+else
+unexport PYTHONPATH
+endif
+unexport PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
+.PHONY: help setup demo test lint clean
+.DEFAULT_GOAL := help
+
+help: ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r target text; do printf '  make %-12s %s\n' "$$target" "$$text"; done
+
+setup: ## set up what is missing: environment, ROS 2, messages, package, compiled kernels
+	@sh scripts/set_up/start.sh
+
+demo: setup ## watch the monitor at work, live
+	@$(BIN)/collision-monitor demo
+
+test: lint ## set up, lint and run every test
+	@$(BIN)/python -m pytest
+
+lint: setup ## ruff and mypy --strict
+	@$(BIN)/ruff check .
+	@$(BIN)/mypy
+
+clean: ## remove everything that was set up or built
+	rm -rf .venv build install log .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info

@@ -1,0 +1,75 @@
+"""`collision-monitor`: parse the command line, run the command, turn what can go wrong into one line and an exit code."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Final
+
+from collision_monitor._version import VERSION
+from collision_monitor.errors import CollisionMonitorError
+
+COMMANDS: Final = ("demo", "run", "world", "replay")
+"""In the order of `--help`. Each is a module of this package with `add_parser(subparsers)`."""
+
+EXIT_ERROR: Final = 1
+EXIT_INTERRUPTED: Final = 128 + 2  # what a shell reports for SIGINT
+EXIT_BROKEN_PIPE: Final = 128 + 13
+
+DESCRIPTION = "What touches now, what will touch next, when, and how sure that is: a ROS 2 collision monitor."
+
+EPILOG = """\
+examples:
+  collision-monitor demo                                  a scene and a monitor, live in this terminal
+  collision-monitor run --record run.mcap                 the monitor node, recording what it sees and says
+  collision-monitor world --list                          the scenes that can be played to it
+  collision-monitor world crossing                        play one of them
+  collision-monitor replay run.mcap                       the same answers again, without ROS; differences are shown
+
+exit codes: 0 done, 1 error, 2 wrong usage, 3 a replay gave other answers than the recording, 130 interrupted
+`collision-monitor COMMAND --help` says more about each command.
+"""
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """Return the parser with every command registered."""
+    parser = argparse.ArgumentParser(
+        prog="collision-monitor",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"%(prog)s {VERSION}")
+    subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for name in COMMANDS:
+        if find_spec(f"collision_monitor.cli.{name}"):
+            import_module(f"collision_monitor.cli.{name}").add_parser(subparsers)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line (default: the process's own) and return the exit code."""
+    args = make_parser().parse_args(arguments)
+    command: Callable[[argparse.Namespace], int] = args.command
+    try:
+        code = command(args)
+        sys.stdout.flush()
+        return code
+    except CollisionMonitorError as error:
+        print(f"collision-monitor: error: {error}", file=sys.stderr)
+        return EXIT_ERROR
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        # The reader (head, less) went away. Point stdout elsewhere, or Python complains again when it exits.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_BROKEN_PIPE
+
+
+def replay_main() -> int:
+    """`ros2 run collision_monitor replay …`: the command of that name."""
+    return main(["replay", *sys.argv[1:]])

@@ -1,0 +1,222 @@
+"""The stages of the set-up, in order. Each says what it depends on, does its work, and can be asked whether it holds."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+import machine
+
+ROOT = Path(__file__).resolve().parents[2]
+VENV = ROOT / ".venv"
+BUILD = ROOT / "build"
+PYTHON = VENV / "bin" / "python"
+MESSAGES = "collision_monitor_msgs"
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step: its name, what it says while it runs, the digest of what it is made from, and its work."""
+
+    name: str
+    text: str
+    inputs: Callable[[machine.RosInstall | None], str]
+    run: Callable[[machine.RosInstall | None, IO[str]], None]
+
+
+def _digest(*parts: str, files: Iterable[Path] = ()) -> str:
+    digest = hashlib.blake2b("\0".join(parts).encode(), digest_size=16)
+    for path in files:
+        digest.update(f"\0{path.relative_to(ROOT)}\0".encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def environment_variables(ros: machine.RosInstall | None) -> dict[str, str]:
+    """Variables for every command: what the caller exported for other Pythons or other workspaces is left out."""
+    strays = ("PYTHONHOME", "VIRTUAL_ENV", "_ROS_WHEELS_BOOTSTRAP_COMPLETE", "PIP_USER", "PIP_TARGET", "PIP_PREFIX")
+    env = {key: value for key, value in os.environ.items() if key not in strays and not key.startswith("COLCON_")}
+    prefixes = [str(VENV)]
+    libraries = [str(VENV / "lib"), *filter(None, env.get("LD_LIBRARY_PATH", "").split(":"))]
+    if ros:
+        prefixes += [str(prefix) for prefix in ros.prefixes]
+    else:
+        env.pop("PYTHONPATH", None)
+    return env | {
+        "PATH": f"{VENV / 'bin'}:{env.get('PATH', os.defpath)}",
+        "AMENT_PREFIX_PATH": ":".join(prefixes),
+        "CMAKE_PREFIX_PATH": ":".join(prefixes),
+        "LD_LIBRARY_PATH": ":".join(libraries),
+        "COLCON_HOME": str(BUILD / "colcon_home"),  # not the user's defaults
+        "COLCON_LOG_LEVEL": "30",
+    }
+
+
+def _call(log: IO[str], ros: machine.RosInstall | None, *command: str | Path) -> None:
+    log.write(f"$ {' '.join(map(str, command))}\n")
+    log.flush()
+    env = environment_variables(ros)
+    subprocess.run(command, cwd=ROOT, env=env, stdin=subprocess.DEVNULL, stdout=log, stderr=log, check=True)
+
+
+# environment ---------------------------------------------------------------------------------------------------------
+
+
+def _environment_inputs(ros: machine.RosInstall | None) -> str:
+    # Scripts in an environment hold its path: a clone that was moved needs a new one.
+    return _digest(str(VENV), *(map(str, (*ros.prefixes, ros.python)) if ros else ("wheels",)))
+
+
+def _make_environment(ros: machine.RosInstall | None, log: IO[str]) -> None:
+    python = machine.choose_python(ros)
+    shutil.rmtree(VENV, ignore_errors=True)
+    _call(log, ros, python.path, "-m", "venv", *(["--system-site-packages"] if ros else []), VENV)
+
+
+# packages ------------------------------------------------------------------------------------------------------------
+
+
+def requirements(ros: machine.RosInstall | None) -> list[str]:
+    """Everything that pip installs: the project's own lists, and ROS 2 where it is not there already."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    wanted: list[str] = list(project["build-system"]["requires"])
+    wanted += project["project"]["dependencies"]
+    wanted += [name for group in project["project"]["optional-dependencies"].values() for name in group]
+    if not ros:
+        lines = Path(__file__).with_name("ros_wheels.txt").read_text().splitlines()
+        wanted += [line for line in lines if line and not line.startswith("#")]
+    return wanted
+
+
+def _packages_inputs(ros: machine.RosInstall | None) -> str:
+    return _digest(*requirements(ros))
+
+
+def _install_packages(ros: machine.RosInstall | None, log: IO[str]) -> None:
+    _call(log, ros, PYTHON, "-m", "pip", "install", "--no-user", "--disable-pip-version-check", *requirements(ros))
+    if not ros:
+        correct_exported_paths(log)
+
+
+def correct_exported_paths(log: IO[str]) -> None:
+    """Let CMake find Python: files exported by the wheels name the paths of the machine they were built on."""
+    command = "import sysconfig as s; print(s.get_path('include'), s.get_path('purelib'), sep='\\n')"
+    answer = subprocess.run([PYTHON, "-I", "-S", "-c", command], capture_output=True, text=True, check=True)
+    include, packages = answer.stdout.splitlines()
+    for path in sorted((VENV / "share").rglob("*.cmake")):
+        before = path.read_text(encoding="utf-8", errors="surrogateescape")
+        after = re.sub(r"/opt/python/[^/;\"]+/include/python3\.\d+", lambda _: include, before)
+        after = re.sub(r"/opt/python/[^/;\"]+/lib/python3\.\d+/site-packages", lambda _: packages, after)
+        if after != before:
+            path.write_text(after, encoding="utf-8", errors="surrogateescape")
+            log.write(f"corrected {path.relative_to(VENV)}\n")
+
+
+# messages ------------------------------------------------------------------------------------------------------------
+
+
+def _messages_inputs(ros: machine.RosInstall | None) -> str:
+    sources = ROOT / MESSAGES
+    return _digest(files=[sources / "CMakeLists.txt", sources / "package.xml", *sorted((sources / "msg").glob("*.msg"))])
+
+
+def _build_messages(ros: machine.RosInstall | None, log: IO[str]) -> None:
+    machine.require_compiler(ros)
+    build = BUILD / "messages"
+    shutil.rmtree(build, ignore_errors=True)
+    for pattern in ("lib/python3*/site-packages/{}*", "lib/lib{}*", "include/{}", "share/{}"):
+        for old in VENV.glob(pattern.format(MESSAGES)):
+            shutil.rmtree(old) if old.is_dir() else old.unlink()
+    colcon = "import sys; from colcon_core.command import main; sys.exit(main())"
+    _call(
+        log, ros,
+        PYTHON, "-c", colcon, "--log-base", build / "log",
+        "build", "--base-paths", MESSAGES, "--build-base", build, "--install-base", VENV, "--merge-install",
+        "--event-handlers", "console_direct+",
+        "--cmake-args", *([] if ros else ["-G", "Ninja"]), "-DBUILD_TESTING=OFF", "-DCMAKE_BUILD_TYPE=Release",
+        f"-DPython3_EXECUTABLE={PYTHON}", f"-DPYTHON_EXECUTABLE={PYTHON}", "-Wno-deprecated",
+    )  # fmt: skip
+
+
+# package -------------------------------------------------------------------------------------------------------------
+
+
+def _package_inputs(ros: machine.RosInstall | None) -> str:
+    return _digest(files=[ROOT / "pyproject.toml", ROOT / "setup.py", ROOT / "setup.cfg"])
+
+
+def _install_package(ros: machine.RosInstall | None, log: IO[str]) -> None:
+    pip = (PYTHON, "-m", "pip", "install", "--no-user", "--disable-pip-version-check")
+    _call(log, ros, *pip, "--no-deps", "--no-build-isolation", "--editable", ROOT)
+
+
+# warm-up -------------------------------------------------------------------------------------------------------------
+
+
+def _warm_up_inputs(ros: machine.RosInstall | None) -> str:
+    package = ROOT / "collision_monitor"
+    kernels = [package / f"{name}.py" for name in ("warm_up", "_jit", "records", "tolerances")]
+    for folder in ("geometry", "broad_phase", "narrow_phase", "prediction"):
+        kernels += sorted((package / folder).rglob("*.py"))
+    return _digest(files=[path for path in kernels if path.exists()])
+
+
+def _warm_up(ros: machine.RosInstall | None, log: IO[str]) -> None:
+    if (ROOT / "collision_monitor" / "warm_up.py").exists():
+        _call(log, ros, PYTHON, "-m", "collision_monitor.warm_up")
+
+
+STAGES = (
+    Stage("environment", "making .venv", _environment_inputs, _make_environment),
+    Stage("packages", "installing ROS 2, NumPy, numba and the tools", _packages_inputs, _install_packages),
+    Stage("messages", "building collision_monitor_msgs", _messages_inputs, _build_messages),
+    Stage("package", "installing collision-monitor", _package_inputs, _install_package),
+    Stage("warm-up", "compiling the kernels", _warm_up_inputs, _warm_up),
+)
+
+_HEALTH = """
+import importlib.util, sys
+stage = "packages"
+try:
+    import numpy, llvmlite.binding
+    from rclpy.impl.implementation_singleton import rclpy_implementation
+    from rclpy.serialization import serialize_message
+    for name in {modules}:
+        if importlib.util.find_spec(name) is None:
+            raise ImportError(name)
+    stage = "messages"
+    from collision_monitor_msgs.msg import ObjectStateArray
+    serialize_message(ObjectStateArray())
+    stage = "package"
+    found = importlib.util.find_spec("collision_monitor")
+    if found is None or not found.origin.startswith({root!r}):
+        raise ImportError("collision_monitor")
+except Exception as error:
+    sys.exit(f"{{stage}}: {{error!r}}")
+"""
+
+MODULES = ("scipy", "numba", "trimesh", "fcl", "mcap", "rich", "matplotlib", "yaml", "pytest", "hypothesis", "mypy", "rosbags")
+
+
+def first_broken_stage(ros: machine.RosInstall | None) -> tuple[str, str] | None:
+    """Import what the stages installed; return the first stage that does not hold and why, or None."""
+    if not os.access(PYTHON, os.X_OK):
+        return "environment", f"{PYTHON} is not there"
+    code = _HEALTH.format(modules=MODULES, root=f"{ROOT}{os.sep}")
+    env = environment_variables(ros)
+    answer = subprocess.run([PYTHON, "-P", "-c", code], env=env, capture_output=True, text=True, check=False)
+    if answer.returncode:
+        lines = answer.stderr.strip().splitlines() or [f"Python ended with {answer.returncode}"]
+        stage = lines[-1].partition(":")[0]
+        return (stage if stage in {"packages", "messages", "package"} else "environment"), lines[-1]
+    if not os.access(VENV / "bin" / "collision-monitor", os.X_OK):
+        return "package", "bin/collision-monitor is not there"
+    return None

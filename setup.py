@@ -1,0 +1,24 @@
+"""What only colcon needs: the files of a ROS 2 package and its executables. All else is in pyproject.toml."""
+
+from glob import glob
+
+from setuptools import setup
+
+PACKAGE = "collision_monitor"
+
+setup(
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+        (f"share/{PACKAGE}", ["package.xml"]),
+        (f"share/{PACKAGE}/config", sorted(glob("config/*.*"))),
+        (f"share/{PACKAGE}/launch", sorted(glob("launch/*.py"))),
+    ],
+    entry_points={
+        "console_scripts": [
+            "collision-monitor = collision_monitor.cli.main:main",
+            "monitor = collision_monitor.ros.node:main",
+            "world = collision_monitor.ros.world_node:main",
+            "replay = collision_monitor.cli.main:replay_main",
+        ],
+    },
+)
