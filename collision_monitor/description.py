@@ -37,7 +37,8 @@ def _shape_pairs(value: Any, what: str) -> tuple[tuple[Shape, Pose], ...]:
         return ((value, Pose()),)
     pairs = tuple(tuple(item) if isinstance(item, Iterable) else item for item in value)
     for pair in pairs:
-        if not (isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[0], Shape) and isinstance(pair[1], Pose)):
+        is_pair = isinstance(pair, tuple) and len(pair) == 2
+        if not (is_pair and isinstance(pair[0], Shape) and isinstance(pair[1], Pose)):
             raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), got {pair!r} in the list")
     if not pairs:
         raise ShapeError(f"{what}: expected at least one shape, got none")

@@ -1,4 +1,4 @@
-"""Simulated worlds for demos, tests and benchmarks. They use the core as any user would; the core knows none of them."""
+"""Simulated worlds for demos, tests and benchmarks; the core knows none of them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from collision_monitor.errors import InputError
+from collision_monitor.world.clutter import Clutter
+from collision_monitor.world.crossing import Crossing
 from collision_monitor.world.fleet import Fleet
 from collision_monitor.world.scene import Scene
+from collision_monitor.world.trajectory import Trajectory
 
 __all__ = ["Scene", "describe", "make_scene", "scene_names"]
 
@@ -19,10 +22,32 @@ class _Entry:
     description: str
 
 
+def _particles(objects: int | None, seed: int, rate: float | None, _path: Path | None) -> Scene:
+    from collision_monitor.world.particles import Particles  # here, for it compiles: names and help need not wait
+
+    return Particles(objects, seed, rate)
+
+
 _SCENES = {
     "fleet": _Entry(
         lambda objects, seed, rate, path: Fleet(objects, seed, rate),
         "robots and people in a hall with racks, pillars and walls; they do run into each other",
+    ),
+    "particles": _Entry(
+        _particles,
+        "spheres in a closed box that bounce off the walls and off each other",
+    ),
+    "clutter": _Entry(
+        lambda objects, seed, rate, path: Clutter(objects, seed, rate),
+        "boxes, spheres, capsules and cylinders that drift and turn through each other",
+    ),
+    "crossing": _Entry(
+        lambda objects, seed, rate, path: Crossing(objects, rate),
+        "nine pairs whose times of contact are known beforehand, every 8 s anew",
+    ),
+    "trajectory": _Entry(
+        lambda objects, seed, rate, path: Trajectory(objects, rate, path),
+        "plays recorded tracks of people and carts from CSV files (needs a path)",
     ),
 }
 

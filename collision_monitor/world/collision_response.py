@@ -1,0 +1,108 @@
+"""What bodies do when they meet, for worlds that are simulated; what is monitored is never touched.
+
+Vectors are (..., 3) or (..., 2), in m and m/s; normals need not be of unit length; everything broadcasts.
+Source of all but `bounce_between_walls`: the collision response part of the lecture "Collision handling: detection
+and response"; the slide's topic is named at each function.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def _normal_part(vector: Array, normal: Array) -> Array:
+    """u = (v.n / n.n) n, the component of a vector along the normal."""
+    along = np.sum(vector * normal, axis=-1, keepdims=True) / np.sum(normal * normal, axis=-1, keepdims=True)
+    part: Array = along * normal
+    return part
+
+
+def reflect(velocity: ArrayLike, normal: ArrayLike, restitution: ArrayLike = 1.0) -> Array:
+    """The velocity after hitting a wall or plane that stands still, its normal towards the body.
+
+    Slides "Elastic collision with stationary object: horizontal and vertical walls/planes" and ": angled
+    walls/planes": v = u + w, and v' = w - u; "Collision response: damped": restitution times u. A body that already
+    leaves the wall (v.n >= 0) keeps its velocity.
+    """
+    v, n = np.asarray(velocity, dtype=np.float64), np.asarray(normal, dtype=np.float64)
+    u = _normal_part(v, n)
+    approaching = np.sum(v * n, axis=-1, keepdims=True) < 0.0
+    return np.where(approaching, v - u - np.asarray(restitution)[..., None] * u, v)
+
+
+def collide(
+    velocity_a: ArrayLike,
+    velocity_b: ArrayLike,
+    normal: ArrayLike,
+    mass_a: ArrayLike,
+    mass_b: ArrayLike,
+    restitution: ArrayLike = 1.0,
+) -> tuple[Array, Array]:
+    """The velocities after two free bodies met; the normal runs from A to B (spheres: along the line of centres).
+
+    Slides "Elastic collision with movable object" (only the momentum along the normal changes) and "Inelastic
+    Collisions": the coefficient of restitution is the ratio of separating to approaching speed, 1 elastic, 0 staying
+    in contact. Bodies that already part keep their velocities. Masses in kg.
+    """
+    va, vb = np.asarray(velocity_a, dtype=np.float64), np.asarray(velocity_b, dtype=np.float64)
+    n = np.asarray(normal, dtype=np.float64)
+    ma = np.asarray(mass_a, dtype=np.float64)[..., None]
+    mb = np.asarray(mass_b, dtype=np.float64)[..., None]
+    closing = va - vb
+    approaching = np.sum(closing * n, axis=-1, keepdims=True) > 0.0
+    exchanged = (1.0 + np.asarray(restitution, dtype=np.float64)[..., None]) * _normal_part(closing, n) / (ma + mb)
+    exchanged = np.where(approaching, exchanged, 0.0)  # of the impulse, per product of the masses
+    return va - mb * exchanged, vb + ma * exchanged
+
+
+def stick(velocity_a: ArrayLike, velocity_b: ArrayLike, mass_a: ArrayLike, mass_b: ArrayLike) -> Array:
+    """The common velocity of two bodies that stay together: slide "Inelastic Collisions", momentum is conserved."""
+    va, vb = np.asarray(velocity_a, dtype=np.float64), np.asarray(velocity_b, dtype=np.float64)
+    ma = np.asarray(mass_a, dtype=np.float64)[..., None]
+    mb = np.asarray(mass_b, dtype=np.float64)[..., None]
+    common: Array = (ma * va + mb * vb) / (ma + mb)
+    return common
+
+
+def penalty_force(
+    depth: ArrayLike, closing_speed: ArrayLike, normal: ArrayLike, stiffness: float, damping: float = 0.0
+) -> Array:
+    """Force (N) of a spring (N/m) and damper (N s/m) that push a body out along the normal.
+
+    depth: m, positive where it penetrates; closing_speed: m/s, positive going deeper. Slides "Penalty method normal
+    spring force", "Collision response: penalty" and ": damped". It only ever pushes: a damper alone would glue the
+    body to the surface on its way out.
+    """
+    depth, n = np.asarray(depth, dtype=np.float64), np.asarray(normal, dtype=np.float64)
+    push = np.maximum(stiffness * depth + damping * np.asarray(closing_speed, dtype=np.float64), 0.0)
+    size = np.where(depth > 0.0, push, 0.0)[..., None]
+    force: Array = size * n / np.linalg.norm(n, axis=-1, keepdims=True)
+    return force
+
+
+def bounce_between_walls(
+    position: Array, velocity: Array, low: Array, high: Array, dt: float, restitution: float = 1.0
+) -> tuple[Array, Array]:
+    """Position and velocity after `dt` seconds between axis-aligned walls, each bounce at its exact time.
+
+    low, high: where the body's centre turns round. Until the wall the speed is v and after it restitution * v, so
+    the way past the wall is folded back and scaled. With restitution 1 many bounces in one step are one triangle
+    wave; below 1 one bounce per axis and step is done, and the centre is kept inside. Source: own derivation.
+    """
+    moved = position + velocity * dt
+    if restitution == 1.0:
+        room = high - low
+        phase = np.mod(moved - low, 2.0 * room)
+        returning = phase > room
+        inside = (moved >= low) & (moved <= high)  # untouched, not even by round-off
+        folded = np.where(returning, high - (phase - room), low + phase)
+        return (
+            np.where(inside, moved, np.clip(folded, low, high)),
+            np.where(returning & ~inside, -velocity, velocity),
+        )
+    beyond = np.where(moved < low, moved - low, np.where(moved > high, moved - high, 0.0))
+    folded = np.clip(moved - (1.0 + restitution) * beyond, low, high)
+    return folded, np.where(beyond != 0.0, -restitution * velocity, velocity)

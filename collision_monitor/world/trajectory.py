@@ -1,0 +1,135 @@
+"""Plays recorded tracks of people and carts from CSV files, in the format of the CITR data set (arXiv 1902.00487).
+
+`<clip>_ped.csv`: id, frame, label, x_est, y_est, vx_est, vy_est; `<clip>_veh.csv`: id, frame, label, x_est, y_est,
+psi_est (heading, rad), vel_est (speed along it); metres, seconds, 29.97 frames/s. The files give no sizes: a person
+is a cylinder of radius 0.25 m and height 1.75 m, a cart a box of 2.4 x 1.2 x 1.8 m, both standing on z = 0.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from collision_monitor.description import ObjectDescription
+from collision_monitor.errors import InputError
+from collision_monitor.geometry.pose import from_rotation_vector, multiply
+from collision_monitor.geometry.shapes import Box, Cylinder, Shape
+from collision_monitor.records import StateFlag
+from collision_monitor.world.scene import Scene, States, positive_rate, state_array
+from collision_monitor.world.tracks import Tracks, read_tracks
+
+FRAME_RATE = 29.97
+"""Hz, of the recordings."""
+PAUSE = 30
+"""Frames between two clips that are played one after another."""
+PERSON_HEIGHT, CART_HEIGHT = 1.75, 1.8
+PERSON = Cylinder(0.25, PERSON_HEIGHT)
+CART = Box((2.4, 1.2, CART_HEIGHT))
+
+_PEOPLE, _CARTS = "_ped.csv", "_veh.csv"
+_PEOPLE_COLUMNS = ("x_est", "y_est", "vx_est", "vy_est")
+_CART_COLUMNS = ("x_est", "y_est", "psi_est", "vel_est")
+
+
+class Trajectory(Scene):
+    """Everybody is described from the start and has states only while tracked. Several clips follow each other.
+
+    Ids: the people keep theirs, the carts' are raised above them, and those of each further clip above all before.
+    """
+
+    def __init__(self, objects: int | None, rate: float | None, path: Path | None) -> None:
+        if objects is not None:
+            raise InputError(f"objects: the scene 'trajectory' plays who was recorded, leave it out (got {objects!r})")
+        self.name = "trajectory"
+        self.rate = positive_rate(rate, FRAME_RATE)
+        self.descriptions = []
+        clips = _find_clips(path)
+        first_frame, rows, frames = 0, [], []
+        for clip in clips:
+            prefix = f"{clip[0].name.removesuffix(_PEOPLE).removesuffix(_CARTS)}/" if len(clips) > 1 else ""
+            tracks = [read_tracks(file, _PEOPLE_COLUMNS if _is_people(file) else _CART_COLUMNS) for file in clip]
+            start = min(int(t.frame.min()) for t in tracks)
+            for track in tracks:
+                rows.append(self._add(track, prefix))
+                frames.append(track.frame - start + first_frame)
+            first_frame = int(max(f.max() for f in frames)) + PAUSE
+        frame, row = np.concatenate(frames), np.concatenate(rows)
+        order = np.lexsort((row["id"], frame))
+        self._frame, self._row = frame[order], row[order]
+        self.duration = float(self._frame[-1]) / FRAME_RATE
+
+    def _add(self, tracks: Tracks, prefix: str) -> States:
+        """Describe the objects of one file and return their states, one for each of its rows."""
+        offset = max((d.object_id for d in self.descriptions), default=0)
+        people = _is_people(tracks.path)
+        kind: str
+        shape: Shape
+        kind, shape = ("person", PERSON) if people else ("cart", CART)
+        for track in np.unique(tracks.id):
+            self.descriptions.append(ObjectDescription(offset + int(track), shape, f"{prefix}{kind}_{track}"))
+        states = state_array((tracks.id + offset).astype(np.uint32))
+        states["position"][:, :2] = tracks.values[:, :2]
+        if people:
+            states["position"][:, 2] = PERSON_HEIGHT / 2
+            states["linear"][:, :2] = tracks.values[:, 2:]
+        else:
+            _write_carts(states, tracks)
+        for track in np.unique(tracks.id):
+            own = np.flatnonzero(tracks.id == track)
+            states["flags"][own[1:]] = np.where(np.diff(tracks.frame[own]) > 1, StateFlag.DISCONTINUITY, 0)
+        return states
+
+    def _advance(self, dt: float) -> None:
+        """Nothing to move: `states` looks `time` up."""
+
+    def states(self) -> States:
+        """The states of the last frame, moved on at their twist by the part of a frame that has passed since."""
+        now = self.time * FRAME_RATE
+        frame = round(now) if abs(now - round(now)) < 1e-6 else int(now)  # 1e-6: round-off of a sum of many steps
+        first, last = np.searchsorted(self._frame, [frame, frame + 1])
+        states = self._row[first:last].copy()
+        since = max(now - frame, 0.0) / FRAME_RATE
+        if since > 0.0:
+            states["position"] += states["linear"] * since
+            turned = from_rotation_vector(states["angular"] * since)
+            states["quaternion"] = multiply(turned, states["quaternion"])
+        return states
+
+
+def _write_carts(states: States, tracks: Tracks) -> None:
+    """Heading from psi, velocity along it; the yaw rate is not recorded: central differences of psi over the frames."""
+    psi, speed = tracks.values[:, 2], tracks.values[:, 3]
+    states["position"][:, 2] = CART_HEIGHT / 2
+    states["quaternion"] = from_rotation_vector(psi[:, None] * np.array([0.0, 0.0, 1.0]))
+    states["linear"][:, 0] = speed * np.cos(psi)
+    states["linear"][:, 1] = speed * np.sin(psi)
+    for track in np.unique(tracks.id):
+        own = np.flatnonzero(tracks.id == track)
+        if len(own) > 1:
+            states["angular"][own, 2] = np.gradient(np.unwrap(psi[own]), tracks.frame[own] / FRAME_RATE)
+
+
+def _is_people(file: Path) -> bool:
+    return file.name.endswith(_PEOPLE)
+
+
+def _find_clips(path: Path | None) -> list[list[Path]]:
+    """The files of each clip, people first. Raises InputError that says what to give."""
+    give = f"a clip's prefix (clip for clip{_PEOPLE} and clip{_CARTS}), one of these files, or a folder of them"
+    if path is None:
+        raise InputError(f"path: the scene 'trajectory' plays recorded tracks; give {give}")
+    if path.is_file():
+        if not path.name.endswith((_PEOPLE, _CARTS)):
+            raise InputError(f"path: expected a file named *{_PEOPLE} or *{_CARTS}, got {path}")
+        return [[path]]
+    if path.is_dir():
+        files = [file for ending in (_PEOPLE, _CARTS) for file in sorted(path.glob(f"*{ending}"))]
+        prefixes = sorted({file.name.removesuffix(_PEOPLE).removesuffix(_CARTS) for file in files})
+        clips = [[f for f in files if f.name in (prefix + _PEOPLE, prefix + _CARTS)] for prefix in prefixes]
+    else:
+        files = [path.with_name(path.name + ending) for ending in (_PEOPLE, _CARTS)]
+        clips = [[file for file in files if file.is_file()]]
+    if not any(clips):
+        raise InputError(f"path: found no tracks at {path}; expected {give}")
+    return clips
