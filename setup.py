@@ -16,8 +16,8 @@ setup(
     entry_points={
         "console_scripts": [
             "collision-monitor = collision_monitor.cli.main:main",
-            "monitor = collision_monitor.ros.node:main",
-            "world = collision_monitor.ros.world_node:main",
+            "monitor = collision_monitor.ros.main:monitor",
+            "world = collision_monitor.ros.main:world",
             "replay = collision_monitor.cli.main:replay_main",
         ],
     },
