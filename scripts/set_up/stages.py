@@ -197,8 +197,8 @@ try:
     serialize_message(ObjectStateArray())
     stage = "package"
     found = importlib.util.find_spec("collision_monitor")
-    if found is None or not found.origin.startswith({root!r}):
-        raise ImportError("collision_monitor")
+    if found is None or list(found.submodule_search_locations) != [{package!r}]:
+        raise ImportError("collision_monitor is not that of this folder")
 except Exception as error:
     sys.exit(f"{{stage}}: {{error!r}}")
 """
@@ -210,7 +210,7 @@ def first_broken_stage(ros: machine.RosInstall | None) -> tuple[str, str] | None
     """Import what the stages installed; return the first stage that does not hold and why, or None."""
     if not os.access(PYTHON, os.X_OK):
         return "environment", f"{PYTHON} is not there"
-    code = _HEALTH.format(modules=MODULES, root=f"{ROOT}{os.sep}")
+    code = _HEALTH.format(modules=MODULES, package=str(ROOT / "collision_monitor"))
     env = environment_variables(ros)
     answer = subprocess.run([PYTHON, "-P", "-c", code], env=env, capture_output=True, text=True, check=False)
     if answer.returncode:
