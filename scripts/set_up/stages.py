@@ -155,7 +155,9 @@ def _package_inputs(ros: machine.RosInstall | None) -> str:
 
 def _install_package(ros: machine.RosInstall | None, log: IO[str]) -> None:
     pip = (PYTHON, "-m", "pip", "install", "--no-user", "--disable-pip-version-check")
-    _call(log, ros, *pip, "--no-deps", "--no-build-isolation", "--editable", ROOT)
+    # compat: a plain path instead of an import hook, which type checkers and editors understand too.
+    settings = ("--config-settings", "editable_mode=compat")
+    _call(log, ros, *pip, "--no-deps", "--no-build-isolation", *settings, "--editable", ROOT)
 
 
 # warm-up -------------------------------------------------------------------------------------------------------------
@@ -197,7 +199,7 @@ try:
     serialize_message(ObjectStateArray())
     stage = "package"
     found = importlib.util.find_spec("collision_monitor")
-    if found is None or list(found.submodule_search_locations) != [{package!r}]:
+    if found is None or {package!r} not in found.submodule_search_locations:
         raise ImportError("collision_monitor is not that of this folder")
 except Exception as error:
     sys.exit(f"{{stage}}: {{error!r}}")
