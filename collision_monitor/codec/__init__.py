@@ -1,0 +1,40 @@
+"""The messages of `collision_monitor_msgs` as CDR bytes and as arrays, without ROS.
+
+The elements of the hot messages lie in the bytes exactly as `records` describes them, so they are seen, not converted.
+"""
+
+from collision_monitor.codec.answers import (
+    Contacts,
+    Predictions,
+    decode_contacts,
+    decode_predictions,
+    encode_contacts,
+    encode_predictions,
+)
+from collision_monitor.codec.descriptions import (
+    Description,
+    Descriptions,
+    decode_descriptions,
+    encode_descriptions,
+)
+from collision_monitor.codec.states import States, decode_states, encode_states
+from collision_monitor.codec.status import Status, decode_status, encode_status
+
+__all__ = [
+    "Contacts",
+    "Description",
+    "Descriptions",
+    "Predictions",
+    "States",
+    "Status",
+    "decode_contacts",
+    "decode_descriptions",
+    "decode_predictions",
+    "decode_states",
+    "decode_status",
+    "encode_contacts",
+    "encode_descriptions",
+    "encode_predictions",
+    "encode_states",
+    "encode_status",
+]

@@ -1,0 +1,89 @@
+"""ContactArray and PredictedCollisionArray: the answers of one step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from collision_monitor import records
+from collision_monitor.codec.cdr import Buffer, Ids, Reader, Records, Writer, write_header
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """ContactArray: contacts (n,) of records.CONTACT, a read-only view."""
+
+    stamp_ns: int
+    frame_id: str
+    step: int
+    contacts: Records
+    ids: Ids
+    names: list[str]
+
+
+@dataclass(frozen=True, eq=False)
+class Predictions:
+    """PredictedCollisionArray: predictions (n,) of records.PREDICTION, a read-only view."""
+
+    stamp_ns: int
+    frame_id: str
+    step: int
+    horizon: float
+    predictions: Records
+    ids: Ids
+    names: list[str]
+
+
+def decode_contacts(data: Buffer) -> Contacts:
+    """Raises MessageError."""
+    reader = Reader(data, "ContactArray")
+    result = Contacts(
+        stamp_ns=reader.stamp_ns(),
+        frame_id=reader.string("header.frame_id"),
+        step=reader.scalar("u8", "step"),
+        contacts=reader.sequence(records.CONTACT, 8, "contacts"),
+        ids=reader.sequence("<u4", 4, "ids"),
+        names=reader.strings("names"),
+    )
+    reader.finish()
+    return result
+
+
+def encode_contacts(stamp_ns: int, frame_id: str, step: int, contacts: Records, ids: Ids, names: list[str]) -> bytes:
+    """Raises MessageError."""
+    writer = Writer("ContactArray")
+    write_header(writer, stamp_ns, frame_id)
+    writer.scalar("u8", step, "step")
+    writer.sequence(contacts, records.CONTACT, 8)
+    writer.sequence(ids, "<u4", 4)
+    writer.strings(names, "names")
+    return writer.finish()
+
+
+def decode_predictions(data: Buffer) -> Predictions:
+    """Raises MessageError."""
+    reader = Reader(data, "PredictedCollisionArray")
+    result = Predictions(
+        stamp_ns=reader.stamp_ns(),
+        frame_id=reader.string("header.frame_id"),
+        step=reader.scalar("u8", "step"),
+        horizon=reader.scalar("f8", "horizon"),
+        predictions=reader.sequence(records.PREDICTION, 8, "predictions"),
+        ids=reader.sequence("<u4", 4, "ids"),
+        names=reader.strings("names"),
+    )
+    reader.finish()
+    return result
+
+
+def encode_predictions(
+    stamp_ns: int, frame_id: str, step: int, horizon: float, predictions: Records, ids: Ids, names: list[str]
+) -> bytes:
+    """Raises MessageError."""
+    writer = Writer("PredictedCollisionArray")
+    write_header(writer, stamp_ns, frame_id)
+    writer.scalar("u8", step, "step")
+    writer.scalar("f8", horizon, "horizon")
+    writer.sequence(predictions, records.PREDICTION, 8)
+    writer.sequence(ids, "<u4", 4)
+    writer.strings(names, "names")
+    return writer.finish()

@@ -1,0 +1,186 @@
+"""ObjectDescriptionArray: what the objects are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from collision_monitor.codec.cdr import Buffer, Floats, Ids, Reader, Writer, write_header
+from collision_monitor.codec.shapes import LEAST_SHAPE, make_shape, read_shape, write_shape
+from collision_monitor.errors import CollisionMonitorError, ShapeError
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Shape
+from collision_monitor.records import Model
+
+ALL_GROUPS = 0xFFFFFFFF
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """ObjectDescription: what an object is. `pose` is read for static objects only, and None otherwise."""
+
+    object_id: int
+    shapes: tuple[tuple[Shape, Pose], ...] = ()
+    name: str = ""
+    remove: bool = False
+    static: bool = False
+    pose: Pose | None = None
+    group: int = 1
+    mask: int = ALL_GROUPS
+    allowed: tuple[int, ...] = ()
+    padding: float = 0.0
+    model: Model = Model.AUTO
+    max_linear_acceleration: float = 0.0
+    max_angular_acceleration: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Descriptions:
+    """ObjectDescriptionArray: the objects that can exist, and the ids of those that cannot with the reason."""
+
+    stamp_ns: int
+    frame_id: str
+    snapshot: bool
+    objects: tuple[Description, ...]
+    refused: tuple[tuple[int, str], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Raw:
+    """An ObjectDescription as it stands in the message, before anything is made of it."""
+
+    object_id: int
+    operation: int
+    name: str
+    shapes: list[tuple[int, Floats, Floats, Ids]]
+    shape_poses: Floats
+    static: bool
+    pose: Floats
+    group: int
+    mask: int
+    allowed: Ids
+    padding: float
+    model: int
+    max_linear_acceleration: float
+    max_angular_acceleration: float
+
+
+_POSE = ("<f8", 7)
+_LEAST_DESCRIPTION = 111
+"""Bytes of the smallest ObjectDescription that can be written."""
+
+
+def decode_descriptions(data: Buffer) -> Descriptions:
+    """Raises MessageError for bytes that are no such message; an impossible object is only listed as refused."""
+    reader = Reader(data, "ObjectDescriptionArray")
+    stamp_ns, frame_id = reader.stamp_ns(), reader.string("header.frame_id")
+    snapshot = reader.boolean("snapshot")
+    raw = [_read_description(reader) for _ in range(reader.count(_LEAST_DESCRIPTION, "objects"))]
+    reader.finish()
+
+    objects: list[Description] = []
+    refused: list[tuple[int, str]] = []
+    for each in raw:
+        try:
+            objects.append(_description(each))
+        except CollisionMonitorError as error:
+            refused.append((each.object_id, str(error)))
+    return Descriptions(stamp_ns, frame_id, snapshot, tuple(objects), tuple(refused))
+
+
+def _read_description(reader: Reader) -> _Raw:
+    return _Raw(
+        object_id=reader.scalar("u4", "id"),
+        operation=reader.scalar("u1", "operation"),
+        name=reader.string("name"),
+        shapes=[read_shape(reader) for _ in range(reader.count(LEAST_SHAPE, "shapes"))],
+        shape_poses=reader.sequence(_POSE, 8, "shape_poses"),
+        static=reader.boolean("is_static"),
+        pose=np.array([reader.scalar("f8", "pose") for _ in range(7)]),
+        group=reader.scalar("u4", "group"),
+        mask=reader.scalar("u4", "mask"),
+        allowed=reader.sequence("<u4", 4, "allowed"),
+        padding=reader.scalar("f8", "padding"),
+        model=reader.scalar("u1", "model"),
+        max_linear_acceleration=reader.scalar("f8", "max_linear_acceleration"),
+        max_angular_acceleration=reader.scalar("f8", "max_angular_acceleration"),
+    )
+
+
+def _description(raw: _Raw) -> Description:
+    """Raises ShapeError or PoseError."""
+    if raw.operation not in (0, 1):
+        raise ShapeError(f"operation: expected 0 (ADD) or 1 (REMOVE), got {raw.operation}")
+    if raw.operation == 1:
+        return Description(raw.object_id, remove=True)
+    if not raw.shapes:
+        raise ShapeError("shapes: expected at least one shape, got none")
+    if len(raw.shape_poses) not in (0, len(raw.shapes)):
+        raise ShapeError(
+            f"shape_poses: expected none or one for each of {len(raw.shapes)} shapes, got {len(raw.shape_poses)}"
+        )
+    if raw.model not in set(Model):
+        raise ShapeError(f"model: expected {min(Model)} to {max(Model)} (ObjectDescription.MODEL_*), got {raw.model}")
+    poses = [_pose(row) for row in raw.shape_poses] or [Pose()] * len(raw.shapes)
+    return Description(
+        object_id=raw.object_id,
+        shapes=tuple((make_shape(*shape), pose) for shape, pose in zip(raw.shapes, poses, strict=True)),
+        name=raw.name,
+        static=raw.static,
+        pose=_pose(raw.pose) if raw.static else None,
+        group=raw.group or 1,
+        mask=raw.mask or ALL_GROUPS,
+        allowed=tuple(raw.allowed.tolist()),
+        padding=raw.padding,
+        model=Model(raw.model),
+        max_linear_acceleration=_nan_as_zero(raw.max_linear_acceleration),
+        max_angular_acceleration=_nan_as_zero(raw.max_angular_acceleration),
+    )
+
+
+def _nan_as_zero(value: float) -> float:
+    return 0.0 if np.isnan(value) else value
+
+
+def _pose(row: Floats) -> Pose:
+    return Pose(row[:3], row[3:])
+
+
+def encode_descriptions(
+    stamp_ns: int, frame_id: str, objects: Sequence[Description], *, snapshot: bool = False
+) -> bytes:
+    """The inverse of `decode_descriptions`. Raises MessageError."""
+    writer = Writer("ObjectDescriptionArray")
+    write_header(writer, stamp_ns, frame_id)
+    writer.scalar("u1", snapshot, "snapshot")
+    writer.scalar("u4", len(objects), "objects")
+    for each in objects:
+        _write_description(writer, each)
+    return writer.finish()
+
+
+def _write_description(writer: Writer, it: Description) -> None:
+    writer.scalar("u4", it.object_id, "id")
+    writer.scalar("u1", it.remove, "operation")
+    writer.string(it.name, "name")
+    writer.scalar("u4", len(it.shapes), "shapes")
+    for shape, _ in it.shapes:
+        write_shape(writer, shape)
+    writer.scalar("u4", len(it.shapes), "shape_poses")
+    for _, pose in it.shapes:
+        _write_pose(writer, pose)
+    writer.scalar("u1", it.static, "is_static")
+    _write_pose(writer, it.pose or Pose())
+    writer.scalar("u4", it.group, "group")
+    writer.scalar("u4", it.mask, "mask")
+    writer.sequence(np.array(it.allowed, dtype="<u4"), "<u4", 4)
+    writer.scalar("f8", it.padding, "padding")
+    writer.scalar("u1", it.model, "model")
+    writer.scalar("f8", it.max_linear_acceleration, "max_linear_acceleration")
+    writer.scalar("f8", it.max_angular_acceleration, "max_angular_acceleration")
+
+
+def _write_pose(writer: Writer, pose: Pose) -> None:
+    writer.raw(np.concatenate([pose.position, pose.quaternion]).astype("<f8").tobytes(), 8)

@@ -1,0 +1,115 @@
+"""Shape: the fields of the message and the shapes that they describe."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.codec.cdr import Floats, Ids, Reader, Writer
+from collision_monitor.errors import MessageError, ShapeError
+from collision_monitor.geometry.shapes import (
+    Box,
+    Capsule,
+    Circle,
+    Cone,
+    ConvexHull,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Polygon,
+    Shape,
+    Sphere,
+)
+from collision_monitor.records import ShapeType
+
+_POINT = ("<f8", 3)
+LEAST_SHAPE = 13
+"""Bytes of the smallest Shape that can be written."""
+
+
+def read_shape(reader: Reader) -> tuple[int, Floats, Floats, Ids]:
+    """type, dimensions (n,), vertices (n, 3), triangles (n,)"""
+    return (
+        reader.scalar("u1", "type"),
+        reader.sequence("<f8", 8, "dimensions"),
+        reader.sequence(_POINT, 8, "vertices"),
+        reader.sequence("<u4", 4, "triangles"),
+    )
+
+
+_DIMENSIONS: dict[int, tuple[type[Shape], str]] = {
+    ShapeType.SPHERE: (Sphere, "radius"),
+    ShapeType.BOX: (Box, "x, y, z"),
+    ShapeType.CAPSULE: (Capsule, "radius, length"),
+    ShapeType.CYLINDER: (Cylinder, "radius, length"),
+    ShapeType.CONE: (Cone, "radius, length"),
+    ShapeType.HALF_SPACE: (HalfSpace, "nx, ny, nz, offset"),
+    ShapeType.CIRCLE: (Circle, "radius"),
+}
+
+
+def make_shape(kind: int, dimensions: Floats, vertices: Floats, triangles: Ids) -> Shape:
+    """Raises ShapeError."""
+    if kind in _DIMENSIONS:
+        make, names = _DIMENSIONS[kind]
+        expected = names.count(",") + 1
+        if len(dimensions) != expected:
+            raise ShapeError(f"{make.__name__}: expected {expected} dimensions ({names}), got {len(dimensions)}")
+        if make is Box:
+            return Box(dimensions)
+        if make is HalfSpace:
+            return HalfSpace(dimensions[:3], dimensions[3])
+        return make(*dimensions.tolist())
+    if kind == ShapeType.CONVEX_HULL:
+        return ConvexHull(vertices)
+    if kind == ShapeType.POLYGON:
+        return Polygon(vertices[:, :2])
+    if kind == ShapeType.MESH:
+        if len(triangles) % 3:
+            raise ShapeError(f"Mesh triangles: expected three indices for each face, got {len(triangles)} indices")
+        return Mesh(vertices, triangles.astype(np.int64).reshape(-1, 3))
+    raise ShapeError(
+        f"shape type: expected {min(ShapeType)} to {max(ShapeType)} (Shape.SPHERE to Shape.POLYGON), got {kind}"
+    )
+
+
+def write_shape(writer: Writer, shape: Shape) -> None:
+    """Raises MessageError for what is no shape."""
+    kind, dimensions, vertices, triangles = _shape_fields(shape)
+    writer.scalar("u1", kind, "type")
+    writer.sequence(np.array(dimensions, dtype="<f8"), "<f8", 8)
+    writer.scalar("u4", len(vertices), "vertices")
+    if len(vertices):
+        writer.raw(vertices.astype("<f8").tobytes(), 8)
+    writer.sequence(triangles.astype("<u4").ravel(), "<u4", 4)
+
+
+def _shape_fields(shape: Shape) -> tuple[ShapeType, tuple[float, ...], Floats, NDArray[Any]]:
+    """type, dimensions, vertices (n, 3), triangles (n, 3)"""
+    no_vertices, no_triangles = np.empty((0, 3)), np.empty((0, 3), np.uint32)
+    match shape:
+        case Sphere(radius):
+            return ShapeType.SPHERE, (radius,), no_vertices, no_triangles
+        case Box(size):
+            return ShapeType.BOX, tuple(size), no_vertices, no_triangles
+        case Capsule(radius, length):
+            return ShapeType.CAPSULE, (radius, length), no_vertices, no_triangles
+        case Cylinder(radius, length):
+            return ShapeType.CYLINDER, (radius, length), no_vertices, no_triangles
+        case Cone(radius, length):
+            return ShapeType.CONE, (radius, length), no_vertices, no_triangles
+        case HalfSpace(normal, offset):
+            return ShapeType.HALF_SPACE, (*normal, offset), no_vertices, no_triangles
+        case Circle(radius):
+            return ShapeType.CIRCLE, (radius,), no_vertices, no_triangles
+        case ConvexHull(points):
+            return ShapeType.CONVEX_HULL, (), points, no_triangles
+        case Mesh(vertices, faces):
+            return ShapeType.MESH, (), vertices, faces
+        case Polygon(points):
+            return ShapeType.POLYGON, (), np.column_stack([points, np.zeros(len(points))]), no_triangles
+    raise MessageError(
+        f"Shape: expected one of the shapes of collision_monitor.geometry.shapes, got {type(shape).__name__}"
+    )
