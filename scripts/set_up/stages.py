@@ -109,7 +109,7 @@ def _install_packages(ros: machine.RosInstall | None, log: IO[str]) -> None:
 def correct_exported_paths(log: IO[str]) -> None:
     """Let CMake find Python: files exported by the wheels name the paths of the machine they were built on."""
     command = "import sysconfig as s; print(s.get_path('include'), s.get_path('purelib'), sep='\\n')"
-    answer = subprocess.run([PYTHON, "-I", "-S", "-c", command], capture_output=True, text=True, check=True)
+    answer = subprocess.run([PYTHON, "-I", "-c", command], capture_output=True, text=True, check=True)
     include, packages = answer.stdout.splitlines()
     for path in sorted((VENV / "share").rglob("*.cmake")):
         before = path.read_text(encoding="utf-8", errors="surrogateescape")

@@ -1,0 +1,31 @@
+"""The monitor alone, with the parameters of config/monitor.yaml.
+
+ros2 launch collision_monitor monitor.launch.py record:=run.mcap
+"""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
+
+
+def generate_launch_description() -> LaunchDescription:
+    parameters = PathJoinSubstitution([FindPackageShare("collision_monitor"), "config", "monitor.yaml"])
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument("params", default_value=parameters, description="parameters of the monitor (YAML)"),
+            DeclareLaunchArgument("record", default_value="", description="record the session to this .mcap file"),
+            Node(
+                package="collision_monitor",
+                executable="monitor",
+                name="object_monitor",
+                output="screen",
+                parameters=[
+                    LaunchConfiguration("params"),
+                    {"record": ParameterValue(LaunchConfiguration("record"), value_type=str)},
+                ],
+            ),
+        ]
+    )
