@@ -1,4 +1,8 @@
-"""What only colcon needs: the files of a ROS 2 package and its executables. All else is in pyproject.toml."""
+"""What colcon needs to find here: the files of a ROS 2 package and its executables. All else is in pyproject.toml.
+
+`python_requires` and `license` are here because colcon cannot read what setuptools makes of them there, and because
+setuptools 68 (Ubuntu 24.04) and 77 disagree on how a licence is written.
+"""
 
 from glob import glob
 
@@ -7,6 +11,8 @@ from setuptools import setup
 PACKAGE = "collision_monitor"
 
 setup(
+    python_requires=">=3.11",
+    license="Apache-2.0",
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
