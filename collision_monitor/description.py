@@ -35,6 +35,8 @@ def _not_negative(value: Any, what: str, unit: str) -> float:
 def _shape_pairs(value: Any, what: str) -> tuple[tuple[Shape, Pose], ...]:
     if isinstance(value, Shape):
         return ((value, Pose()),)
+    if not isinstance(value, Iterable):
+        raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), got {value!r}")
     pairs = tuple(tuple(item) if isinstance(item, Iterable) else item for item in value)
     for pair in pairs:
         is_pair = isinstance(pair, tuple) and len(pair) == 2

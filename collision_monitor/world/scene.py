@@ -16,6 +16,11 @@ Array = NDArray[np.float64]
 States = NDArray[np.void]
 """An array of `records.STATE`."""
 
+MAX_STEP = 10.0
+"""s: a longer step is a mistake of the caller's clock, and would take scenes with bounces and turns very long."""
+ROUND_OFF = 1e-6
+"""s: more than the sum of millions of steps loses; less than any step."""
+
 
 class Scene(ABC):
     """A simulated world. The same name, objects, seed and steps give the same bits."""
@@ -40,8 +45,8 @@ class Scene(ABC):
     def step(self, dt: float | None = None) -> States:
         """Move on by `dt` seconds (default: 1 / rate) and return the states there. Raises InputError."""
         dt = 1.0 / self.rate if dt is None else float(dt)
-        if not (dt > 0.0 and math.isfinite(dt)):
-            raise InputError(f"step: expected a positive, finite number of seconds, got {dt!r}")
+        if not 0.0 < dt <= MAX_STEP:
+            raise InputError(f"step: expected more than 0 and at most {MAX_STEP:g} s, got {dt!r}")
         self._advance(dt)
         self.time += dt
         return self.states()
@@ -49,7 +54,7 @@ class Scene(ABC):
     @property
     def finished(self) -> bool:
         """Whether `time` is past `duration`."""
-        return self.duration is not None and self.time > self.duration
+        return self.duration is not None and self.time > self.duration + ROUND_OFF
 
 
 def state_array(ids: NDArray[np.uint32]) -> States:

@@ -3,6 +3,9 @@
 `<clip>_ped.csv`: id, frame, label, x_est, y_est, vx_est, vy_est; `<clip>_veh.csv`: id, frame, label, x_est, y_est,
 psi_est (heading, rad), vel_est (speed along it); metres, seconds, 29.97 frames/s. The files give no sizes: a person
 is a cylinder of radius 0.25 m and height 1.75 m, a cart a box of 2.4 x 1.2 x 1.8 m, both standing on z = 0.
+
+Velocities are passed on as recorded. Those of carts are filtered and lag behind the positions where a cart brakes or
+speeds up, by up to 1 m/s: predictions inherit that, as they would from any live tracker.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ from collision_monitor.errors import InputError
 from collision_monitor.geometry.pose import from_rotation_vector, multiply
 from collision_monitor.geometry.shapes import Box, Cylinder, Shape
 from collision_monitor.records import StateFlag
-from collision_monitor.world.scene import Scene, States, positive_rate, state_array
+from collision_monitor.world.scene import ROUND_OFF, Scene, States, positive_rate, state_array
 from collision_monitor.world.tracks import Tracks, read_tracks
 
 FRAME_RATE = 29.97
@@ -86,14 +89,15 @@ class Trajectory(Scene):
     def states(self) -> States:
         """The states of the last frame, moved on at their twist by the part of a frame that has passed since."""
         now = self.time * FRAME_RATE
-        frame = round(now) if abs(now - round(now)) < 1e-6 else int(now)  # 1e-6: round-off of a sum of many steps
+        frame = int(now + ROUND_OFF * FRAME_RATE)
         first, last = np.searchsorted(self._frame, [frame, frame + 1])
         states = self._row[first:last].copy()
         since = max(now - frame, 0.0) / FRAME_RATE
-        if since > 0.0:
+        if since > ROUND_OFF:
             states["position"] += states["linear"] * since
             turned = from_rotation_vector(states["angular"] * since)
             states["quaternion"] = multiply(turned, states["quaternion"])
+            states["flags"] = 0  # a comeback is told once
         return states
 
 

@@ -1,0 +1,59 @@
+"""ObjectDescription: what it fills in and what it refuses."""
+
+import math
+
+import pytest
+
+from collision_monitor.description import ALL_GROUPS, ObjectDescription
+from collision_monitor.errors import InputError, ShapeError
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Box, Sphere
+from collision_monitor.records import Model
+
+
+def test_a_single_shape_becomes_one_pair_at_the_origin():
+    ((shape, pose),) = ObjectDescription(1, Sphere(0.5)).shapes
+    assert shape == Sphere(0.5)
+    assert pose.position.tolist() == [0, 0, 0]
+
+
+def test_a_compound_keeps_its_order():
+    parts = [(Box((1, 1, 1)), Pose()), (Sphere(0.2), Pose((0, 0, 1)))]
+    assert [shape for shape, _ in ObjectDescription(1, parts).shapes] == [Box((1, 1, 1)), Sphere(0.2)]
+
+
+def test_what_the_message_may_leave_out_is_filled_in():
+    made = ObjectDescription(7, Sphere(1), group=0, mask=0, max_linear_acceleration=math.nan, model=3)
+    assert (made.name, made.group, made.mask, made.max_linear_acceleration) == ("object_7", 1, ALL_GROUPS, 0.0)
+    assert made.model is Model.AABB
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ({"object_id": -1}, "object id"),
+        ({"object_id": 2**32}, "object id"),
+        ({"object_id": 1.5}, "object id"),
+        ({"object_id": True}, "object id"),
+        ({"static": True}, "needs the pose"),
+        ({"pose": (0, 0, 0)}, "expected a Pose"),
+        ({"padding": -0.1}, "padding"),
+        ({"padding": math.nan}, "padding"),
+        ({"padding": "wide"}, "padding"),
+        ({"group": 2**32}, "group"),
+        ({"mask": -1}, "mask"),
+        ({"model": 99}, "KDOP26"),
+        ({"allowed": (1, -2)}, "allowed"),
+        ({"max_linear_acceleration": -1.0}, "max_linear_acceleration"),
+        ({"max_angular_acceleration": math.inf}, "max_angular_acceleration"),
+    ],
+)
+def test_bad_fields_are_refused_with_their_name(arguments, text):
+    with pytest.raises(InputError, match=text):
+        ObjectDescription(**{"object_id": 1, "shapes": Sphere(1), **arguments})
+
+
+@pytest.mark.parametrize("shapes", [[], [Sphere(1)], [(Sphere(1), None)], [(Pose(), Sphere(1))], None, "box", 3])
+def test_bad_shapes_are_refused(shapes):
+    with pytest.raises(ShapeError, match="expected"):
+        ObjectDescription(1, shapes)
