@@ -1,0 +1,121 @@
+"""Build with colcon as a workspace would, source it, and start the executables where `ros2 run` looks for them."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import tomllib
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from collision_monitor._version import VERSION
+
+ROOT = Path(__file__).parents[2]
+EXECUTABLES = {"monitor", "world", "replay", "collision-monitor"}
+COLCON = "import sys; from colcon_core.command import main; sys.exit(main())"
+
+
+@pytest.fixture(scope="module")
+def install(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The package, built and installed into a workspace of its own. Its messages come from the environment."""
+    workspace = tmp_path_factory.mktemp("workspace")
+    folders = ("--build-base", workspace / "build", "--install-base", workspace / "install")
+    command = [sys.executable, "-c", COLCON, "--log-base", workspace / "log", "build", "--base-paths", ROOT, *folders]
+    environment = os.environ | {"COLCON_HOME": str(workspace / "home"), "AMENT_PREFIX_PATH": sys.prefix}
+    selected = [*command, "--packages-select", "collision_monitor"]
+    answer = subprocess.run(selected, env=environment, cwd=workspace, capture_output=True, text=True, timeout=120)
+    assert answer.returncode == 0, answer.stdout + answer.stderr
+    return workspace / "install"
+
+
+def sourced(install: Path, *command: str | Path) -> list[str]:
+    """The command in a shell that has sourced the workspace, as a ROS user has."""
+    return ["bash", "-c", f"source {shlex.quote(str(install))}/setup.bash && exec {shlex.join(map(str, command))}"]
+
+
+def run(install: Path, *command: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(sourced(install, *command), cwd=install, capture_output=True, text=True, timeout=60)
+
+
+def executable(install: Path, name: str) -> Path:
+    return install / "collision_monitor" / "lib" / "collision_monitor" / name
+
+
+def test_the_package_is_in_the_ament_index(install: Path) -> None:
+    code = (
+        "from ament_index_python.packages import get_package_prefix, get_package_share_directory as share\n"
+        "print(get_package_prefix('collision_monitor'), share('collision_monitor'), sep='\\n')"
+    )
+    answer = run(install, sys.executable, "-c", code)
+    assert answer.returncode == 0, answer.stderr
+    prefix, share = map(Path, answer.stdout.splitlines())
+    assert prefix == install / "collision_monitor"
+    installed = {str(path.relative_to(share)) for folder in ("config", "launch") for path in (share / folder).iterdir()}
+    assert {"config/monitor.yaml", "launch/monitor.launch.py", "launch/demo.launch.py"} <= installed
+    assert (share / "package.xml").is_file()
+
+
+def test_ros2_run_finds_every_executable(install: Path) -> None:
+    folder = install / "collision_monitor" / "lib" / "collision_monitor"
+    assert {path.name for path in folder.iterdir() if os.access(path, os.X_OK)} == EXECUTABLES
+
+
+def test_the_installed_copy_runs_not_the_source(install: Path) -> None:
+    answer = run(install, sys.executable, "-P", "-c", "import collision_monitor; print(list(collision_monitor.__path__))")
+    assert str(install) in answer.stdout, answer.stderr
+
+
+def test_the_command_line_runs_from_the_workspace(install: Path) -> None:
+    assert run(install, executable(install, "collision-monitor"), "--version").stdout.endswith(f"{VERSION}\n")
+    answer = run(install, executable(install, "replay"), "--help")
+    assert answer.stdout.startswith("usage: collision-monitor replay"), answer.stderr
+
+
+@pytest.mark.parametrize("name", ["monitor", "world"])
+def test_a_node_starts_and_ends_cleanly_when_interrupted(install: Path, ros_domain_id: int, name: str) -> None:
+    command = sourced(install, executable(install, name))
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        assert process.stdout
+        first = process.stdout.readline()  # the node says that it runs
+        process.send_signal(signal.SIGINT)
+        rest = process.stdout.read()
+        assert process.wait(30) == 0, first + rest
+    assert "Traceback" not in first + rest
+    assert "[INFO]" in first
+
+
+def test_versions_agree() -> None:
+    for package in (ROOT / "package.xml", ROOT / "collision_monitor_msgs" / "package.xml"):
+        assert ET.parse(package).findtext("version") == VERSION
+    newest = re.search(r"^(\d+\.\d+\.\d+) ", (ROOT / "CHANGELOG.rst").read_text(), re.MULTILINE)
+    assert newest is not None
+    assert newest[1] == VERSION
+
+
+def test_every_message_is_built() -> None:
+    listed = set(re.findall(r"msg/\w+\.msg", (ROOT / "collision_monitor_msgs" / "CMakeLists.txt").read_text()))
+    assert listed == {f"msg/{path.name}" for path in (ROOT / "collision_monitor_msgs" / "msg").glob("*.msg")}
+
+
+def test_what_is_imported_is_declared() -> None:
+    """Each top-level import of the package is the standard library, a ROS package of package.xml or a requirement."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    modules = {"python-fcl": "fcl", "PyYAML": "yaml"}
+    names = {re.split(r"[<>=\[; ]", requirement)[0] for requirement in project["dependencies"]}
+    declared = {modules.get(name, name.replace("-", "_")) for name in names}
+    declared |= {element.text for element in ET.parse(ROOT / "package.xml").iter("depend") if element.text}
+    used = set()
+    for path in (ROOT / "collision_monitor").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                used |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                used.add(node.module.partition(".")[0])
+    assert used - set(sys.stdlib_module_names) - declared - {"collision_monitor"} == set()
