@@ -14,6 +14,10 @@ UNIT_QUATERNION: Final = 1e-3
 """|norm - 1| of a quaternion that is normalised; beyond it the input is refused.
 Larger: garbage passes as a rotation. Smaller: honest float32 sources are refused."""
 
+LARGEST_INPUT: Final = 1e18
+"""Largest position, velocity or angular velocity (m, m/s, rad/s) that a state may hold: squares stay finite and the
+hash grid's cells stay in range. Larger: products overflow and a pair could be lost."""
+
 PARALLEL_SIN2: Final = 1e-12
 """sin^2 of the angle between two unit edges below which SAT drops their cross product.
 The round-off of a normalised cross product grows as EPSILON / sin; at sin = 1e-6 it is 2e-10 of the size.
@@ -30,3 +34,33 @@ SAT_ROUND_OFF: Final = 64 * EPSILON
 HULL_DROP: Final = 1e-14
 """A point that stands out of its hull by less than this part of the hull's size is dropped with the interior ones.
 Larger: visible corners vanish. Smaller: round-off keeps points that lie in a face, and each costs time in every test."""
+
+FEATURE_TIE: Final = 1e-9
+"""An edge or face counts as touching as a whole when its ends differ by less than this part of the size along the normal.
+Larger: witness points leave the surface visibly. Smaller: resting faces are reported as a vertex that jumps about."""
+
+SEGMENT_PARALLEL_SIN2: Final = 1e-20
+"""sin^2 below which two segments count as parallel when their closest points are sought.
+The distance is then wrong by at most sin * length = 1e-10 of the size. Unlike in SAT the formula holds far below
+PARALLEL_SIN2: where it loses the place, the distance hardly depends on the place."""
+
+TOUCHING: Final = 1e-10
+"""GJK hands a pair over to EPA when the cores are closer than this part of their size:
+below it the direction of the difference vector is round-off, and a face normal is exact."""
+
+GJK_RELATIVE: Final = 1e-12
+"""GJK ends when the certified lower bound is within this part of the distance.
+Larger: error bounds grow. Smaller: curved shapes take more iterations for nothing anyone can measure."""
+
+EPA_POLYTOPE: Final = 1e-12
+"""EPA ends when the depth is certified to this part of the size: for polytopes it is reached exactly, in finitely many steps."""
+
+EPA_CURVED: Final = 1e-6
+"""The same for pairs with a cylinder or a cone, whose surface EPA approaches by flat faces:
+each further factor of 4 costs about 3 iterations. The bound reached is reported."""
+
+FLAT: Final = 1e-12
+"""A simplex thinner than this part of the size counts as flat: which side of it the origin is on would be noise."""
+
+SLIVER_SIN2: Final = 1e-20
+"""sin^2 between two edges of an EPA face below which the face is a sliver: it closes the surface but has no normal."""

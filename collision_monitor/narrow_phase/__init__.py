@@ -1,0 +1,1 @@
+"""Tests of one pair of shapes: distance, depth, normal, witness points. `dispatch` is the table of them."""

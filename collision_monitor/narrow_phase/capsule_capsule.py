@@ -1,0 +1,70 @@
+"""Capsules and spheres against each other: closest points of their core segments. (Ericson, 4.5.1)"""
+
+from __future__ import annotations
+
+from math import copysign, sqrt
+from typing import Any
+
+from collision_monitor._jit import device
+from collision_monitor.narrow_phase.answer import SURFACE, write
+from collision_monitor.narrow_phase.segment import segment_segment
+from collision_monitor.narrow_phase.sphere_sphere import direction
+from collision_monitor.tolerances import SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2, TOUCHING
+
+
+@device
+def capsule_capsule_contact(
+    ra: float, la: float, rb: float, lb: float, RA: Any, RB: Any, px: float, py: float, pz: float, out: Any
+) -> None:
+    """Radius with margin and half core length (m) of each; half length 0 is a sphere.
+
+    Where the cores cross they part across both, and a core within the other's line parts at a right angle to it.
+    """
+    ux, uy, uz = la * RA[0, 2], la * RA[1, 2], la * RA[2, 2]
+    vx, vy, vz = lb * RB[0, 2], lb * RB[1, 2], lb * RB[2, 2]
+    s, t = segment_segment(ux, uy, uz, vx, vy, vz, px, py, pz)
+    wx = px + t * vx - s * ux
+    wy = py + t * vy - s * uy
+    wz = pz + t * vz - s * uz
+    distance, nx, ny, nz = direction(wx, wy, wz)
+    if abs(s) < 1.0 and abs(t) < 1.0 or distance <= TOUCHING * (la + lb):
+        cx = uy * vz - uz * vy
+        cy = uz * vx - ux * vz
+        cz = ux * vy - uy * vx
+        length2 = cx * cx + cy * cy + cz * cz
+        if la > 0.0 and lb > 0.0 and length2 > SEGMENT_PARALLEL_SIN2 * (la * la) * (lb * lb):
+            # between the segments' insides the closest points lie across both: exact where the difference is noise
+            length = sqrt(length2)
+            side = copysign(1.0, cx * wx + cy * wy + cz * wz)
+            nx, ny, nz = side * cx / length, side * cy / length, side * cz / length
+            distance = nx * wx + ny * wy + nz * wz
+        elif distance <= TOUCHING * (la + lb):
+            ax, ay, az = (RA[0, 2], RA[1, 2], RA[2, 2]) if la >= lb else (RB[0, 2], RB[1, 2], RB[2, 2])
+            nx, ny, nz = _across(ax, ay, az, wx, wy, wz)
+            distance = nx * wx + ny * wy + nz * wz
+    write(
+        out,
+        distance - (ra + rb),
+        nx,
+        ny,
+        nz,
+        s * ux + ra * nx,
+        s * uy + ra * ny,
+        s * uz + ra * nz,
+        SAT_ROUND_OFF * (distance + ra + rb + la + lb + abs(px) + abs(py) + abs(pz)),
+    )
+    out[11] = SURFACE
+    out[13] = SURFACE
+
+
+@device
+def _across(x: float, y: float, z: float, wx: float, wy: float, wz: float) -> Any:
+    """A unit vector at a right angle to the unit vector (x, y, z), on the side of w."""
+    if abs(x) <= abs(y) and abs(x) <= abs(z):
+        nx, ny, nz = 0.0, z, -y
+    elif abs(y) <= abs(z):
+        nx, ny, nz = -z, 0.0, x
+    else:
+        nx, ny, nz = y, -x, 0.0
+    length = copysign(sqrt(nx * nx + ny * ny + nz * nz), nx * wx + ny * wy + nz * wz)
+    return nx / length, ny / length, nz / length

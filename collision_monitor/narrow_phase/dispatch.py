@@ -1,0 +1,271 @@
+"""The table of pair tests: which test answers for which two kinds of shape.
+
+Pairs are brought into one order (by kind, then by slot) first, so that swapping A and B mirrors the answer bit by bit.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any
+
+import numpy as np
+from numba import get_num_threads, prange
+from numpy.typing import NDArray
+
+from collision_monitor._jit import device, kernel, parallel_kernel
+from collision_monitor.geometry.shape_table import BOX, CAPSULE, HALF_SPACE, SPHERE
+from collision_monitor.narrow_phase.answer import CONTACT_SIZE, WORK_SIZE
+from collision_monitor.narrow_phase.box_box import axis_direction, box_box_separation, sat, touching_features
+from collision_monitor.narrow_phase.capsule_capsule import capsule_capsule_contact
+from collision_monitor.narrow_phase.convex_convex import convex_contact, convex_separation
+from collision_monitor.narrow_phase.half_space import half_space_contact
+from collision_monitor.narrow_phase.sphere_box import sphere_box_contact, sphere_box_separation
+from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact, sphere_sphere_separation
+from collision_monitor.tolerances import FACE_PREFERENCE
+
+
+@device
+def _swapped(table: Any, a: int, b: int) -> bool:
+    """Whether the canonical order is b, a."""
+    ka, kb = table.kind[a], table.kind[b]
+    return ka > kb or (ka == kb and a > b)
+
+
+@device
+def separation(
+    table: Any, a: int, b: int, R_WA: Any, R_WB: Any, px: float, py: float, pz: float, out: Any, work: Any
+) -> float:
+    """Certified lower bound (m) of the distance of shapes a and b, with its unit direction from A to B in out[0:3].
+
+    p = position of b - position of a, world axes. <= 0 where they overlap or touch. Projected on the direction, the
+    shapes are apart by this much. Exact for all pairs but separated boxes, whose bound is the largest SAT gap.
+    """
+    if _swapped(table, a, b):
+        gap = _separation(table, b, a, R_WB, R_WA, -px, -py, -pz, out, work)
+        out[0] = -out[0]
+        out[1] = -out[1]
+        out[2] = -out[2]
+        return gap
+    return _separation(table, a, b, R_WA, R_WB, px, py, pz, out, work)
+
+
+@device
+def _separation(
+    table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float, pz: float, out: Any, work: Any
+) -> float:
+    ka, kb = table.kind[a], table.kind[b]
+    margin = table.margin[a] + table.margin[b]
+    if ka == BOX and kb == BOX:
+        return box_box_separation(
+            table.size[a, 0], table.size[a, 1], table.size[a, 2], table.size[b, 0], table.size[b, 1], table.size[b, 2],
+            margin, RA, RB, px, py, pz, out,
+        )  # fmt: skip
+    if ka == SPHERE and kb == SPHERE:
+        return sphere_sphere_separation(
+            table.size[a, 0] + table.margin[a], table.size[b, 0] + table.margin[b], px, py, pz, out
+        )
+    if ka == SPHERE and kb == BOX:
+        return sphere_box_separation(
+            table.size[a, 0] + margin, table.size[b, 0], table.size[b, 1], table.size[b, 2], RB, px, py, pz, out
+        )
+    if kb == HALF_SPACE or (kb == CAPSULE and (ka == CAPSULE or ka == SPHERE)):
+        # closed forms: the contact costs little more than the distance
+        answer = work[0:CONTACT_SIZE]
+        if kb == HALF_SPACE:
+            if ka == HALF_SPACE:
+                out[0] = 0.0
+                out[1] = 0.0
+                out[2] = 1.0
+                return -inf
+            half_space_contact(table, a, b, RA, RB, px, py, pz, answer)
+        else:
+            _capsules(table, a, b, RA, RB, px, py, pz, answer)
+        out[0] = answer[1]
+        out[1] = answer[2]
+        out[2] = answer[3]
+        return answer[0] - answer[10]
+    return convex_separation(table, a, b, RA, RB, px, py, pz, inf, out, work)
+
+
+@device
+def _capsules(table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float, pz: float, out: Any) -> None:
+    """Capsules, and a sphere as the capsule without a core."""
+    la = table.size[a, 1] if table.kind[a] == CAPSULE else 0.0
+    lb = table.size[b, 1] if table.kind[b] == CAPSULE else 0.0
+    capsule_capsule_contact(
+        table.size[a, 0] + table.margin[a], la, table.size[b, 0] + table.margin[b], lb, RA, RB, px, py, pz, out
+    )
+
+
+@device
+def contact_within(
+    table: Any,
+    a: int,
+    b: int,
+    R_WA: Any,
+    R_WB: Any,
+    px: float,
+    py: float,
+    pz: float,
+    limit: float,
+    out: Any,
+    work: Any,
+) -> bool:
+    """Whether the signed distance is at most `limit` (m); only then out[0:15] holds the contact (see answer.py).
+
+    Arguments as in `separation`. Most pairs of a broad phase are apart: they cost as little as can prove it.
+    """
+    if not _swapped(table, a, b):
+        return _contact(table, a, b, R_WA, R_WB, px, py, pz, limit, out, work) and out[0] <= limit
+    if not (_contact(table, b, a, R_WB, R_WA, -px, -py, -pz, limit, out, work) and out[0] <= limit):
+        return False
+    for i in range(3):
+        p = px if i == 0 else (py if i == 1 else pz)
+        out[1 + i] = -out[1 + i]
+        witness = out[4 + i]
+        out[4 + i] = out[7 + i] + p
+        out[7 + i] = witness + p
+    for i in range(11, 13):
+        feature = out[i]
+        out[i] = out[i + 2]
+        out[i + 2] = feature
+    return True
+
+
+@device
+def contact(
+    table: Any, a: int, b: int, R_WA: Any, R_WB: Any, px: float, py: float, pz: float, out: Any, work: Any
+) -> None:
+    """Signed distance, normal, witness points, error bound and features in out[0:15] (see answer.py)."""
+    contact_within(table, a, b, R_WA, R_WB, px, py, pz, inf, out, work)
+
+
+@device
+def _contact(
+    table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float, pz: float, limit: float, out: Any, work: Any
+) -> bool:
+    ka, kb = table.kind[a], table.kind[b]
+    if ka == BOX and kb == BOX:
+        return _boxes(table, a, b, RA, RB, px, py, pz, limit, out, work)
+    if ka == SPHERE and kb == SPHERE:
+        sphere_sphere_contact(
+            table.size[a, 0] + table.margin[a], table.size[b, 0] + table.margin[b], px, py, pz, out
+        )
+    elif ka == SPHERE and kb == BOX:
+        sphere_box_contact(
+            table.size[a, 0] + table.margin[a], table.size[b, 0], table.size[b, 1], table.size[b, 2],
+            table.margin[b], RB, px, py, pz, out,
+        )  # fmt: skip
+    elif kb == CAPSULE and (ka == CAPSULE or ka == SPHERE):
+        _capsules(table, a, b, RA, RB, px, py, pz, out)
+    elif kb == HALF_SPACE:
+        if ka == HALF_SPACE:
+            # both unbounded: they overlap without end but where they face away from each other
+            for i in range(CONTACT_SIZE):
+                out[i] = 0.0
+            out[0] = -inf
+            out[3] = 1.0
+        else:
+            half_space_contact(table, a, b, RA, RB, px, py, pz, out)
+    else:
+        return convex_contact(table, a, b, RA, RB, px, py, pz, limit, out, work)
+    return True
+
+
+@device
+def _boxes(
+    table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float, pz: float, limit: float, out: Any, work: Any
+) -> bool:
+    """SAT, and GJK for the distance of boxes whose nearest features no SAT axis is at a right angle to."""
+    ha, hb = table.size[a], table.size[b]
+    ma, mb = table.margin[a], table.margin[b]
+    gap, axis, sign = sat(ha[0], ha[1], ha[2], hb[0], hb[1], hb[2], RA, RB, px, py, pz)
+    if gap - ma - mb > limit:
+        return False
+    size = max(max(ha[0], ha[1], ha[2]), max(hb[0], hb[1], hb[2]))
+    if gap > 0.0:
+        if not convex_contact(table, a, b, RA, RB, px, py, pz, limit, out, work):
+            return False
+        if out[0] + ma + mb - gap > FACE_PREFERENCE * size:
+            return True
+        # the SAT axis is the direction of the distance too, and has no noise however near the boxes are
+    nx, ny, nz = axis_direction(axis, sign, RA, RB)
+    touching_features(ha, hb, RA, RB, px, py, pz, gap, nx, ny, nz, out, work)
+    if ma > 0.0 or mb > 0.0:
+        out[0] -= ma + mb
+        for i in range(3):
+            out[4 + i] += ma * out[1 + i]
+            out[7 + i] -= mb * out[1 + i]
+    return True
+
+
+@device
+def _pair(table: Any, position: Any, rotation: Any, a: int, b: int, out: Any, work: Any) -> None:
+    contact(
+        table,
+        a,
+        b,
+        rotation[a],
+        rotation[b],
+        position[b, 0] - position[a, 0],
+        position[b, 1] - position[a, 1],
+        position[b, 2] - position[a, 2],
+        out,
+        work,
+    )
+
+
+@kernel
+def _contact_serial(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
+    for k in range(len(pairs)):
+        _pair(table, position, rotation, pairs[k, 0], pairs[k, 1], out[k], work[0])
+
+
+@parallel_kernel
+def _contact_parallel(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
+    blocks = len(work)
+    for block in prange(blocks):
+        for k in range(block * len(pairs) // blocks, (block + 1) * len(pairs) // blocks):
+            _pair(table, position, rotation, pairs[k, 0], pairs[k, 1], out[k], work[block])
+
+
+@kernel
+def _separation_serial(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
+    for k in range(len(pairs)):
+        a, b = pairs[k, 0], pairs[k, 1]
+        out[k, 3] = separation(
+            table,
+            a,
+            b,
+            rotation[a],
+            rotation[b],
+            position[b, 0] - position[a, 0],
+            position[b, 1] - position[a, 1],
+            position[b, 2] - position[a, 2],
+            out[k],
+            work,
+        )
+
+
+def contact_batch(
+    table: Any, position: NDArray[np.float64], rotation: NDArray[np.float64], pairs: NDArray[np.int32], threads: int = 1
+) -> NDArray[np.float64]:
+    """Contacts (M, 15) of the pairs (M, 2) of slots at position (K, 3) and rotation (K, 3, 3), world axes.
+
+    The bytes of the answer do not depend on `threads`.
+    """
+    out = np.zeros((len(pairs), CONTACT_SIZE))
+    if threads == 1:
+        _contact_serial(table, position, rotation, pairs, out, np.zeros((1, WORK_SIZE)))
+    else:
+        _contact_parallel(table, position, rotation, pairs, out, np.zeros((min(threads, get_num_threads()), WORK_SIZE)))
+    return out
+
+
+def separation_batch(
+    table: Any, position: NDArray[np.float64], rotation: NDArray[np.float64], pairs: NDArray[np.int32]
+) -> NDArray[np.float64]:
+    """Directions and certified lower bounds (M, 4) of the pairs; arguments as in `contact_batch`."""
+    out = np.zeros((len(pairs), 4))
+    _separation_serial(table, position, rotation, pairs, out, np.zeros(WORK_SIZE))
+    return out

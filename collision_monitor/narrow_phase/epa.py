@@ -1,0 +1,286 @@
+"""Penetration depth of two convex cores by the expanding polytope algorithm, with bounds from both sides.
+
+(van den Bergen, Proximity Queries and Penetration Depth Computation, 2001.) The polytope lies inside of B - A, so the
+distance of its nearest face bounds the depth from below; the support distance along any direction bounds it from above.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Any, Final
+
+from collision_monitor._jit import device
+from collision_monitor.narrow_phase.answer import EDGES, FACES, MAX_FACES, MAX_VERTICES, SIMPLEX
+from collision_monitor.narrow_phase.gjk import WEIGHTS, _triangle
+from collision_monitor.narrow_phase.support import support_difference
+from collision_monitor.tolerances import EPSILON, FLAT, SLIVER_SIN2
+
+NX: Final = FACES
+NY: Final = FACES + MAX_FACES
+NZ: Final = FACES + 2 * MAX_FACES
+D: Final = FACES + 3 * MAX_FACES
+I: Final = FACES + 4 * MAX_FACES  # noqa: E741
+J: Final = FACES + 5 * MAX_FACES
+K: Final = FACES + 6 * MAX_FACES
+FROM: Final = EDGES
+TO: Final = EDGES + 3 * MAX_FACES
+
+
+@device
+def _normal(work: Any, i: int, j: int, k: int) -> Any:
+    """Cross product of the edges ij and ik, and the product of their squared lengths."""
+    a, b, c = SIMPLEX + 8 * i, SIMPLEX + 8 * j, SIMPLEX + 8 * k
+    ux, uy, uz = work[b] - work[a], work[b + 1] - work[a + 1], work[b + 2] - work[a + 2]
+    vx, vy, vz = work[c] - work[a], work[c + 1] - work[a + 1], work[c + 2] - work[a + 2]
+    return (
+        uy * vz - uz * vy,
+        uz * vx - ux * vz,
+        ux * vy - uy * vx,
+        (ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz),
+    )
+
+
+@device
+def _set_face(work: Any, f: int, i: int, j: int, k: int) -> None:
+    """Face f through the points i, j, k, counter-clockwise from outside; a sliver gets distance inf and no normal."""
+    nx, ny, nz, product = _normal(work, i, j, k)
+    n2 = nx * nx + ny * ny + nz * nz
+    work[I + f] = i
+    work[J + f] = j
+    work[K + f] = k
+    if n2 > SLIVER_SIN2 * product:
+        length = sqrt(n2)
+        nx /= length
+        ny /= length
+        nz /= length
+        a = SIMPLEX + 8 * i
+        work[D + f] = nx * work[a] + ny * work[a + 1] + nz * work[a + 2]
+    else:
+        nx = ny = nz = 0.0
+        work[D + f] = inf
+    work[NX + f] = nx
+    work[NY + f] = ny
+    work[NZ + f] = nz
+
+
+@device
+def _off_line(work: Any, at: int) -> float:
+    """Squared distance of the row `at` from the line through the first two points."""
+    ex, ey, ez = work[SIMPLEX + 8] - work[SIMPLEX], work[SIMPLEX + 9] - work[SIMPLEX + 1], work[SIMPLEX + 10] - work[SIMPLEX + 2]
+    x, y, z = work[at] - work[SIMPLEX], work[at + 1] - work[SIMPLEX + 1], work[at + 2] - work[SIMPLEX + 2]
+    cx, cy, cz = ey * z - ez * y, ez * x - ex * z, ex * y - ey * x
+    return (cx * cx + cy * cy + cz * cz) / (ex * ex + ey * ey + ez * ez)
+
+
+@device
+def _push_edge(work: Any, count: int, i: float, j: float) -> int:
+    """Add a directed edge to the horizon, or cancel it against its reverse: it then lies inside of the hole."""
+    for e in range(count):
+        if work[FROM + e] == j and work[TO + e] == i:
+            work[FROM + e] = work[FROM + count - 1]
+            work[TO + e] = work[TO + count - 1]
+            return count - 1
+    work[FROM + count] = i
+    work[TO + count] = j
+    return count + 1
+
+
+@device
+def epa(
+    ka: int,
+    a0: float,
+    a1: float,
+    a2: float,
+    sa: int,
+    na: int,
+    kb: int,
+    b0: float,
+    b1: float,
+    b2: float,
+    sb: int,
+    nb: int,
+    vertices: Any,
+    work: Any,
+    size: float,
+    count: int,
+    tolerance: float,
+) -> Any:
+    """Depth of two cores that overlap or touch, from the `count` simplex points that GJK left, in A's frame.
+
+    Returns (upper, lower, nx, ny, nz, ax, ay, az): bounds of the depth (m), the unit direction from A to B, the
+    witness on A. Ends when upper - lower <= tolerance * size (m), or when the scratch memory is full.
+    """
+    flat = FLAT * size
+    # the simplex becomes a tetrahedron
+    if count == 1:
+        farthest = 0.0
+        for k in range(6):
+            s = 1.0 if k % 2 == 0 else -1.0
+            x, y, z = support_difference(
+                ka, a0, a1, a2, sa, na, kb, b0, b1, b2, sb, nb, vertices, work,
+                s if k // 2 == 0 else 0.0, s if k // 2 == 1 else 0.0, s if k // 2 == 2 else 0.0, SIMPLEX + 16,
+            )  # fmt: skip
+            x, y, z = x - work[SIMPLEX], y - work[SIMPLEX + 1], z - work[SIMPLEX + 2]
+            if x * x + y * y + z * z > farthest:
+                farthest = x * x + y * y + z * z
+                for m in range(8):
+                    work[SIMPLEX + 8 + m] = work[SIMPLEX + 16 + m]
+        if farthest <= flat * flat:
+            return 0.0, 0.0, 0.0, 0.0, 1.0, work[SIMPLEX + 3], work[SIMPLEX + 4], work[SIMPLEX + 5]
+        work[WEIGHTS + 1] = 0.0
+        count = 2
+    if count == 2:
+        ex, ey, ez = work[SIMPLEX + 8] - work[SIMPLEX], work[SIMPLEX + 9] - work[SIMPLEX + 1], work[SIMPLEX + 10] - work[SIMPLEX + 2]
+        if abs(ex) <= abs(ey) and abs(ex) <= abs(ez):
+            ux, uy, uz = 0.0, ez, -ey
+        elif abs(ey) <= abs(ez):
+            ux, uy, uz = -ez, 0.0, ex
+        else:
+            ux, uy, uz = ey, -ex, 0.0
+        vx, vy, vz = ey * uz - ez * uy, ez * ux - ex * uz, ex * uy - ey * ux
+        farthest = 0.0
+        for k in range(4):
+            s = 1.0 if k % 2 == 0 else -1.0
+            x, y, z = (s * ux, s * uy, s * uz) if k < 2 else (s * vx, s * vy, s * vz)
+            support_difference(
+                ka, a0, a1, a2, sa, na, kb, b0, b1, b2, sb, nb, vertices, work, x, y, z, SIMPLEX + 24
+            )
+            d2 = _off_line(work, SIMPLEX + 24)
+            if d2 > farthest:
+                farthest = d2
+                for m in range(8):
+                    work[SIMPLEX + 16 + m] = work[SIMPLEX + 24 + m]
+        if farthest <= flat * flat:
+            # a segment: any direction across it parts the cores
+            length = sqrt(ux * ux + uy * uy + uz * uz)
+            wa, wb = work[WEIGHTS], work[WEIGHTS + 1]
+            return (
+                0.0, 0.0, ux / length, uy / length, uz / length,
+                wa * work[SIMPLEX + 3] + wb * work[SIMPLEX + 11],
+                wa * work[SIMPLEX + 4] + wb * work[SIMPLEX + 12],
+                wa * work[SIMPLEX + 5] + wb * work[SIMPLEX + 13],
+            )  # fmt: skip
+        work[WEIGHTS + 2] = 0.0
+        count = 3
+    if count == 3:
+        x, y, z, _ = _normal(work, 0, 1, 2)
+        length = sqrt(x * x + y * y + z * z)
+        x, y, z = x / length, y / length, z / length
+        base = x * work[SIMPLEX] + y * work[SIMPLEX + 1] + z * work[SIMPLEX + 2]
+        found = False
+        upper, side = inf, 1.0
+        for k in range(2):
+            s = 1.0 if k == 0 else -1.0
+            wx, wy, wz = support_difference(
+                ka, a0, a1, a2, sa, na, kb, b0, b1, b2, sb, nb, vertices, work, s * x, s * y, s * z, SIMPLEX + 24
+            )
+            h = s * (x * wx + y * wy + z * wz)
+            if h - s * base > flat:
+                found = True
+                break
+            if h < upper:
+                upper, side = h, s
+        if not found:
+            # B - A is a flat piece: the depth is that of its plane
+            wa, wb, wc = work[WEIGHTS], work[WEIGHTS + 1], work[WEIGHTS + 2]
+            return (
+                upper, min(upper, -flat), -side * x, -side * y, -side * z,
+                wa * work[SIMPLEX + 3] + wb * work[SIMPLEX + 11] + wc * work[SIMPLEX + 19],
+                wa * work[SIMPLEX + 4] + wb * work[SIMPLEX + 12] + wc * work[SIMPLEX + 20],
+                wa * work[SIMPLEX + 5] + wb * work[SIMPLEX + 13] + wc * work[SIMPLEX + 21],
+            )  # fmt: skip
+    x, y, z, _ = _normal(work, 0, 1, 2)
+    fourth = SIMPLEX + 24
+    side = (
+        x * (work[fourth] - work[SIMPLEX])
+        + y * (work[fourth + 1] - work[SIMPLEX + 1])
+        + z * (work[fourth + 2] - work[SIMPLEX + 2])
+    )
+    p, q = (1, 2) if side < 0.0 else (2, 1)
+    _set_face(work, 0, 0, p, q)
+    _set_face(work, 1, 0, q, 3)
+    _set_face(work, 2, 0, 3, p)
+    _set_face(work, 3, p, 3, q)
+    faces = 4
+    points = 4
+
+    upper = inf
+    lower_cap = inf
+    lower = -inf
+    mx = my = mz = 0.0
+    plane = 0.0
+    visible = 8.0 * EPSILON * size
+    while points < MAX_VERTICES:
+        near = 0
+        for f in range(1, faces):
+            if work[D + f] < work[D + near]:
+                near = f
+        d = work[D + near]
+        if not d < inf:
+            break
+        lower = max(lower, min(d, lower_cap))
+        x, y, z = work[NX + near], work[NY + near], work[NZ + near]
+        at = SIMPLEX + 8 * points
+        wx, wy, wz = support_difference(
+            ka, a0, a1, a2, sa, na, kb, b0, b1, b2, sb, nb, vertices, work, x, y, z, at
+        )
+        h = x * wx + y * wy + z * wz
+        if h < upper:
+            upper = h
+            mx, my, mz = x, y, z
+            plane = d
+        if upper - lower <= tolerance * size or upper <= d:
+            break
+        known = False
+        for k in range(points):
+            r = SIMPLEX + 8 * k
+            if work[r] == wx and work[r + 1] == wy and work[r + 2] == wz:
+                known = True
+                break
+        if known or h - d <= visible:
+            # a face that round-off tilted: it cannot be expanded, and what it promised is kept as a bound
+            lower_cap = min(lower_cap, d)
+            work[D + near] = inf
+            continue
+        edges = 0
+        f = 0
+        while f < faces:
+            if work[NX + f] * wx + work[NY + f] * wy + work[NZ + f] * wz - work[D + f] > visible:
+                edges = _push_edge(work, edges, work[I + f], work[J + f])
+                edges = _push_edge(work, edges, work[J + f], work[K + f])
+                edges = _push_edge(work, edges, work[K + f], work[I + f])
+                faces -= 1
+                for m in range(7):
+                    work[FACES + m * MAX_FACES + f] = work[FACES + m * MAX_FACES + faces]
+            else:
+                f += 1
+        if faces + edges > MAX_FACES:
+            break
+        for e in range(edges):
+            _set_face(work, faces, int(work[FROM + e]), int(work[TO + e]), points)
+            faces += 1
+        points += 1
+
+    # the witness: where the ray along the answer's normal leaves the polytope, on whichever coplanar face that is
+    best = inf
+    ax = ay = az = 0.0
+    reach = plane + max(upper - plane, 64.0 * EPSILON * size)
+    for f in range(faces):
+        if work[D + f] <= reach or best == inf:
+            i, j, k = SIMPLEX + 8 * int(work[I + f]), SIMPLEX + 8 * int(work[J + f]), SIMPLEX + 8 * int(work[K + f])
+            ox, oy, oz = upper * mx, upper * my, upper * mz
+            wa, wb, wc, _ = _triangle(
+                work[i] - ox, work[i + 1] - oy, work[i + 2] - oz,
+                work[j] - ox, work[j + 1] - oy, work[j + 2] - oz,
+                work[k] - ox, work[k + 1] - oy, work[k + 2] - oz,
+            )  # fmt: skip
+            x = wa * work[i] + wb * work[j] + wc * work[k] - ox
+            y = wa * work[i + 1] + wb * work[j + 1] + wc * work[k + 1] - oy
+            z = wa * work[i + 2] + wb * work[j + 2] + wc * work[k + 2] - oz
+            d2 = x * x + y * y + z * z
+            if d2 < best:
+                best = d2
+                ax = wa * work[i + 3] + wb * work[j + 3] + wc * work[k + 3]
+                ay = wa * work[i + 4] + wb * work[j + 4] + wc * work[k + 4]
+                az = wa * work[i + 5] + wb * work[j + 5] + wc * work[k + 5]
+    return upper, lower, -mx, -my, -mz, ax, ay, az

@@ -1,0 +1,54 @@
+"""Closest points of two segments. (Ericson, Real-Time Collision Detection, 5.1.9; Lumelsky, 1985)"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from collision_monitor._jit import device
+from collision_monitor.tolerances import SEGMENT_PARALLEL_SIN2
+
+
+@device
+def clamp(value: float) -> float:
+    """Into -1 ... 1."""
+    return min(max(value, -1.0), 1.0)
+
+
+@device
+def segment_segment(
+    ux: float, uy: float, uz: float, vx: float, vy: float, vz: float, px: float, py: float, pz: float
+) -> Any:
+    """Parameters s, t in [-1, 1] of the closest points s u and p + t v (u, v: half segments; p: B's middle from A's).
+
+    Parallel segments answer with the middle of where they run beside each other.
+    """
+    a = ux * ux + uy * uy + uz * uz
+    e = vx * vx + vy * vy + vz * vz
+    b = ux * vx + uy * vy + uz * vz
+    c = ux * px + uy * py + uz * pz
+    f = vx * px + vy * py + vz * pz
+    if not a > 0.0:
+        return 0.0, clamp(-f / e) if e > 0.0 else 0.0
+    if not e > 0.0:
+        return clamp(c / a), 0.0
+    # |u x v|^2 from the product itself: a e - b^2 cancels
+    wx = uy * vz - uz * vy
+    wy = uz * vx - ux * vz
+    wz = ux * vy - uy * vx
+    cross2 = wx * wx + wy * wy + wz * wz
+    if cross2 <= SEGMENT_PARALLEL_SIN2 * a * e:
+        # B covers [c - |b|, c + |b|] / a of A's parameter; the middle of the overlap, or the nearer end
+        low = max(-1.0, (c - abs(b)) / a)
+        high = min(1.0, (c + abs(b)) / a)
+        s = clamp(0.5 * (low + high))
+    else:
+        # s of the lines' closest points: (p x v) . (u x v) / |u x v|^2
+        s = clamp(
+            ((py * vz - pz * vy) * wx + (pz * vx - px * vz) * wy + (px * vy - py * vx) * wz) / cross2
+        )
+    t = (b * s - f) / e
+    if t < -1.0:
+        return clamp((c - b) / a), -1.0
+    if t > 1.0:
+        return clamp((c + b) / a), 1.0
+    return s, t

@@ -1,0 +1,106 @@
+"""Support functions: the farthest point of a core shape in a direction, in the shape's own frame.
+
+A core is the shape without its radius: a point for a sphere, a segment for a capsule, else the shape itself.
+(Ericson, Real-Time Collision Detection, 9.5.4; van den Bergen, Collision Detection in Interactive 3D Environments, 4.3.4)
+"""
+
+from __future__ import annotations
+
+from math import copysign, sqrt
+from typing import Any
+
+from collision_monitor._jit import device
+from collision_monitor.geometry.shape_table import BOX, CAPSULE, CONE, CYLINDER, SPHERE
+
+
+@device
+def core_radius(kind: int, s0: float) -> float:
+    """Radius (m) by which the core of a shape is grown: 0 but for spheres and capsules."""
+    return s0 if kind == SPHERE or kind == CAPSULE else 0.0
+
+
+@device
+def support(
+    kind: int, s0: float, s1: float, s2: float, vertices: Any, start: int, count: int, dx: float, dy: float, dz: float
+) -> Any:
+    """Farthest point (x, y, z) of the core along d, which need not be a unit vector, and its vertex number or -1."""
+    if kind == BOX:
+        index = int(dx > 0.0) + 2 * int(dy > 0.0) + 4 * int(dz > 0.0)
+        return (
+            s0 if dx > 0.0 else -s0,
+            s1 if dy > 0.0 else -s1,
+            s2 if dz > 0.0 else -s2,
+            index,
+        )
+    if kind == CAPSULE:
+        return 0.0, 0.0, copysign(s1, dz), -1
+    if kind == CYLINDER or kind == CONE:
+        rim = sqrt(dx * dx + dy * dy)
+        if kind == CONE and dz * s1 >= s0 * rim - dz * s1:
+            return 0.0, 0.0, s1, -1
+        z = -s1 if kind == CONE else copysign(s1, dz)
+        if rim > 0.0:
+            return s0 * dx / rim, s0 * dy / rim, z, -1
+        return 0.0, 0.0, z, -1
+    if kind == SPHERE:
+        return 0.0, 0.0, 0.0, -1
+    best = start
+    most = dx * vertices[0, start] + dy * vertices[1, start] + dz * vertices[2, start]
+    for k in range(start + 1, start + count):
+        dot = dx * vertices[0, k] + dy * vertices[1, k] + dz * vertices[2, k]
+        if dot > most:
+            most = dot
+            best = k
+    return vertices[0, best], vertices[1, best], vertices[2, best], best
+
+
+@device
+def support_difference(
+    ka: int,
+    a0: float,
+    a1: float,
+    a2: float,
+    sa: int,
+    na: int,
+    kb: int,
+    b0: float,
+    b1: float,
+    b2: float,
+    sb: int,
+    nb: int,
+    vertices: Any,
+    work: Any,
+    dx: float,
+    dy: float,
+    dz: float,
+    at: int,
+) -> Any:
+    """Farthest point of B - A along d in A's frame; work[0:12] holds R_AB (row by row) and p_AB.
+
+    Writes a row at work[at:at + 8]: the difference, the point on A, the vertex numbers; returns the difference.
+    """
+    ax, ay, az, ia = support(ka, a0, a1, a2, vertices, sa, na, -dx, -dy, -dz)
+    lx, ly, lz, ib = support(
+        kb,
+        b0,
+        b1,
+        b2,
+        vertices,
+        sb,
+        nb,
+        work[0] * dx + work[3] * dy + work[6] * dz,
+        work[1] * dx + work[4] * dy + work[7] * dz,
+        work[2] * dx + work[5] * dy + work[8] * dz,
+    )
+    x = work[0] * lx + work[1] * ly + work[2] * lz + work[9] - ax
+    y = work[3] * lx + work[4] * ly + work[5] * lz + work[10] - ay
+    z = work[6] * lx + work[7] * ly + work[8] * lz + work[11] - az
+    work[at] = x
+    work[at + 1] = y
+    work[at + 2] = z
+    work[at + 3] = ax
+    work[at + 4] = ay
+    work[at + 5] = az
+    work[at + 6] = ia
+    work[at + 7] = ib
+    return x, y, z
