@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 States = NDArray[np.void]
 """An array of `records.STATE`."""
 
-MAX_STEP = 10.0
+MAX_STEP = 60.0
 """s: a longer step is a mistake of the caller's clock, and would take scenes with bounces and turns very long."""
 ROUND_OFF = 1e-6
 """s: more than the sum of millions of steps loses; less than any step."""
