@@ -79,7 +79,7 @@ def _run(first: int, reason: str, ros: machine.RosInstall | None) -> None:
         for stage in stages.STAGES[first:]:
             _stamp(stage).unlink(missing_ok=True)
         for stage in stages.STAGES[first:]:
-            print(f"  {stage.name:<12} {stage.text:<46}", end="", flush=True)
+            print(f"  {stage.name:<12} {stage.text:<34}", end="", flush=True)
             start = time.monotonic()
             inputs = stage.inputs(ros)
             try:

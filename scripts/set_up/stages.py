@@ -178,7 +178,7 @@ def _warm_up(ros: machine.RosInstall | None, log: IO[str]) -> None:
 
 STAGES = (
     Stage("environment", "making .venv", _environment_inputs, _make_environment),
-    Stage("packages", "installing ROS 2, NumPy, numba and the tools", _packages_inputs, _install_packages),
+    Stage("packages", "installing Python packages", _packages_inputs, _install_packages),
     Stage("messages", "building collision_monitor_msgs", _messages_inputs, _build_messages),
     Stage("package", "installing collision-monitor", _package_inputs, _install_package),
     Stage("warm-up", "compiling the kernels", _warm_up_inputs, _warm_up),
