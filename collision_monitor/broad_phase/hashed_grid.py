@@ -60,8 +60,10 @@ def make_hashed_grid(capacity: int) -> HashedGrid:
 @device
 def _level_of(width):  # type: ignore[no-untyped-def]
     """The finest level whose cells are at least `width` wide."""
+    if not width < 2.0**62:
+        return LEVELS - 1
     exponent = frexp(width)[1] if width > 0.0 else -LEVEL_OFFSET
-    return min(max(exponent + LEVEL_OFFSET, 0), LEVELS - 1)
+    return max(exponent + LEVEL_OFFSET, 0)
 
 
 @device

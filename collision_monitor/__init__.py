@@ -1,0 +1,82 @@
+"""What touches now, what will touch next, when, how sure that is and what it costs to know.
+
+    monitor         Monitor, StepResult, StepStatus        the core: states in, contacts and predictions out
+    profiles        Profile                                the settings that trade speed for accuracy
+    shapes, poses   Sphere, Box, …, Pose, Motion           what objects are made of and where they are
+    description     ObjectDescription                      an object with its shapes, group and bounds
+    errors          CollisionMonitorError and its kinds    what can be wrong with an input
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "Monitor": "monitor",
+    "StepResult": "monitor",
+    "StepStatus": "monitor",
+    "Profile": "profiles",
+    "ObjectDescription": "description",
+    "Pose": "geometry.pose",
+    "Motion": "geometry.pose",
+    "Sphere": "geometry.shapes",
+    "Box": "geometry.shapes",
+    "Capsule": "geometry.shapes",
+    "Cylinder": "geometry.shapes",
+    "Cone": "geometry.shapes",
+    "ConvexHull": "geometry.shapes",
+    "Mesh": "geometry.shapes",
+    "HalfSpace": "geometry.shapes",
+    "Circle": "geometry.shapes",
+    "Polygon": "geometry.shapes",
+    "CollisionMonitorError": "errors",
+    "InputError": "errors",
+    "ShapeError": "errors",
+    "PoseError": "errors",
+    "ProfileError": "errors",
+    "UnsupportedError": "errors",
+    "MessageError": "errors",
+    "SessionError": "errors",
+    "Refusal": "errors",
+}
+__all__ = ["__version__", *_HOME]
+
+if TYPE_CHECKING:
+    from collision_monitor.description import ObjectDescription as ObjectDescription
+    from collision_monitor.errors import CollisionMonitorError as CollisionMonitorError
+    from collision_monitor.errors import InputError as InputError
+    from collision_monitor.errors import MessageError as MessageError
+    from collision_monitor.errors import PoseError as PoseError
+    from collision_monitor.errors import ProfileError as ProfileError
+    from collision_monitor.errors import Refusal as Refusal
+    from collision_monitor.errors import SessionError as SessionError
+    from collision_monitor.errors import ShapeError as ShapeError
+    from collision_monitor.errors import UnsupportedError as UnsupportedError
+    from collision_monitor.geometry.pose import Motion as Motion
+    from collision_monitor.geometry.pose import Pose as Pose
+    from collision_monitor.geometry.shapes import Box as Box
+    from collision_monitor.geometry.shapes import Capsule as Capsule
+    from collision_monitor.geometry.shapes import Circle as Circle
+    from collision_monitor.geometry.shapes import Cone as Cone
+    from collision_monitor.geometry.shapes import ConvexHull as ConvexHull
+    from collision_monitor.geometry.shapes import Cylinder as Cylinder
+    from collision_monitor.geometry.shapes import HalfSpace as HalfSpace
+    from collision_monitor.geometry.shapes import Mesh as Mesh
+    from collision_monitor.geometry.shapes import Polygon as Polygon
+    from collision_monitor.geometry.shapes import Sphere as Sphere
+    from collision_monitor.monitor import Monitor as Monitor
+    from collision_monitor.monitor import StepResult as StepResult
+    from collision_monitor.monitor import StepStatus as StepStatus
+    from collision_monitor.profiles import Profile as Profile
+
+
+def __getattr__(name: str) -> Any:
+    """Import on first use: `collision-monitor --help` must not wait for the kernels."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value

@@ -1,0 +1,497 @@
+"""The monitor: what touches now and what will touch next, step by step. The only stateful class of the core.
+
+A step goes one straight way: states in -> which bodies left their predicted motion -> whom could those meet ->
+when -> the event list -> the pairs that are due -> contacts and predictions out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from collision_monitor import records
+from collision_monitor.broad_phase.hashed_grid import make_hashed_grid, put_boxes, remove_boxes
+from collision_monitor.description import ObjectDescription
+from collision_monitor.errors import CollisionMonitorError, InputError, Refusal, UnsupportedError
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shape_table import ShapeTableBuilder
+from collision_monitor.geometry.shapes import HalfSpace, Shape, Sphere
+from collision_monitor.prediction import active_pairs, answers, candidates, tracking
+from collision_monitor.prediction.event_list import EventList
+from collision_monitor.prediction.motion import Bodies, grown, make_bodies
+from collision_monitor.prediction.time_of_impact import IMPACT
+from collision_monitor.profiles import Profile
+from collision_monitor.records import Model
+
+NANOSECOND = 1e-9
+
+_VERDICTS = {
+    tracking.UNKNOWN_ID: (Refusal.UNKNOWN_ID, "expected the id of an object that was described, got {id}"),
+    tracking.NON_FINITE: (
+        Refusal.NON_FINITE,
+        "object {id}: expected finite numbers up to 1e18 in pose and twist, got {row}",
+    ),
+    tracking.QUATERNION: (Refusal.QUATERNION, "object {id}: expected a unit quaternion within 1e-3, got {quaternion}"),
+    tracking.OLD: (Refusal.OLD, "object {id}: expected a state newer than its last one, or the object is static"),
+}
+
+
+@dataclass(frozen=True)
+class StepStatus:
+    """What a step did; the fields are those of MonitorStatus.msg."""
+
+    objects: int
+    objects_static: int
+    objects_unseen: int
+    objects_stale: int
+    contacts: int
+    predictions: int
+    unresolved: int
+    objects_moved: int
+    candidate_pairs: int
+    narrow_phase_tests: int
+    impact_queries: int
+    events_due: int
+    events_pending: int
+    deferred: int
+
+
+@dataclass(frozen=True, eq=False)
+class StepResult:
+    """The answers of one step: `contacts` (records.CONTACT), sorted by ids; `predictions` (records.PREDICTION), soonest first.
+
+    accepted is False where the whole step was refused for its stamp; the answers are then those of the last time.
+    """
+
+    stamp_ns: int
+    step: int
+    contacts: NDArray[np.void]
+    predictions: NDArray[np.void]
+    status: StepStatus
+    accepted: bool = True
+
+
+class Monitor:
+    """Keeps objects, follows their states, and tells contacts and predicted collisions at every step.
+
+    The answers are a function of the profile, the descriptions and the states in the order in which they were given:
+    no clock, no random numbers, the same bytes on every run.
+    """
+
+    def __init__(self, profile: str | Profile = "balanced") -> None:
+        self.profile = Profile.named(profile) if isinstance(profile, str) else profile
+        self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
+        self.last_refusal = ""
+        self.digest = 0
+        self._step = 0
+        self._slots: dict[int, int] = {}
+        self._names: dict[int, str] = {}
+        self._free: list[int] = []
+        self._top = 0  # slots below have been used
+        self._shapes = ShapeTableBuilder()
+        self._next_shape = np.full(64, -1, np.int32)
+        self._shape_index = np.zeros(64, np.uint32)
+        self._bodies: Bodies = make_bodies(64)
+        self._spin_radius = np.zeros(64)
+        self._grid = make_hashed_grid(64)
+        self._allowed: dict[int, frozenset[int]] = {}
+        self._allowed_keys = np.zeros(0, np.uint64)
+        self._origin_ns: int | None = None
+        self._now_ns = 0
+        self._jump_ns: int | None = None  # a refused stamp; the next message may confirm it
+        self._renewed: set[int] = set()  # slots whose description changed: predicted anew in the next step
+        self._events = EventList()
+        self._pairs = np.zeros(0, active_pairs.PAIR)
+        self._pair_events = np.zeros(0, IMPACT)
+        self._orphans: list[tuple[int, float]] = []  # contacts (key, since) that ended because an object was removed
+        self._ids = np.zeros(0, np.uint32)
+        self._ids_slots = np.zeros(0, np.int32)
+        self._candidates = np.zeros((1024, 2), np.int32)
+        self._last: StepResult | None = None
+
+    # ------------------------------------------------------------------ objects
+
+    @property
+    def ids(self) -> list[int]:
+        """The ids of all described objects, ascending."""
+        return sorted(self._slots)
+
+    def name(self, object_id: int) -> str:
+        """The object's name for people. Raises InputError for an unknown id."""
+        self._slot(object_id)
+        return self._names[object_id]
+
+    def _slot(self, object_id: int) -> int:
+        if object_id not in self._slots:
+            raise InputError(f"expected the id of an object that was described, got {object_id!r}")
+        return self._slots[object_id]
+
+    def add(self, object_id: int, shape: Shape | Sequence[tuple[Shape, Pose]], **fields: Any) -> None:
+        """Describe an object: one shape, or several with their poses in its frame.
+
+        The further fields are those of `ObjectDescription`: name, static, pose, group, mask, padding, model, allowed,
+        max_linear_acceleration, max_angular_acceleration. Raises as `describe` does.
+        """
+        self.describe(ObjectDescription(object_id, shape, **fields))
+
+    def describe(self, description: ObjectDescription) -> None:
+        """Take in a new object, or the new description of a known one, whose state is kept.
+
+        Raises InputError, ShapeError; UnsupportedError for a shape or model that is not offered.
+        """
+        d = description
+        if d.model not in (Model.AUTO, Model.EXACT):
+            raise UnsupportedError(f"object {d.object_id}: model {d.model.name}; supported are AUTO, EXACT")
+        if not d.static and any(isinstance(shape, HalfSpace) for shape, _ in d.shapes):
+            raise UnsupportedError(f"object {d.object_id}: a HalfSpace has no end and can only be static")
+        slots: list[int] = []
+        try:
+            for shape, offset in d.shapes:
+                slots.append(self._shapes.append(shape, offset, d.padding))
+        except CollisionMonitorError:
+            for slot in slots:
+                self._shapes.remove(slot)
+            raise
+        i = self._slots.get(d.object_id)
+        if i is None:
+            i = self._slots[d.object_id] = self._new_body()
+        else:
+            self._drop_shapes(i)
+        self._link_shapes(i, slots)
+        bodies, table = self._bodies, self._shapes.table
+        bodies.id[i], bodies.used[i] = d.object_id, True
+        bodies.group[i], bodies.mask[i] = d.group, d.mask
+        bodies.radius[i] = max(float(np.linalg.norm(table.local_position[s]) + table.radius[s]) for s in slots)
+        centred = len(slots) == 1 and isinstance(d.shapes[0][0], Sphere) and not table.local_position[slots[0]].any()
+        self._spin_radius[i] = 0.0 if centred else bodies.radius[i]
+        if d.static:
+            assert d.pose is not None
+            bodies.position[i], bodies.quaternion[i] = d.pose.position, d.pose.quaternion
+            bodies.linear[i] = bodies.angular[i] = 0.0
+            bodies.tube_0[i] = bodies.tube_1[i] = 0.0
+            bodies.seen[i] = True
+        elif bodies.static[i]:
+            bodies.seen[i] = False
+        bodies.static[i] = d.static
+        self._names[d.object_id] = d.name
+        self._allow(d.object_id, frozenset(d.allowed))
+        self._renewed.add(i)
+        self._ids = np.zeros(0, np.uint32)
+
+    def remove(self, object_id: int) -> None:
+        """Forget an object; its contacts end. Raises InputError for an unknown id."""
+        i = self._slot(object_id)
+        mine = (self._pairs["i"] == i) | (self._pairs["j"] == i)
+        for pair in self._pairs[mine & (self._pairs["touching"] == 1)]:
+            self._orphans.append((int(pair["key"]), float(pair["since"])))
+        self._pairs, self._pair_events = self._pairs[~mine], self._pair_events[~mine]
+        remove_boxes(self._grid, np.array([i], np.int32))
+        self._drop_shapes(i)
+        self._bodies.used[i] = self._bodies.seen[i] = self._bodies.static[i] = False
+        self._bodies.version[i] += 1
+        self._renewed.discard(i)
+        self._free.append(i)
+        del self._slots[object_id], self._names[object_id]
+        self._allow(object_id, frozenset())
+        self._ids = np.zeros(0, np.uint32)
+
+    def _new_body(self) -> int:
+        if self._free:
+            return self._free.pop()
+        if self._top == len(self._bodies.id):
+            capacity = 2 * self._top
+            self._bodies = grown(self._bodies, capacity)
+            self._spin_radius = np.resize(self._spin_radius, capacity)
+            old = self._grid
+            inside = np.flatnonzero(old.level >= 0).astype(np.int32)
+            self._grid = make_hashed_grid(capacity)
+            put_boxes(self._grid, inside, old.centre, old.half)
+        self._top += 1
+        return self._top - 1
+
+    def _link_shapes(self, i: int, slots: list[int]) -> None:
+        capacity = len(self._shapes.table.kind)
+        if len(self._next_shape) < capacity:
+            self._next_shape = np.concatenate([self._next_shape, np.full(capacity - len(self._next_shape), -1, np.int32)])
+            self._shape_index = np.concatenate(
+                [self._shape_index, np.zeros(capacity - len(self._shape_index), np.uint32)]
+            )
+        self._bodies.first_shape[i] = slots[0]
+        for index, slot in enumerate(slots):
+            self._shape_index[slot] = index
+            self._next_shape[slot] = slots[index + 1] if index + 1 < len(slots) else -1
+
+    def _drop_shapes(self, i: int) -> None:
+        slot = int(self._bodies.first_shape[i])
+        while slot >= 0:
+            self._shapes.remove(slot)
+            slot, self._next_shape[slot] = int(self._next_shape[slot]), -1
+        self._bodies.first_shape[i] = -1
+
+    def _allow(self, object_id: int, others: frozenset[int]) -> None:
+        if others == self._allowed.get(object_id, frozenset()):
+            return
+        self._allowed[object_id] = others
+        if not others:
+            del self._allowed[object_id]
+        keys = {(min(a, b) << 32) | max(a, b) for a, others in self._allowed.items() for b in others}
+        self._allowed_keys = np.array(sorted(keys), np.uint64)
+
+    # ------------------------------------------------------------------ steps
+
+    def refuse(self, reason: Refusal, text: str, count: int = 1) -> None:
+        """Count a refused input; also for what the layer above finds wrong."""
+        self.refused[reason] += count
+        self.last_refusal = text
+
+    def reset(self) -> None:
+        """Forget all states, events and contacts; the objects stay and are unseen until their next state."""
+        self._origin_ns = None
+        self._restart_clock()
+
+    def _restart_clock(self) -> None:
+        bodies = self._bodies
+        for pair in self._pairs[self._pairs["touching"] == 1]:
+            self._orphans.append((int(pair["key"]), float("nan")))
+        self._pairs, self._pair_events = self._pairs[:0], self._pair_events[:0]
+        self._events.clear()
+        bodies.seen[:] = bodies.static & bodies.used
+        bodies.version[:] += 1
+        remove_boxes(self._grid, np.arange(self._top, dtype=np.int32))
+        self._renewed = {i for i in range(self._top) if bodies.used[i]}
+
+    def step(self, stamp_ns: int, ids: ArrayLike, poses: Any = None, twists: Any = None) -> StepResult:
+        """Take in the states of some objects at `stamp_ns` and answer for all objects at the latest time so far.
+
+        Either ids (N,), poses (N, 7: position, quaternion xyzw), twists (N, 6: linear, angular; default 0), or as
+        `ids` a structured array of records.STATE. World frame, SI units.
+        Single rows that cannot be used are refused and counted (`refused`), never raised. Raises InputError for
+        arrays of another shape.
+        """
+        states = self._states(ids, poses, twists)
+        if not self._accept_time(int(stamp_ns)):
+            return self._repeat()
+        assert self._origin_ns is not None
+        now = (self._now_ns - self._origin_ns) * NANOSECOND
+        self._take(states, (int(stamp_ns) - self._origin_ns) * NANOSECOND)
+        self._step += 1
+        work = dict.fromkeys(
+            ("objects_moved", "candidate_pairs", "narrow_phase_tests", "impact_queries", "events_due", "deferred"), 0
+        )
+        new = self._predict_moved(now, work)
+        contacts = self._examine_active(new, now, work)
+        predictions, unresolved = self._predictions(now)
+        unresolved += int(np.count_nonzero(contacts["status"] == records.ContactStatus.UNRESOLVED))
+        status = self._status(now, contacts, predictions, unresolved, work)
+        for part in (contacts, predictions):
+            self.digest = int(answers.chain_digest(np.uint64(self.digest), part.view(np.uint64)))
+        self._last = StepResult(self._now_ns, self._step, contacts, predictions, status)
+        return self._last
+
+    def _states(self, ids: ArrayLike, poses: Any, twists: Any) -> NDArray[np.void]:
+        given = np.asarray(ids)
+        if given.dtype == records.STATE:
+            if given.ndim != 1:
+                raise InputError(f"states: expected one dimension, got shape {given.shape}")
+            return np.array(given)  # a copy: aligned, contiguous, and the caller's to change
+        try:
+            pose = np.asarray(poses, dtype=np.float64)
+            twist = np.zeros((len(given), 6)) if twists is None else np.asarray(twists, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError("poses and twists: expected arrays of numbers") from None
+        n = len(given) if given.ndim == 1 else -1
+        if n < 0 or pose.shape != (n, 7) or twist.shape != (n, 6):
+            raise InputError(
+                "expected ids (N,), poses (N, 7) and twists (N, 6), "
+                f"got shapes {given.shape}, {pose.shape} and {twist.shape}"
+            )
+        if n and not (np.issubdtype(given.dtype, np.integer) and given.min() >= 0 and given.max() < 2**32):
+            raise InputError(f"ids: expected integers from 0 to 4294967295, got {given.dtype}")
+        states = np.zeros(n, records.STATE)
+        states["id"] = given
+        states["position"], states["quaternion"] = pose[:, :3], pose[:, 3:]
+        states["linear"], states["angular"] = twist[:, :3], twist[:, 3:]
+        return states
+
+    def _accept_time(self, stamp_ns: int) -> bool:
+        """Move the clock to the stamp; False: the stamp jumps too far and no second message has confirmed it yet."""
+        if self._origin_ns is None:
+            self._origin_ns = self._now_ns = stamp_ns
+            self._jump_ns = None
+            return True
+        limit = int(self.profile.max_time_step / NANOSECOND)
+        if abs(stamp_ns - self._now_ns) <= limit:
+            self._now_ns = max(self._now_ns, stamp_ns)
+            self._jump_ns = None
+            return True
+        if self._jump_ns is not None and abs(stamp_ns - self._jump_ns) <= limit:
+            self._restart_clock()
+            self._origin_ns = self._now_ns = stamp_ns
+            self._jump_ns = None
+            return True
+        self._jump_ns = stamp_ns
+        seconds = (stamp_ns - self._now_ns) * NANOSECOND
+        self.refuse(
+            Refusal.TIME,
+            f"stamp: expected within {self.profile.max_time_step:g} s of the last one, got {seconds:+.3f} s; "
+            "the next message restarts the clock there if it agrees",
+        )
+        return False
+
+    def _repeat(self) -> StepResult:
+        if self._last is not None:
+            last = self._last
+            return StepResult(last.stamp_ns, last.step, last.contacts, last.predictions, last.status, accepted=False)
+        raise AssertionError("the first stamp is always accepted")
+
+    def _take(self, states: NDArray[np.void], time: float) -> None:
+        if len(states) == 0:
+            return
+        slots = self._slots_of(states["id"])
+        numbers = states.view(np.float64).reshape(len(states), -1)
+        verdicts = np.empty(len(states), np.uint8)
+        flags = np.ascontiguousarray(states["flags"])
+        if tracking.take_states(self._bodies, slots, numbers, flags, time, verdicts) == len(states):
+            return
+        for verdict, (reason, text) in _VERDICTS.items():
+            rows = np.flatnonzero(verdicts == verdict)
+            if len(rows):
+                row = states[rows[0]]
+                told = {"id": int(row["id"]), "quaternion": row["quaternion"].tolist()}
+                told["row"] = [*row["position"].tolist(), *row["linear"].tolist(), *row["angular"].tolist()]
+                self.refuse(reason, text.format(**told), len(rows))
+
+    def _slots_of(self, ids: NDArray[np.uint32]) -> NDArray[np.int32]:
+        """Slot of each id, -1 where unknown; messages usually name the same objects as the last one did."""
+        if not np.array_equal(ids, self._ids):
+            known = np.fromiter(self._slots, np.uint32, len(self._slots))
+            slot_of = np.fromiter(self._slots.values(), np.int32, len(self._slots))
+            order = np.argsort(known)
+            known, slot_of = known[order], slot_of[order]
+            at = np.searchsorted(known, ids)
+            at[at == len(known)] = 0
+            found = known[at] == ids if len(known) else np.zeros(len(ids), bool)
+            self._ids_slots = np.where(found, slot_of[at] if len(known) else -1, -1).astype(np.int32)
+            self._ids = ids.copy()
+        return self._ids_slots
+
+    def _predict_moved(self, now: float, work: dict[str, int]) -> NDArray[np.void]:
+        """Start the motion of bodies anew whose predictions no longer hold; their first impacts (IMPACT)."""
+        p, bodies = self.profile, self._bodies
+        moved = np.empty(self._top + len(self._renewed), np.int32)
+        n = tracking.find_moved(bodies, self._spin_radius, self._top, now, p.horizon, p.stale_acceleration, moved)
+        which = moved[:n]
+        if self._renewed:
+            renewed = np.array([i for i in self._renewed if bodies.seen[i]], np.int32)
+            which = np.union1d(which, renewed).astype(np.int32)
+            self._renewed.difference_update(renewed.tolist())
+        work["objects_moved"] = len(which)
+        if len(which) == 0:
+            return np.zeros(0, IMPACT)
+        tracking.restart_motion(
+            bodies, self._spin_radius, self._grid, which, now, p.horizon, 0.5 * p.horizon, p.contact_margin,
+            p.stale_acceleration, p.position_tolerance, p.velocity_tolerance, p.orientation_tolerance,
+            p.angular_velocity_tolerance,
+        )  # fmt: skip
+        is_new = np.zeros(self._top, np.bool_)
+        is_new[which] = True
+        while True:
+            n = candidates.find_candidates(bodies, self._grid, which, is_new, self._allowed_keys, self._candidates)
+            if n <= len(self._candidates):
+                break
+            self._candidates = np.zeros((2 * n, 2), np.int32)
+        work["candidate_pairs"] = n
+        events = np.zeros(n + 1, IMPACT)
+        hits, queries = candidates.predict_pairs(
+            self._shapes.table, self._next_shape, bodies, self._candidates[:n], now, p.contact_margin,
+            p.impact_tolerance, p.impact_iterations, events,
+        )  # fmt: skip
+        work["impact_queries"] += queries
+        return events[:hits]
+
+    def _examine_active(self, new: NDArray[np.void], now: float, work: dict[str, int]) -> NDArray[np.void]:
+        """Look at the pairs that are due or touch; the contacts (records.CONTACT). New events go into the list."""
+        p, bodies = self.profile, self._bodies
+        due = self._events.update(new, bodies.version, now)
+        work["events_due"] = len(due)
+        room = len(self._pairs) + len(due)
+        pairs = np.zeros(room, active_pairs.PAIR)
+        events = np.zeros(room, IMPACT)
+        order = np.argsort(due["key"], kind="stable")
+        n = active_pairs.unite(bodies, self._pairs, self._pair_events, due, order, pairs, events)
+        results = np.zeros((n + 1, active_pairs.RESULT))
+        later = np.zeros(n, IMPACT)
+        n, n_later, tests, queries = active_pairs.examine(
+            self._shapes.table, self._next_shape, bodies, pairs[:n], events[:n], now, p.contact_margin,
+            p.stale_acceleration, p.impact_tolerance, p.impact_iterations, results, later,
+        )  # fmt: skip
+        work["narrow_phase_tests"] += tests
+        work["impact_queries"] += queries
+        self._pairs, self._pair_events = pairs[:n], events[:n]
+        if n_later:
+            self._events.update(later[:n_later], bodies.version, now)
+        contacts = np.zeros(n, records.CONTACT)
+        n = answers.write_contacts(
+            self._pairs, results, self._shape_index, now,
+            contacts.view(np.float64).reshape(-1, 17),
+            contacts.view(np.uint32).reshape(-1, 34),
+            contacts.view(np.uint8).reshape(-1, 136),
+        )  # fmt: skip
+        return self._with_orphans(contacts[:n], now)
+
+    def _with_orphans(self, contacts: NDArray[np.void], now: float) -> NDArray[np.void]:
+        """Add the END of contacts whose object is gone."""
+        if not self._orphans:
+            return contacts
+        ended = np.zeros(len(self._orphans), records.CONTACT)
+        for row, (key, since) in zip(ended, self._orphans, strict=True):
+            for name in ("signed_distance", "error_bound", "point_a", "point_b", "normal", "closing_speed"):
+                row[name] = np.nan
+            row["id_a"], row["id_b"] = key >> 32, key & 0xFFFFFFFF
+            row["duration"] = now - since
+            row["phase"], row["point_count"] = records.Phase.END, 1
+            row["model_a"] = row["model_b"] = Model.EXACT
+        self._orphans.clear()
+        both = np.concatenate([contacts, ended])
+        return both[np.lexsort((both["phase"], both["id_b"], both["id_a"]))]
+
+    def _predictions(self, now: float) -> tuple[NDArray[np.void], int]:
+        p = self.profile
+        pending = self._events.events
+        within = int(np.searchsorted(pending["lower"], now + p.horizon, side="right"))
+        predictions = np.zeros(within + len(self._pairs), records.PREDICTION)
+        n, unresolved = answers.write_predictions(
+            self._pairs, self._pair_events, pending[:within], self._bodies, self._shape_index, now, p.horizon,
+            p.stale_after,
+            predictions.view(np.float64).reshape(-1, 16),
+            predictions.view(np.uint32).reshape(-1, 32),
+            predictions.view(np.uint8).reshape(-1, 128),
+        )  # fmt: skip
+        return predictions[:n], int(unresolved)
+
+    def _status(
+        self,
+        now: float,
+        contacts: NDArray[np.void],
+        predictions: NDArray[np.void],
+        unresolved: int,
+        work: dict[str, int],
+    ) -> StepStatus:
+        bodies, top = self._bodies, self._top
+        used, static, seen = bodies.used[:top], bodies.static[:top], bodies.seen[:top]
+        stale = used & seen & ~static & (now - bodies.time[:top] > self.profile.stale_after)
+        return StepStatus(
+            objects=len(self._slots),
+            objects_static=int(np.count_nonzero(used & static)),
+            objects_unseen=int(np.count_nonzero(used & ~seen)),
+            objects_stale=int(np.count_nonzero(stale)),
+            contacts=int(np.count_nonzero(contacts["phase"] != records.Phase.END)),
+            predictions=len(predictions),
+            unresolved=unresolved,
+            events_pending=len(self._events),
+            **work,
+        )

@@ -1,0 +1,1 @@
+"""Where objects will be and when they will meet."""

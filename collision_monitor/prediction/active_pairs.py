@@ -1,0 +1,200 @@
+"""The pairs that must be looked at in every step: those that touch, and those whose certified time has run out."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Final
+
+import numpy as np
+
+from collision_monitor._jit import device, kernel
+from collision_monitor.narrow_phase.dispatch import contact_within
+from collision_monitor.prediction.motion import quaternion_to_matrix, turn_quaternion
+from collision_monitor.prediction.time_of_impact import CLEAR, body_impact, closing_speed, make_scratch
+from collision_monitor.records import ContactStatus, Phase
+
+PAIR = np.dtype(
+    [
+        ("key", np.uint64),  # (smaller id << 32) | larger id; the set is sorted by it
+        ("i", np.int32),  # body slots; body i has the smaller id
+        ("j", np.int32),
+        ("since", np.float64),  # s after the monitor's origin: when it began to touch
+        ("touching", np.uint8),
+        ("touched", np.uint8),  # the same, one step before
+        ("leaving", np.uint8),  # reported once more (END), then dropped
+    ]
+)
+
+RESULT: Final = 20
+"""Numbers for each pair: what narrow_phase.dispatch.contact gives relative to body i, then by name below."""
+CLOSING: Final = 15
+BOUND: Final = 10
+SHAPE_I: Final = 16
+SHAPE_J: Final = 17
+STATUS: Final = 18
+
+TOUCHING: Final = int(ContactStatus.TOUCHING)
+UNRESOLVED: Final = int(ContactStatus.UNRESOLVED)
+PERSIST: Final = int(Phase.PERSIST)
+BEGIN: Final = int(Phase.BEGIN)
+END: Final = int(Phase.END)
+
+
+@kernel
+def unite(bodies, pairs, events, due, order, new_pairs, new_events):  # type: ignore[no-untyped-def]
+    """The active pairs with those that came due, by key; both have an event of their own at the same index.
+
+    Left out are pairs that do not touch and whose motion has changed (they were predicted anew), and pairs of bodies
+    that are gone. order (D,): of `due` by key. Returns how many there are.
+    """
+    n = k = m = 0
+    while k < pairs.size or m < order.size:
+        if k < pairs.size:
+            i, j = pairs[k].i, pairs[k].j
+            key = (np.uint64(bodies.id[i]) << np.uint64(32)) | np.uint64(bodies.id[j])
+            gone = not (bodies.used[i] and bodies.used[j]) or key != pairs[k].key
+            changed = bodies.version[i] != events[k].version_i or bodies.version[j] != events[k].version_j
+            if gone or pairs[k].leaving == 1 or (changed and pairs[k].touching == 0):
+                k += 1
+                continue
+        if k < pairs.size and (m >= order.size or pairs[k].key <= due[order[m]].key):
+            new_pairs[n] = pairs[k]
+            new_pairs[n].touched = pairs[k].touching
+            new_events[n] = events[k]
+            if m < order.size and pairs[k].key == due[order[m]].key:
+                new_events[n] = due[order[m]]
+                m += 1
+            k += 1
+        else:
+            event = due[order[m]]
+            new_events[n] = event
+            new_pairs[n].key, new_pairs[n].i, new_pairs[n].j = event.key, event.i, event.j
+            new_pairs[n].touched = new_pairs[n].touching = new_pairs[n].leaving = 0
+            new_pairs[n].since = np.nan
+            m += 1
+        n += 1
+    return n
+
+
+@device
+def _rotation_now(bodies, i, now, q, R):  # type: ignore[no-untyped-def]
+    """Rotation of body i at `now`, from its last state, into R; returns the time since that state."""
+    age = 0.0 if bodies.static[i] else now - bodies.time[i]
+    turn_quaternion(bodies.quaternion, i, bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2], age, q[0])
+    quaternion_to_matrix(q, 0, R)
+    return age
+
+
+@device
+def _shape_pose(table, s, R, R_shape):  # type: ignore[no-untyped-def]
+    x, y, z = table.local_position[s, 0], table.local_position[s, 1], table.local_position[s, 2]
+    for r in range(3):
+        for c in range(3):
+            R_shape[r, c] = (
+                R[r, 0] * table.local_rotation[s, 0, c]
+                + R[r, 1] * table.local_rotation[s, 1, c]
+                + R[r, 2] * table.local_rotation[s, 2, c]
+            )
+    return (
+        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
+        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
+        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
+    )
+
+
+@device
+def body_contact(table, next_shape, bodies, i, j, now, margin, stale_acceleration, scratch, q, result):  # type: ignore[no-untyped-def]
+    """Do bodies i and j touch at `now`, from their last states? The deepest contact of their shapes into result.
+
+    Not heard of for a time, a body may be off by what it could have accelerated: the bound says so, and a pair that
+    may touch within it counts as touching, UNRESOLVED. Returns (touching, narrow-phase tests made).
+    """
+    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
+    out = scratch.out
+    age_i = _rotation_now(bodies, i, now, q, R_i)
+    age_j = _rotation_now(bodies, j, now, q, R_j)
+    px = bodies.position[j, 0] - bodies.position[i, 0] + (bodies.linear[j, 0] * age_j - bodies.linear[i, 0] * age_i)
+    py = bodies.position[j, 1] - bodies.position[i, 1] + (bodies.linear[j, 1] * age_j - bodies.linear[i, 1] * age_i)
+    pz = bodies.position[j, 2] - bodies.position[i, 2] + (bodies.linear[j, 2] * age_j - bodies.linear[i, 2] * age_i)
+    widen = 0.5 * stale_acceleration * (age_i * age_i + age_j * age_j)
+    wanted = margin + widen
+    best = inf
+    tests = 0
+    if bodies.radius[i] + bodies.radius[j] < inf:
+        reach = bodies.radius[i] + bodies.radius[j] + wanted
+        if px * px + py * py + pz * pz > reach * reach * (1.0 + 1e-14):
+            return False, 0
+    a = bodies.first_shape[i]
+    while a >= 0:
+        oa = _shape_pose(table, a, R_i, R_a)
+        b = bodies.first_shape[j]
+        while b >= 0:
+            ob = _shape_pose(table, b, R_j, R_b)
+            x, y, z = px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]
+            tests += 1
+            limit = min(wanted, best)
+            if contact_within(table, a, b, R_a, R_b, x, y, z, limit, out, scratch.work) and out[0] < best:
+                best = out[0]
+                for c in range(3):
+                    out[4 + c] += oa[c]
+                    out[7 + c] += oa[c]
+                result[:15] = out[:15]
+                result[SHAPE_I], result[SHAPE_J] = a, b
+            b = next_shape[b]
+        a = next_shape[a]
+    if best == inf:
+        return False, tests
+    result[CLOSING] = closing_speed(bodies.linear, bodies.angular, i, j, px, py, pz, result)
+    result[BOUND] += widen
+    result[STATUS] = TOUCHING if best <= margin else UNRESOLVED
+    ti = age_i
+    for c in range(3):
+        at = bodies.position[i, c] + bodies.linear[i, c] * ti
+        result[4 + c] += at
+        result[7 + c] += at
+    return True, tests
+
+
+@kernel
+def examine(
+    table, next_shape, bodies, pairs, events, now, margin, stale_acceleration, tolerance, budget, results, later
+):  # fmt: skip  # type: ignore[no-untyped-def]
+    """Look at every active pair at `now`: contact into results (n, RESULT), and what does not touch is predicted on.
+
+    Pairs that stay active, or have just ended, are moved to the front of pairs and events; those that are certified
+    apart for a while go into `later` (IMPACT). Returns (active, later, narrow-phase tests, impact queries).
+    """
+    scratch = make_scratch()
+    q = np.empty((1, 4))
+    n = n_later = tests = queries = 0
+    for k in range(pairs.size):
+        i, j = pairs[k].i, pairs[k].j
+        touching, made = body_contact(
+            table, next_shape, bodies, i, j, now, margin, stale_acceleration, scratch, q, results[n]
+        )
+        tests += made
+        pair, event = pairs[k], events[k]
+        stays = touching
+        if not touching:
+            predicted = bodies.ref_time[i] == now or bodies.ref_time[j] == now
+            current = bodies.version[i] == event.version_i and bodies.version[j] == event.version_j
+            if current or not predicted:
+                end = min(bodies.cover[i], bodies.cover[j])
+                queries += body_impact(
+                    table, next_shape, bodies, i, j, now, end, margin, tolerance, budget, scratch, event
+                )
+                if event.status != CLEAR:
+                    if event.lower > now:
+                        later[n_later] = event
+                        n_later += 1
+                    else:
+                        stays = True
+        if stays or pair.touched == 1:
+            pairs[n] = pair
+            events[n] = event
+            if touching and pairs[n].touched == 0:
+                pairs[n].since = now
+            pairs[n].touching = 1 if touching else 0
+            pairs[n].leaving = 0 if stays else 1
+            n += 1
+    return n, n_later, tests, queries

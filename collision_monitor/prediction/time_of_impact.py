@@ -1,0 +1,402 @@
+"""Time of impact of two bodies at constant twist, as an interval whose lower end is safe.
+
+Conservative advancement along a separating axis (Mirtich 1996), with the rotation followed to first order: for a fixed
+unit axis n the gap after a time d is at least
+
+    gap + d n.v - [h_A(n + d n x w_A) - h_A(n)] - [h_B(-n - d n x w_B) - h_B(-n)] - (|w_A|^2 r_A + |w_B|^2 r_B) d^2 / 2
+
+where h is the support value of the body about its own origin and r its farthest point. The bound is concave in d, so a
+chord from 0 to any d lies below it and the chord's root is a safe advance. It is exact to second order, which makes the
+advancement converge quadratically where a bound by |w| r converges linearly.
+Lecture topics: "predict the time to collide", "Compute fractional time at which collision actually occurred".
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from collision_monitor._jit import device
+from collision_monitor.geometry.shape_table import SPHERE
+from collision_monitor.narrow_phase.dispatch import WORK_SIZE, contact, separation
+from collision_monitor.prediction.motion import turned
+from collision_monitor.prediction.support import support_value
+from collision_monitor.records import Method, PredictionStatus
+
+HIT: Final = int(PredictionStatus.HIT)
+UNRESOLVED: Final = int(PredictionStatus.UNRESOLVED)
+CLEAR: Final = 2
+CLOSED_FORM: Final = int(Method.CLOSED_FORM)
+CONSERVATIVE_ADVANCEMENT: Final = int(Method.CONSERVATIVE_ADVANCEMENT)
+
+IMPACT = np.dtype(
+    [
+        ("lower", np.float64),  # s after the monitor's origin, like all times here
+        ("upper", np.float64),
+        ("point_x", np.float64),
+        ("point_y", np.float64),
+        ("point_z", np.float64),
+        ("normal_x", np.float64),
+        ("normal_y", np.float64),
+        ("normal_z", np.float64),
+        ("closing_speed", np.float64),
+        ("key", np.uint64),  # (smaller id << 32) | larger id
+        ("i", np.int32),  # body slots; body i has the smaller id
+        ("j", np.int32),
+        ("version_i", np.uint32),
+        ("version_j", np.uint32),
+        ("shape_i", np.int32),  # slots in the shape table
+        ("shape_j", np.int32),
+        ("status", np.uint8),
+        ("method", np.uint8),
+    ]
+)
+"""One predicted impact. The versions tell whether the motions it rests on still hold."""
+
+
+class Scratch(NamedTuple):
+    """Room for one thread's intermediate results, so that the kernels allocate nothing."""
+
+    rotation: Any  # (4, 3, 3)
+    out: Any  # (16,)
+    work: Any  # (WORK_SIZE,)
+
+
+@device
+def make_scratch():  # type: ignore[no-untyped-def]
+    """Scratch for one thread."""
+    return Scratch(np.empty((4, 3, 3)), np.zeros(16), np.zeros(WORK_SIZE))
+
+
+@device
+def sphere_interval(dx, dy, dz, vx, vy, vz, reach, growth, end):  # type: ignore[no-untyped-def]
+    """First and last time in [0, end] at which |d + v t| <= reach + growth t; (inf, inf): never.
+
+    Closed form; the root is taken as c / (-b + sqrt(D)), which does not cancel (Numerical Recipes 5.6).
+    The result is widened by the round-off of the discriminant: the first time is never late.
+    """
+    c = dx * dx + dy * dy + dz * dz - reach * reach
+    a = vx * vx + vy * vy + vz * vz - growth * growth
+    b = dx * vx + dy * vy + dz * vz - reach * growth
+    if c <= 0.0:
+        first = 0.0
+        if a <= 0.0:
+            return first, end
+        return first, min(end, (-b + sqrt(max(b * b - a * c, 0.0))) / a)
+    if b >= 0.0 and a >= 0.0:
+        return inf, inf
+    discriminant = b * b - a * c
+    if discriminant < -1e-14 * b * b:
+        return inf, inf
+    root = sqrt(max(discriminant, 0.0))
+    if root - b <= 0.0:
+        return inf, inf
+    first = c / (root - b)
+    if first > end:
+        return inf, inf
+    first *= 1.0 - 1e-7 if discriminant < 1e-14 * b * b else 1.0 - 1e-14
+    if a <= 0.0:
+        return first, end
+    return first, min(end, (root - b) / a)
+
+
+@device
+def _place(table, bodies, i, s, t, R_body, R_shape):  # type: ignore[no-untyped-def]
+    """Body i's rotation at time t into R_body, its shape s's into R_shape; returns the shape's offset in the world."""
+    turned(
+        bodies.ref_rotation[i],
+        bodies.ref_angular[i, 0],
+        bodies.ref_angular[i, 1],
+        bodies.ref_angular[i, 2],
+        t - bodies.ref_time[i],
+        R_body,
+    )
+    lx, ly, lz = table.local_position[s, 0], table.local_position[s, 1], table.local_position[s, 2]
+    for r in range(3):
+        for c in range(3):
+            R_shape[r, c] = (
+                R_body[r, 0] * table.local_rotation[s, 0, c]
+                + R_body[r, 1] * table.local_rotation[s, 1, c]
+                + R_body[r, 2] * table.local_rotation[s, 2, c]
+            )
+    return (
+        R_body[0, 0] * lx + R_body[0, 1] * ly + R_body[0, 2] * lz,
+        R_body[1, 0] * lx + R_body[1, 1] * ly + R_body[1, 2] * lz,
+        R_body[2, 0] * lx + R_body[2, 1] * ly + R_body[2, 2] * lz,
+    )
+
+
+@device
+def _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, d):  # type: ignore[no-untyped-def]
+    """Lower bound on the gap along n after d seconds; turn_*: n x w, h_*: the support values at d = 0."""
+    value = gap + d * rate - curvature * d * d
+    if table.kind[a] != SPHERE and (turn_a[0] != 0.0 or turn_a[1] != 0.0 or turn_a[2] != 0.0):
+        m = support_value(table, a, R_a, n[0] + d * turn_a[0], n[1] + d * turn_a[1], n[2] + d * turn_a[2])
+        value -= m - h_a
+    if table.kind[b] != SPHERE and (turn_b[0] != 0.0 or turn_b[1] != 0.0 or turn_b[2] != 0.0):
+        m = support_value(table, b, R_b, -n[0] - d * turn_b[0], -n[1] - d * turn_b[1], -n[2] - d * turn_b[2])
+        value -= m - h_b
+    return value
+
+
+@device
+def _safe_advance(table, a, b, R_a, R_b, n, turn_a, turn_b, rate, curvature, gap, remaining):  # type: ignore[no-untyped-def]
+    """A time d in (0, remaining] up to which the gap along n stays positive; close to the last such time."""
+    h_a = support_value(table, a, R_a, n[0], n[1], n[2])
+    h_b = support_value(table, b, R_b, -n[0], -n[1], -n[2])
+    high = remaining
+    f_high = _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, high)
+    if f_high >= 0.0:
+        return remaining
+    low, f_low = 0.0, gap
+    for _ in range(5):
+        middle = low + (high - low) * (f_low / (f_low - f_high))  # root of the chord: below the concave bound
+        f = _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, middle)
+        if not (middle > low and f > 0.0):
+            break
+        drop = f_low - f
+        if drop > 0.0:
+            # beyond the two points their line lies above the bound: its root is past the last safe time
+            far = middle + f * ((middle - low) / drop)
+            if far < high:
+                high = far
+                f_high = _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, high)
+        low, f_low = middle, f
+        if f <= 0.05 * gap or f_high >= 0.0:
+            break
+    if f_high >= 0.0:
+        return high
+    return low
+
+
+@device
+def shape_impact(table, bodies, i, j, a, b, begin, end, tube_0, tube_1, tolerance, budget, scratch):  # type: ignore[no-untyped-def]
+    """When the gap between shape a of body i and shape b of body j first is within the wanted one.
+
+    begin, end: seconds after the monitor's origin; the wanted gap is tube_0 + tube_1 (t - begin) (m).
+    Returns (status, t, queries): no time in [begin, t) is within the wanted gap; at t it is within tolerance of it
+    (HIT), t is end (CLEAR), or the budget of distance queries ran out (UNRESOLVED).
+    """
+    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
+    wa = (bodies.ref_angular[i, 0], bodies.ref_angular[i, 1], bodies.ref_angular[i, 2])
+    wb = (bodies.ref_angular[j, 0], bodies.ref_angular[j, 1], bodies.ref_angular[j, 2])
+    v = (
+        bodies.ref_linear[j, 0] - bodies.ref_linear[i, 0],
+        bodies.ref_linear[j, 1] - bodies.ref_linear[i, 1],
+        bodies.ref_linear[j, 2] - bodies.ref_linear[i, 2],
+    )
+    curvature = 0.5 * (_spin(table, a, wa) + _spin(table, b, wb))
+    t = begin
+    for query in range(1, budget + 1):
+        oa = _place(table, bodies, i, a, t, R_i, R_a)
+        ob = _place(table, bodies, j, b, t, R_j, R_b)
+        px, py, pz = relative_position(bodies, i, j, t)
+        gap = separation(
+            table, a, b, R_a, R_b, px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2], scratch.out, scratch.work
+        )
+        gap -= tube_0 + tube_1 * (t - begin)
+        if gap <= tolerance:
+            return HIT, t, query
+        n = (scratch.out[0], scratch.out[1], scratch.out[2])
+        turn_a = (n[1] * wa[2] - n[2] * wa[1], n[2] * wa[0] - n[0] * wa[2], n[0] * wa[1] - n[1] * wa[0])
+        turn_b = (n[1] * wb[2] - n[2] * wb[1], n[2] * wb[0] - n[0] * wb[2], n[0] * wb[1] - n[1] * wb[0])
+        rate = n[0] * v[0] + n[1] * v[1] + n[2] * v[2] - tube_1
+        rate -= turn_a[0] * oa[0] + turn_a[1] * oa[1] + turn_a[2] * oa[2]
+        rate += turn_b[0] * ob[0] + turn_b[1] * ob[1] + turn_b[2] * ob[2]
+        # aim at half the tolerance, so that the last advance ends inside it
+        d = _safe_advance(
+            table, a, b, R_a, R_b, n, turn_a, turn_b, rate, curvature, gap - 0.5 * tolerance, end - t
+        )
+        if d >= end - t:
+            return CLEAR, end, query
+        if t + d <= t:  # the resolution of the time is reached before the gap is
+            return UNRESOLVED, t, query
+        t += d
+    return UNRESOLVED, t, budget
+
+
+@device
+def relative_position(bodies, i, j, t):  # type: ignore[no-untyped-def]
+    """Position of body j relative to body i at time t (m): positions are subtracted before anything is added."""
+    ti, tj = t - bodies.ref_time[i], t - bodies.ref_time[j]
+    return (
+        bodies.ref_position[j, 0] - bodies.ref_position[i, 0] + (bodies.ref_linear[j, 0] * tj - bodies.ref_linear[i, 0] * ti),
+        bodies.ref_position[j, 1] - bodies.ref_position[i, 1] + (bodies.ref_linear[j, 1] * tj - bodies.ref_linear[i, 1] * ti),
+        bodies.ref_position[j, 2] - bodies.ref_position[i, 2] + (bodies.ref_linear[j, 2] * tj - bodies.ref_linear[i, 2] * ti),
+    )
+
+
+@device
+def _spin(table, s, w):  # type: ignore[no-untyped-def]
+    """|w|^2 times the farthest point of the shape from its body's origin: bound on the acceleration of its support."""
+    rate2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+    if rate2 == 0.0:
+        return 0.0
+    x, y, z = table.local_position[s, 0], table.local_position[s, 1], table.local_position[s, 2]
+    offset = sqrt(x * x + y * y + z * z)
+    if table.kind[s] == SPHERE:
+        return rate2 * offset  # turning about its own centre does not move a sphere
+    return rate2 * (offset + table.radius[s])
+
+
+@device
+def _contact_at(table, bodies, i, j, a, b, t, scratch):  # type: ignore[no-untyped-def]
+    """Contact of shape a of body i with shape b of body j at time t, into scratch.out; returns the signed distance.
+
+    out as narrow_phase.dispatch.contact gives it, but relative to body i's origin; out[15]: closing speed (m/s).
+    """
+    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
+    out = scratch.out
+    oa = _place(table, bodies, i, a, t, R_i, R_a)
+    ob = _place(table, bodies, j, b, t, R_j, R_b)
+    px, py, pz = relative_position(bodies, i, j, t)
+    contact(table, a, b, R_a, R_b, px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2], out, scratch.work)
+    for k in range(3):
+        out[4 + k] += oa[k]
+        out[7 + k] += oa[k]
+    out[15] = closing_speed(bodies.ref_linear, bodies.ref_angular, i, j, px, py, pz, out)
+    return out[0]
+
+
+@device
+def closing_speed(linear, angular, i, j, px, py, pz, out):  # type: ignore[no-untyped-def]
+    """Speed (m/s) at which the witness points of a contact approach along its normal; p: body j relative to body i."""
+    ax, ay, az = out[4], out[5], out[6]
+    bx, by, bz = out[7] - px, out[8] - py, out[9] - pz
+    vx = linear[j, 0] - linear[i, 0] + (angular[j, 1] * bz - angular[j, 2] * by) - (angular[i, 1] * az - angular[i, 2] * ay)
+    vy = linear[j, 1] - linear[i, 1] + (angular[j, 2] * bx - angular[j, 0] * bz) - (angular[i, 2] * ax - angular[i, 0] * az)
+    vz = linear[j, 2] - linear[i, 2] + (angular[j, 0] * by - angular[j, 1] * bx) - (angular[i, 0] * ay - angular[i, 1] * ax)
+    return -(vx * out[1] + vy * out[2] + vz * out[3])
+
+
+@device
+def _touching_by(table, bodies, i, j, a, b, t, end, tube_0, tube_1, begin, margin, tolerance, scratch):  # type: ignore[no-untyped-def]
+    """A time in [t, end] at which they overlap by more than the tube, whatever the motions inside it; inf: none found.
+
+    Newton steps on the signed distance from the safe time t. The contact at that time is left in scratch.out.
+    """
+    for _ in range(12):
+        distance = _contact_at(table, bodies, i, j, a, b, t, scratch)
+        excess = distance - margin + tube_0 + tube_1 * (t - begin)
+        if excess <= 0.0:
+            return t
+        speed = scratch.out[15] - tube_1
+        if speed <= 0.0 or t >= end:
+            return inf
+        t = min(end, t + 1.001 * (excess + tolerance) / speed)
+    return inf
+
+
+@device
+def body_impact(table, next_shape, bodies, i, j, begin, end, margin, tolerance, budget, scratch, event):  # type: ignore[no-untyped-def]
+    """First impact of bodies i and j in [begin, end] into the IMPACT record `event`; returns distance queries made.
+
+    event.status = CLEAR where there is none. Overlapping or within `margin` (m) already is an impact at begin.
+    The reference motions and their tubes are read from `bodies`; ids decide which body counts as i.
+    """
+    if bodies.id[i] > bodies.id[j]:
+        i, j = j, i
+    event.i, event.j = i, j
+    event.key = (np.uint64(bodies.id[i]) << np.uint64(32)) | np.uint64(bodies.id[j])
+    event.version_i, event.version_j = bodies.version[i], bodies.version[j]
+    event.status, event.method = CLEAR, CONSERVATIVE_ADVANCEMENT
+    event.lower = event.upper = inf
+    event.shape_i, event.shape_j = -1, -1
+    tube_1 = bodies.tube_1[i] + bodies.tube_1[j]
+    tube_0 = bodies.tube_0[i] + bodies.tube_0[j]
+    tube_0 += bodies.tube_1[i] * (begin - bodies.ref_time[i]) + bodies.tube_1[j] * (begin - bodies.ref_time[j])
+    px, py, pz = relative_position(bodies, i, j, begin)
+    vx = bodies.ref_linear[j, 0] - bodies.ref_linear[i, 0]
+    vy = bodies.ref_linear[j, 1] - bodies.ref_linear[i, 1]
+    vz = bodies.ref_linear[j, 2] - bodies.ref_linear[i, 2]
+    # the time in which the bounding spheres overlap holds every impact
+    first, last = 0.0, end - begin
+    reach = bodies.radius[i] + bodies.radius[j] + margin
+    if reach < inf:
+        first, last = sphere_interval(px, py, pz, vx, vy, vz, reach + tube_0, tube_1, last)
+        if not first <= last:
+            return 0
+    a, b = bodies.first_shape[i], bodies.first_shape[j]
+    if (
+        table.kind[a] == SPHERE
+        and table.kind[b] == SPHERE
+        and next_shape[a] < 0
+        and next_shape[b] < 0
+        and _centred(table, a)
+        and _centred(table, b)
+    ):
+        _sphere_impact(bodies, i, j, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, begin, first, end, event)
+        return 1
+    queries = 0
+    stop = begin + last
+    while a >= 0:
+        b = bodies.first_shape[j]
+        while b >= 0:
+            status, t, n = shape_impact(
+                table, bodies, i, j, a, b, begin + first, stop,
+                tube_0 + tube_1 * first + margin, tube_1, tolerance, budget, scratch,
+            )  # fmt: skip
+            queries += n
+            if status != CLEAR and t < event.lower:
+                event.lower, event.status = t, status
+                event.shape_i, event.shape_j = a, b
+                stop = t
+            b = next_shape[b]
+        a = next_shape[a]
+    if event.status == CLEAR:
+        return queries
+    a, b = event.shape_i, event.shape_j
+    t = _touching_by(table, bodies, i, j, a, b, event.lower, end, tube_0, tube_1, begin, margin, tolerance, scratch)
+    event.upper = t
+    event.status = HIT if t < inf else UNRESOLVED
+    at = t if t < inf else event.lower
+    _set_geometry(event, bodies, i, at, scratch.out)
+    return queries
+
+
+@device
+def _centred(table, s):  # type: ignore[no-untyped-def]
+    return table.local_position[s, 0] == 0.0 and table.local_position[s, 1] == 0.0 and table.local_position[s, 2] == 0.0
+
+
+@device
+def _set_geometry(event, bodies, i, t, out):  # type: ignore[no-untyped-def]
+    """Where and how they meet, from a contact at time t relative to body i."""
+    ti = t - bodies.ref_time[i]
+    event.point_x = bodies.ref_position[i, 0] + bodies.ref_linear[i, 0] * ti + 0.5 * (out[4] + out[7])
+    event.point_y = bodies.ref_position[i, 1] + bodies.ref_linear[i, 1] * ti + 0.5 * (out[5] + out[8])
+    event.point_z = bodies.ref_position[i, 2] + bodies.ref_linear[i, 2] * ti + 0.5 * (out[6] + out[9])
+    event.normal_x, event.normal_y, event.normal_z = out[1], out[2], out[3]
+    event.closing_speed = out[15]
+
+
+@device
+def _sphere_impact(bodies, i, j, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, begin, first, end, event):  # type: ignore[no-untyped-def]
+    """Two spheres: closed form for both ends of the interval."""
+    event.method = CLOSED_FORM
+    event.shape_i, event.shape_j = a, b
+    event.lower = begin + first
+    sure = inf
+    if reach - tube_0 > 0.0:
+        sure, _ = sphere_interval(px, py, pz, vx, vy, vz, reach - tube_0, -tube_1, end - begin)
+        if reach - tube_0 - tube_1 * sure <= 0.0:  # the tube has outgrown the spheres: nothing is sure any more
+            sure = inf
+    event.status = HIT if sure < inf else UNRESOLVED
+    # rounded up: the closed form errs by a few units in the last place, near a graze by their square root
+    event.upper = begin + sure * (1.0 + 2e-7) if sure < inf else inf
+    t = first if sure == inf else sure
+    dx, dy, dz = px + vx * t, py + vy * t, pz + vz * t
+    length = sqrt(dx * dx + dy * dy + dz * dz)
+    if length > 0.0:
+        nx, ny, nz = dx / length, dy / length, dz / length
+    else:
+        nx, ny, nz = 0.0, 0.0, 1.0
+    ti = begin + t - bodies.ref_time[i]
+    half = bodies.radius[i] / (bodies.radius[i] + bodies.radius[j]) * length
+    event.point_x = bodies.ref_position[i, 0] + bodies.ref_linear[i, 0] * ti + half * nx
+    event.point_y = bodies.ref_position[i, 1] + bodies.ref_linear[i, 1] * ti + half * ny
+    event.point_z = bodies.ref_position[i, 2] + bodies.ref_linear[i, 2] * ti + half * nz
+    event.normal_x, event.normal_y, event.normal_z = nx, ny, nz
+    event.closing_speed = -(vx * nx + vy * ny + vz * nz)
