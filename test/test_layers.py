@@ -26,7 +26,7 @@ LAYERS = (
     {"session"},
     {"ros", "cli"},
 )
-"""From the bottom up. A module imports its own layer and those below; what is not listed is free (errors, records …)."""
+"""From the bottom up. A module imports its own layer and those below; the rest is free (errors, records …)."""
 
 WITHOUT_ROS = """
 import importlib, importlib.abc, sys

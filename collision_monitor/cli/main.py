@@ -1,4 +1,4 @@
-"""`collision-monitor`: parse the command line, run the command, turn what can go wrong into one line and an exit code."""
+"""`collision-monitor`: parse the command line, run the command, turn errors into one line and an exit code."""
 
 from __future__ import annotations
 

@@ -127,8 +127,8 @@ def choose_python(ros: RosInstall | None, probe: Callable[[str], Python | None] 
         wanted = f"python{ros.python[0]}.{ros.python[1]}"
         if ros.python < OLDEST:
             raise SetupError(
-                f"ROS 2 {ros.distro} runs on Python {ros.python[0]}.{ros.python[1]}, collision_monitor needs 3.11 or newer; "
-                "source ROS 2 Jazzy or newer, or run this in a shell without ROS to use the wheels"
+                f"ROS 2 {ros.distro} runs on Python {ros.python[0]}.{ros.python[1]}, collision_monitor needs 3.11 or "
+                "newer; source ROS 2 Jazzy or newer, or run this in a shell without ROS to use the wheels"
             )
         commands = [f"/usr/bin/{wanted}", wanted, "python3"]
         oldest = newest = ros.python
@@ -145,4 +145,5 @@ def choose_python(ros: RosInstall | None, probe: Callable[[str], Python | None] 
         raise SetupError(f"{in_range[0].path} is incomplete; install: sudo apt install {' '.join(in_range[0].missing)}")
     versions = f"{wanted} of ROS 2 {ros.distro}" if ros else "Python 3.11, 3.12 or 3.13"
     seen = ", ".join(f"{version[0]}.{version[1]}" for version in sorted({python.version for python in found})) or "none"
-    raise SetupError(f"no {versions} found (found: {seen}); install: sudo apt install {wanted} {wanted}-venv {wanted}-dev")
+    packages = f"{wanted} {wanted}-venv {wanted}-dev"
+    raise SetupError(f"no {versions} found (found: {seen}); install: sudo apt install {packages}")

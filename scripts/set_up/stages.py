@@ -1,4 +1,4 @@
-"""The stages of the set-up, in order. Each says what it depends on, does its work, and can be asked whether it holds."""
+"""The stages of the set-up, in order: what each depends on, what it does, and whether it still holds."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -125,7 +124,8 @@ def correct_exported_paths(log: IO[str]) -> None:
 
 def _messages_inputs(ros: machine.RosInstall | None) -> str:
     sources = ROOT / MESSAGES
-    return _digest(files=[sources / "CMakeLists.txt", sources / "package.xml", *sorted((sources / "msg").glob("*.msg"))])
+    messages = sorted((sources / "msg").glob("*.msg"))
+    return _digest(files=[sources / "CMakeLists.txt", sources / "package.xml", *messages])
 
 
 def _build_messages(ros: machine.RosInstall | None, log: IO[str]) -> None:
@@ -184,6 +184,11 @@ STAGES = (
     Stage("warm-up", "compiling the kernels", _warm_up_inputs, _warm_up),
 )
 
+MODULES = (
+    *("scipy", "numba", "trimesh", "fcl", "mcap", "rich", "matplotlib", "yaml"),
+    *("pytest", "hypothesis", "rosbags", "mypy", "colcon_core"),
+)
+
 _HEALTH = """
 import importlib.util, sys
 stage = "packages"
@@ -204,8 +209,6 @@ try:
 except Exception as error:
     sys.exit(f"{{stage}}: {{error!r}}")
 """
-
-MODULES = ("scipy", "numba", "trimesh", "fcl", "mcap", "rich", "matplotlib", "yaml", "pytest", "hypothesis", "mypy", "rosbags")
 
 
 def first_broken_stage(ros: machine.RosInstall | None) -> tuple[str, str] | None:

@@ -60,7 +60,7 @@ def test_our_own_environment_is_no_install(tmp_path: Path) -> None:
 def test_missing_ros_packages_are_named_as_apt_names_them(tmp_path: Path) -> None:
     prefix = make_ros(tmp_path, "python3.12", *(set(machine.ROS_PACKAGES) - {"rosidl_default_generators"}))
     ros = RosInstall("jazzy", (prefix,), (3, 12))
-    with pytest.raises(SetupError, match="sudo apt install ros-jazzy-rosidl-default-generators$"):
+    with pytest.raises(SetupError, match=r"sudo apt install ros-jazzy-rosidl-default-generators$"):
         machine.require_ros_packages(ros)
     (prefix / "share" / "rosidl_default_generators").mkdir()
     machine.require_ros_packages(ros)
@@ -81,7 +81,8 @@ def test_the_first_python_that_will_do(pythons: dict[str, tuple[int, int] | Pyth
 
 
 def test_no_usable_python_is_one_line_with_the_cure() -> None:
-    with pytest.raises(SetupError, match=r"found: 3\.9, 3\.14.*sudo apt install python3 python3-venv python3-dev") as error:
+    cure = r"found: 3\.9, 3\.14.*sudo apt install python3 python3-venv python3-dev"
+    with pytest.raises(SetupError, match=cure) as error:
         machine.choose_python(None, probe_of(python3=(3, 14), python3_11=(3, 9)))
     assert "\n" not in str(error.value)
 

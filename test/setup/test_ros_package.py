@@ -68,7 +68,8 @@ def test_ros2_run_finds_every_executable(install: Path) -> None:
 
 
 def test_the_installed_copy_runs_not_the_source(install: Path) -> None:
-    answer = run(install, sys.executable, "-P", "-c", "import collision_monitor; print(list(collision_monitor.__path__))")
+    code = "import collision_monitor; print(list(collision_monitor.__path__))"
+    answer = run(install, sys.executable, "-P", "-c", code)
     assert str(install) in answer.stdout, answer.stderr
 
 
