@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from collision_monitor import codec, records
 from collision_monitor.codec.status import LIVE_FIELDS
+from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import MessageError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import (
@@ -66,9 +67,9 @@ def random_records(dtype: np.dtype, count: int, seed: int = 0) -> np.ndarray:
 def examples() -> dict[str, bytes]:
     pose = Pose((1, 2, 3), (0, 0, 0.6, 0.8))
     descriptions = [
-        codec.Description(7, tuple((shape, pose) for shape in EVERY_SHAPE), name="Gabelstapler ü", allowed=(1, 2)),
-        codec.Description(8, ((Sphere(1.0), Pose()),), static=True, pose=pose, model=records.Model.OBB, padding=0.125),
-        codec.Description(9, remove=True),
+        ObjectDescription(7, tuple((shape, pose) for shape in EVERY_SHAPE), name="Gabelstapler ü", allowed=(1, 2)),
+        ObjectDescription(8, ((Sphere(1.0), Pose()),), static=True, pose=pose, model=records.Model.OBB, padding=0.125),
+        codec.Removal(9),
     ]
     return {
         "states": codec.encode_states(STAMP, "world", 42, random_records(records.STATE, 3), np.arange(36.0)),
@@ -142,8 +143,7 @@ def test_descriptions_come_back() -> None:
     assert column.pose is not None
     assert column.model == records.Model.OBB
     assert column.padding == 0.125
-    assert gone.remove
-    assert gone.object_id == 9
+    assert gone == codec.Removal(9)
     again = codec.encode_descriptions(back.stamp_ns, back.frame_id, back.objects, snapshot=True)
     assert codec.decode_descriptions(again).objects[0].name == forklift.name
 
@@ -224,11 +224,11 @@ def test_values_that_do_not_fit_are_refused_when_writing() -> None:
 
 def test_only_the_impossible_object_is_refused() -> None:
     """Each wrong byte below makes one object impossible; the one beside it is taken."""
-    good = codec.Description(1, ((Sphere(1.0), Pose()),))
+    good = ObjectDescription(1, ((Sphere(1.0), Pose()),))
     radius = 0.7071067811865476
 
     def with_bytes(old: bytes, new: bytes, **fields: object) -> codec.Descriptions:
-        marked = codec.Description(2, ((Sphere(radius), Pose()),), **fields)  # type: ignore[arg-type]
+        marked = ObjectDescription(2, ((Sphere(radius), Pose()),), **fields)  # type: ignore[arg-type]
         data = codec.encode_descriptions(0, "w", [marked, good])
         at = data.rindex(old, 0, data.index(mark) + len(mark))
         return codec.decode_descriptions(data[:at] + new + data[at + len(old) :])
@@ -250,7 +250,7 @@ def test_only_the_impossible_object_is_refused() -> None:
 
 
 def test_zero_group_and_mask_and_nan_acceleration_take_their_defaults() -> None:
-    it = codec.Description(1, ((Sphere(1.0), Pose()),), group=0, mask=0, max_linear_acceleration=float("nan"))
+    it = ObjectDescription(1, ((Sphere(1.0), Pose()),), group=0, mask=0, max_linear_acceleration=float("nan"))
     (back,) = codec.decode_descriptions(codec.encode_descriptions(0, "w", [it])).objects
     assert (back.group, back.mask, back.max_linear_acceleration) == (1, 0xFFFFFFFF, 0.0)
 

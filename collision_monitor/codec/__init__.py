@@ -12,8 +12,9 @@ from collision_monitor.codec.answers import (
     encode_predictions,
 )
 from collision_monitor.codec.descriptions import (
-    Description,
+    Change,
     Descriptions,
+    Removal,
     decode_descriptions,
     encode_descriptions,
 )
@@ -21,10 +22,11 @@ from collision_monitor.codec.states import States, decode_states, encode_states
 from collision_monitor.codec.status import Status, decode_status, encode_status
 
 __all__ = [
+    "Change",
     "Contacts",
-    "Description",
     "Descriptions",
     "Predictions",
+    "Removal",
     "States",
     "Status",
     "decode_contacts",

@@ -9,41 +9,32 @@ import numpy as np
 
 from collision_monitor.codec.cdr import Buffer, Floats, Ids, Reader, Writer, write_header
 from collision_monitor.codec.shapes import LEAST_SHAPE, make_shape, read_shape, write_shape
-from collision_monitor.errors import CollisionMonitorError, ShapeError
+from collision_monitor.description import ObjectDescription
+from collision_monitor.errors import CollisionMonitorError, InputError, ShapeError
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Shape
-from collision_monitor.records import Model
+from collision_monitor.geometry.shapes import Sphere
 
-ALL_GROUPS = 0xFFFFFFFF
+_ADD, _REMOVE = 0, 1
 
 
-@dataclass(frozen=True, eq=False)
-class Description:
-    """ObjectDescription: what an object is. `pose` is read for static objects only, and None otherwise."""
+@dataclass(frozen=True)
+class Removal:
+    """An ObjectDescription whose operation is REMOVE."""
 
     object_id: int
-    shapes: tuple[tuple[Shape, Pose], ...] = ()
-    name: str = ""
-    remove: bool = False
-    static: bool = False
-    pose: Pose | None = None
-    group: int = 1
-    mask: int = ALL_GROUPS
-    allowed: tuple[int, ...] = ()
-    padding: float = 0.0
-    model: Model = Model.AUTO
-    max_linear_acceleration: float = 0.0
-    max_angular_acceleration: float = 0.0
+
+
+Change = ObjectDescription | Removal
 
 
 @dataclass(frozen=True, eq=False)
 class Descriptions:
-    """ObjectDescriptionArray: the objects that can exist, and the ids of those that cannot with the reason."""
+    """ObjectDescriptionArray: the changes that can be made, in order, and for each of the others its id and why not."""
 
     stamp_ns: int
     frame_id: str
     snapshot: bool
-    objects: tuple[Description, ...]
+    objects: tuple[Change, ...]
     refused: tuple[tuple[int, str], ...] = ()
 
 
@@ -80,13 +71,15 @@ def decode_descriptions(data: Buffer) -> Descriptions:
     raw = [_read_description(reader) for _ in range(reader.count(_LEAST_DESCRIPTION, "objects"))]
     reader.finish()
 
-    objects: list[Description] = []
+    objects: list[Change] = []
     refused: list[tuple[int, str]] = []
     for each in raw:
         try:
-            objects.append(_description(each))
+            objects.append(_change(each))
         except CollisionMonitorError as error:
-            refused.append((each.object_id, str(error)))
+            what = f"object {each.object_id}"
+            text = str(error)
+            refused.append((each.object_id, text if text.startswith(what) else f"{what}: {text}"))
     return Descriptions(stamp_ns, frame_id, snapshot, tuple(objects), tuple(refused))
 
 
@@ -109,61 +102,53 @@ def _read_description(reader: Reader) -> _Raw:
     )
 
 
-def _description(raw: _Raw) -> Description:
-    """Raises ShapeError or PoseError."""
-    if raw.operation not in (0, 1):
-        raise ShapeError(f"operation: expected 0 (ADD) or 1 (REMOVE), got {raw.operation}")
-    if raw.operation == 1:
-        return Description(raw.object_id, remove=True)
-    if not raw.shapes:
-        raise ShapeError("shapes: expected at least one shape, got none")
+def _change(raw: _Raw) -> Change:
+    """Raises ShapeError, PoseError or InputError."""
+    if raw.operation == _REMOVE:
+        return Removal(raw.object_id)
+    if raw.operation != _ADD:
+        raise InputError(f"operation: expected 0 (ADD) or 1 (REMOVE), got {raw.operation}")
     if len(raw.shape_poses) not in (0, len(raw.shapes)):
-        raise ShapeError(
-            f"shape_poses: expected none or one for each of {len(raw.shapes)} shapes, got {len(raw.shape_poses)}"
-        )
-    if raw.model not in set(Model):
-        raise ShapeError(f"model: expected {min(Model)} to {max(Model)} (ObjectDescription.MODEL_*), got {raw.model}")
+        raise ShapeError(f"shape_poses: expected none or {len(raw.shapes)}, as shapes, got {len(raw.shape_poses)}")
     poses = [_pose(row) for row in raw.shape_poses] or [Pose()] * len(raw.shapes)
-    return Description(
+    return ObjectDescription(
         object_id=raw.object_id,
-        shapes=tuple((make_shape(*shape), pose) for shape, pose in zip(raw.shapes, poses, strict=True)),
+        shapes=[(make_shape(*shape), pose) for shape, pose in zip(raw.shapes, poses, strict=True)],
         name=raw.name,
         static=raw.static,
         pose=_pose(raw.pose) if raw.static else None,
-        group=raw.group or 1,
-        mask=raw.mask or ALL_GROUPS,
+        group=raw.group,
+        mask=raw.mask,
         allowed=tuple(raw.allowed.tolist()),
         padding=raw.padding,
-        model=Model(raw.model),
-        max_linear_acceleration=_nan_as_zero(raw.max_linear_acceleration),
-        max_angular_acceleration=_nan_as_zero(raw.max_angular_acceleration),
+        model=raw.model,  # type: ignore[arg-type]  # checked there
+        max_linear_acceleration=raw.max_linear_acceleration,
+        max_angular_acceleration=raw.max_angular_acceleration,
     )
-
-
-def _nan_as_zero(value: float) -> float:
-    return 0.0 if np.isnan(value) else value
 
 
 def _pose(row: Floats) -> Pose:
     return Pose(row[:3], row[3:])
 
 
-def encode_descriptions(
-    stamp_ns: int, frame_id: str, objects: Sequence[Description], *, snapshot: bool = False
-) -> bytes:
+def encode_descriptions(stamp_ns: int, frame_id: str, objects: Sequence[Change], *, snapshot: bool = False) -> bytes:
     """The inverse of `decode_descriptions`. Raises MessageError."""
     writer = Writer("ObjectDescriptionArray")
     write_header(writer, stamp_ns, frame_id)
     writer.scalar("u1", snapshot, "snapshot")
     writer.scalar("u4", len(objects), "objects")
     for each in objects:
-        _write_description(writer, each)
+        if isinstance(each, Removal):
+            it = ObjectDescription(each.object_id, Sphere(1.0))  # only the id is read of it
+            _write_description(writer, it, _REMOVE)
+        else:
+            _write_description(writer, each, _ADD)
     return writer.finish()
 
 
-def _write_description(writer: Writer, it: Description) -> None:
+def _write_description(writer: Writer, it: ObjectDescription, operation: int) -> None:
     writer.scalar("u4", it.object_id, "id")
-    writer.scalar("u1", it.remove, "operation")
+    writer.scalar("u1", operation, "operation")
     writer.string(it.name, "name")
     writer.scalar("u4", len(it.shapes), "shapes")
     for shape, _ in it.shapes:

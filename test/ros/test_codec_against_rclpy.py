@@ -170,19 +170,27 @@ def test_descriptions_are_written_as_rclpy_writes_them() -> None:
     pose.position.x, pose.orientation.z, pose.orientation.w = 1.5, 0.6, 0.8
     objects = []
     for k in range(9):
-        each = msg.ObjectDescription(id=k, name="n" * k, group=1 + k, mask=0xF, allowed=list(range(k)), model=k)
+        each = msg.ObjectDescription(id=k, name="n" * (k + 1), group=1 + k, mask=0xF, allowed=list(range(k)), model=k)
         each.shapes, each.shape_poses = shapes[: k + 2], [pose] * (k + 2)
         each.is_static, each.pose, each.padding, each.max_linear_acceleration = k % 2 == 0, Pose(), 0.25 * k, 1.0 * k
         objects.append(each)
-    objects.append(msg.ObjectDescription(id=99, operation=msg.ObjectDescription.REMOVE, group=1, mask=0xFFFFFFFF))
     message = msg.ObjectDescriptionArray(snapshot=True, objects=objects)
     message.header.stamp.sec, message.header.frame_id = 7, "world"
     data = serialize_message(message)
     it = codec.decode_descriptions(data)
     assert it.refused == ()
-    assert len(it.objects) == 10
+    assert len(it.objects) == 9
     again = codec.encode_descriptions(it.stamp_ns, it.frame_id, it.objects, snapshot=it.snapshot)
     assert deserialize_message(again, msg.ObjectDescriptionArray) == message
+
+
+def test_removals() -> None:
+    (theirs,) = deserialize_message(
+        codec.encode_descriptions(0, "world", [codec.Removal(99)]), msg.ObjectDescriptionArray
+    ).objects
+    assert (theirs.id, theirs.operation) == (99, msg.ObjectDescription.REMOVE)
+    message = msg.ObjectDescriptionArray(objects=[msg.ObjectDescription(id=99, operation=msg.ObjectDescription.REMOVE)])
+    assert codec.decode_descriptions(serialize_message(message)).objects == (codec.Removal(99),)
 
 
 def test_the_record_layouts_are_those_of_the_messages() -> None:

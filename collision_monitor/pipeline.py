@@ -1,0 +1,228 @@
+"""Message bytes in, the monitor, message bytes out: the one path that the node and the replay share."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor._version import VERSION
+from collision_monitor.codec import (
+    Removal,
+    States,
+    Status,
+    decode_descriptions,
+    decode_states,
+    encode_contacts,
+    encode_predictions,
+    encode_status,
+)
+from collision_monitor.description import ObjectDescription
+from collision_monitor.errors import CollisionMonitorError, InputError, MessageError, Refusal
+from collision_monitor.monitor import Monitor, StepResult
+from collision_monitor.profiles import Profile
+from collision_monitor.provenance import provenance
+
+Records = NDArray[np.void]
+
+STDDEVS: Final = ("position_stddev", "orientation_stddev", "velocity_stddev", "angular_velocity_stddev")
+
+LARGEST_WRAP: Final = 1 << 16
+"""A sequence number that falls is the counter's wrap at 2^32 if it lost at most this many messages, else a restart."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outputs:
+    """The answers of one step: complete CDR messages, and what they were made of."""
+
+    contacts: bytes
+    predictions: bytes
+    result: StepResult
+    digest: int
+
+
+class Pipeline:
+    """Feeds a Monitor with message bytes. No method raises for what a message holds: it is refused and counted."""
+
+    def __init__(self, profile: Profile | str = "balanced", frame_id: str = "world") -> None:
+        self.monitor = Monitor(profile)
+        self.frame_id = frame_id
+        self.messages_lost = 0
+        self._sequence: int | None = None
+        self._static: set[int] = set()
+        self._removed: dict[int, str] = {}  # since the last step: names that its answers may still need
+        self._last: StepResult | None = None
+
+    # -- in
+
+    def on_shapes(self, data: bytes) -> None:
+        """An ObjectDescriptionArray: add, replace, remove. An object that cannot be is refused, the others not."""
+        try:
+            message = decode_descriptions(data)
+        except MessageError as error:
+            self.monitor.refuse(Refusal.MALFORMED, str(error))
+            return
+        if not self._is_our_frame(message.frame_id, "ObjectDescriptionArray"):
+            return
+        for _, text in message.refused:
+            self.monitor.refuse(Refusal.SHAPE, text)
+        if message.snapshot:
+            # A refused object stays in the set: if it is known, it goes on being monitored as what it was.
+            kept = {each.object_id for each in message.objects} | {object_id for object_id, _ in message.refused}
+            for object_id in sorted(set(self.monitor.ids) - kept):
+                self._remove(object_id)
+        for each in message.objects:
+            if isinstance(each, Removal):
+                self._remove(each.object_id)
+            else:
+                self._describe(each)
+
+    def on_states(self, data: bytes) -> Outputs | None:
+        """An ObjectStateArray: one step. None: the message was refused as a whole and there is no new answer."""
+        try:
+            message = decode_states(data)
+        except MessageError as error:
+            self.monitor.refuse(Refusal.MALFORMED, str(error))
+            return None
+        self._count_lost(message.sequence)
+        if not self._is_our_frame(message.frame_id, "ObjectStateArray"):
+            return None
+        if len(message.covariance) not in (0, 12 * len(message.states)):
+            self.monitor.refuse(
+                Refusal.MALFORMED,
+                f"ObjectStateArray.covariance: expected none or 12 numbers for each of {len(message.states)} states, "
+                f"got {len(message.covariance)}",
+            )
+            return None
+        result = self.monitor.step(message.stamp_ns, _with_stddevs(message))
+        if not result.accepted:
+            return None
+        self._last = result
+        return self._outputs(result)
+
+    # -- out
+
+    def status(self, *, silent: bool = False, **live: Any) -> bytes:
+        """A MonitorStatus: the last step's counters, and the fields of `codec.status.LIVE_FIELDS` from the caller.
+
+        silent: states no longer arrive, so every moving object that was seen counts as stale.
+        """
+        monitor, last = self.monitor, self._last
+        if last is not None:
+            values = dataclasses.asdict(last.status)
+            values.update(stamp_ns=last.stamp_ns, step=last.step)
+        else:
+            objects, static = len(monitor.ids), len(self._static)
+            values = {"objects": objects, "objects_static": static, "objects_unseen": objects - static}
+        if silent:
+            values["objects_stale"] = values["objects"] - values["objects_static"] - values["objects_unseen"]
+        values.update({f"refused_{reason.value}": monitor.refused.get(reason, 0) for reason in Refusal})
+        return encode_status(
+            Status(
+                frame_id=self.frame_id,
+                digest=monitor.digest,
+                version=VERSION,
+                profile=monitor.profile.name,
+                last_refusal=monitor.last_refusal,
+                messages_lost=self.messages_lost,
+                **values,
+                **live,
+            )
+        )
+
+    def metadata(self, node: str = "") -> dict[str, str]:
+        """What a session needs to be replayed and compared: profile, frame, versions, determinism key."""
+        profile = json.dumps(self.monitor.profile.to_dict(), sort_keys=True)
+        return {**provenance(), "profile": profile, "frame_id": self.frame_id, "node": node}
+
+    # -- parts
+
+    def _is_our_frame(self, frame_id: str, message: str) -> bool:
+        """An empty frame is taken for ours."""
+        if frame_id in ("", self.frame_id):
+            return True
+        self.monitor.refuse(Refusal.FRAME, f"{message}: expected frame_id {self.frame_id!r}, got {frame_id!r}")
+        return False
+
+    def _describe(self, it: ObjectDescription) -> None:
+        try:
+            self.monitor.describe(it)
+        except CollisionMonitorError as error:
+            self.monitor.refuse(Refusal.SHAPE, str(error))
+            return
+        (self._static.add if it.static else self._static.discard)(it.object_id)
+
+    def _remove(self, object_id: int) -> None:
+        """Removing what is not there is no error: the sender's wish is met."""
+        with suppress(InputError):
+            self._removed[object_id] = self.monitor.name(object_id)
+            self.monitor.remove(object_id)
+            self._static.discard(object_id)
+
+    def _name(self, object_id: int) -> str:
+        """Also of an object whose contact ended because it was removed."""
+        try:
+            return self.monitor.name(object_id)
+        except InputError:
+            return self._removed[object_id]
+
+    def _count_lost(self, sequence: int) -> None:
+        last, self._sequence = self._sequence, sequence
+        if last is None or sequence == last:
+            return
+        gap = (sequence - last) % (1 << 32) - 1
+        if sequence > last or gap <= LARGEST_WRAP:
+            self.messages_lost += gap
+
+    def _outputs(self, result: StepResult) -> Outputs:
+        outputs = Outputs(
+            contacts=encode_contacts(
+                result.stamp_ns, self.frame_id, result.step, result.contacts, *self._mentioned(result.contacts)
+            ),
+            predictions=encode_predictions(
+                result.stamp_ns,
+                self.frame_id,
+                result.step,
+                self.monitor.profile.horizon,
+                result.predictions,
+                *self._mentioned(result.predictions),
+            ),
+            result=result,
+            digest=self.monitor.digest,
+        )
+        self._removed.clear()
+        return outputs
+
+    def _mentioned(self, answers: Records) -> tuple[NDArray[np.uint32], list[str]]:
+        """The ids in `answers`, ascending, and their names."""
+        ids = np.unique(np.concatenate([answers["id_a"], answers["id_b"]]))
+        return ids, [self._name(object_id) for object_id in ids.tolist()]
+
+
+def _with_stddevs(message: States) -> Records:
+    """A copy of the states whose standard deviations are numbers: unknown is 0, and covariances take their place."""
+    states = message.states.copy()
+    for name in STDDEVS:
+        states[name][np.isnan(states[name])] = 0.0
+    if len(message.covariance):
+        triangles = message.covariance.reshape(-1, 2, 6)
+        states["position_stddev"] = _largest_stddev(triangles[:, 0])
+        states["velocity_stddev"] = _largest_stddev(triangles[:, 1])
+    return states
+
+
+def _largest_stddev(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard deviation along the worst axis of covariances (n, 6), upper triangles: sqrt of the largest eigenvalue.
+
+    NaN (unknown) gives 0. What is no covariance gives a number that the monitor refuses: infinite or negative.
+    """
+    known = np.where(np.isfinite(triangles).all(axis=1, keepdims=True), triangles, 0.0)
+    matrices = known[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
+    largest = np.linalg.eigvalsh(matrices)[:, -1]
+    largest[np.isinf(triangles).any(axis=1)] = np.inf
+    return np.sign(largest) * np.sqrt(np.abs(largest))

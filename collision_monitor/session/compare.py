@@ -1,0 +1,114 @@
+"""Where two answers differ first, in words: which pair, which field, both values."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.codec import Status, decode_contacts, decode_predictions, decode_status
+from collision_monitor.codec.status import LIVE_FIELDS
+from collision_monitor.errors import MessageError
+
+_DECODERS: Final[dict[str, tuple[Callable[[bytes], Any], str]]] = {
+    "ContactArray": (decode_contacts, "contacts"),
+    "PredictedCollisionArray": (decode_predictions, "predictions"),
+}
+_NOT_COMPARED: Final = {*LIVE_FIELDS, "version", "objects_stale"}
+
+
+@dataclass(frozen=True)
+class Difference:
+    """The first difference of a replay."""
+
+    step: int
+    topic: str
+    element: str
+    field: str
+    recorded: str
+    replayed: str
+
+    def __str__(self) -> str:
+        where = f"step {self.step}, {self.topic}, {self.element}"
+        return f"{where}: {self.field}: recorded {self.recorded}, replayed {self.replayed}"
+
+
+def compare_answers(kind: str, topic: str, step: int, recorded: bytes, replayed: bytes) -> Difference | None:
+    """The first difference of two messages of type `kind`; None where all bytes are equal."""
+    if recorded == replayed:
+        return None
+    decode, rows = _DECODERS[kind]
+    ours = decode(replayed)
+    try:
+        theirs = decode(recorded)
+    except MessageError as error:
+        return Difference(step, topic, "the message", "bytes", str(error), f"{len(replayed)} bytes that can be read")
+    return (
+        _row_difference(rows, topic, step, theirs, ours)
+        or _field_difference(topic, step, theirs, ours, rows)
+        or Difference(step, topic, "the message", "padding", f"{len(recorded)} bytes", f"{len(replayed)} bytes")
+    )
+
+
+def compare_status(topic: str, step: int, recorded: bytes, replayed: bytes) -> Difference | None:
+    """The first difference of two MonitorStatus in what depends on the inputs alone."""
+    ours = decode_status(replayed)
+    try:
+        theirs = decode_status(recorded)
+    except MessageError as error:
+        return Difference(step, topic, "the message", "bytes", str(error), "a status")
+    for field in dataclasses.fields(Status):
+        a, b = getattr(theirs, field.name), getattr(ours, field.name)
+        if field.name not in _NOT_COMPARED and a != b:
+            return Difference(step, topic, "the status", field.name, repr(a), repr(b))
+    # A watchdog that hears nothing calls every moving object stale: that is a matter of the clock.
+    silent = theirs.objects - theirs.objects_static - theirs.objects_unseen
+    if theirs.objects_stale not in (ours.objects_stale, silent):
+        return Difference(
+            step, topic, "the status", "objects_stale", repr(theirs.objects_stale), repr(ours.objects_stale)
+        )
+    return None
+
+
+def _row_difference(rows: str, topic: str, step: int, theirs: Any, ours: Any) -> Difference | None:
+    a, b = getattr(theirs, rows), getattr(ours, rows)
+    common = min(len(a), len(b))
+    unequal = np.flatnonzero(_as_bytes(a[:common]) != _as_bytes(b[:common]))
+    if unequal.size:
+        at = int(unequal[0])
+        element = f"{rows}[{at}] {_pair(theirs, a[at])}"
+        for name in a.dtype.names:
+            if a[at][name].tobytes() != b[at][name].tobytes():
+                return Difference(step, topic, element, name, _text(a[at][name]), _text(b[at][name]))
+    if len(a) != len(b):
+        longer, side = (theirs, "only recorded") if len(a) > len(b) else (ours, "only replayed")
+        element = f"{rows}[{common}] {_pair(longer, getattr(longer, rows)[common])}, {side}"
+        return Difference(step, topic, element, "number", str(len(a)), str(len(b)))
+    return None
+
+
+def _field_difference(topic: str, step: int, theirs: Any, ours: Any, rows: str) -> Difference | None:
+    for field in dataclasses.fields(ours):
+        a, b = getattr(theirs, field.name), getattr(ours, field.name)
+        if field.name != rows and not np.array_equal(a, b):
+            return Difference(step, topic, "the message", field.name, _text(a), _text(b))
+    return None
+
+
+def _as_bytes(rows: NDArray[Any]) -> NDArray[Any]:
+    """Each row as one opaque value, so that NaN equals NaN and 0.0 is not -0.0."""
+    return np.ascontiguousarray(rows).view(f"V{rows.dtype.itemsize}")
+
+
+def _pair(message: Any, row: Any) -> str:
+    names = dict(zip(message.ids.tolist(), message.names, strict=False))
+    a, b = int(row["id_a"]), int(row["id_b"])
+    return f"pair ({a} {names.get(a, '')!r}, {b} {names.get(b, '')!r})"
+
+
+def _text(value: Any) -> str:
+    return repr(value.tolist() if isinstance(value, np.ndarray | np.generic) else value)

@@ -1,0 +1,61 @@
+"""The text and the hash of a message type, as sessions carry them so that any reader can decode the messages."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from collision_monitor.errors import SessionError
+
+_SEPARATOR = "=" * 80
+_FIELD = re.compile(r"^\s*(?:([a-z]\w*)/)?([A-Z]\w*)(?:\[[^]]*\])?\s+[a-z]\w*", re.MULTILINE)
+
+
+def definition(type_name: str) -> str:
+    """The definition of `package/msg/Name`, then those of all types it is made of (rosbag2's `ros2msg`).
+
+    Raises SessionError where no ROS prefix or source tree holds one of them.
+    """
+    names = [type_name]
+    for name in names:  # grows while it is walked
+        package = name.split("/")[0]
+        for other, nested in _FIELD.findall(_read(name, "msg")):
+            full = f"{other or package}/msg/{nested}"
+            if full not in names:
+                names.append(full)
+    rest = [f"{_SEPARATOR}\nMSG: {name.replace('/msg/', '/')}\n{_read(name, 'msg')}" for name in names[1:]]
+    return "\n".join([_read(type_name, "msg"), *rest])
+
+
+def type_hash(type_name: str) -> str:
+    """The RIHS01 hash from the installed type description; empty where only the sources are there."""
+    try:
+        description = json.loads(_read(type_name, "json"))
+    except (SessionError, ValueError):
+        return ""
+    hashes = {each["type_name"]: each["hash_string"] for each in description["type_hashes"]}
+    return str(hashes.get(type_name, ""))
+
+
+def _read(type_name: str, suffix: str) -> str:
+    package, _, name = type_name.split("/")
+    for root in _roots():
+        path = root / package / "msg" / f"{name}.{suffix}"
+        if path.is_file():
+            return path.read_text(encoding="utf-8")
+    raise SessionError(
+        f"{type_name}: expected {package}/msg/{name}.{suffix} under a ROS prefix (AMENT_PREFIX_PATH, {sys.prefix}), "
+        "got none: build and source collision_monitor_msgs"
+    )
+
+
+def _roots() -> Iterator[Path]:
+    """Where packages are installed, then the source tree of this one."""
+    for prefix in [*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), sys.prefix]:
+        if prefix:
+            yield Path(prefix) / "share"
+    yield Path(__file__).parents[2]

@@ -1,0 +1,162 @@
+"""Feeds the recorded inputs to the same pipeline and compares its answers with the recorded ones, byte by byte."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from collision_monitor.errors import SessionError
+from collision_monitor.pipeline import Pipeline
+from collision_monitor.provenance import provenance
+from collision_monitor.session.compare import Difference, compare_answers, compare_status
+from collision_monitor.session.reader import Recorded, Session
+
+
+class Verdict(IntEnum):
+    """What a replay came to; the values are the exit codes of `collision-monitor replay`."""
+
+    IDENTICAL = 0
+    DIVERGED = 3
+    NOT_COMPARABLE = 4
+
+
+@dataclass
+class Report:
+    """What a replay did and found. Durations in s; digest: of all answers that the replay gave."""
+
+    steps: int = 0
+    messages: int = 0
+    compared: int = 0
+    differing: int = 0
+    digest: int = 0
+    recorded_duration: float = 0.0
+    replay_duration: float = 0.0
+    first_difference: Difference | None = None
+    notes: list[str] = field(default_factory=list)
+    foreign: bool = False
+    hole: bool = False
+
+    @property
+    def verdict(self) -> Verdict:
+        """Equal bytes are equal wherever they come from; unequal ones say something only of the same program."""
+        if self.first_difference is not None:
+            return Verdict.NOT_COMPARABLE if self.foreign else Verdict.DIVERGED
+        return Verdict.NOT_COMPARABLE if self.hole or not self.compared else Verdict.IDENTICAL
+
+    @property
+    def speed(self) -> float:
+        """Times real time."""
+        return self.recorded_duration / self.replay_duration if self.replay_duration > 0 else 0.0
+
+
+def replay(session: Session, *, threads: int | None = None, progress: Callable[[Report], None] | None = None) -> Report:
+    """Replay a session; threads: instead of the recorded number. progress: called after every message.
+
+    Raises SessionError where the session holds no inputs or cannot be read.
+    """
+    profile = session.profile if threads is None else session.profile.replace(threads=threads)
+    run = _Replay(Pipeline(profile, frame_id=session.frame_id))
+    report = run.report
+    report.foreign = session.metadata.get("determinism_key") != provenance()["determinism_key"]
+    if report.foreign:
+        report.notes.append(f"recorded by another program: {_provenance_differences(session)}")
+
+    topics: set[str] = set()
+    inputs = 0
+    begin: int | None = None
+    started = time.perf_counter()
+    for count, message in enumerate(session.messages()):
+        missing = (message.sequence - count) & 0xFFFFFFFF
+        if missing:
+            report.hole = True
+            report.notes.append(
+                f"{missing} messages are missing after step {report.steps}: replayed and compared up to there"
+            )
+            break
+        topics.add(message.topic)
+        inputs += message.type in ("ObjectStateArray", "ObjectDescriptionArray")
+        begin = message.log_time if begin is None else begin
+        run.feed(message)
+        report.messages = count + 1
+        report.recorded_duration = (message.log_time - begin) * 1e-9
+        report.replay_duration = time.perf_counter() - started
+        if progress is not None:
+            progress(report)
+    if not inputs and not report.hole:
+        found = ", ".join(sorted(topics)) or "no messages at all"
+        raise SessionError(f"{session.path}: expected object states and shapes, found {found}")
+    report.notes += session.damage
+    if not (report.hole or session.damage):
+        run.expect_nothing_more()
+    if not report.compared:
+        report.notes.append("the session holds no answers to compare with")
+    return report
+
+
+class _Replay:
+    """The pipeline, and the answers that it gave and the session has not shown yet."""
+
+    def __init__(self, pipeline: Pipeline) -> None:
+        self.pipeline = pipeline
+        self.report = Report(digest=pipeline.monitor.digest)
+        self._open: dict[str, bytes] = {}
+        self._differed_in = -1
+
+    def feed(self, message: Recorded) -> None:
+        """One recorded message: an input is processed, an answer is compared."""
+        match message.type:
+            case "ObjectDescriptionArray":
+                self.expect_nothing_more()
+                self.pipeline.on_shapes(message.data)
+            case "ObjectStateArray":
+                self.expect_nothing_more()
+                outputs = self.pipeline.on_states(message.data)
+                if outputs is not None:
+                    self._open = {"ContactArray": outputs.contacts, "PredictedCollisionArray": outputs.predictions}
+                    self.report.steps = outputs.result.step
+                    self.report.digest = outputs.digest
+            case "ContactArray" | "PredictedCollisionArray":
+                self._compare(message)
+            case "MonitorStatus":
+                self.report.compared += 1
+                step = self.report.steps
+                self._note(compare_status(message.topic, step, message.data, self.pipeline.status()))
+
+    def expect_nothing_more(self) -> None:
+        """All answers of the last step must have been in the session."""
+        for kind, data in self._open.items():
+            nothing = f"a {kind} of {len(data)} bytes"
+            self._note(Difference(self.report.steps, kind, "the message", "presence", "nothing", nothing))
+        self._open = {}
+
+    def _compare(self, message: Recorded) -> None:
+        self.report.compared += 1
+        step = self.report.steps
+        replayed = self._open.pop(message.type, None)
+        if replayed is None:
+            recorded = f"a {message.type} of {len(message.data)} bytes"
+            self._note(Difference(step, message.topic, "the message", "presence", recorded, "nothing"))
+        else:
+            self._note(compare_answers(message.type, message.topic, step, message.data, replayed))
+
+    def _note(self, difference: Difference | None) -> None:
+        if difference is None:
+            return
+        if self.report.first_difference is None:
+            self.report.first_difference = difference
+        if self._differed_in != difference.step:
+            self._differed_in = difference.step
+            self.report.differing += 1
+
+
+def _provenance_differences(session: Session) -> str:
+    """What is not the same as here, in words."""
+    theirs, ours = session.metadata, provenance()
+    differences = [
+        f"{name} {theirs.get(name, 'unknown')} (here {ours[name]})"
+        for name in ours
+        if name != "determinism_key" and theirs.get(name) != ours[name]
+    ]
+    return ", ".join(differences) or "the same versions with other source files"
