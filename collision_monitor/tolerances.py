@@ -64,3 +64,7 @@ FLAT: Final = 1e-12
 
 SLIVER_SIN2: Final = 1e-20
 """sin^2 between two edges of an EPA face below which the face is a sliver: it closes the surface but has no normal."""
+
+THIN_SIN2: Final = 1e-8
+"""sin^2 between two edges of a GJK triangle below which its plane is not used for the closest point's direction.
+The plane's normal is wrong by EPSILON / sin = 2e-12 at the limit."""

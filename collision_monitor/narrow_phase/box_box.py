@@ -6,7 +6,7 @@ Axes 0-2 are A's face normals, 3-5 are B's, 6 + 3 i + j is the cross product of 
 
 from __future__ import annotations
 
-from math import copysign, inf, sqrt
+from math import copysign, sqrt
 from typing import Any
 
 from collision_monitor._jit import device

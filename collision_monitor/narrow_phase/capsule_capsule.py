@@ -27,7 +27,7 @@ def capsule_capsule_contact(
     wy = py + t * vy - s * uy
     wz = pz + t * vz - s * uz
     distance, nx, ny, nz = direction(wx, wy, wz)
-    if abs(s) < 1.0 and abs(t) < 1.0 or distance <= TOUCHING * (la + lb):
+    if (abs(s) < 1.0 and abs(t) < 1.0) or distance <= TOUCHING * (la + lb):
         cx = uy * vz - uz * vy
         cy = uz * vx - ux * vz
         cz = ux * vy - uy * vx

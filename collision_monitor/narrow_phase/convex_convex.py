@@ -6,6 +6,7 @@ are those of the cores less the radii, exactly. (van den Bergen, 2003, 4.5)
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any
 
 from collision_monitor._jit import device
@@ -66,7 +67,7 @@ def convex_contact(
     ra = table.margin[a] + core_radius(ka, table.size[a, 0])
     rb = table.margin[b] + core_radius(kb, table.size[b, 0])
     size = core_size(table, a) + core_size(table, b)
-    count, upper, lower, x, y, z = gjk(
+    count, _, lower, x, y, z = gjk(
         ka, table.size[a, 0], table.size[a, 1], table.size[a, 2], table.vertex_start[a], table.vertex_count[a],
         kb, table.size[b, 0], table.size[b, 1], table.size[b, 2], table.vertex_start[b], table.vertex_count[b],
         table.vertices, work, size, limit + ra + rb,
@@ -74,15 +75,20 @@ def convex_contact(
     if count == 0:
         return False
     if lower > 0.0:
+        # the length of a point of B - A, a true upper bound where the simplex is too thin for `upper` to be one
+        wx = wy = wz = 0.0
         qx = qy = qz = 0.0
         for k in range(count):
             at = SIMPLEX + 8 * k
             w = work[WEIGHTS + k]
+            wx += w * work[at]
+            wy += w * work[at + 1]
+            wz += w * work[at + 2]
             qx += w * work[at + 3]
             qy += w * work[at + 4]
             qz += w * work[at + 5]
-        distance = upper
-        bound = upper - lower
+        distance = max(sqrt(wx * wx + wy * wy + wz * wz), lower)
+        bound = distance - lower
     else:
         curved = ka == CYLINDER or ka == CONE or kb == CYLINDER or kb == CONE
         upper, lower, x, y, z, qx, qy, qz = epa(

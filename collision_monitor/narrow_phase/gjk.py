@@ -12,7 +12,7 @@ from typing import Any, Final
 from collision_monitor._jit import device
 from collision_monitor.narrow_phase.answer import SIMPLEX
 from collision_monitor.narrow_phase.support import support_difference
-from collision_monitor.tolerances import EPSILON, FLAT, GJK_RELATIVE, TOUCHING
+from collision_monitor.tolerances import EPSILON, FLAT, GJK_RELATIVE, THIN_SIN2, TOUCHING
 
 MAX_ITERATIONS: Final = 64
 
@@ -75,8 +75,12 @@ def _triangle(
 
 
 @device
-def _face_vector(i: int, j: int, k: int, work: Any) -> Any:
-    """Projection of the origin on the plane of three simplex points: exact in direction where a weighted sum is not."""
+def _face_vector(i: int, j: int, k: int, wj: float, wk: float, work: Any) -> Any:
+    """Projection of the origin on the plane of three simplex points; of a thin triangle the weighted point.
+
+    Near contact the plane's normal is exact in direction where the weighted sum is round-off; of a thin triangle
+    the normal is.
+    """
     a, b, c = SIMPLEX + 8 * i, SIMPLEX + 8 * j, SIMPLEX + 8 * k
     ax, ay, az = work[a], work[a + 1], work[a + 2]
     ux, uy, uz = work[b] - ax, work[b + 1] - ay, work[b + 2] - az
@@ -84,7 +88,10 @@ def _face_vector(i: int, j: int, k: int, work: Any) -> Any:
     nx = uy * vz - uz * vy
     ny = uz * vx - ux * vz
     nz = ux * vy - uy * vx
-    f = (nx * ax + ny * ay + nz * az) / (nx * nx + ny * ny + nz * nz)
+    n2 = nx * nx + ny * ny + nz * nz
+    if n2 <= THIN_SIN2 * (ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz):
+        return ax + wj * ux + wk * vx, ay + wj * uy + wk * vy, az + wj * uz + wk * vz
+    f = (nx * ax + ny * ay + nz * az) / n2
     return nx * f, ny * f, nz * f
 
 
@@ -122,7 +129,7 @@ def _reduce(work: Any, count: int, size: float) -> Any:
         work[WEIGHTS + 1] = wb
         work[WEIGHTS + 2] = wc
         if inside:
-            x, y, z = _face_vector(0, 1, 2, work)
+            x, y, z = _face_vector(0, 1, 2, wb, wc, work)
             return 3, False, x, y, z
         x = wa * ax + wb * bx + wc * cx
         y = wa * ay + wb * by + wc * cy
@@ -156,7 +163,7 @@ def _reduce(work: Any, count: int, size: float) -> Any:
         outside = True
         wa, wb, wc, inside = _triangle(ax, ay, az, bx, by, bz, cx, cy, cz)
         if inside:
-            x, y, z = _face_vector(i, j, k, work)
+            x, y, z = _face_vector(i, j, k, wb, wc, work)
         else:
             x = wa * ax + wb * bx + wc * cx
             y = wa * ay + wb * by + wc * cy
