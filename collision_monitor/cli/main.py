@@ -7,7 +7,6 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from importlib.util import find_spec
 from typing import Final
 
 from collision_monitor._version import VERSION
@@ -30,7 +29,8 @@ examples:
   collision-monitor world crossing                        play one of them
   collision-monitor replay run.mcap                       the same answers again, without ROS; differences are shown
 
-exit codes: 0 done, 1 error, 2 wrong usage, 3 a replay gave other answers than the recording, 130 interrupted
+exit codes: 0 done, 1 error, 2 wrong usage, 3 a replay gave other answers than the recording, 4 it could not be compared,
+130 interrupted
 `collision-monitor COMMAND --help` says more about each command.
 """
 
@@ -46,8 +46,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"%(prog)s {VERSION}")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in COMMANDS:
-        if find_spec(f"collision_monitor.cli.{name}"):
-            import_module(f"collision_monitor.cli.{name}").add_parser(subparsers)
+        import_module(f"collision_monitor.cli.{name}").add_parser(subparsers)
     return parser
 
 

@@ -1,0 +1,49 @@
+"""What README.md says is so: its example runs, its tables are complete, its files and targets exist."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from collision_monitor.profiles import Profile
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text()
+
+
+def test_the_python_example_predicts_the_impact() -> None:
+    (example,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    answer = subprocess.run([sys.executable, "-c", example], capture_output=True, text=True, timeout=300)
+    assert answer.returncode == 0, answer.stderr
+    times = re.fullmatch(r"cart meets ball in (\S+) to (\S+) s\n", answer.stdout)
+    assert times, answer.stdout
+    # The cart's front is at 0.5 m, the ball's near side at 3.5 m: 3 m at 2 m/s.
+    assert float(times[1]) <= 1.5 <= float(times[2]) + 1e-3
+
+
+@pytest.mark.parametrize("setting", Profile.fields(), ids=lambda setting: setting.name)
+def test_the_parameter_table_has_every_setting_with_its_default(setting: Profile) -> None:
+    assert f"| `{setting.name}` | {setting.default:g} |" in README
+
+
+def test_every_linked_file_exists() -> None:
+    for document in ("README.md", "CONTRIBUTING.md"):
+        for target in re.findall(r"\]\((?!http)([^)#]+)\)", (ROOT / document).read_text()):
+            assert (ROOT / target).exists(), f"{document} links to {target}"
+
+
+def test_every_make_target_that_is_named_exists() -> None:
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    for document in ("README.md", "CONTRIBUTING.md"):
+        named = set(re.findall(r"(?:^    |`)make ([a-z-]+)", (ROOT / document).read_text(), re.MULTILINE))
+        assert named <= targets, f"{document} names {sorted(named - targets)}"
+
+
+def test_plain_make_lists_every_target() -> None:
+    listed = subprocess.run(["make", "-s"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert re.findall(r"^  make ([a-z-]+) +\S", listed, re.MULTILINE) == targets
