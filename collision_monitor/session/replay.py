@@ -91,6 +91,7 @@ def replay(session: Session, *, threads: int | None = None, progress: Callable[[
     if not (report.hole or session.damage):
         run.expect_nothing_more()
     if not report.compared:
+        report.first_difference, report.differing = None, 0
         report.notes.append("the session holds no answers to compare with")
     return report
 

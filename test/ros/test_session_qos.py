@@ -1,0 +1,28 @@
+"""The quality of service that a session states is the one that the node offers."""
+
+from __future__ import annotations
+
+import pytest
+
+qos = pytest.importorskip("collision_monitor.ros.qos")
+
+from collision_monitor.session.rosbag2 import TYPES, qos_profiles  # noqa: E402
+
+NODE = {
+    "ObjectStateArray": qos.STATES,
+    "ObjectDescriptionArray": qos.SHAPES,
+    "ContactArray": qos.ANSWERS,
+    "PredictedCollisionArray": qos.ANSWERS,
+    "MonitorStatus": qos.STATUS,
+}
+
+
+@pytest.mark.parametrize("name", TYPES)
+def test_the_recorded_profile_is_the_nodes(name: str) -> None:
+    (recorded,) = qos_profiles(name)
+    profile = NODE[name]
+    assert recorded["depth"] == profile.depth
+    assert recorded["history"] == profile.history.name.lower()
+    assert recorded["reliability"] == profile.reliability.name.lower()
+    assert recorded["durability"] in (profile.durability.name.lower(), "volatile")
+    assert (recorded["durability"] == "transient_local") == (profile.durability.name == "TRANSIENT_LOCAL")

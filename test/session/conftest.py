@@ -1,0 +1,19 @@
+"""A recorded session for all tests of this folder; they import the scene that is in it from beside them."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from session_scene import record
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished session of 50 steps; not to be changed."""
+    path = tmp_path_factory.mktemp("session") / "run.mcap"
+    record(path)
+    return path

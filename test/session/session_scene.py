@@ -1,0 +1,80 @@
+"""A small scene through the pipeline and the recorder, as the node does it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from collision_monitor import records
+from collision_monitor.codec import Removal, encode_descriptions, encode_states
+from collision_monitor.description import ObjectDescription
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Box, Capsule, Sphere
+from collision_monitor.pipeline import Pipeline
+from collision_monitor.session import Recorder
+
+NODE = "/object_monitor"
+TYPES = {
+    f"{NODE}/objects/shapes": "ObjectDescriptionArray",
+    f"{NODE}/objects/states": "ObjectStateArray",
+    f"{NODE}/contacts": "ContactArray",
+    f"{NODE}/predictions": "PredictedCollisionArray",
+    f"{NODE}/status": "MonitorStatus",
+}
+SHAPES, STATES, CONTACTS, PREDICTIONS, STATUS = TYPES
+START = 1_700_000_000_000_000_000
+STEP = 10_000_000
+
+
+def inputs(steps: int) -> Iterator[tuple[str, bytes]]:
+    """(topic, bytes): three kinds of bodies that bounce along x through each other, and everything that goes wrong."""
+    shapes = [Sphere(0.5), Box((1.0, 0.6, 0.4)), Capsule(0.3, 0.8)]
+    objects = [ObjectDescription(k, shapes[k % 3], name=f"body {k}") for k in range(1, 7)]
+    wall = ObjectDescription(9, Box((0.2, 8, 8)), name="wall", static=True, pose=Pose((4, 0, 0)))
+    yield SHAPES, encode_descriptions(START, "world", [*objects, wall], snapshot=True)
+    generator = np.random.default_rng(7)
+    phase, speed = generator.uniform(0, 6.28, 6), generator.uniform(0.5, 3.0, 6)
+    states = np.zeros(6, records.STATE)
+    states["id"] = np.arange(1, 7)
+    states["quaternion"][:, 3] = 1.0
+    for k in range(steps):
+        t = k * STEP * 1e-9
+        states["position"][:, 0] = 4.2 * np.sin(phase + speed * t)
+        states["linear"][:, 0] = 4.2 * speed * np.cos(phase + speed * t)
+        states["angular"][:, 2] = 0.3
+        data = encode_states(START + k * STEP, "world", k + 1, states)
+        if k == 10:
+            yield STATES, data[:50]  # cut
+            yield STATES, encode_states(START + k * STEP, "elsewhere", k + 1, states)
+        if k == 20:
+            yield SHAPES, encode_descriptions(START, "world", [Removal(3)])
+        if k == 30:
+            yield SHAPES, encode_descriptions(START, "world", [objects[2]])
+        yield STATES, data
+
+
+def record(path: Path, steps: int = 50, *, close: bool = True, pipeline: Pipeline | None = None) -> Recorder:
+    """The scene, recorded as the node records it."""
+    pipeline = pipeline or Pipeline("balanced")
+    recorder = Recorder(path, TYPES, pipeline.metadata(node=NODE))
+    now = START
+    recorder.write(STATUS, pipeline.status(), now, now)
+    for topic, data in inputs(steps):
+        now += STEP
+        if topic == SHAPES:
+            pipeline.on_shapes(data)
+            recorder.write(topic, data, now, now)
+            continue
+        outputs = pipeline.on_states(data)
+        recorder.write(topic, data, now, now)
+        if outputs is not None:
+            stamp = outputs.result.stamp_ns
+            recorder.write(CONTACTS, outputs.contacts, now, stamp)
+            recorder.write(PREDICTIONS, outputs.predictions, now, stamp)
+            if outputs.result.step % 5 == 0:
+                recorder.write(STATUS, pipeline.status(**recorder.status(), rate=100.0), now, now)
+    if close:
+        recorder.close()
+    return recorder

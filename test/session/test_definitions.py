@@ -1,0 +1,61 @@
+"""The definitions in a session against readers of others and against the installed type descriptions."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from collision_monitor.errors import SessionError
+from collision_monitor.session import definitions
+from collision_monitor.session.rosbag2 import TYPES, full_name
+
+
+@pytest.mark.parametrize("name", TYPES)
+def test_rosbags_parses_every_definition(name: str) -> None:
+    from rosbags.typesys import get_types_from_msg
+
+    types = get_types_from_msg(definitions.definition(full_name(name)), full_name(name))
+    assert full_name(name) in types
+    assert {"std_msgs/msg/Header", "builtin_interfaces/msg/Time"} <= set(types)
+
+
+@pytest.mark.parametrize("name", TYPES)
+def test_mcap_ros2_makes_a_decoder_of_every_definition(name: str) -> None:
+    from mcap_ros2._dynamic import generate_dynamic
+
+    decoders = generate_dynamic(full_name(name), definitions.definition(full_name(name)))
+    assert full_name(name) in decoders
+
+
+def test_every_nested_type_comes_once() -> None:
+    text = definitions.definition("collision_monitor_msgs/msg/ObjectDescriptionArray")
+    nested = [line[5:] for line in text.splitlines() if line.startswith("MSG: ")]
+    assert sorted(nested) == sorted(set(nested))
+    assert set(nested) == {
+        "std_msgs/Header",
+        "builtin_interfaces/Time",
+        "collision_monitor_msgs/ObjectDescription",
+        "collision_monitor_msgs/Shape",
+        "geometry_msgs/Pose",
+        "geometry_msgs/Point",
+        "geometry_msgs/Quaternion",
+    }
+
+
+@pytest.mark.parametrize("name", TYPES)
+def test_the_hash_is_that_of_the_installed_type(name: str) -> None:
+    path = Path(sys.prefix) / "share" / "collision_monitor_msgs" / "msg" / f"{name}.json"
+    if not path.is_file():
+        pytest.skip("collision_monitor_msgs is not installed in this environment")
+    hashes = {each["type_name"]: each["hash_string"] for each in json.loads(path.read_text())["type_hashes"]}
+    assert definitions.type_hash(full_name(name)) == hashes[full_name(name)]
+    assert definitions.type_hash(full_name(name)).startswith("RIHS01_")
+
+
+def test_an_unknown_type_is_named() -> None:
+    with pytest.raises(SessionError, match="expected nowhere_msgs/msg/Nothing"):
+        definitions.definition("nowhere_msgs/msg/Nothing")
+    assert definitions.type_hash("nowhere_msgs/msg/Nothing") == ""
