@@ -29,8 +29,7 @@ examples:
   collision-monitor world crossing                        play one of them
   collision-monitor replay run.mcap                       the same answers again, without ROS; differences are shown
 
-exit codes: 0 done, 1 error, 2 wrong usage, 3 a replay gave other answers than the recording, 4 it could not be compared,
-130 interrupted
+exit codes: 0 done, 1 error, 2 wrong usage, 130 interrupted; replay: 3 the answers differ, 4 they cannot be compared
 `collision-monitor COMMAND --help` says more about each command.
 """
 

