@@ -26,7 +26,7 @@ def provenance() -> dict[str, str]:
         "numpy": numpy.__version__,
         "numba": numba.__version__,
         "machine": platform.machine(),
-        "cpu": llvmlite.binding.get_host_cpu_name(),  # type: ignore[no-untyped-call]
+        "cpu": llvmlite.binding.get_host_cpu_name(),
     }
     digest = hashlib.blake2b("\n".join(facts.values()).encode(), digest_size=16)
     for path in sorted(_PACKAGE.rglob("*.py")):

@@ -139,7 +139,8 @@ class Session:
             try:
                 records = _unpack(opcode, payload)
             except Exception as error:
-                self.damage.append(f"{_name(opcode)} of {len(payload)} bytes at byte {start} is damaged: {error!r}")
+                reason = str(error) or repr(error)
+                self.damage.append(f"{_name(opcode)} of {len(payload)} bytes at byte {start} is damaged: {reason}")
                 continue
             yield from records
 

@@ -74,7 +74,7 @@ def record(path: Path, steps: int = 50, *, close: bool = True, pipeline: Pipelin
             recorder.write(CONTACTS, outputs.contacts, now, stamp)
             recorder.write(PREDICTIONS, outputs.predictions, now, stamp)
             if outputs.result.step % 5 == 0:
-                recorder.write(STATUS, pipeline.status(**recorder.status(), rate=100.0), now, now)
+                recorder.write(STATUS, pipeline.status(recording=1, rate=100.0), now, now)
     if close:
         recorder.close()
     return recorder

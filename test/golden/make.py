@@ -1,0 +1,34 @@
+"""Make the golden sessions anew. Only after a change that is meant to change answers; say in the commit why it does.
+
+python test/golden/make.py
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Final
+
+HERE: Final = Path(__file__).parent
+sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "session")]
+
+from session_scene import record  # noqa: E402
+
+from collision_monitor.pipeline import Pipeline  # noqa: E402
+
+STEPS: Final = 300
+PROFILES: Final = ("balanced", "exact")
+
+
+def main() -> None:
+    """One session for each profile: 3 s of six bodies, a wall, and everything that can be refused."""
+    for name in PROFILES:
+        path = HERE / f"{name}.mcap"
+        path.unlink(missing_ok=True)
+        pipeline = Pipeline(name)
+        record(path, STEPS, pipeline=pipeline)
+        print(f"{path.name}: {path.stat().st_size} bytes, digest {pipeline.monitor.digest:016x}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,25 @@
+"""The golden sessions replay to the same bytes, with one thread and with two."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from collision_monitor.session import Session
+from collision_monitor.session.replay import replay
+
+SESSIONS = sorted(Path(__file__).parent.glob("*.mcap"))
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("path", SESSIONS, ids=lambda path: path.stem)
+def test_a_golden_session_replays_to_the_same_bytes(path: Path, threads: int) -> None:
+    """Recorded by another build of the sources: so equal bytes are asked for here, whatever their origin."""
+    report = replay(Session(path), threads=threads)
+    assert report.first_difference is None, (
+        f"{report.first_difference}. Where this change of answers is meant, run test/golden/make.py"
+    )
+    assert not report.hole
+    assert report.steps == 300
+    assert report.compared > 600
