@@ -23,7 +23,7 @@ from collision_monitor.geometry.shapes import HalfSpace, Shape, Sphere
 from collision_monitor.prediction import active_pairs, answers, candidates, tracking
 from collision_monitor.prediction.event_list import EventList
 from collision_monitor.prediction.motion import Bodies, grown, make_bodies
-from collision_monitor.prediction.time_of_impact import IMPACT
+from collision_monitor.prediction.time_of_impact import IMPACT, make_scratch
 from collision_monitor.profiles import Profile
 from collision_monitor.records import Model
 
@@ -105,6 +105,7 @@ class Monitor:
         self._jump_ns: int | None = None  # a refused stamp; the next message may confirm it
         self._renewed: set[int] = set()  # slots whose description changed: predicted anew in the next step
         self._events = EventList()
+        self._scratch = make_scratch()
         self._pairs = np.zeros(0, active_pairs.PAIR)
         self._pair_events = np.zeros(0, IMPACT)
         self._orphans: list[tuple[int, float]] = []  # contacts (key, since) that ended because an object was removed
@@ -382,9 +383,7 @@ class Monitor:
     def _predict_moved(self, now: float, work: dict[str, int]) -> NDArray[np.void]:
         """Start the motion of bodies anew whose predictions no longer hold; their first impacts (IMPACT)."""
         p, bodies = self.profile, self._bodies
-        moved = np.empty(self._top + len(self._renewed), np.int32)
-        n = tracking.find_moved(bodies, self._spin_radius, self._top, now, p.horizon, p.stale_acceleration, moved)
-        which = moved[:n]
+        which = self._moved(now)
         if self._renewed:
             renewed = np.array([i for i in self._renewed if bodies.seen[i]], np.int32)
             which = np.union1d(which, renewed).astype(np.int32)
@@ -408,10 +407,19 @@ class Monitor:
         events = np.zeros(n + 1, IMPACT)
         hits, queries = candidates.predict_pairs(
             self._shapes.table, self._next_shape, bodies, self._candidates[:n], now, p.contact_margin,
-            p.impact_tolerance, p.impact_iterations, events,
+            p.impact_tolerance, p.impact_iterations, events, self._scratch,
         )  # fmt: skip
         work["impact_queries"] += queries
         return events[:hits]
+
+    def _moved(self, now: float) -> NDArray[np.int32]:
+        """Slots of the bodies that left their predicted motion, or are not predicted far enough."""
+        moved = np.empty(self._top, np.int32)
+        p = self.profile
+        n = tracking.find_moved(
+            self._bodies, self._spin_radius, self._top, now, p.horizon, p.stale_acceleration, moved
+        )
+        return moved[:n]
 
     def _examine_active(self, new: NDArray[np.void], now: float, work: dict[str, int]) -> NDArray[np.void]:
         """Look at the pairs that are due or touch; the contacts (records.CONTACT). New events go into the list."""
@@ -427,7 +435,7 @@ class Monitor:
         later = np.zeros(n, IMPACT)
         n, n_later, tests, queries = active_pairs.examine(
             self._shapes.table, self._next_shape, bodies, pairs[:n], events[:n], now, p.contact_margin,
-            p.stale_acceleration, p.impact_tolerance, p.impact_iterations, results, later,
+            p.stale_acceleration, p.impact_tolerance, p.impact_iterations, results, later, self._scratch,
         )  # fmt: skip
         work["narrow_phase_tests"] += tests
         work["impact_queries"] += queries

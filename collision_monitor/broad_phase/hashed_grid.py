@@ -8,7 +8,7 @@ Source: lecture slides "Efficient collision detection: spatial partitioning" (ha
 
 from __future__ import annotations
 
-from math import floor, frexp
+from math import frexp
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -68,7 +68,7 @@ def _level_of(width):  # type: ignore[no-untyped-def]
 
 @device
 def _coordinate(x, cell):  # type: ignore[no-untyped-def]
-    return np.int64(min(max(floor(x / cell), -FARTHEST_CELL), FARTHEST_CELL))
+    return np.int64(min(max(np.floor(x / cell), -FARTHEST_CELL), FARTHEST_CELL))
 
 
 @device
@@ -154,12 +154,12 @@ def query_box(grid, i, found):  # type: ignore[no-untyped-def]
         size = 2.0 ** (level - LEVEL_OFFSET)
         # a box of this level reaches at most half a cell from its centre; the outermost level holds any size
         reach = 0.5 * size if level < LEVELS - 1 else np.inf
-        x0 = floor((grid.centre[i, 0] - grid.half[i, 0] - reach) / size)
-        x1 = floor((grid.centre[i, 0] + grid.half[i, 0] + reach) / size)
-        y0 = floor((grid.centre[i, 1] - grid.half[i, 1] - reach) / size)
-        y1 = floor((grid.centre[i, 1] + grid.half[i, 1] + reach) / size)
-        z0 = floor((grid.centre[i, 2] - grid.half[i, 2] - reach) / size)
-        z1 = floor((grid.centre[i, 2] + grid.half[i, 2] + reach) / size)
+        x0 = np.floor((grid.centre[i, 0] - grid.half[i, 0] - reach) / size)
+        x1 = np.floor((grid.centre[i, 0] + grid.half[i, 0] + reach) / size)
+        y0 = np.floor((grid.centre[i, 1] - grid.half[i, 1] - reach) / size)
+        y1 = np.floor((grid.centre[i, 1] + grid.half[i, 1] + reach) / size)
+        z0 = np.floor((grid.centre[i, 2] - grid.half[i, 2] - reach) / size)
+        z1 = np.floor((grid.centre[i, 2] + grid.half[i, 2] + reach) / size)
         cells = (x1 - x0 + 1.0) * (y1 - y0 + 1.0) * (z1 - z0 + 1.0)
         outermost = max(abs(x0), abs(x1), abs(y0), abs(y1), abs(z0), abs(z1))
         if not (cells <= 2.0 * count and outermost < FARTHEST_CELL):

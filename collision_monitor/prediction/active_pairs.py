@@ -10,7 +10,7 @@ import numpy as np
 from collision_monitor._jit import device, kernel
 from collision_monitor.narrow_phase.dispatch import contact_within
 from collision_monitor.prediction.motion import quaternion_to_matrix, turn_quaternion
-from collision_monitor.prediction.time_of_impact import CLEAR, body_impact, closing_speed, make_scratch
+from collision_monitor.prediction.time_of_impact import CLEAR, body_impact, closing_speed
 from collision_monitor.records import ContactStatus, Phase
 
 PAIR = np.dtype(
@@ -138,7 +138,8 @@ def body_contact(table, next_shape, bodies, i, j, now, margin, stale_acceleratio
                 for c in range(3):
                     out[4 + c] += oa[c]
                     out[7 + c] += oa[c]
-                result[:15] = out[:15]
+                for c in range(15):
+                    result[c] = out[c]
                 result[SHAPE_I], result[SHAPE_J] = a, b
             b = next_shape[b]
         a = next_shape[a]
@@ -157,14 +158,13 @@ def body_contact(table, next_shape, bodies, i, j, now, margin, stale_acceleratio
 
 @kernel
 def examine(
-    table, next_shape, bodies, pairs, events, now, margin, stale_acceleration, tolerance, budget, results, later
+    table, next_shape, bodies, pairs, events, now, margin, stale_acceleration, tolerance, budget, results, later, scratch
 ):  # fmt: skip  # type: ignore[no-untyped-def]
     """Look at every active pair at `now`: contact into results (n, RESULT), and what does not touch is predicted on.
 
     Pairs that stay active, or have just ended, are moved to the front of pairs and events; those that are certified
     apart for a while go into `later` (IMPACT). Returns (active, later, narrow-phase tests, impact queries).
     """
-    scratch = make_scratch()
     q = np.empty((1, 4))
     n = n_later = tests = queries = 0
     for k in range(pairs.size):

@@ -6,7 +6,7 @@ import numpy as np
 
 from collision_monitor._jit import device, kernel
 from collision_monitor.broad_phase.hashed_grid import query_box
-from collision_monitor.prediction.time_of_impact import CLEAR, body_impact, make_scratch
+from collision_monitor.prediction.time_of_impact import CLEAR, body_impact
 
 
 @device
@@ -48,12 +48,11 @@ def find_candidates(bodies, grid, which, is_new, allowed, pairs):  # type: ignor
 
 
 @kernel
-def predict_pairs(table, next_shape, bodies, pairs, now, margin, tolerance, budget, events):  # type: ignore[no-untyped-def]
+def predict_pairs(table, next_shape, bodies, pairs, now, margin, tolerance, budget, events, scratch):  # type: ignore[no-untyped-def]
     """First impacts of pairs (P, 2) from `now` until both bodies' cover times, into events (IMPACT).
 
     Returns (how many impacts, distance queries made).
     """
-    scratch = make_scratch()
     n = queries = 0
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]

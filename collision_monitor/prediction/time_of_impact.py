@@ -64,15 +64,14 @@ class Scratch(NamedTuple):
     work: Any  # (WORK_SIZE,)
 
 
-@device
-def make_scratch():  # type: ignore[no-untyped-def]
+def make_scratch() -> Scratch:
     """Scratch for one thread."""
-    return Scratch(np.empty((4, 3, 3)), np.zeros(16), np.zeros(WORK_SIZE))
+    return Scratch(np.zeros((4, 3, 3)), np.zeros(16), np.zeros(WORK_SIZE))
 
 
 @device
 def sphere_interval(dx, dy, dz, vx, vy, vz, reach, growth, end):  # type: ignore[no-untyped-def]
-    """First and last time in [0, end] at which |d + v t| <= reach + growth t; (inf, inf): never.
+    """First and last time in [0, end] at which |d + v t| <= reach + growth t; (inf, -inf): never.
 
     Closed form; the root is taken as c / (-b + sqrt(D)), which does not cancel (Numerical Recipes 5.6).
     The result is widened by the round-off of the discriminant: the first time is never late.
@@ -86,16 +85,16 @@ def sphere_interval(dx, dy, dz, vx, vy, vz, reach, growth, end):  # type: ignore
             return first, end
         return first, min(end, (-b + sqrt(max(b * b - a * c, 0.0))) / a)
     if b >= 0.0 and a >= 0.0:
-        return inf, inf
+        return inf, -inf
     discriminant = b * b - a * c
     if discriminant < -1e-14 * b * b:
-        return inf, inf
+        return inf, -inf
     root = sqrt(max(discriminant, 0.0))
     if root - b <= 0.0:
-        return inf, inf
+        return inf, -inf
     first = c / (root - b)
     if first > end:
-        return inf, inf
+        return inf, -inf
     first *= 1.0 - 1e-7 if discriminant < 1e-14 * b * b else 1.0 - 1e-14
     if a <= 0.0:
         return first, end
@@ -154,7 +153,7 @@ def _safe_advance(table, a, b, R_a, R_b, n, turn_a, turn_b, rate, curvature, gap
     for _ in range(5):
         middle = low + (high - low) * (f_low / (f_low - f_high))  # root of the chord: below the concave bound
         f = _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, middle)
-        if not (middle > low and f > 0.0):
+        if not middle > low:
             break
         drop = f_low - f
         if drop > 0.0:
@@ -163,7 +162,7 @@ def _safe_advance(table, a, b, R_a, R_b, n, turn_a, turn_b, rate, curvature, gap
             if far < high:
                 high = far
                 f_high = _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, high)
-        low, f_low = middle, f
+        low, f_low = middle, f  # f may be a rounding below 0: half the tolerance is there for it
         if f <= 0.05 * gap or f_high >= 0.0:
             break
     if f_high >= 0.0:
@@ -316,7 +315,7 @@ def body_impact(table, next_shape, bodies, i, j, begin, end, margin, tolerance, 
     reach = bodies.radius[i] + bodies.radius[j] + margin
     if reach < inf:
         first, last = sphere_interval(px, py, pz, vx, vy, vz, reach + tube_0, tube_1, last)
-        if not first <= last:
+        if first > last:
             return 0
     a, b = bodies.first_shape[i], bodies.first_shape[j]
     if (

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from collision_monitor._jit import kernel
+from collision_monitor._jit import device, kernel
 from collision_monitor.broad_phase.hashed_grid import put_box
 from collision_monitor.prediction.motion import angle_between, quaternion_to_matrix, turn_quaternion
 from collision_monitor.records import StateFlag
@@ -76,7 +76,7 @@ def take_states(bodies, slots, numbers, flags, time, verdicts):  # type: ignore[
     return accepted
 
 
-@kernel
+@device
 def _estimate_twist(bodies, i, numbers, k, x, y, z, w, elapsed):  # type: ignore[no-untyped-def]
     """Twist from the last pose to this one: difference of positions, logarithm of the relative rotation."""
     for c in range(3):

@@ -1,0 +1,378 @@
+"""The monitor as a whole: against plain recomputation, against every pair looked at, and fed with what is wrong."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from collision_monitor import records
+from collision_monitor.errors import InputError, Refusal, ShapeError, UnsupportedError
+from collision_monitor.geometry.pose import Pose, from_rotation_vector, multiply, rotation_matrix
+from collision_monitor.geometry.shapes import Box, Capsule, Circle, HalfSpace, Sphere
+from collision_monitor.monitor import Monitor, StepResult
+from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.plain import PlainMonitor
+from collision_monitor.profiles import Profile
+from collision_monitor.world import make_scene
+
+SECOND = 1_000_000_000
+
+
+def pair(record: np.void) -> tuple[int, int]:
+    return int(record["id_a"]), int(record["id_b"])
+
+
+def touching(result: StepResult) -> set[tuple[int, int]]:
+    return {pair(c) for c in result.contacts if c["phase"] != records.Phase.END}
+
+
+def assert_sorted(result: StepResult) -> None:
+    contacts = [(*pair(c), int(c["point_index"])) for c in result.contacts]
+    assert contacts == sorted(contacts)
+    predictions = [(float(p["lower"]), *pair(p)) for p in result.predictions]
+    assert predictions == sorted(predictions)
+    assert all(a < b for a, b in map(pair, (*result.contacts, *result.predictions)))
+
+
+def assert_agrees_with_plain(mine: StepResult, plain: StepResult, horizon: float) -> None:
+    """No collision missed, none late, none invented, within the bounds that `mine` states."""
+    assert touching(mine) == touching(plain)
+    stated = {pair(p): p for p in mine.predictions}
+    assert not stated.keys() & touching(mine)
+    for truth in plain.predictions:
+        if truth["status"] == records.PredictionStatus.HIT and truth["upper"] < horizon:
+            prediction = stated[pair(truth)]  # KeyError: a missed collision
+            assert prediction["lower"] <= truth["upper"]
+            assert prediction["upper"] >= truth["lower"]
+    possible = {pair(p): p for p in plain.predictions}
+    for prediction in mine.predictions:
+        if prediction["status"] == records.PredictionStatus.HIT and prediction["upper"] < horizon:
+            assert pair(prediction) in possible
+
+
+class Swarm:
+    """Boxes, spheres, capsules and compounds on their way through a box of space, with noise and course changes."""
+
+    def __init__(self, n: int, seed: int) -> None:
+        self.rng = rng = np.random.default_rng(seed)
+        self.n = n
+        side = (n / 0.25) ** (1 / 3)
+        self.position = rng.uniform(0, side, (n, 3))
+        q = rng.normal(0, 1, (n, 4))
+        self.quaternion = q / np.linalg.norm(q, axis=1, keepdims=True)
+        self.linear = rng.uniform(-1, 1, (n, 3))
+        self.angular = rng.uniform(-1, 1, (n, 3))
+        self.side = side
+
+    def describe(self, monitor: Monitor) -> None:
+        rng = np.random.default_rng(99)
+        for i in range(self.n):
+            kind = i % 4
+            if kind == 0:
+                monitor.add(i, Box(rng.uniform(0.2, 1.0, 3)))
+            elif kind == 1:
+                monitor.add(i, Sphere(rng.uniform(0.2, 0.5)))
+            elif kind == 2:
+                monitor.add(i, Capsule(0.2, 0.6), padding=0.05)
+            else:
+                monitor.add(i, [(Box((0.5, 0.3, 0.2)), Pose((0.3, 0, 0))), (Sphere(0.2), Pose((-0.3, 0.1, 0)))])
+        monitor.add(self.n, Box((self.side, self.side, 0.2)), static=True, pose=Pose((self.side / 2, self.side / 2, 0)))
+        monitor.add(self.n + 1, HalfSpace((1, 0, 0), 0.3), static=True, pose=Pose())
+
+    def move(self, dt: float, turn: float = 0.0) -> None:
+        self.position += self.linear * dt
+        self.quaternion = multiply(from_rotation_vector(self.angular * dt), self.quaternion)
+        out = (self.position < 0) & (self.linear < 0) | (self.position > self.side) & (self.linear > 0)
+        self.linear[out] *= -1
+        changed = self.rng.random(self.n) < turn
+        self.linear[changed] = self.rng.uniform(-1, 1, (int(changed.sum()), 3))
+        self.angular[changed] = self.rng.uniform(-1, 1, (int(changed.sum()), 3))
+
+    def states(self, noise: float = 0.0, keep: float = 1.0) -> NDArray[np.void]:
+        states = np.zeros(self.n, records.STATE)
+        states["id"] = np.arange(self.n)
+        shake = lambda: noise * self.rng.uniform(-1, 1, (self.n, 3)) / np.sqrt(3)  # noqa: E731
+        states["position"] = self.position + shake()
+        states["quaternion"] = multiply(from_rotation_vector(shake()), self.quaternion)
+        states["linear"] = self.linear + shake()
+        states["angular"] = self.angular + shake()
+        return states[self.rng.random(self.n) < keep]
+
+
+@pytest.mark.parametrize(
+    ("noise", "turn", "keep"),
+    [(0.0, 0.0, 1.0), (0.0, 0.05, 1.0), (4e-4, 0.0, 1.0), (0.0, 1.0, 1.0), (3e-4, 0.02, 0.6)],
+    ids=["steady", "some turn", "noise", "all jump", "noise, turns and gaps"],
+)
+def test_the_event_list_equals_plain_recomputation(noise: float, turn: float, keep: float) -> None:
+    swarm = Swarm(60, seed=3)
+    profile = Profile.named("balanced").replace(stale_acceleration=0.0)
+    mine, plain = Monitor(profile), PlainMonitor(profile)
+    for monitor in (mine, plain):
+        swarm.describe(monitor)
+    moved = seen = 0
+    for step in range(150):
+        states = swarm.states(noise, keep)
+        a, b = mine.step(step * SECOND // 50, states), plain.step(step * SECOND // 50, states)
+        assert_sorted(a)
+        assert_agrees_with_plain(a, b, profile.horizon)
+        seen += len(b.predictions) + len(b.contacts)
+        moved += a.status.objects_moved
+        swarm.move(0.02, turn)
+    assert seen > 500
+    if turn == 0.0:
+        assert moved < 60 * 150 / 10
+
+
+def test_contacts_are_those_of_looking_at_every_pair() -> None:
+    swarm = Swarm(48, seed=5)
+    monitor = Monitor("fast")
+    swarm.describe(monitor)
+    table = monitor._shapes.table
+    owner = {}
+    for i in range(swarm.n):
+        slot = int(monitor._bodies.first_shape[i])
+        while slot >= 0:
+            owner[slot] = i
+            slot = int(monitor._next_shape[slot])
+    slots = sorted(owner)
+    pairs = np.array([p for p in itertools.combinations(slots, 2) if owner[p[0]] != owner[p[1]]], np.int32)
+    found = 0
+    for step in range(60):
+        result = monitor.step(step * SECOND // 20, swarm.states())
+        rotation = np.zeros((len(table.kind), 3, 3))
+        position = np.zeros((len(table.kind), 3))
+        R = rotation_matrix(swarm.quaternion)
+        for slot in slots:
+            i = owner[slot]
+            position[slot] = swarm.position[i] + R[i] @ table.local_position[slot]
+            rotation[slot] = R[i] @ table.local_rotation[slot]
+        deepest: dict[tuple[int, int], float] = {}
+        for (a, b), contact in zip(pairs, contact_batch(table, position, rotation, pairs), strict=True):
+            if contact[0] <= 0.0:
+                key = tuple(sorted((owner[a], owner[b])))
+                deepest[key] = min(contact[0], deepest.get(key, 0.0))
+        mine = {pair(c): c for c in result.contacts if c["phase"] != records.Phase.END and pair(c)[1] < swarm.n}
+        assert mine.keys() == deepest.keys()
+        for key, c in mine.items():
+            assert c["signed_distance"] == pytest.approx(deepest[key], abs=1e-12)
+            apart = c["point_b"] - c["point_a"]
+            assert np.allclose(apart, c["signed_distance"] * c["normal"], atol=1e-9)
+        found += len(mine)
+        swarm.move(0.05)
+    assert found > 100
+
+
+def test_contacts_begin_persist_and_end_once() -> None:
+    monitor = Monitor()
+    monitor.add(1, Sphere(0.5))
+    monitor.add(2, Sphere(0.5))
+    phases: list[int] = []
+    durations: list[float] = []
+    for step in range(60):
+        x = -1.5 + 0.05 * step
+        poses = [[x, 0, 0, 0, 0, 0, 1], [0, 0, 0, 0, 0, 0, 1]]
+        result = monitor.step(step * SECOND // 20, [1, 2], poses, [[1, 0, 0, 0, 0, 0], [0] * 6])
+        for contact in result.contacts:
+            phases.append(int(contact["phase"]))
+            durations.append(float(contact["duration"]))
+        assert not (len(result.contacts) and len(result.predictions))
+    assert phases == [records.Phase.BEGIN, *[records.Phase.PERSIST] * (len(phases) - 2), records.Phase.END]
+    assert np.allclose(durations, np.arange(len(phases)) * 0.05)
+    assert len(phases) == 42  # touching from x = -1 to x = 1, both included, and the END
+
+
+def test_crossing_happens_when_it_must() -> None:
+    scene = make_scene("crossing")
+    monitor = Monitor("exact")
+    for description in scene.descriptions:
+        monitor.describe(description)
+    begins: dict[tuple[int, int], float] = {}
+    first_seen: dict[tuple[int, int], tuple[float, float]] = {}
+    while scene.time < 6.0:
+        result = monitor.step(round(scene.time * SECOND), scene.states())
+        for p in result.predictions:
+            if p["status"] == records.PredictionStatus.HIT:
+                first_seen.setdefault(pair(p), (scene.time + p["lower"], scene.time + p["upper"]))
+        for c in result.contacts:
+            if c["phase"] == records.Phase.BEGIN:
+                begins.setdefault(pair(c), scene.time)
+        scene.step()
+    for encounter in scene.expected:
+        key = min(encounter.id_a, encounter.id_b), max(encounter.id_a, encounter.id_b)
+        if encounter.begin is None:
+            assert key not in first_seen and key not in begins, encounter.derivation
+        elif encounter.begin < 6.0:
+            lower, upper = first_seen[key]
+            assert lower <= encounter.begin + 1e-9 and encounter.begin <= upper + 1e-9, encounter.derivation
+            assert upper - lower < 1e-4
+            assert encounter.begin <= begins[key] < encounter.begin + 1.0 / scene.rate + 1e-9
+
+
+def still(*positions: float) -> NDArray[np.float64]:
+    poses = np.zeros((len(positions), 7))
+    poses[:, 0], poses[:, 6] = positions, 1.0
+    return poses
+
+
+class TestRefusals:
+    @pytest.fixture
+    def monitor(self) -> Monitor:
+        monitor = Monitor()
+        for object_id in (1, 2, 3):
+            monitor.add(object_id, Sphere(0.5))
+        monitor.step(0, [1, 2, 3], still(0, 0.9, 5))
+        return monitor
+
+    @pytest.mark.parametrize(
+        ("row", "reason"),
+        [
+            ([np.nan, 0, 0, 0, 0, 0, 1], Refusal.NON_FINITE),
+            ([0, np.inf, 0, 0, 0, 0, 1], Refusal.NON_FINITE),
+            ([1e300, 0, 0, 0, 0, 0, 1], Refusal.NON_FINITE),
+            ([0, 0, 0, 0, 0, 0, 0], Refusal.QUATERNION),
+            ([0, 0, 0, 1, 1, 1, 1], Refusal.QUATERNION),
+            ([0, 0, 0, 0, 0, 0, np.nan], Refusal.NON_FINITE),
+        ],
+    )
+    def test_a_bad_state_is_counted_and_the_others_go_on(
+        self, monitor: Monitor, row: list[float], reason: Refusal
+    ) -> None:
+        poses = still(0, 0.9, 5)
+        poses[2] = row
+        result = monitor.step(SECOND // 10, [1, 2, 3], poses)
+        assert monitor.refused[reason] == 1 and sum(monitor.refused.values()) == 1
+        assert "object 3" in monitor.last_refusal
+        assert touching(result) == {(1, 2)}
+        assert np.isfinite(result.contacts["signed_distance"]).all()
+
+    def test_unknown_removed_and_old(self, monitor: Monitor) -> None:
+        monitor.remove(3)
+        result = monitor.step(SECOND // 10, [1, 2, 3, 77], still(0, 0.9, 5, 5))
+        assert monitor.refused[Refusal.UNKNOWN_ID] == 2
+        assert touching(result) == {(1, 2)}
+        monitor.step(SECOND // 20, [1, 2], still(8, 9))
+        assert monitor.refused[Refusal.OLD] == 2
+        result = monitor.step(SECOND // 5, [1, 1], still(3, 9))
+        assert monitor.refused[Refusal.OLD] == 3  # one id twice: the first counts
+        assert touching(result) == set()
+
+    def test_a_stamp_that_jumps_is_refused_until_it_is_confirmed(self, monitor: Monitor) -> None:
+        far = 2**63 - 1
+        result = monitor.step(far, [1, 2], still(0, 9))
+        assert not result.accepted and monitor.refused[Refusal.TIME] == 1
+        result = monitor.step(SECOND // 10, [1, 2], still(0, 0.8))
+        assert result.accepted and touching(result) == {(1, 2)}
+        monitor.step(-50 * SECOND, [1, 2], still(0, 0.9))
+        result = monitor.step(-49 * SECOND, [1, 2], still(0, 9))
+        assert result.accepted and result.stamp_ns == -49 * SECOND
+        assert [int(c["phase"]) for c in result.contacts] == [records.Phase.END]
+        assert result.status.objects_unseen == 1
+
+    def test_arrays_of_another_shape_raise(self, monitor: Monitor) -> None:
+        with pytest.raises(InputError, match=r"poses \(N, 7\)"):
+            monitor.step(1, [1, 2], still(0))
+        with pytest.raises(InputError, match="numbers"):
+            monitor.step(1, [1], [["a"] * 7])
+        with pytest.raises(InputError, match="ids"):
+            monitor.step(1, [-1], still(0))
+        with pytest.raises(InputError, match="described"):
+            monitor.remove(99)
+
+    def test_bad_descriptions_change_nothing(self, monitor: Monitor) -> None:
+        with pytest.raises(ShapeError):
+            monitor.add(1, Sphere(-1))
+        with pytest.raises(UnsupportedError, match="Circle"):
+            monitor.add(1, [(Sphere(1), Pose()), (Circle(1), Pose())])
+        with pytest.raises(UnsupportedError, match="static"):
+            monitor.add(4, HalfSpace((0, 0, 1)))
+        with pytest.raises(UnsupportedError, match="KDOP14"):
+            monitor.add(4, Sphere(1), model=records.Model.KDOP14)
+        assert monitor.ids == [1, 2, 3] and len(monitor._shapes) == 3
+        assert touching(monitor.step(SECOND // 10, [1, 2], still(0, 0.9))) == {(1, 2)}
+
+
+def test_an_object_that_is_not_heard_of_is_never_clear() -> None:
+    monitor = Monitor(Profile(stale_after=0.35, stale_acceleration=2.0))
+    monitor.add(1, Sphere(0.5))
+    monitor.add(2, Sphere(0.5))
+    monitor.step(0, [1, 2], still(0, 2.0))
+    statuses = []
+    for step in range(1, 20):
+        result = monitor.step(step * SECOND // 10, [1], still(0))
+        assert result.status.objects_stale == (1 if step > 3 else 0)
+        statuses.append([int(c["status"]) for c in result.contacts])
+    # a gap of 1 m is open to an acceleration of 2 m/s^2 after 1 s
+    assert statuses[:9] == [[]] * 9
+    assert statuses[10:] == [[records.ContactStatus.UNRESOLVED]] * 9
+    assert result.contacts[0]["error_bound"] >= 0.5 * 2.0 * 1.9**2
+
+
+def test_masks_allowed_pairs_and_new_descriptions() -> None:
+    monitor = Monitor()
+    monitor.add(1, Sphere(0.5), group=1, mask=2)
+    monitor.add(2, Sphere(0.5), group=2)
+    monitor.add(3, Sphere(0.5), group=4, allowed=(2,))
+    poses = still(0, 0.1, 0.2)
+    assert touching(monitor.step(0, [1, 2, 3], poses)) == {(1, 2)}
+    monitor.add(3, Sphere(0.5), group=4)
+    assert touching(monitor.step(1, [1, 2, 3], poses)) == {(1, 2), (2, 3)}
+    monitor.add(1, Sphere(0.01), group=1)
+    poses[0, 0] = 2.0
+    assert touching(monitor.step(2, [1, 2, 3], poses)) == {(2, 3)}
+    monitor.add(1, Sphere(1.9), group=1)
+    assert touching(monitor.step(3, [1, 2, 3], poses)) == {(1, 2), (1, 3), (2, 3)}
+    monitor.remove(2)
+    result = monitor.step(4, [1, 3], poses[[0, 2]])
+    assert touching(result) == {(1, 3)}
+    ended = [c for c in result.contacts if c["phase"] == records.Phase.END]
+    assert [pair(c) for c in ended] == [(1, 2), (2, 3)] and np.isnan(ended[0]["signed_distance"])
+
+
+def test_objects_come_and_go_without_a_trace() -> None:
+    rng = np.random.default_rng(0)
+    monitor = Monitor()
+    for step in range(300):
+        for object_id in rng.integers(0, 40, 3).tolist():
+            if object_id in monitor.ids:
+                monitor.remove(object_id)
+            else:
+                monitor.add(object_id, Box(rng.uniform(0.2, 1, 3)) if object_id % 2 else Sphere(0.4))
+        ids = monitor.ids
+        poses = np.zeros((len(ids), 7))
+        poses[:, :3] = np.random.default_rng(7).uniform(0, 3, (40, 3))[ids]
+        poses[:, 6] = 1.0
+        result = monitor.step(step * SECOND // 100, ids, poses)
+        fresh = Monitor()
+        for object_id in ids:
+            fresh.describe(described := monitor_description(monitor, object_id))
+            assert described.object_id == object_id
+        assert touching(result) == touching(fresh.step(0, ids, poses))
+    assert monitor._top <= 40 and len(monitor._shapes) == len(monitor.ids)
+
+
+def monitor_description(monitor: Monitor, object_id: int):  # type: ignore[no-untyped-def]
+    from collision_monitor.description import ObjectDescription
+
+    slot = int(monitor._bodies.first_shape[monitor._slot(object_id)])
+    table = monitor._shapes.table
+    if table.kind[slot] == records.ShapeType.SPHERE:
+        return ObjectDescription(object_id, Sphere(float(table.size[slot, 0])))
+    return ObjectDescription(object_id, Box(2 * table.size[slot, :3]))
+
+
+def test_the_same_inputs_give_the_same_bytes() -> None:
+    digests = set()
+    for _ in range(2):
+        swarm, monitor = Swarm(40, seed=11), Monitor()
+        swarm.describe(monitor)
+        for step in range(50):
+            result = monitor.step(step * SECOND // 50, swarm.states(1e-3))
+            swarm.move(0.02, 0.02)
+        digests.add((monitor.digest, result.contacts.tobytes(), result.predictions.tobytes()))
+    assert len(digests) == 1
+    monitor.step(step * SECOND // 50 + 1, swarm.states())
+    assert monitor.digest not in {d[0] for d in digests}
