@@ -53,9 +53,20 @@ def kernel(function: F) -> F:
     return compiled
 
 
+# Counting references to array arguments is atomic memory traffic: 300 ns for one pair of spheres, 18 ns without.
+# So device functions only borrow their arrays: they must not allocate, and must return numbers, never an array.
+_BORROWING: dict[str, Any] = {**_OPTIONS, "_nrt": False}
+
+
 def device(function: F) -> F:
-    """Compile a function that only kernels call; inlined into them by LLVM where that pays."""
-    compiled: F = numba.njit(**_OPTIONS)(function)
+    """Compile a function that only kernels call; it borrows its arrays and returns numbers."""
+    compiled: F = numba.njit(**_BORROWING)(function)
+    return compiled
+
+
+def inlined(function: F) -> F:
+    """A device function that is always inlined: for small ones whose array arguments cost more to pass than to use."""
+    compiled: F = numba.njit(forceinline=True, **_BORROWING)(function)
     return compiled
 
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device
+from collision_monitor._jit import inlined
 
 CONTACT_SIZE: Final = 15
 
@@ -47,7 +47,7 @@ def work_array() -> NDArray[np.float64]:
     return np.zeros(WORK_SIZE)
 
 
-@device
+@inlined
 def write(
     out: Any, distance: float, nx: float, ny: float, nz: float, ax: float, ay: float, az: float, bound: float
 ) -> None:

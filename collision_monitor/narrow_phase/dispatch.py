@@ -12,7 +12,7 @@ import numpy as np
 from numba import get_num_threads, prange
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, kernel, parallel_kernel
+from collision_monitor._jit import device, inlined, kernel, parallel_kernel
 from collision_monitor.geometry.shape_table import BOX, CAPSULE, HALF_SPACE, SPHERE
 from collision_monitor.narrow_phase.answer import CONTACT_SIZE, WORK_SIZE
 from collision_monitor.narrow_phase.box_box import axis_direction, box_box_separation, sat, touching_features
@@ -24,14 +24,14 @@ from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact, 
 from collision_monitor.tolerances import FACE_PREFERENCE
 
 
-@device
+@inlined
 def _swapped(table: Any, a: int, b: int) -> bool:
     """Whether the canonical order is b, a."""
     ka, kb = table.kind[a], table.kind[b]
     return ka > kb or (ka == kb and a > b)
 
 
-@device
+@inlined
 def separation(
     table: Any, a: int, b: int, R_WA: Any, R_WB: Any, px: float, py: float, pz: float, out: Any, work: Any
 ) -> float:
@@ -40,16 +40,20 @@ def separation(
     p = position of b - position of a, world axes. <= 0 where they overlap or touch. Projected on the direction, the
     shapes are apart by this much. Exact for all pairs but separated boxes, whose bound is the largest SAT gap.
     """
-    if _swapped(table, a, b):
-        gap = _separation(table, b, a, R_WB, R_WA, -px, -py, -pz, out, work)
+    swapped = _swapped(table, a, b)
+    if swapped:
+        a, b = b, a
+        R_WA, R_WB = R_WB, R_WA
+        px, py, pz = -px, -py, -pz
+    gap = _separation(table, a, b, R_WA, R_WB, px, py, pz, out, work)
+    if swapped:
         out[0] = -out[0]
         out[1] = -out[1]
         out[2] = -out[2]
-        return gap
-    return _separation(table, a, b, R_WA, R_WB, px, py, pz, out, work)
+    return gap
 
 
-@device
+@inlined
 def _separation(
     table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float, pz: float, out: Any, work: Any
 ) -> float:
@@ -87,7 +91,7 @@ def _separation(
     return convex_separation(table, a, b, RA, RB, px, py, pz, inf, out, work)
 
 
-@device
+@inlined
 def _capsules(table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float, pz: float, out: Any) -> None:
     """Capsules, and a sphere as the capsule without a core."""
     la = table.size[a, 1] if table.kind[a] == CAPSULE else 0.0
@@ -97,7 +101,7 @@ def _capsules(table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float
     )
 
 
-@device
+@inlined
 def contact_within(
     table: Any,
     a: int,
@@ -115,10 +119,21 @@ def contact_within(
 
     Arguments as in `separation`. Most pairs of a broad phase are apart: they cost as little as can prove it.
     """
-    if not _swapped(table, a, b):
-        return _contact(table, a, b, R_WA, R_WB, px, py, pz, limit, out, work) and out[0] <= limit
-    if not (_contact(table, b, a, R_WB, R_WA, -px, -py, -pz, limit, out, work) and out[0] <= limit):
+    swapped = _swapped(table, a, b)
+    if swapped:
+        a, b = b, a
+        R_WA, R_WB = R_WB, R_WA
+        px, py, pz = -px, -py, -pz
+    if not (_contact(table, a, b, R_WA, R_WB, px, py, pz, limit, out, work) and out[0] <= limit):
         return False
+    if swapped:
+        _mirror(out, -px, -py, -pz)
+    return True
+
+
+@inlined
+def _mirror(out: Any, px: float, py: float, pz: float) -> None:
+    """The contact of (b, a) from that of (a, b)."""
     for i in range(3):
         p = px if i == 0 else (py if i == 1 else pz)
         out[1 + i] = -out[1 + i]
@@ -129,10 +144,9 @@ def contact_within(
         feature = out[i]
         out[i] = out[i + 2]
         out[i + 2] = feature
-    return True
 
 
-@device
+@inlined
 def contact(
     table: Any, a: int, b: int, R_WA: Any, R_WB: Any, px: float, py: float, pz: float, out: Any, work: Any
 ) -> None:
@@ -140,7 +154,7 @@ def contact(
     contact_within(table, a, b, R_WA, R_WB, px, py, pz, inf, out, work)
 
 
-@device
+@inlined
 def _contact(
     table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float, pz: float, limit: float, out: Any, work: Any
 ) -> bool:
@@ -172,7 +186,7 @@ def _contact(
     return True
 
 
-@device
+@inlined
 def _boxes(
     table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float, pz: float, limit: float, out: Any, work: Any
 ) -> bool:
@@ -199,38 +213,54 @@ def _boxes(
     return True
 
 
+# The loops are device functions: in a kernel each rotation[a] would count references (see _jit).
+
+
 @device
-def _pair(table: Any, position: Any, rotation: Any, a: int, b: int, out: Any, work: Any) -> None:
-    contact(
-        table,
-        a,
-        b,
-        rotation[a],
-        rotation[b],
-        position[b, 0] - position[a, 0],
-        position[b, 1] - position[a, 1],
-        position[b, 2] - position[a, 2],
-        out,
-        work,
-    )
+def _contacts(table: Any, position: Any, rotation: Any, pairs: Any, begin: int, end: int, out: Any, work: Any) -> None:
+    for k in range(begin, end):
+        a, b = pairs[k, 0], pairs[k, 1]
+        contact(
+            table,
+            a,
+            b,
+            rotation[a],
+            rotation[b],
+            position[b, 0] - position[a, 0],
+            position[b, 1] - position[a, 1],
+            position[b, 2] - position[a, 2],
+            out[k],
+            work,
+        )
 
 
-@kernel
-def _contact_serial(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
+@device
+def _contacts_within(
+    table: Any, position: Any, rotation: Any, pairs: Any, limit: float, found: Any, out: Any, work: Any
+) -> int:
+    count = 0
     for k in range(len(pairs)):
-        _pair(table, position, rotation, pairs[k, 0], pairs[k, 1], out[k], work[0])
+        a, b = pairs[k, 0], pairs[k, 1]
+        if contact_within(
+            table,
+            a,
+            b,
+            rotation[a],
+            rotation[b],
+            position[b, 0] - position[a, 0],
+            position[b, 1] - position[a, 1],
+            position[b, 2] - position[a, 2],
+            limit,
+            out[count],
+            work,
+        ):
+            found[count] = k
+            count += 1
+    return count
 
 
-@parallel_kernel
-def _contact_parallel(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
-    blocks = len(work)
-    for block in prange(blocks):
-        for k in range(block * len(pairs) // blocks, (block + 1) * len(pairs) // blocks):
-            _pair(table, position, rotation, pairs[k, 0], pairs[k, 1], out[k], work[block])
-
-
-@kernel
-def _separation_serial(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
+@device
+def _separations(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
     for k in range(len(pairs)):
         a, b = pairs[k, 0], pairs[k, 1]
         out[k, 3] = separation(
@@ -247,6 +277,31 @@ def _separation_serial(table: Any, position: Any, rotation: Any, pairs: Any, out
         )
 
 
+@kernel
+def _contact_serial(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
+    _contacts(table, position, rotation, pairs, 0, len(pairs), out, work)
+
+
+@parallel_kernel
+def _contact_parallel(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
+    blocks = len(work)
+    for block in prange(blocks):
+        begin, end = block * len(pairs) // blocks, (block + 1) * len(pairs) // blocks
+        _contacts(table, position, rotation, pairs, begin, end, out, work[block])
+
+
+@kernel
+def _within_serial(
+    table: Any, position: Any, rotation: Any, pairs: Any, limit: float, found: Any, out: Any, work: Any
+) -> int:
+    return _contacts_within(table, position, rotation, pairs, limit, found, out, work)
+
+
+@kernel
+def _separation_serial(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
+    _separations(table, position, rotation, pairs, out, work)
+
+
 def contact_batch(
     table: Any, position: NDArray[np.float64], rotation: NDArray[np.float64], pairs: NDArray[np.int32], threads: int = 1
 ) -> NDArray[np.float64]:
@@ -256,10 +311,24 @@ def contact_batch(
     """
     out = np.zeros((len(pairs), CONTACT_SIZE))
     if threads == 1:
-        _contact_serial(table, position, rotation, pairs, out, np.zeros((1, WORK_SIZE)))
+        _contact_serial(table, position, rotation, pairs, out, np.zeros(WORK_SIZE))
     else:
         _contact_parallel(table, position, rotation, pairs, out, np.zeros((min(threads, get_num_threads()), WORK_SIZE)))
     return out
+
+
+def contact_within_batch(
+    table: Any,
+    position: NDArray[np.float64],
+    rotation: NDArray[np.float64],
+    pairs: NDArray[np.int32],
+    limit: float,
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Which of the pairs are at most `limit` (m) apart, ascending (H,), and their contacts (H, 15)."""
+    found = np.empty(len(pairs), np.int32)
+    out = np.zeros((len(pairs), CONTACT_SIZE))
+    count = _within_serial(table, position, rotation, pairs, limit, found, out, np.zeros(WORK_SIZE))
+    return found[:count], out[:count]
 
 
 def separation_batch(

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from collision_monitor._jit import device
+from collision_monitor._jit import inlined
 from collision_monitor.tolerances import SEGMENT_PARALLEL_SIN2
 
 
-@device
+@inlined
 def clamp(value: float) -> float:
     """Into -1 ... 1."""
     return min(max(value, -1.0), 1.0)
 
 
-@device
+@inlined
 def segment_segment(
     ux: float, uy: float, uz: float, vx: float, vy: float, vz: float, px: float, py: float, pz: float
 ) -> Any:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from math import copysign, sqrt
 from typing import Any
 
-from collision_monitor._jit import device
+from collision_monitor._jit import inlined
 from collision_monitor.narrow_phase.answer import EDGE, FACE, SURFACE, VERTEX, write
 from collision_monitor.narrow_phase.sphere_sphere import direction
 from collision_monitor.tolerances import EPSILON
 
 
-@device
+@inlined
 def sphere_box_separation(
     radius: float, hx: float, hy: float, hz: float, R: Any, px: float, py: float, pz: float, out: Any
 ) -> float:
@@ -35,7 +35,7 @@ def sphere_box_separation(
     return length - radius - 16.0 * EPSILON * (abs(px) + abs(py) + abs(pz))
 
 
-@device
+@inlined
 def _nearest_face(qx: float, qy: float, qz: float, hx: float, hy: float, hz: float) -> Any:
     """Minus the depth of a point in a box, and the direction against the face it is nearest to; x wins ties, then y."""
     dx = hx - abs(qx)
@@ -48,7 +48,7 @@ def _nearest_face(qx: float, qy: float, qz: float, hx: float, hy: float, hz: flo
     return -dz, 0.0, 0.0, -copysign(1.0, qz)
 
 
-@device
+@inlined
 def sphere_box_contact(
     radius: float,
     hx: float,

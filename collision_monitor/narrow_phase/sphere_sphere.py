@@ -5,12 +5,12 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
-from collision_monitor._jit import device
+from collision_monitor._jit import inlined
 from collision_monitor.narrow_phase.answer import SURFACE, write
 from collision_monitor.tolerances import EPSILON
 
 
-@device
+@inlined
 def direction(x: float, y: float, z: float) -> Any:
     """Length and unit vector of (x, y, z); of a zero vector: 0 and +z. Safe from overflow and underflow."""
     scale = max(abs(x), abs(y), abs(z))
@@ -23,7 +23,7 @@ def direction(x: float, y: float, z: float) -> Any:
     return length * scale, x / length, y / length, z / length
 
 
-@device
+@inlined
 def sphere_sphere_separation(ra: float, rb: float, px: float, py: float, pz: float, out: Any) -> float:
     """Distance of the surfaces (m), negative inside."""
     length = sqrt(px * px + py * py + pz * pz)
@@ -38,7 +38,7 @@ def sphere_sphere_separation(ra: float, rb: float, px: float, py: float, pz: flo
     return length * (1.0 - 4.0 * EPSILON) - (ra + rb)
 
 
-@device
+@inlined
 def sphere_sphere_contact(ra: float, rb: float, px: float, py: float, pz: float, out: Any) -> None:
     """Spheres of radius ra and rb (m), margins included; concentric ones part along +z."""
     length, nx, ny, nz = direction(px, py, pz)
