@@ -21,6 +21,9 @@ ROOT = Path(__file__).parents[2]
 EXECUTABLES = {"monitor", "world", "replay", "collision-monitor"}
 COLCON = "import sys; from colcon_core.command import main; sys.exit(main())"
 
+PREFIXES = ":".join(filter(None, (sys.prefix, os.environ.get("AMENT_PREFIX_PATH"))))
+"""Our messages, and ROS 2 itself where an install is sourced."""
+
 
 @pytest.fixture(scope="module")
 def install(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -28,7 +31,7 @@ def install(tmp_path_factory: pytest.TempPathFactory) -> Path:
     workspace = tmp_path_factory.mktemp("workspace")
     folders = ("--build-base", workspace / "build", "--install-base", workspace / "install")
     command = [sys.executable, "-c", COLCON, "--log-base", workspace / "log", "build", "--base-paths", ROOT, *folders]
-    environment = os.environ | {"COLCON_HOME": str(workspace / "home"), "AMENT_PREFIX_PATH": sys.prefix}
+    environment = os.environ | {"COLCON_HOME": str(workspace / "home"), "AMENT_PREFIX_PATH": PREFIXES}
     selected = [*command, "--packages-select", "collision_monitor"]
     answer = subprocess.run(selected, env=environment, cwd=workspace, capture_output=True, text=True, timeout=120)
     assert answer.returncode == 0, answer.stdout + answer.stderr

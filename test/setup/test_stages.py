@@ -1,0 +1,130 @@
+"""Which stages run again, and when: fresh, finished, interrupted, changed, damaged and moved set-ups."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+from pathlib import Path
+
+import machine
+import pytest
+import stages
+
+ROOT = Path(__file__).parents[2]
+SPEC = importlib.util.spec_from_file_location("set_up", ROOT / "scripts" / "set_up" / "__main__.py")
+assert SPEC
+assert SPEC.loader
+set_up = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(set_up)
+
+NAMES = [stage.name for stage in stages.STAGES]
+ROS = machine.ros_install(os.environ, stages.VENV)
+
+
+@pytest.fixture
+def stamps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The stamps of a finished set-up of this environment, to be spoilt by the test."""
+    monkeypatch.setattr(set_up, "STAMPS", tmp_path)
+    for stage in stages.STAGES:
+        (tmp_path / stage.name).write_text(stage.inputs(ROS))
+    return tmp_path
+
+
+def pending() -> list[str]:
+    return [stage.name for stage in set_up.stages_to_run(ROS)[0]]
+
+
+def python_in_front_of_which(tmp_path: Path, module: str) -> Path:
+    """This environment's Python, where importing that module fails as a damaged one does."""
+    broken = tmp_path / "broken" / module
+    broken.mkdir(parents=True)
+    (broken / "__init__.py").write_text("raise ImportError('file too short')\n")
+    python = tmp_path / "broken" / "python"
+    python.write_text(f'#!/bin/sh\nPYTHONPATH="{broken.parent}:$PYTHONPATH" exec "{stages.PYTHON}" "$@"\n')
+    python.chmod(0o755)
+    return python
+
+
+def test_nothing_runs_again_when_all_is_well(stamps: Path) -> None:
+    assert pending() == []
+
+
+def test_everything_runs_at_first(stamps: Path) -> None:
+    for stamp in stamps.iterdir():
+        stamp.unlink()
+    assert pending() == NAMES
+
+
+@pytest.mark.parametrize("name", ["environment", "packages"])
+def test_an_interrupted_installation_starts_anew(stamps: Path, name: str) -> None:
+    (stamps / name).unlink()
+    assert pending() == NAMES
+
+
+@pytest.mark.parametrize("name", ["messages", "package", "warm-up"])
+def test_an_interrupted_later_stage_runs_alone(stamps: Path, name: str) -> None:
+    (stamps / name).unlink()
+    assert pending() == [name]
+
+
+@pytest.mark.parametrize("name", ["packages", "messages", "package", "warm-up"])
+def test_changed_inputs_run_their_stage_alone(stamps: Path, name: str) -> None:
+    (stamps / name).write_text("the digest of something else")
+    assert pending() == [name]
+
+
+def test_a_moved_clone_starts_anew(stamps: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stages, "VENV", stamps / "elsewhere" / ".venv")
+    assert pending() == NAMES
+
+
+def test_another_ros_starts_anew(stamps: Path) -> None:
+    other = machine.RosInstall("rolling", (Path("/opt/ros/rolling"),), (3, 12))
+    assert [stage.name for stage in set_up.stages_to_run(other)[0]] == NAMES
+
+
+def test_an_environment_whose_python_is_gone_starts_anew(stamps: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stages, "PYTHON", stamps / "no" / "python")
+    assert pending() == NAMES
+
+
+@pytest.mark.parametrize("module", ["rclpy", "numpy", "llvmlite"])
+def test_damaged_packages_start_anew(
+    stamps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str
+) -> None:
+    monkeypatch.setattr(stages, "PYTHON", python_in_front_of_which(tmp_path, module))
+    assert pending() == NAMES
+
+
+def test_damaged_messages_are_built_again(stamps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stages, "PYTHON", python_in_front_of_which(tmp_path, stages.MESSAGES))
+    assert pending() == ["messages"]
+
+
+def test_a_package_of_another_clone_is_installed_again(
+    stamps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = tmp_path / "broken" / "collision_monitor"
+    python = python_in_front_of_which(tmp_path, "collision_monitor")
+    (other / "__init__.py").write_text("")
+    monkeypatch.setattr(stages, "PYTHON", python)
+    assert pending() == ["package"]
+
+
+def test_exported_variables_of_other_pythons_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    strays = ("PYTHONHOME", "VIRTUAL_ENV", "PIP_USER", "PIP_TARGET", "COLCON_DEFAULTS_FILE")
+    for name in strays:
+        monkeypatch.setenv(name, "/somewhere/else")
+    monkeypatch.setenv("PYTHONPATH", "/somewhere/else")
+    assert not set(strays) & set(stages.environment_variables(None))
+    assert "PYTHONPATH" not in stages.environment_variables(None)
+    install = machine.RosInstall("jazzy", (Path("/opt/ros/jazzy"),), (3, 12))
+    assert stages.environment_variables(install)["PYTHONPATH"] == "/somewhere/else"
+    assert stages.environment_variables(install)["AMENT_PREFIX_PATH"] == f"{stages.VENV}:/opt/ros/jazzy"
+
+
+def test_a_second_run_only_checks() -> None:
+    """`make setup` itself, which `make test` has run just before."""
+    answer = subprocess.run(["make", "-s", "setup"], cwd=ROOT, capture_output=True, text=True, timeout=600)
+    assert (answer.returncode, answer.stdout, answer.stderr) == (0, "", "")
