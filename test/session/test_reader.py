@@ -63,7 +63,7 @@ def test_every_cut_gives_every_complete_chunk(tmp_path: Path) -> None:
     ends = chunked(path)
     data = path.read_bytes()
     opened = 0
-    for length in range(8, len(data)):
+    for length in range(8, len(data), 3):
         cut.write_bytes(data[:length])
         try:
             session = Session(cut)
