@@ -1,0 +1,19 @@
+"""Options of the command line as ROS parameters."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+
+def parameters(**values: str | int | float | Path | None) -> list[str]:
+    """`-p name:=value` for each value that is not None, to be put behind --ros-args.
+
+    ROS reads the values as YAML, so texts are quoted: a file named `7` or `yes` stays a text.
+    """
+    found = []
+    for name, value in values.items():
+        if value is not None:
+            text = json.dumps(str(value)) if isinstance(value, str | Path) else repr(value)
+            found += ["-p", f"{name}:={text}"]
+    return found

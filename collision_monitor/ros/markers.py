@@ -1,0 +1,131 @@
+"""A picture of a step for RViz or Foxglove: shapes by what happens to them, contacts, and impacts to come."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.codec import Descriptions, Removal
+from collision_monitor.geometry.pose import Pose, rotation_matrix
+from collision_monitor.monitor import StepResult
+from collision_monitor.records import Phase
+from collision_monitor.ros.marker_bytes import Color, Kind, Marker, encode
+from collision_monitor.ros.surfaces import triangles
+
+STATIC: Final[Color] = (0.55, 0.57, 0.60, 0.35)
+CALM: Final[Color] = (0.35, 0.55, 0.85, 0.9)
+PREDICTED: Final[Color] = (0.95, 0.70, 0.15, 1.0)
+TOUCHING: Final[Color] = (0.85, 0.15, 0.15, 1.0)
+CONTACT: Final[Color] = (1.0, 1.0, 1.0, 1.0)
+
+NORMAL_LENGTH = 0.5
+"""m, of the line that shows a contact's normal."""
+LABELS = 10
+"""The soonest impacts are labelled with the time that is left."""
+
+Vertices = NDArray[np.float64]
+
+
+class MarkerView:
+    """Remembers shapes and last poses; draws when asked."""
+
+    def __init__(self, frame_id: str) -> None:
+        self._frame_id = frame_id
+        self._surfaces: dict[int, Vertices] = {}
+        self._static: dict[int, Vertices] = {}
+        self._ids = np.empty(0, np.uint32)
+        self._vertices = np.empty((0, 3))
+        self._owner = np.empty(0, np.intp)
+        self._poses: dict[int, NDArray[np.float64]] = {}
+
+    def describe(self, message: Descriptions) -> None:
+        """Take in new and changed objects, forget removed ones."""
+        if message.snapshot:
+            keep = {description.object_id for description in message.objects}
+            for object_id in (self._surfaces.keys() | self._static.keys()) - keep:
+                self._forget(object_id)
+        for description in message.objects:
+            self._forget_shape(description.object_id)
+            if isinstance(description, Removal):
+                self._forget(description.object_id)
+                continue
+            parts = [_placed(triangles(shape).reshape(-1, 3), pose) for shape, pose in description.shapes]
+            vertices = np.concatenate(parts)
+            if description.static and description.pose is not None:
+                self._static[description.object_id] = _placed(vertices, description.pose)
+            else:
+                self._surfaces[description.object_id] = vertices
+        self._ids = np.array(sorted(self._surfaces), np.uint32)
+        surfaces = [self._surfaces[int(i)] for i in self._ids]
+        self._vertices = np.concatenate(surfaces) if surfaces else np.empty((0, 3))
+        self._owner = np.repeat(np.arange(len(surfaces)), [len(s) for s in surfaces])
+
+    def _forget_shape(self, object_id: int) -> None:
+        self._surfaces.pop(object_id, None)
+        self._static.pop(object_id, None)
+
+    def _forget(self, object_id: int) -> None:
+        self._forget_shape(object_id)
+        self._poses.pop(object_id, None)
+
+    def draw(self, states: NDArray[np.void], result: StepResult) -> bytes:
+        """MarkerArray bytes; `states`: those of the step (records.STATE). Objects without a state are left out."""
+        for state in states:
+            self._poses[int(state["id"])] = np.r_[state["position"], state["quaternion"]]
+        contacts = result.contacts[result.contacts["phase"] != Phase.END]
+        touching = np.isin(self._ids, [contacts["id_a"], contacts["id_b"]])
+        predicted = np.isin(self._ids, [result.predictions["id_a"], result.predictions["id_b"]]) & ~touching
+        seen = np.array([int(i) in self._poses for i in self._ids], bool)
+        world = self._world_vertices()
+
+        def surface(namespace: str, color: Color, which: NDArray[np.bool_]) -> Marker:
+            return Marker(namespace, Kind.TRIANGLE_LIST, color, world[(which & seen)[self._owner]])
+
+        static = np.concatenate(list(self._static.values())) if self._static else np.empty((0, 3))
+        markers = [
+            Marker("static", Kind.TRIANGLE_LIST, STATIC, static),
+            surface("clear", CALM, ~touching & ~predicted),
+            surface("predicted", PREDICTED, predicted),
+            surface("touching", TOUCHING, touching),
+            *_contact_markers(contacts),
+            *_prediction_markers(result.predictions),
+        ]
+        return encode(result.stamp_ns, self._frame_id, markers)
+
+    def _world_vertices(self) -> Vertices:
+        nowhere = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+        poses = np.array([self._poses.get(int(i), nowhere) for i in self._ids]).reshape(-1, 7)
+        rotations = rotation_matrix(poses[:, 3:])
+        turned = np.einsum("nij,nj->ni", rotations[self._owner], self._vertices)
+        world: Vertices = turned + poses[self._owner, :3]
+        return world
+
+
+def _placed(vertices: Vertices, pose: Pose) -> Vertices:
+    placed: Vertices = vertices @ pose.rotation.T + pose.position
+    return placed
+
+
+def _contact_markers(contacts: NDArray[np.void]) -> list[Marker]:
+    known = contacts[np.isfinite(contacts["point_a"]).all(axis=1)]
+    start = known["point_a"]
+    lines = np.stack([start, start + NORMAL_LENGTH * known["normal"]], axis=1).reshape(-1, 3)
+    return [
+        Marker("contact points", Kind.SPHERE_LIST, CONTACT, start, (0.1, 0.1, 0.1)),
+        Marker("contact normals", Kind.LINE_LIST, CONTACT, lines, (0.03, 0.0, 0.0)),
+    ]
+
+
+def _prediction_markers(predictions: NDArray[np.void]) -> list[Marker]:
+    known = predictions[np.isfinite(predictions["point"]).all(axis=1)]
+    markers = [Marker("predicted impacts", Kind.SPHERE_LIST, PREDICTED, known["point"], (0.15, 0.15, 0.15))]
+    for i in range(LABELS):
+        label = Marker("time left", Kind.TEXT, PREDICTED, scale=(0.0, 0.0, 0.4), number=i)
+        if i < len(known):
+            x, y, z = (float(c) for c in known["point"][i])
+            label = replace(label, position=(x, y, z + 0.5), text=f"{known['lower'][i]:.2f} s")
+        markers.append(label)
+    return markers

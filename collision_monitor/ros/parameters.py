@@ -1,0 +1,110 @@
+"""ROS parameters that are checked when a node starts and read-only from then on.
+
+The monitor's are generated from the profile's settings. They are read-only because a session has one profile from its
+first to its last message, so that it can be replayed: to change a setting, start the node with another value.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.node import Node
+
+from collision_monitor.errors import InputError, ProfileError
+from collision_monitor.profiles import Profile, Setting
+
+T = TypeVar("T", str, int, float, str | int | float)
+
+_BY_RCLPY = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+_TYPES = {str: "a text", int: "a whole number", float: "a number"}
+
+
+class ParameterReader:
+    """Declares the parameters of a node and returns their values.
+
+    The node is made with `automatically_declare_parameters_from_overrides`: so a misspelt name is refused rather than
+    ignored, and a whole number is accepted where a decimal one is meant (`-p horizon:=1`). Raises InputError.
+    """
+
+    def __init__(self, node: Node, names: Sequence[str]) -> None:
+        self._node = node
+        self._given = {name: parameter.value for name, parameter in node.get_parameters_by_prefix("").items()}
+        for name in self._given:
+            if name in names or name.startswith(_BY_RCLPY):
+                continue
+            near = difflib.get_close_matches(name, names, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names)}"
+            raise InputError(f"parameter {name!r} is unknown: {hint}")
+
+    def value(self, name: str, default: T) -> T:
+        """What was given, or the default, which also says the type."""
+        value = self._given.get(name, default)
+        if isinstance(default, float) and type(value) is int:
+            value = float(value)
+        if type(value) is not type(default):
+            raise InputError(f"parameter {name}: expected {_TYPES[type(default)]}, got {value!r}")
+        result: T = value
+        return result
+
+    def declare(self, name: str, value: str | int | float, descriptor: ParameterDescriptor) -> None:
+        """Show the value to `ros2 param`, with its description and range."""
+        if self._node.has_parameter(name):
+            self._node.undeclare_parameter(name)
+        descriptor.read_only = True
+        self._node.declare_parameter(name, value, descriptor, ignore_override=True)
+
+    def read(self, name: str, default: T, description: str) -> T:
+        """`value` and `declare` in one."""
+        value = self.value(name, default)
+        self.declare(name, value, ParameterDescriptor(description=description))
+        return value
+
+
+EXECUTORS = ("single", "events")
+
+
+@dataclass(frozen=True)
+class MonitorParameters:
+    """What the monitor was told."""
+
+    profile: Profile
+    frame_id: str
+    record: str
+    executor: str
+
+
+def read_monitor_parameters(node: Node) -> MonitorParameters:
+    """Raises InputError, ProfileError for a setting out of range."""
+    settings = Profile.fields()
+    reader = ParameterReader(node, ["profile", *(s.name for s in settings), "frame_id", "record", "executor"])
+    profile = Profile.named(
+        reader.read("profile", "balanced", f"Where the settings start from: {', '.join(Profile.names())}.")
+    )
+    profile = profile.replace(**{s.name: reader.value(s.name, getattr(profile, s.name)) for s in settings})
+    for setting in settings:
+        reader.declare(setting.name, getattr(profile, setting.name), _descriptor(setting))
+
+    frame_id = reader.read("frame_id", "world", "The frame of all poses; messages in another one are refused.")
+    record = reader.read("record", "", "Path of the session file (.mcap) to write; empty: no recording.")
+    executor = reader.read("executor", "single", f"The rclpy executor: {' or '.join(EXECUTORS)}.")
+    if not frame_id:
+        raise ProfileError("parameter frame_id: expected the name of a frame, got an empty text")
+    if executor not in EXECUTORS:
+        raise ProfileError(f"parameter executor: expected {' or '.join(EXECUTORS)}, got {executor!r}")
+    return MonitorParameters(profile, frame_id, record, executor)
+
+
+def _descriptor(setting: Setting) -> ParameterDescriptor:
+    unit = "" if setting.unit == "1" else f" [{setting.unit}]"
+    descriptor = ParameterDescriptor(description=f"{setting.description}{unit}")
+    if setting.type is int:
+        low, high = int(setting.minimum), int(setting.maximum)
+        descriptor.integer_range = [IntegerRange(from_value=low, to_value=high, step=1)]
+    else:
+        least, most = float(setting.minimum), float(setting.maximum)
+        descriptor.floating_point_range = [FloatingPointRange(from_value=least, to_value=most, step=0.0)]
+    return descriptor

@@ -1,0 +1,50 @@
+"""How long steps take, how old their input is, and how many there are each second."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+WINDOW = 1000
+"""Steps over which the 99th percentile is taken."""
+
+CLOCK_TOLERANCE = 1e-3
+"""s: a stamp this far in the future is round-off and clock synchronisation; beyond it the clocks do not agree."""
+
+
+class StepTimes:
+    """All times in ns; the steady clock for durations and rate, ROS time for the latency."""
+
+    def __init__(self, longest_latency: float) -> None:
+        """`longest_latency` (s): beyond it the stamps come from another clock, not from a slow network."""
+        self._longest_latency = longest_latency
+        self._durations = np.zeros(WINDOW)
+        self._steps = 0
+        self._ends: deque[int] = deque()
+        self._latency = float("nan")
+
+    def add(self, began: int, ended: int, latency: int) -> None:
+        """Note one step."""
+        self._durations[self._steps % WINDOW] = (ended - began) * 1e-9
+        self._steps += 1
+        self._ends.append(ended)
+        self._forget(ended)
+        seconds = latency * 1e-9
+        agree = -CLOCK_TOLERANCE <= seconds <= self._longest_latency
+        self._latency = max(seconds, 0.0) if agree else float("nan")
+
+    def summary(self, now: int) -> dict[str, float]:
+        """The timing fields of MonitorStatus, in s and Hz; NaN before the first step."""
+        self._forget(now)
+        known = self._durations[: min(self._steps, WINDOW)]
+        return {
+            "step_duration": float(self._durations[(self._steps - 1) % WINDOW]) if self._steps else float("nan"),
+            "step_duration_p99": float(np.percentile(known, 99)) if self._steps else float("nan"),
+            "latency": self._latency,
+            "rate": float(len(self._ends)),
+        }
+
+    def _forget(self, now: int) -> None:
+        while self._ends and now - self._ends[0] > 1_000_000_000:
+            self._ends.popleft()

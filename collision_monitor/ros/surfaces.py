@@ -1,0 +1,103 @@
+"""Shapes as triangles, coarse, to be looked at: never used to answer anything."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.geometry.shapes import (
+    Box,
+    Capsule,
+    Circle,
+    Cone,
+    ConvexHull,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Polygon,
+    Shape,
+    Sphere,
+)
+
+Triangles = NDArray[np.float64]
+"""(n, 3, 3): triangle, corner, coordinate in m."""
+
+SIDES = 16
+"""Of what is round."""
+HALF_SPACE_EXTENT = 20.0
+"""m, the side of the square that stands for an endless plane."""
+
+
+def triangles(shape: Shape) -> Triangles:
+    """The surface of a shape in its own frame."""
+    match shape:
+        case Box():
+            return _box(np.asarray(shape.size))
+        case Sphere():
+            angles = np.linspace(-np.pi / 2, np.pi / 2, SIDES // 2 + 1)
+            return _revolve(shape.radius * np.cos(angles), shape.radius * np.sin(angles))
+        case Capsule():
+            angles = np.linspace(0.0, np.pi / 2, SIDES // 4 + 1)
+            radii, heights = shape.radius * np.cos(angles), shape.radius * np.sin(angles) + shape.length / 2
+            return _revolve(np.r_[radii[::-1], radii], np.r_[-heights[::-1], heights])
+        case Cylinder():
+            h = shape.length / 2
+            return _revolve(np.array([0.0, shape.radius, shape.radius, 0.0]), np.array([-h, -h, h, h]))
+        case Cone():
+            h = shape.length / 2
+            return _revolve(np.array([0.0, shape.radius, 0.0]), np.array([-h, -h, h]))
+        case Circle():
+            return _revolve(np.array([0.0, shape.radius]), np.zeros(2))
+        case Mesh():
+            corners: Triangles = np.asarray(shape.vertices)[np.asarray(shape.faces)]
+            return corners
+        case ConvexHull():
+            return _hull(np.asarray(shape.points))
+        case Polygon():
+            return _outline(np.asarray(shape.points))
+        case HalfSpace():
+            return _plane(np.asarray(shape.normal), shape.offset)
+    raise TypeError(f"no surface for {type(shape).__name__}")
+
+
+def _revolve(radii: NDArray[np.float64], heights: NDArray[np.float64]) -> Triangles:
+    """The profile (radius, height), turned about z."""
+    turn = np.linspace(0.0, 2 * np.pi, SIDES + 1)
+    ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    rings = np.empty((len(radii), SIDES + 1, 3))
+    rings[:, :, :2] = radii[:, None, None] * ring
+    rings[:, :, 2] = heights[:, None]
+    low, high = rings[:-1], rings[1:]
+    a, b, c, d = low[:, :-1], low[:, 1:], high[:, 1:], high[:, :-1]
+    return np.concatenate([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)]).reshape(-1, 3, 3)
+
+
+def _box(size: NDArray[np.float64]) -> Triangles:
+    corner = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * size
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    return np.array([corner[[q[0], q[i], q[i + 1]]] for q in quads for i in (1, 2)])
+
+
+def _hull(points: NDArray[np.float64]) -> Triangles:
+    from scipy.spatial import ConvexHull as Hull
+
+    corners: Triangles = points[Hull(points).simplices]
+    return corners
+
+
+def _outline(points: NDArray[np.float64]) -> Triangles:
+    """A thin upright band along the boundary: right for concave polygons too."""
+    a = np.c_[points, np.zeros(len(points))]
+    b = np.roll(a, -1, axis=0)
+    up = np.array([0.0, 0.0, 0.1])
+    return np.concatenate([np.stack([a, b, b + up], axis=1), np.stack([a, b + up, a + up], axis=1)])
+
+
+def _plane(normal: NDArray[np.float64], offset: float) -> Triangles:
+    helper = np.eye(3)[np.argmin(np.abs(normal))]
+    u = np.cross(normal, helper)
+    u *= HALF_SPACE_EXTENT / 2 / np.linalg.norm(u)
+    v = np.cross(normal, u)
+    centre = normal * offset
+    a, b, c, d = centre - u - v, centre + u - v, centre + u + v, centre - u + v
+    return np.array([[a, b, c], [a, c, d]])

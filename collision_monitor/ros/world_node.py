@@ -1,0 +1,94 @@
+"""Plays a scene as a robot team would be heard: shapes once, latched, then states at a steady rate.
+
+    ros2 run collision_monitor world --ros-args -p scene:=fleet -p objects:=200
+"""
+
+from __future__ import annotations
+
+import math
+import time
+
+from rclpy.node import Node
+
+from collision_monitor import codec
+from collision_monitor.errors import CollisionMonitorError, InputError
+from collision_monitor.ros import qos
+from collision_monitor.ros.parameters import ParameterReader
+from collision_monitor.ros.process import WAKE_UP, StopRequest
+from collision_monitor.world import make_scene, scene_names
+from collision_monitor_msgs.msg import ObjectDescriptionArray, ObjectStateArray
+
+PARAMETERS = ("scene", "objects", "rate", "duration", "seed", "path", "monitor", "frame_id")
+
+
+class WorldNode(Node):
+    """Publishes one scene to one monitor. Raises InputError for a scene that cannot be."""
+
+    def __init__(self) -> None:
+        super().__init__("world", automatically_declare_parameters_from_overrides=True)
+        try:
+            self._read_parameters()
+        except CollisionMonitorError:
+            self.destroy_node()
+            raise
+        topics = f"/{self._monitor}/objects"
+        self._shapes_out = self.create_publisher(ObjectDescriptionArray, f"{topics}/shapes", qos.SHAPES)
+        self._states_out = self.create_publisher(ObjectStateArray, f"{topics}/states", qos.STATES)
+
+    def _read_parameters(self) -> None:
+        reader = ParameterReader(self, PARAMETERS)
+        name = reader.read("scene", "fleet", f"One of {', '.join(scene_names())}.")
+        objects = reader.read("objects", 0, "How many move; 0: the scene's own number.")
+        rate = reader.read("rate", 0.0, "Messages per second [Hz]; 0: the scene's own rate.")
+        seed = reader.read("seed", 1, "Of the scene's random numbers.")
+        path = reader.read("path", "", "Recorded tracks, for the scene that plays them.")
+        self._scene = make_scene(name, objects=objects or None, seed=seed, rate=rate or None, path=path or None)
+        self._duration = reader.read("duration", 0.0, "After which it stops [s]; 0: the scene's own end, or endless.")
+        if not (self._duration >= 0.0 and math.isfinite(self._duration)):
+            raise InputError(f"duration: expected a finite number of seconds, at least 0, got {self._duration}")
+        self._monitor = reader.read("monitor", "object_monitor", "Name of the monitor to publish to.").strip("/")
+        self._frame_id = reader.read("frame_id", "world", "The frame of all poses.")
+
+    def play(self, stop: StopRequest) -> None:
+        """Publish until the duration or the scene is over, or a stop is asked for.
+
+        Deadlines are counted from the start, so the rate does not drift, and stamps are those deadlines, so states
+        are exactly one period apart. Where the machine is too slow, whole periods are skipped and counted.
+        """
+        scene, period = self._scene, 1.0 / self._scene.rate
+        self.get_logger().info(
+            f"{scene.name}: {len(scene.descriptions)} objects at {scene.rate:g} Hz to {self._states_out.topic_name}"
+        )
+        first_stamp = self.get_clock().now().nanoseconds
+        self._shapes_out.publish(
+            codec.encode_descriptions(first_stamp, self._frame_id, scene.descriptions, snapshot=True)
+        )
+        end = self._duration or math.inf
+        states = scene.states()
+        tick = messages = skipped = 0
+        latest = 0.0
+        began = time.monotonic()
+        while not scene.finished and tick * period < end and _sleep_until(began + tick * period, stop):
+            messages += 1
+            stamp = first_stamp + round(tick * period * 1e9)
+            self._states_out.publish(codec.encode_states(stamp, self._frame_id, messages, states))
+            late = time.monotonic() - began - tick * period
+            latest = max(latest, late)
+            missed = int(late / period)
+            skipped += missed
+            tick += 1 + missed
+            states = scene.step(period * (1 + missed))
+        self.get_logger().info(
+            f"published {messages} messages in {time.monotonic() - began:.1f} s, {skipped} periods skipped, "
+            f"at most {latest * 1e3:.1f} ms after their stamp"
+        )
+
+
+def _sleep_until(deadline: float, stop: StopRequest) -> bool:
+    """False where a stop is asked for meanwhile; it is looked for every WAKE_UP seconds."""
+    while not stop.received:
+        left = deadline - time.monotonic()
+        if left <= 0.0:
+            return True
+        time.sleep(min(left, WAKE_UP))
+    return False

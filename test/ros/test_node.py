@@ -1,0 +1,231 @@
+"""The node as a robot team meets it: another process, real DDS, messages read by rclpy."""
+
+import math
+import signal
+
+import numpy as np
+import pytest
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.parameter import Parameter
+from rosgraph_msgs.msg import Clock
+
+from collision_monitor import codec, records
+from collision_monitor.codec import Removal
+from collision_monitor.description import ObjectDescription
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Sphere
+from collision_monitor.ros import main
+from collision_monitor_msgs.msg import Contact, MonitorStatus
+
+BALL = ((Sphere(0.5), Pose()),)
+SECOND = 1_000_000_000
+
+
+def ball(object_id, **options):
+    return ObjectDescription(object_id, BALL, name=f"ball {object_id}", **options)
+
+
+def state(object_id, position, linear=(0, 0, 0)):
+    row = np.zeros((), records.STATE)
+    row["id"], row["position"], row["linear"] = object_id, position, linear
+    row["quaternion"] = (0, 0, 0, 1)
+    return row
+
+
+APPROACHING = (state(1, (0, 0, 0), (1, 0, 0)), state(2, (2, 0, 0)))
+"""Two balls with 1 m between them, closing at 1 m/s: they touch in 1 s."""
+OVERLAPPING = (state(3, (0, 10, 0)), state(4, (0.9, 10, 0)))
+"""Two balls, 0.1 m into each other."""
+
+
+def test_a_known_contact_and_a_known_impact(start, team):
+    monitor = start("run")
+    team.meet()
+    team.describe(*map(ball, (1, 2, 3, 4)))
+    team.status(lambda s: s.objects == 4)
+    contacts, predictions = team.ask(*APPROACHING, *OVERLAPPING)
+
+    (contact,) = contacts.contacts
+    assert (contact.id_a, contact.id_b) == (3, 4)
+    assert contact.signed_distance == pytest.approx(-0.1, abs=1e-9)
+    assert (contact.normal.x, contact.normal.y, contact.normal.z) == pytest.approx((1, 0, 0))
+    assert contact.phase == Contact.BEGIN
+    assert (list(contacts.ids), contacts.names) == ([3, 4], ["ball 3", "ball 4"])
+
+    (impact,) = predictions.predictions
+    assert (impact.id_a, impact.id_b) == (1, 2)
+    assert impact.lower <= 1.0 <= impact.upper
+    assert impact.upper - impact.lower < 0.02
+    assert impact.closing_speed == pytest.approx(1.0)
+    assert (list(predictions.ids), predictions.names) == ([1, 2], ["ball 1", "ball 2"])
+    assert (contacts.header.frame_id, contacts.step, predictions.horizon) == ("world", 1, 2.0)
+
+    status = team.status(lambda s: s.step == 1)
+    assert (status.contacts, status.predictions, status.objects) == (1, 1, 4)
+    assert 0.0 < status.latency < 5.0
+    assert 0.0 < status.step_duration < 5.0
+    assert status.recording == MonitorStatus.RECORDING_OFF
+    assert monitor.stop() == 0
+    assert "Traceback" not in monitor.words
+
+
+def test_shapes_that_were_published_before_the_monitor_started_are_known(start, team):
+    team.describe(ball(1), ball(2))
+    start("run")
+    team.meet()
+    team.status(lambda s: s.objects == 2)
+    _, predictions = team.ask(*APPROACHING)
+    assert len(predictions.predictions) == 1
+
+
+def _refused(team, field):
+    return team.status(lambda s: getattr(s, field) == 1)
+
+
+def test_bad_input_is_counted_and_the_others_are_still_monitored(start, team):
+    monitor = start("run")
+    team.meet()
+    team.describe(ball(1), ball(2), ball(5))
+    team.status(lambda s: s.objects == 3)
+
+    nan, lying, stranger = state(5, (math.nan, 0, 0)), state(5, (50, 0, 0)), state(77, (0, 0, 0))
+    lying["quaternion"] = 0.0
+    for bad, field in ((nan, "non_finite"), (lying, "quaternion"), (stranger, "unknown_id")):
+        _, predictions = team.ask(*APPROACHING, bad)
+        assert [(p.id_a, p.id_b) for p in predictions.predictions] == [(1, 2)]
+        assert _refused(team, f"refused_{field}").last_refusal
+
+    # Not the empty message: Fast DDS itself never delivers it.
+    for garbage in (b"\x00", b"\x00\x01\x00\x00", b"\xff" * 7, bytes(range(256)) * 4):
+        team.publish_states(garbage)
+        team.publish_shapes(garbage)
+    team.status(lambda s: s.refused_malformed == 8)
+
+    stamp = team.say(*APPROACHING, stamp=team.now)
+    team.status(lambda s: s.step == 4)
+    team.say(*APPROACHING, stamp=stamp - SECOND // 100)
+    assert team.status(lambda s: s.refused_old == 2).objects == 3
+    team.say(*APPROACHING, frame_id="moon")
+    _refused(team, "refused_frame")
+    team.say(*APPROACHING, stamp=team.now + 3600 * SECOND)
+    _refused(team, "refused_time")
+
+    _, predictions = team.ask(*APPROACHING)
+    assert len(predictions.predictions) == 1
+    team.describe(Removal(5))
+    team.ask(*APPROACHING, state(5, (0.5, 0, 0)))
+    status = team.status(lambda s: s.refused_unknown_id == 2)
+    assert status.objects == 2
+    assert monitor.stop() == 0
+
+
+def test_an_impossible_shape_is_refused_and_the_others_are_taken(start, team):
+    start("run")
+    team.meet()
+    data = bytearray(_encoded(ball(1), ball(2)))
+    radius = np.float64(0.5).tobytes()
+    first = bytes(data).index(radius)
+    data[first : first + 8] = np.float64(-0.5).tobytes()
+    team.publish_shapes(bytes(data))
+    status = _refused(team, "refused_shape")
+    assert status.objects == 1
+    assert "-0.5" in status.last_refusal
+
+
+def _encoded(*objects):
+    return codec.encode_descriptions(0, "world", objects)
+
+
+def test_silence_is_never_clear(start, team):
+    start("run", "--ros-args", "-p", "stale_after:=0.3")
+    team.meet()
+    team.describe(ball(1), ball(2), ball(3))
+    team.status(lambda s: s.objects == 3)
+    team.ask(*APPROACHING)
+    status = team.status(lambda s: s.objects_stale == 2)
+    assert (status.objects_unseen, status.predictions) == (1, 1)
+    heard = len(team.statuses)
+    team.listen(2.2)
+    assert len(team.statuses) - heard >= 2
+    assert team.statuses[-1].rate == 0.0
+    assert team.statuses[-1].step == 1
+
+
+def test_simulated_time(start, team):
+    """An hour after the epoch on the simulated clock; the latency is by that clock."""
+    start("run", "--ros-args", "-p", "use_sim_time:=true")
+    team.meet()
+    clock = team.node.create_publisher(Clock, "/clock", 10)
+    team.until(lambda: clock.get_subscription_count())
+    team.describe(ball(1), ball(2))
+    team.status(lambda s: s.objects == 2)
+    message = Clock()
+    message.clock.sec, message.clock.nanosec = 3600, 250_000_000
+    clock.publish(message)
+    team.listen(0.3)
+    team.ask(*APPROACHING, stamp=3600 * SECOND)
+    assert team.status(lambda s: s.step == 1).latency == pytest.approx(0.25)
+
+
+@pytest.fixture
+def signals():
+    """Puts back the handlers that a main function takes over."""
+    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in kept.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["-p", "horizon:=-1.0"], "horizon: expected 0 to 1e+06 s, got -1"),
+        (["-p", "horizn:=1.0"], "did you mean 'horizon'?"),
+        (["-p", "threads:=1.5"], "threads: expected a whole number, got 1.5"),
+        (["-p", "profile:=hasty"], "expected one of balanced, exact, fast, got 'hasty'"),
+        (["-p", "executor:=none"], "expected single or events, got 'none'"),
+        (["-p", "frame_id:=''"], "expected the name of a frame, got an empty text"),
+    ],
+)
+def test_impossible_parameters_are_refused_in_one_line(ros_domain_id, signals, capfd, arguments, words):
+    assert main.monitor(["monitor", "--ros-args", *arguments]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert words in line
+
+
+def test_parameters_can_be_read_and_not_changed(start, team):
+    start("run", "--ros-args", "-p", "horizon:=1")
+    team.meet()
+
+    def call(kind, name, request):
+        client = team.node.create_client(kind, f"/object_monitor/{name}")
+        assert client.wait_for_service(10.0)
+        future = client.call_async(request)
+        team.until(future.done)
+        return future.result()
+
+    values = call(GetParameters, "get_parameters", GetParameters.Request(names=["horizon", "profile"])).values
+    assert (values[0].double_value, values[1].string_value) == (1.0, "balanced")
+    change = SetParameters.Request(parameters=[Parameter("horizon", value=3.0).to_parameter_msg()])
+    (result,) = call(SetParameters, "set_parameters", change).results
+    assert not result.successful
+    assert "read-only" in result.reason
+
+
+@pytest.mark.parametrize("executor", ["single", "events"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_end_it_cleanly_idle_and_under_load(start, team, tmp_path, number, executor):
+    monitor = start("run", "--record", "run.mcap", "--ros-args", "-p", f"executor:={executor}")
+    team.meet()
+    if executor == "single":  # load: messages go on arriving while it stops
+        team.describe(ball(1), ball(2))
+        timer = team.node.create_timer(0.001, lambda: team.say(*APPROACHING))
+        team.status(lambda s: s.step > 20)
+    monitor.send(number)
+    monitor.send(number)
+    team.until(lambda: not monitor.running)
+    if executor == "single":
+        team.node.destroy_timer(timer)
+    assert monitor.wait() == 0
+    assert "Traceback" not in monitor.words
+    assert (tmp_path / "run.mcap").read_bytes().endswith(b"\x89MCAP0\r\n")
