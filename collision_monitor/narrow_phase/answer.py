@@ -30,7 +30,7 @@ MAX_VERTICES: Final = 512
 MAX_FACES: Final = 2 * MAX_VERTICES
 """A closed triangle surface has fewer than twice as many faces as vertices."""
 
-SIMPLEX: Final = 16
+SIMPLEX: Final = 24
 """Start of the points (rows of 8: B - A, point on A, index on A, index on B); 0:12 hold the pose of B in A's frame."""
 
 FACES: Final = SIMPLEX + 8 * MAX_VERTICES

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from collision_monitor._jit import device
 from collision_monitor.narrow_phase.answer import EDGES, FACES, MAX_FACES, MAX_VERTICES, SIMPLEX
-from collision_monitor.narrow_phase.gjk import WEIGHTS, _triangle
+from collision_monitor.narrow_phase.gjk import WEIGHTS, closest_on_triangle
 from collision_monitor.narrow_phase.support import support_difference
 from collision_monitor.tolerances import EPSILON, FLAT, SLIVER_SIN2
 
@@ -269,7 +269,7 @@ def epa(
         if work[D + f] <= reach or best == inf:
             i, j, k = SIMPLEX + 8 * int(work[I + f]), SIMPLEX + 8 * int(work[J + f]), SIMPLEX + 8 * int(work[K + f])
             ox, oy, oz = upper * mx, upper * my, upper * mz
-            wa, wb, wc, _ = _triangle(
+            wa, wb, wc = closest_on_triangle(
                 work[i] - ox, work[i + 1] - oy, work[i + 2] - oz,
                 work[j] - ox, work[j + 1] - oy, work[j + 2] - oz,
                 work[k] - ox, work[k + 1] - oy, work[k + 2] - oz,

@@ -19,6 +19,9 @@ MAX_ITERATIONS: Final = 64
 WEIGHTS: Final = 12
 """work[12:16]: weights of the simplex points that make up the closest point."""
 
+NEW_WEIGHTS: Final = 16
+"""work[16:20]: the same of the next simplex, until it proves to be nearer."""
+
 
 @device
 def _segment(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Any:
@@ -37,7 +40,7 @@ def _segment(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -
 def _triangle(
     ax: float, ay: float, az: float, bx: float, by: float, bz: float, cx: float, cy: float, cz: float
 ) -> Any:
-    """Weights of a, b, c in the closest point to the origin; and whether it lies inside of the face."""
+    """Weights of a, b and the newest point c in the closest point to the origin; and whether it lies inside the face."""
     ux, uy, uz = bx - ax, by - ay, bz - az
     vx, vy, vz = cx - ax, cy - ay, cz - az
     nx = uy * vz - uz * vy
@@ -51,58 +54,62 @@ def _triangle(
     if wa > 0.0 and wb > 0.0 and wc > 0.0 and n2 > 0.0:
         total = wa + wb + wc
         return wa / total, wb / total, wc / total, True
-    best = inf
-    ra = rb = rc = 0.0
-    # on an edge or a corner: the nearest of the three edges, which holds however thin the triangle is
-    t = _segment(ax, ay, az, bx, by, bz)
-    x, y, z = ax + t * ux, ay + t * uy, az + t * uz
-    d2 = x * x + y * y + z * z
-    if d2 < best:
-        best = d2
-        ra, rb, rc = 1.0 - t, t, 0.0
+    # on an edge or a corner, which holds however thin the triangle is; edge ab is out, as it was not the nearest before
     t = _segment(ax, ay, az, cx, cy, cz)
     x, y, z = ax + t * vx, ay + t * vy, az + t * vz
-    d2 = x * x + y * y + z * z
-    if d2 < best:
-        best = d2
-        ra, rb, rc = 1.0 - t, 0.0, t
-    t = _segment(bx, by, bz, cx, cy, cz)
-    x, y, z = bx + t * (cx - bx), by + t * (cy - by), bz + t * (cz - bz)
-    d2 = x * x + y * y + z * z
-    if d2 < best:
-        ra, rb, rc = 0.0, 1.0 - t, t
-    return ra, rb, rc, False
+    s = _segment(bx, by, bz, cx, cy, cz)
+    u, v, w = bx + s * (cx - bx), by + s * (cy - by), bz + s * (cz - bz)
+    if x * x + y * y + z * z <= u * u + v * v + w * w:
+        return 1.0 - t, 0.0, t, False
+    return 0.0, 1.0 - s, s, False
 
 
 @device
-def _face_vector(i: int, j: int, k: int, wj: float, wk: float, work: Any) -> Any:
-    """Projection of the origin on the plane of three simplex points; of a thin triangle the weighted point.
+def closest_on_triangle(
+    ax: float, ay: float, az: float, bx: float, by: float, bz: float, cx: float, cy: float, cz: float
+) -> Any:
+    """Weights of a, b, c in the point of a triangle that is closest to the origin, whatever is known before."""
+    wa, wb, wc, inside = _triangle(ax, ay, az, bx, by, bz, cx, cy, cz)
+    if inside:
+        return wa, wb, wc
+    x, y, z = wa * ax + wb * bx + wc * cx, wa * ay + wb * by + wc * cy, wa * az + wb * bz + wc * cz
+    t = _segment(ax, ay, az, bx, by, bz)
+    u, v, w = ax + t * (bx - ax), ay + t * (by - ay), az + t * (bz - az)
+    if u * u + v * v + w * w < x * x + y * y + z * z:
+        return 1.0 - t, t, 0.0
+    return wa, wb, wc
+
+
+@device
+def _face_vector(
+    ax: float, ay: float, az: float, bx: float, by: float, bz: float, cx: float, cy: float, cz: float,
+    wb: float, wc: float,
+) -> Any:
+    """Projection of the origin on the plane of a triangle; of a thin one, the weighted point.
 
     Near contact the plane's normal is exact in direction where the weighted sum is round-off; of a thin triangle
     the normal is.
     """
-    a, b, c = SIMPLEX + 8 * i, SIMPLEX + 8 * j, SIMPLEX + 8 * k
-    ax, ay, az = work[a], work[a + 1], work[a + 2]
-    ux, uy, uz = work[b] - ax, work[b + 1] - ay, work[b + 2] - az
-    vx, vy, vz = work[c] - ax, work[c + 1] - ay, work[c + 2] - az
+    ux, uy, uz = bx - ax, by - ay, bz - az
+    vx, vy, vz = cx - ax, cy - ay, cz - az
     nx = uy * vz - uz * vy
     ny = uz * vx - ux * vz
     nz = ux * vy - uy * vx
     n2 = nx * nx + ny * ny + nz * nz
     if n2 <= THIN_SIN2 * (ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz):
-        return ax + wj * ux + wk * vx, ay + wj * uy + wk * vy, az + wj * uz + wk * vz
+        return ax + wb * ux + wc * vx, ay + wb * uy + wc * vy, az + wb * uz + wc * vz
     f = (nx * ax + ny * ay + nz * az) / n2
     return nx * f, ny * f, nz * f
 
 
 @device
 def _keep(work: Any, count: int) -> int:
-    """Drop the simplex points of weight 0; returns how many are left."""
+    """Take over the new weights and drop the simplex points of weight 0; returns how many are left."""
     kept = 0
     for k in range(count):
-        if work[WEIGHTS + k] > 0.0:
+        if work[NEW_WEIGHTS + k] > 0.0:
+            work[WEIGHTS + kept] = work[NEW_WEIGHTS + k]
             if kept != k:
-                work[WEIGHTS + kept] = work[WEIGHTS + k]
                 for m in range(8):
                     work[SIMPLEX + 8 * kept + m] = work[SIMPLEX + 8 * k + m]
             kept += 1
@@ -111,82 +118,61 @@ def _keep(work: Any, count: int) -> int:
 
 @device
 def _reduce(work: Any, count: int, size: float) -> Any:
-    """Closest point of the simplex to the origin: the points left, whether it holds the origin, and the point."""
+    """Closest point of the simplex to the origin: whether it holds the origin, and the point; its weights as new ones.
+
+    The last point is the newest; without it the origin was known to be nearest to the inside of the others.
+    """
     ax, ay, az = work[SIMPLEX], work[SIMPLEX + 1], work[SIMPLEX + 2]
-    if count == 1:
-        work[WEIGHTS] = 1.0
-        return 1, False, ax, ay, az
     bx, by, bz = work[SIMPLEX + 8], work[SIMPLEX + 9], work[SIMPLEX + 10]
     if count == 2:
         t = _segment(ax, ay, az, bx, by, bz)
-        work[WEIGHTS] = 1.0 - t
-        work[WEIGHTS + 1] = t
-        return _keep(work, 2), False, ax + t * (bx - ax), ay + t * (by - ay), az + t * (bz - az)
+        work[NEW_WEIGHTS] = 1.0 - t
+        work[NEW_WEIGHTS + 1] = t
+        return False, ax + t * (bx - ax), ay + t * (by - ay), az + t * (bz - az)
+    cx, cy, cz = work[SIMPLEX + 16], work[SIMPLEX + 17], work[SIMPLEX + 18]
     if count == 3:
-        cx, cy, cz = work[SIMPLEX + 16], work[SIMPLEX + 17], work[SIMPLEX + 18]
         wa, wb, wc, inside = _triangle(ax, ay, az, bx, by, bz, cx, cy, cz)
-        work[WEIGHTS] = wa
-        work[WEIGHTS + 1] = wb
-        work[WEIGHTS + 2] = wc
+        work[NEW_WEIGHTS] = wa
+        work[NEW_WEIGHTS + 1] = wb
+        work[NEW_WEIGHTS + 2] = wc
         if inside:
-            x, y, z = _face_vector(0, 1, 2, wb, wc, work)
-            return 3, False, x, y, z
-        x = wa * ax + wb * bx + wc * cx
-        y = wa * ay + wb * by + wc * cy
-        z = wa * az + wb * bz + wc * cz
-        return _keep(work, 3), False, x, y, z
+            x, y, z = _face_vector(ax, ay, az, bx, by, bz, cx, cy, cz, wb, wc)
+            return False, x, y, z
+        return False, wa * ax + wb * bx + wc * cx, wa * ay + wb * by + wc * cy, wa * az + wb * bz + wc * cz
     flat2 = (FLAT * size) ** 2
     best = inf
-    outside = False
     rx = ry = rz = 0.0
-    r0 = r1 = r2 = r3 = 0.0
-    for face in range(4):
-        # face = the points but for number `face`
-        i = 1 if face == 0 else 0
-        j = 2 if face <= 1 else 1
-        k = 3 if face <= 2 else 2
-        a, b, c, d = SIMPLEX + 8 * i, SIMPLEX + 8 * j, SIMPLEX + 8 * k, SIMPLEX + 8 * face
-        ax, ay, az = work[a], work[a + 1], work[a + 2]
-        bx, by, bz = work[b], work[b + 1], work[b + 2]
-        cx, cy, cz = work[c], work[c + 1], work[c + 2]
-        ux, uy, uz = bx - ax, by - ay, bz - az
-        vx, vy, vz = cx - ax, cy - ay, cz - az
+    dx, dy, dz = work[SIMPLEX + 24], work[SIMPLEX + 25], work[SIMPLEX + 26]
+    for face in range(3):
+        # a, b and the newest point d; c is the one across
+        if face > 0:
+            ax, ay, az, bx, by, bz, cx, cy, cz = bx, by, bz, cx, cy, cz, ax, ay, az
+        ux, uy, uz = ax - dx, ay - dy, az - dz
+        vx, vy, vz = bx - dx, by - dy, bz - dz
         nx = uy * vz - uz * vy
         ny = uz * vx - ux * vz
         nz = ux * vy - uy * vx
-        origin = -(nx * ax + ny * ay + nz * az)
-        fourth = nx * (work[d] - ax) + ny * (work[d + 1] - ay) + nz * (work[d + 2] - az)
-        n2 = nx * nx + ny * ny + nz * nz
+        origin = -(nx * dx + ny * dy + nz * dz)
+        across = nx * (cx - dx) + ny * (cy - dy) + nz * (cz - dz)
         # a flat tetrahedron holds nothing: its sides are noise
-        if origin * fourth > 0.0 and fourth * fourth > flat2 * n2:
+        if origin * across > 0.0 and across * across > flat2 * (nx * nx + ny * ny + nz * nz):
             continue
-        outside = True
-        wa, wb, wc, inside = _triangle(ax, ay, az, bx, by, bz, cx, cy, cz)
+        wa, wb, wd, inside = _triangle(ax, ay, az, bx, by, bz, dx, dy, dz)
         if inside:
-            x, y, z = _face_vector(i, j, k, wb, wc, work)
+            x, y, z = _face_vector(ax, ay, az, bx, by, bz, dx, dy, dz, wb, wd)
         else:
-            x = wa * ax + wb * bx + wc * cx
-            y = wa * ay + wb * by + wc * cy
-            z = wa * az + wb * bz + wc * cz
+            x = wa * ax + wb * bx + wd * dx
+            y = wa * ay + wb * by + wd * dy
+            z = wa * az + wb * bz + wd * dz
         d2 = x * x + y * y + z * z
         if d2 < best:
             best = d2
             rx, ry, rz = x, y, z
-            if face == 0:
-                r0, r1, r2, r3 = 0.0, wa, wb, wc
-            elif face == 1:
-                r0, r1, r2, r3 = wa, 0.0, wb, wc
-            elif face == 2:
-                r0, r1, r2, r3 = wa, wb, 0.0, wc
-            else:
-                r0, r1, r2, r3 = wa, wb, wc, 0.0
-    if not outside:
-        return 4, True, 0.0, 0.0, 0.0
-    work[WEIGHTS] = r0
-    work[WEIGHTS + 1] = r1
-    work[WEIGHTS + 2] = r2
-    work[WEIGHTS + 3] = r3
-    return _keep(work, 4), False, rx, ry, rz
+            work[NEW_WEIGHTS + face] = wa
+            work[NEW_WEIGHTS + (face + 1) % 3] = wb
+            work[NEW_WEIGHTS + (face + 2) % 3] = 0.0
+            work[NEW_WEIGHTS + 3] = wd
+    return best == inf, rx, ry, rz
 
 
 @device
@@ -242,15 +228,14 @@ def gjk(
                 return 0, length, lower, lx, ly, lz
         if length - lower <= GJK_RELATIVE * length + 4.0 * EPSILON * size:
             break
-        kept, inside, nx, ny, nz = _reduce(work, count + 1, size)
-        if inside:
+        inside, nx, ny, nz = _reduce(work, count + 1, size)
+        if inside and lower <= 0.0:
             return 4, 0.0, 0.0, 0.0, 0.0, 1.0
         shorter = nx * nx + ny * ny + nz * nz
-        stalled = not shorter < squared
-        count = kept
-        x, y, z = nx, ny, nz
-        squared = shorter
-        if stalled:
+        if inside or not shorter < squared:
             # round-off: no more progress is possible, what is known stands with its bounds
             break
+        count = _keep(work, count + 1)
+        x, y, z = nx, ny, nz
+        squared = shorter
     return count, sqrt(squared), lower, lx, ly, lz
