@@ -11,6 +11,7 @@ from typing import Any
 
 from collision_monitor._jit import device
 from collision_monitor.geometry.shape_table import BOX, CAPSULE, CONE, CYLINDER, SPHERE
+from collision_monitor.narrow_phase.vertex_scan import farthest_vertex
 
 
 @device
@@ -44,13 +45,7 @@ def support(
         return 0.0, 0.0, z, -1
     if kind == SPHERE:
         return 0.0, 0.0, 0.0, -1
-    best = start
-    most = dx * vertices[0, start] + dy * vertices[1, start] + dz * vertices[2, start]
-    for k in range(start + 1, start + count):
-        dot = dx * vertices[0, k] + dy * vertices[1, k] + dz * vertices[2, k]
-        if dot > most:
-            most = dot
-            best = k
+    best = farthest_vertex(vertices, start, count, dx, dy, dz)
     return vertices[0, best], vertices[1, best], vertices[2, best], best
 
 
