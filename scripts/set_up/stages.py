@@ -178,6 +178,9 @@ def _warm_up_inputs(ros: machine.RosInstall | None) -> str:
 def _warm_up(ros: machine.RosInstall | None, log: IO[str]) -> None:
     if (ROOT / "collision_monitor" / "warm_up.py").exists():
         _call(log, ros, PYTHON, "-m", "collision_monitor.warm_up")
+    caches = sorted((VENV / "var" / "cache" / "collision_monitor").glob("*"), key=lambda path: path.stat().st_mtime)
+    for outdated in caches[:-3]:  # one for each state of the sources; going back and forth a little stays quick
+        shutil.rmtree(outdated, ignore_errors=True)
 
 
 STAGES = (

@@ -84,7 +84,8 @@ def test_the_command_line_runs_from_the_workspace(install: Path) -> None:
 
 @pytest.mark.parametrize("name", ["monitor", "world"])
 def test_a_node_starts_and_ends_cleanly_when_interrupted(install: Path, ros_domain_id: int, name: str) -> None:
-    command = sourced(install, executable(install, name))
+    # The executable is the workspace's; the modules are the source's, whose kernels are compiled already.
+    command = sourced(install, "env", f"PYTHONPATH={ROOT}", executable(install, name))
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         assert process.stdout
         first = process.stdout.readline()  # the node says that it runs
