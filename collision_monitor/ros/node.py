@@ -60,7 +60,7 @@ class MonitorNode(Node):
         self._markers = MarkerView(self.settings.frame_id)
         self._last_status = self._last_markers = self._last_log = time.monotonic_ns()
         self._last_step: int | None = None
-        self._silent = False
+        self._said_silent = False
         self._no_recording: dict[str, Any] = {}
 
         self._contacts_out = self.create_publisher(ContactArray, "~/contacts", qos.ANSWERS)
@@ -136,26 +136,30 @@ class MonitorNode(Node):
 
     def _on_watchdog(self) -> None:
         now = time.monotonic_ns()
-        quiet_for = None if self._last_step is None else (now - self._last_step) * 1e-9
-        silent = quiet_for is not None and quiet_for >= self.settings.profile.stale_after
-        if silent and not self._silent:
-            self.get_logger().warning(f"no states for {quiet_for:.1f} s: all moving objects are stale")
-        elif self._silent and not silent:
+        silent = self._is_silent(now)
+        if silent and not self._said_silent:
+            self.get_logger().warning(f"no states on {self._states_topic}: all moving objects are stale")
+        elif self._said_silent and not silent:
             self.get_logger().info("states arrive again")
-        self._silent = silent
+        self._said_silent = silent
         if now - self._last_status >= STATUS_PERIOD:
             self._publish_status()
         if now - self._last_log >= LOG_PERIOD and not silent and self._last_step is not None:
             self._last_log = now
             self.get_logger().info(self._line(codec.decode_status(self._publish_status())))
 
+    def _is_silent(self, now: int) -> bool:
+        """Whether states came once and come no more, by the steady clock."""
+        return self._last_step is not None and now - self._last_step >= self.settings.profile.stale_after * 1e9
+
     # -- answers
 
     def _publish_status(self) -> bytes:
         self._last_status = time.monotonic_ns()
         live = self._times.summary(self._last_status)
+        silent = self._is_silent(self._last_status)
         recording = self._no_recording if self._recorder is None else self._recorder.status()
-        data = self._pipeline.status(silent=self._silent, **live, **recording)
+        data = self._pipeline.status(silent=silent, **live, **recording)
         self._status_out.publish(data)
         now = self._now()
         self._record(self._status_out.topic_name, data, now, now)

@@ -20,6 +20,9 @@ from collision_monitor_msgs.msg import ObjectDescriptionArray, ObjectStateArray
 
 PARAMETERS = ("scene", "objects", "rate", "duration", "seed", "path", "monitor", "frame_id")
 
+LISTENER_PATIENCE = 4.0
+"""s: on a busy machine DDS can lose its first announcement, and makes the next one 3 s later."""
+
 
 class WorldNode(Node):
     """Publishes one scene to one monitor. Raises InputError for a scene that cannot be."""
@@ -59,6 +62,7 @@ class WorldNode(Node):
         self.get_logger().info(
             f"{scene.name}: {len(scene.descriptions)} objects at {scene.rate:g} Hz to {self._states_out.topic_name}"
         )
+        self._wait_for_listener(stop)
         first_stamp = self.get_clock().now().nanoseconds
         self._shapes_out.publish(
             codec.encode_descriptions(first_stamp, self._frame_id, scene.descriptions, snapshot=True)
@@ -82,6 +86,12 @@ class WorldNode(Node):
             f"published {messages} messages in {time.monotonic() - began:.1f} s, {skipped} periods skipped, "
             f"at most {latest * 1e3:.1f} ms after their stamp"
         )
+
+    def _wait_for_listener(self, stop: StopRequest) -> None:
+        """So that a monitor that runs already sees the scene from its beginning; without one, play all the same."""
+        patience = time.monotonic() + LISTENER_PATIENCE
+        while not self._states_out.get_subscription_count() and time.monotonic() < patience and not stop.received:
+            time.sleep(0.01)
 
 
 def _sleep_until(deadline: float, stop: StopRequest) -> bool:

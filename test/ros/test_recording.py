@@ -1,0 +1,77 @@
+"""What the node records, and that the same answers come out of it without ROS."""
+
+import numpy as np
+import pytest
+
+from collision_monitor import records
+from collision_monitor.description import ObjectDescription
+from collision_monitor.geometry.shapes import Box
+from collision_monitor.session import Session
+from collision_monitor_msgs.msg import MonitorStatus
+
+
+def states(step):
+    rows = np.zeros(20, records.STATE)
+    rows["id"] = np.arange(1, 21)
+    rows["quaternion"][:, 3] = 1.0
+    rows["linear"][:, 0] = np.where(rows["id"] % 2, 0.5, -0.5)
+    rows["position"][:, 0] = np.where(rows["id"] % 2, -1.5, 1.5) + rows["linear"][:, 0] * step * 0.05
+    rows["position"][:, 1] = 3.0 * ((rows["id"] - 1) // 2)
+    rows["angular"][:, 2] = 0.3
+    return rows
+
+
+def test_a_recorded_session_replays_to_the_same_bytes(start, team, tmp_path):
+    monitor = start("run", "--record", "run.mcap")
+    team.meet()
+    team.describe(*(ObjectDescription(i, Box((1, 1, 1))) for i in range(1, 21)))
+    team.status(lambda s: s.objects == 20)
+    for step in range(60):
+        team.say(*states(step))
+        team.listen(0.02)
+    team.publish_states(b"\xff" * 100)  # what is refused is part of the session
+    status = team.status(lambda s: s.step == 60 and s.refused_malformed == 1 and s.recorded_messages > 180)
+    assert status.recording == MonitorStatus.RECORDING_ON
+    assert status.recording_path == "run.mcap"
+    assert status.recording_dropped == 0
+    assert monitor.stop() == 0
+
+    topics = [message.topic for message in Session(tmp_path / "run.mcap").messages()]
+    assert topics.count("/object_monitor/objects/shapes") == 1
+    assert topics.count("/object_monitor/objects/states") == 61
+    first = topics.index("/object_monitor/objects/states")
+    assert topics[first : first + 3] == [
+        "/object_monitor/objects/states",
+        "/object_monitor/contacts",
+        "/object_monitor/predictions",
+    ]
+    replay = start("replay", "run.mcap")
+    assert replay.wait() == 0, replay.words
+    assert "identical" in replay.words
+    assert sum(len(m.predictions) for m in team.predictions) > 100
+    assert sum(len(m.contacts) for m in team.contacts) > 100
+
+
+def test_a_recording_that_exists_is_not_overwritten(start, tmp_path):
+    (tmp_path / "run.mcap").write_bytes(b"precious")
+    monitor = start("run", "--record", "run.mcap")
+    assert monitor.wait() == 1
+    assert "run.mcap is there already" in monitor.words
+    assert (tmp_path / "run.mcap").read_bytes() == b"precious"
+
+
+@pytest.mark.parametrize("path", ["missing/run.mcap", "there.mcap"])
+def test_a_recording_that_fails_does_not_stop_the_monitor(start, team, tmp_path, path):
+    (tmp_path / "there.mcap").write_bytes(b"precious")
+    monitor = start("run", "--ros-args", "-p", f"record:={path}")
+    team.meet()
+    team.describe(*(ObjectDescription(i, Box((1, 1, 1))) for i in range(1, 21)))
+    team.status(lambda s: s.objects == 20)
+    _, predictions = team.ask(*states(0))
+    assert len(predictions.predictions) == 10
+    status = team.status(lambda s: s.step == 1)
+    assert status.recording == MonitorStatus.RECORDING_FAILED
+    assert path in status.recording_error
+    assert monitor.stop() == 0
+    assert "not recording" in monitor.words
+    assert (tmp_path / "there.mcap").read_bytes() == b"precious"
