@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from collision_monitor._jit import device
+from collision_monitor._jit import inlined
 from collision_monitor.geometry.shape_table import BOX, CAPSULE, CONE, CONVEX_HULL, CYLINDER, SPHERE
 
 
-@device
+@inlined
 def support_value(table, slot, R, mx, my, mz):  # type: ignore[no-untyped-def]
     """max of m . x over the points x of a shape turned by R (3, 3), margin included. m need not be of unit length."""
     kind = table.kind[slot]

@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from collision_monitor._jit import device
+from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.shape_table import SPHERE
 from collision_monitor.narrow_phase.dispatch import WORK_SIZE, contact, separation
 from collision_monitor.prediction.motion import turned
@@ -101,7 +101,7 @@ def sphere_interval(dx, dy, dz, vx, vy, vz, reach, growth, end):  # type: ignore
     return first, min(end, (root - b) / a)
 
 
-@device
+@inlined
 def _place(table, bodies, i, s, t, R_body, R_shape):  # type: ignore[no-untyped-def]
     """Body i's rotation at time t into R_body, its shape s's into R_shape; returns the shape's offset in the world."""
     turned(
@@ -127,7 +127,7 @@ def _place(table, bodies, i, s, t, R_body, R_shape):  # type: ignore[no-untyped-
     )
 
 
-@device
+@inlined
 def _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, d):  # type: ignore[no-untyped-def]
     """Lower bound on the gap along n after d seconds; turn_*: n x w, h_*: the support values at d = 0."""
     value = gap + d * rate - curvature * d * d
@@ -140,7 +140,7 @@ def _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvatu
     return value
 
 
-@device
+@inlined
 def _safe_advance(table, a, b, R_a, R_b, n, turn_a, turn_b, rate, curvature, gap, remaining):  # type: ignore[no-untyped-def]
     """A time d in (0, remaining] up to which the gap along n stays positive; close to the last such time."""
     h_a = support_value(table, a, R_a, n[0], n[1], n[2])
@@ -170,7 +170,7 @@ def _safe_advance(table, a, b, R_a, R_b, n, turn_a, turn_b, rate, curvature, gap
     return low
 
 
-@device
+@inlined
 def shape_impact(table, bodies, i, j, a, b, begin, end, tube_0, tube_1, tolerance, budget, scratch):  # type: ignore[no-untyped-def]
     """When the gap between shape a of body i and shape b of body j first is within the wanted one.
 
@@ -216,7 +216,7 @@ def shape_impact(table, bodies, i, j, a, b, begin, end, tube_0, tube_1, toleranc
     return UNRESOLVED, t, budget
 
 
-@device
+@inlined
 def relative_position(bodies, i, j, t):  # type: ignore[no-untyped-def]
     """Position of body j relative to body i at time t (m): positions are subtracted before anything is added."""
     ti, tj = t - bodies.ref_time[i], t - bodies.ref_time[j]
@@ -227,7 +227,7 @@ def relative_position(bodies, i, j, t):  # type: ignore[no-untyped-def]
     )
 
 
-@device
+@inlined
 def _spin(table, s, w):  # type: ignore[no-untyped-def]
     """|w|^2 times the farthest point of the shape from its body's origin: bound on the acceleration of its support."""
     rate2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
@@ -240,7 +240,7 @@ def _spin(table, s, w):  # type: ignore[no-untyped-def]
     return rate2 * (offset + table.radius[s])
 
 
-@device
+@inlined
 def _contact_at(table, bodies, i, j, a, b, t, scratch):  # type: ignore[no-untyped-def]
     """Contact of shape a of body i with shape b of body j at time t, into scratch.out; returns the signed distance.
 
@@ -259,7 +259,7 @@ def _contact_at(table, bodies, i, j, a, b, t, scratch):  # type: ignore[no-untyp
     return out[0]
 
 
-@device
+@inlined
 def closing_speed(linear, angular, i, j, px, py, pz, out):  # type: ignore[no-untyped-def]
     """Speed (m/s) at which the witness points of a contact approach along its normal; p: body j relative to body i."""
     ax, ay, az = out[4], out[5], out[6]
@@ -270,7 +270,7 @@ def closing_speed(linear, angular, i, j, px, py, pz, out):  # type: ignore[no-un
     return -(vx * out[1] + vy * out[2] + vz * out[3])
 
 
-@device
+@inlined
 def _touching_by(table, bodies, i, j, a, b, t, end, tube_0, tube_1, begin, margin, tolerance, scratch):  # type: ignore[no-untyped-def]
     """A time in [t, end] at which they overlap by more than the tube, whatever the motions inside it; inf: none found.
 
@@ -355,12 +355,12 @@ def body_impact(table, next_shape, bodies, i, j, begin, end, margin, tolerance, 
     return queries
 
 
-@device
+@inlined
 def _centred(table, s):  # type: ignore[no-untyped-def]
     return table.local_position[s, 0] == 0.0 and table.local_position[s, 1] == 0.0 and table.local_position[s, 2] == 0.0
 
 
-@device
+@inlined
 def _set_geometry(event, bodies, i, t, out):  # type: ignore[no-untyped-def]
     """Where and how they meet, from a contact at time t relative to body i."""
     ti = t - bodies.ref_time[i]
@@ -371,7 +371,7 @@ def _set_geometry(event, bodies, i, t, out):  # type: ignore[no-untyped-def]
     event.closing_speed = out[15]
 
 
-@device
+@inlined
 def _sphere_impact(bodies, i, j, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, begin, first, end, event):  # type: ignore[no-untyped-def]
     """Two spheres: closed form for both ends of the interval."""
     event.method = CLOSED_FORM

@@ -22,6 +22,10 @@ OLD: Final = 4
 STATE_NUMBERS: Final = 20
 """float64 numbers at the front of a records.STATE; id and flags follow."""
 
+GOLDEN_RATIO: Final = 0.6180339887498949
+PLASTIC_RATIO: Final = 0.7548776662466927
+"""Multiples of these, modulo 1, fill the unit interval evenly."""
+
 _TWIST_UNKNOWN: Final = int(StateFlag.TWIST_UNKNOWN)
 _DISCONTINUITY: Final = int(StateFlag.DISCONTINUITY)
 
@@ -168,8 +172,8 @@ def restart_motion(
             bodies.cover[i] = np.inf
             sweep = 0.0
         else:
-            spread = (np.uint32(i) * np.uint32(2654435761) + bodies.version[i] * np.uint32(0x9E3779B9)) >> np.uint32(8)
-            sweep = horizon + slack * (0.125 + 0.875 * (np.float64(spread) / 16777216.0))
+            spread = (i * GOLDEN_RATIO + bodies.version[i] * PLASTIC_RATIO) % 1.0
+            sweep = horizon + slack * (0.125 + 0.875 * spread)
             bodies.cover[i] = now + sweep
             r = spin_radius[i]
             bodies.tube_0[i] = position_tolerance + r * orientation_tolerance
