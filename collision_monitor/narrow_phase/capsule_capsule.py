@@ -7,7 +7,7 @@ from typing import Any
 
 from collision_monitor._jit import device
 from collision_monitor.narrow_phase.answer import SURFACE, write
-from collision_monitor.narrow_phase.segment import segment_segment
+from collision_monitor.narrow_phase.segment import across, segment_segment
 from collision_monitor.narrow_phase.sphere_sphere import direction
 from collision_monitor.tolerances import SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2, TOUCHING
 
@@ -40,7 +40,7 @@ def capsule_capsule_contact(
             distance = nx * wx + ny * wy + nz * wz
         elif distance <= TOUCHING * (la + lb):
             ax, ay, az = (RA[0, 2], RA[1, 2], RA[2, 2]) if la >= lb else (RB[0, 2], RB[1, 2], RB[2, 2])
-            nx, ny, nz = _across(ax, ay, az, wx, wy, wz)
+            nx, ny, nz = across(ax, ay, az, wx, wy, wz)
             distance = nx * wx + ny * wy + nz * wz
     write(
         out,
@@ -55,16 +55,3 @@ def capsule_capsule_contact(
     )
     out[11] = SURFACE
     out[13] = SURFACE
-
-
-@device
-def _across(x: float, y: float, z: float, wx: float, wy: float, wz: float) -> Any:
-    """A unit vector at a right angle to the unit vector (x, y, z), on the side of w."""
-    if abs(x) <= abs(y) and abs(x) <= abs(z):
-        nx, ny, nz = 0.0, z, -y
-    elif abs(y) <= abs(z):
-        nx, ny, nz = -z, 0.0, x
-    else:
-        nx, ny, nz = y, -x, 0.0
-    length = copysign(sqrt(nx * nx + ny * ny + nz * nz), nx * wx + ny * wy + nz * wz)
-    return nx / length, ny / length, nz / length

@@ -13,13 +13,15 @@ from numba import get_num_threads, prange
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel, parallel_kernel
-from collision_monitor.geometry.shape_table import BOX, CAPSULE, HALF_SPACE, SPHERE
+from collision_monitor.geometry.shape_table import BOX, CAPSULE, CONE, CYLINDER, HALF_SPACE, SPHERE
 from collision_monitor.narrow_phase.answer import CONTACT_SIZE, WORK_SIZE
 from collision_monitor.narrow_phase.box_box import axis_direction, box_box_separation, sat, touching_features
 from collision_monitor.narrow_phase.capsule_capsule import capsule_capsule_contact
 from collision_monitor.narrow_phase.convex_convex import convex_contact, convex_separation
+from collision_monitor.narrow_phase.cylinder_cylinder import is_parallel, parallel_cylinders_contact
 from collision_monitor.narrow_phase.half_space import half_space_contact
 from collision_monitor.narrow_phase.sphere_box import sphere_box_contact, sphere_box_separation
+from collision_monitor.narrow_phase.sphere_cone import sphere_cone_contact
 from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact, sphere_sphere_separation
 from collision_monitor.tolerances import FACE_PREFERENCE
 
@@ -72,18 +74,14 @@ def _separation(
         return sphere_box_separation(
             table.size[a, 0] + margin, table.size[b, 0], table.size[b, 1], table.size[b, 2], RB, px, py, pz, out
         )
-    if kb == HALF_SPACE or (kb == CAPSULE and (ka == CAPSULE or ka == SPHERE)):
-        # closed forms: the contact costs little more than the distance
-        answer = work[0:CONTACT_SIZE]
-        if kb == HALF_SPACE:
-            if ka == HALF_SPACE:
-                out[0] = 0.0
-                out[1] = 0.0
-                out[2] = 1.0
-                return -inf
-            half_space_contact(table, a, b, RA, RB, px, py, pz, answer)
-        else:
-            _capsules(table, a, b, RA, RB, px, py, pz, answer)
+    if ka == HALF_SPACE:
+        out[0] = 0.0
+        out[1] = 0.0
+        out[2] = 1.0
+        return -inf
+    # the closed forms that are left: a contact costs little more than a distance
+    answer = work[0:CONTACT_SIZE]
+    if _closed_form(table, a, b, RA, RB, px, py, pz, answer):
         out[0] = answer[1]
         out[1] = answer[2]
         out[2] = answer[3]
@@ -92,13 +90,30 @@ def _separation(
 
 
 @inlined
-def _capsules(table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float, pz: float, out: Any) -> None:
-    """Capsules, and a sphere as the capsule without a core."""
-    la = table.size[a, 1] if table.kind[a] == CAPSULE else 0.0
-    lb = table.size[b, 1] if table.kind[b] == CAPSULE else 0.0
-    capsule_capsule_contact(
-        table.size[a, 0] + table.margin[a], la, table.size[b, 0] + table.margin[b], lb, RA, RB, px, py, pz, out
-    )
+def _closed_form(
+    table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float, pz: float, out: Any
+) -> bool:
+    """The contact into out, where one formula gives it; sphere-sphere, sphere-box and box-box are not looked for."""
+    ka, kb = table.kind[a], table.kind[b]
+    if kb == HALF_SPACE:
+        half_space_contact(table, a, b, RA, RB, px, py, pz, out)
+        return True
+    if kb == CAPSULE and (ka == CAPSULE or ka == SPHERE):
+        capsule_capsule_contact(
+            table.size[a, 0] + table.margin[a], table.size[a, 1], table.size[b, 0] + table.margin[b], table.size[b, 1],
+            RA, RB, px, py, pz, out,
+        )  # fmt: skip
+        return True
+    if kb == CYLINDER and ka != BOX and is_parallel(table, a, RA, RB):
+        parallel_cylinders_contact(table, a, b, RB, px, py, pz, out)
+        return True
+    if kb == CONE and ka == SPHERE:
+        sphere_cone_contact(
+            table.size[a, 0] + table.margin[a], table.size[b, 0], table.size[b, 1], table.margin[b],
+            RB, px, py, pz, out,
+        )  # fmt: skip
+        return True
+    return False
 
 
 @inlined
@@ -170,18 +185,13 @@ def _contact(
             table.size[a, 0] + table.margin[a], table.size[b, 0], table.size[b, 1], table.size[b, 2],
             table.margin[b], RB, px, py, pz, out,
         )  # fmt: skip
-    elif kb == CAPSULE and (ka == CAPSULE or ka == SPHERE):
-        _capsules(table, a, b, RA, RB, px, py, pz, out)
-    elif kb == HALF_SPACE:
-        if ka == HALF_SPACE:
-            # both unbounded: they overlap without end but where they face away from each other
-            for i in range(CONTACT_SIZE):
-                out[i] = 0.0
-            out[0] = -inf
-            out[3] = 1.0
-        else:
-            half_space_contact(table, a, b, RA, RB, px, py, pz, out)
-    else:
+    elif ka == HALF_SPACE:
+        # both unbounded: they overlap without end but where they face away from each other
+        for i in range(CONTACT_SIZE):
+            out[i] = 0.0
+        out[0] = -inf
+        out[3] = 1.0
+    elif not _closed_form(table, a, b, RA, RB, px, py, pz, out):
         return convex_contact(table, a, b, RA, RB, px, py, pz, limit, out, work)
     return True
 

@@ -1,7 +1,8 @@
-"""Closest points of two segments. (Ericson, Real-Time Collision Detection, 5.1.9; Lumelsky, 1985)"""
+"""Closest points of two segments, and a direction across one. (Ericson, Real-Time Collision Detection, 5.1.9; Lumelsky, 1985)"""
 
 from __future__ import annotations
 
+from math import copysign, sqrt
 from typing import Any
 
 from collision_monitor._jit import inlined
@@ -52,3 +53,15 @@ def segment_segment(
     if t > 1.0:
         return clamp((c + b) / a), 1.0
     return s, t
+
+@inlined
+def across(x: float, y: float, z: float, wx: float, wy: float, wz: float) -> Any:
+    """A unit vector at a right angle to the unit vector (x, y, z), on the side of w."""
+    if abs(x) <= abs(y) and abs(x) <= abs(z):
+        nx, ny, nz = 0.0, z, -y
+    elif abs(y) <= abs(z):
+        nx, ny, nz = -z, 0.0, x
+    else:
+        nx, ny, nz = y, -x, 0.0
+    length = copysign(sqrt(nx * nx + ny * ny + nz * nz), nx * wx + ny * wy + nz * wz)
+    return nx / length, ny / length, nz / length

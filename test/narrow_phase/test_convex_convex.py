@@ -165,3 +165,36 @@ def test_many_vertices_end_with_an_honest_bound():
     assert -2.0 <= c.distance <= -1.8
     assert abs(projected_gap(a, a, np.zeros(3), EYE, EYE, c.normal) - c.distance) < 1e-9
     assert c.bound < 0.1
+
+
+def as_polygon(shape, R, p, sides):
+    return points_of(shape, sides) @ R.T + p
+
+
+def test_sphere_against_cylinder_and_cone_by_the_definition():
+    rng = np.random.default_rng(16)
+    sides = 400
+    for _ in range(60):
+        radius, height, r = rng.uniform(0.2, 1, 3)
+        R, p = rotation(rng), rng.normal(size=3) * 0.8
+        for shape in (Cylinder(radius, height), Cone(radius, height)):
+            c = contact(Sphere(r), shape, p, EYE, R)
+            inscribed = polytope_signed_distance(np.zeros((1, 3)), as_polygon(shape, R, p, sides)) - r
+            assert inscribed - 4e-5 * radius <= c.distance <= inscribed + 1e-12
+            assert projected_gap(Sphere(r), shape, p, EYE, R, c.normal) == pytest.approx(c.distance, abs=1e-12)
+            assert c.bound < 1e-9
+
+
+def test_parallel_cylinders_and_capsules():
+    rng = np.random.default_rng(17)
+    for _ in range(60):
+        a = (Cylinder if rng.random() < 0.5 else Capsule)(*rng.uniform(0.2, 1, 2))
+        b = Cylinder(*rng.uniform(0.2, 1, 2))
+        R, p = rotation(rng), rng.normal(size=3) * 0.8
+        R_A = R @ np.diag([1, -1, -1]) if rng.random() < 0.5 else R
+        c = contact(a, b, p, R_A, R)
+        tilt = np.array([[1, 0, 0], [0, np.cos(1e-7), -np.sin(1e-7)], [0, np.sin(1e-7), np.cos(1e-7)]])
+        tilted = contact(a, b, p, R_A @ tilt, R)
+        assert c.distance == pytest.approx(tilted.distance, abs=2e-6)
+        assert projected_gap(a, b, p, R_A, R, c.normal) == pytest.approx(c.distance, abs=1e-9)
+        assert c.bound < 1e-8

@@ -1,0 +1,78 @@
+"""A sphere, capsule or cylinder against a cylinder with the same axis direction: a box problem in (radius, height).
+
+The difference of two parallel cylinders is a cylinder again. This is the case that EPA does worst, as all directions
+around the common axis tie. Cylinders that are not parallel go to convex_convex.
+"""
+
+from __future__ import annotations
+
+from math import copysign, sqrt
+from typing import Any
+
+from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.shape_table import CYLINDER, SPHERE
+from collision_monitor.narrow_phase.answer import SURFACE, write
+from collision_monitor.narrow_phase.segment import across
+from collision_monitor.narrow_phase.support import core_radius
+from collision_monitor.tolerances import SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2
+
+
+@inlined
+def is_parallel(table: Any, a: int, RA: Any, RB: Any) -> bool:
+    """Whether shape a, a sphere, capsule or cylinder, has the axis direction of B's frame (a sphere has any)."""
+    if table.kind[a] == SPHERE:
+        return True
+    x = RA[1, 2] * RB[2, 2] - RA[2, 2] * RB[1, 2]
+    y = RA[2, 2] * RB[0, 2] - RA[0, 2] * RB[2, 2]
+    z = RA[0, 2] * RB[1, 2] - RA[1, 2] * RB[0, 2]
+    return x * x + y * y + z * z <= SEGMENT_PARALLEL_SIN2
+
+
+@device
+def parallel_cylinders_contact(
+    table: Any, a: int, b: int, RB: Any, px: float, py: float, pz: float, out: Any
+) -> None:
+    """Contact of a with the cylinder b where `is_parallel` holds. Touching faces meet in the middle of what they share."""
+    kind = table.kind[a]
+    round_a = table.margin[a] + core_radius(kind, table.size[a, 0])
+    round_b = table.margin[b]
+    ra = table.size[a, 0] if kind == CYLINDER else 0.0
+    ha = 0.0 if kind == SPHERE else table.size[a, 1]
+    rb, hb = table.size[b, 0], table.size[b, 1]
+    zx, zy, zz = RB[0, 2], RB[1, 2], RB[2, 2]
+    height = zx * px + zy * py + zz * pz
+    x, y, z = px - height * zx, py - height * zy, pz - height * zz
+    reach = sqrt(x * x + y * y + z * z)
+    size = ra + ha + rb + hb
+    if reach > SAT_ROUND_OFF * (size + abs(height)):
+        x, y, z = x / reach, y / reach, z / reach
+    else:
+        x, y, z = across(zx, zy, zz, x, y, z)
+    up = copysign(1.0, height)
+    out_of_side = reach - (ra + rb)
+    out_of_cap = abs(height) - (ha + hb)
+    if out_of_side > 0.0 and out_of_cap > 0.0:
+        distance = sqrt(out_of_side * out_of_side + out_of_cap * out_of_cap)
+        side, cap = out_of_side / distance, up * out_of_cap / distance
+        r, h = ra, up * ha
+    elif out_of_side >= out_of_cap:
+        distance, side, cap = out_of_side, 1.0, 0.0
+        r, h = ra, 0.5 * (max(-ha, height - hb) + min(ha, height + hb))
+    else:
+        distance, side, cap = out_of_cap, 0.0, up
+        r, h = 0.5 * (max(-ra, reach - rb) + min(ra, reach + rb)), up * ha
+    nx, ny, nz = side * x + cap * zx, side * y + cap * zy, side * z + cap * zz
+    bound = (SAT_ROUND_OFF + sqrt(SEGMENT_PARALLEL_SIN2)) * (size + abs(px) + abs(py) + abs(pz) + round_a + round_b)
+    write(
+        out,
+        distance - round_a - round_b,
+        nx,
+        ny,
+        nz,
+        r * x + h * zx + round_a * nx,
+        r * y + h * zy + round_a * ny,
+        r * z + h * zz + round_a * nz,
+        bound,
+    )
+    if kind != CYLINDER:
+        out[11] = SURFACE

@@ -1,0 +1,54 @@
+"""Sphere against cone: a point against a triangle in the plane through the axis."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+from collision_monitor._jit import device
+from collision_monitor.narrow_phase.answer import SURFACE, write
+from collision_monitor.narrow_phase.segment import across
+from collision_monitor.tolerances import SAT_ROUND_OFF
+
+
+@device
+def sphere_cone_contact(
+    radius: float, r: float, h: float, margin: float, R: Any, px: float, py: float, pz: float, out: Any
+) -> None:
+    """radius with the sphere's margin; base radius r, half height h and margin of the cone; R (3, 3) is the cone's."""
+    zx, zy, zz = R[0, 2], R[1, 2], R[2, 2]
+    # the sphere's centre from the cone's: v up the axis, u away from it
+    v = -(zx * px + zy * py + zz * pz)
+    x, y, z = -px - v * zx, -py - v * zy, -pz - v * zz
+    u = sqrt(x * x + y * y + z * z)
+    if u > SAT_ROUND_OFF * (r + h + abs(v)):
+        x, y, z = x / u, y / u, z / u
+    else:
+        x, y, z = across(zx, zy, zz, x, y, z)
+    length = sqrt(4.0 * h * h + r * r)
+    slant = (2.0 * h * u + r * (v - h)) / length
+    base = -h - v
+    if slant <= 0.0 and base <= 0.0:
+        if slant >= base:
+            distance, nu, nv = slant, 2.0 * h / length, r / length
+        else:
+            distance, nu, nv = base, 0.0, -1.0
+    else:
+        # nearest points of the slant, from the apex (0, h) to the rim (r, -h), and of the base
+        t = min(max((u * r + (h - v) * 2.0 * h) / (length * length), 0.0), 1.0)
+        su, sv = u - t * r, v - (h - 2.0 * t * h)
+        bu, bv = u - min(u, r), v + h
+        if su * su + sv * sv <= bu * bu + bv * bv:
+            nu, nv = su, sv
+        else:
+            nu, nv = bu, bv
+        distance = sqrt(nu * nu + nv * nv)
+        if 0.0 < t < 1.0 and slant > 0.0 and slant <= distance:
+            distance, nu, nv = slant, 2.0 * h / length, r / length
+        else:
+            nu, nv = nu / distance, nv / distance
+    # (nu, nv) points from the cone to the sphere
+    nx, ny, nz = -(nu * x + nv * zx), -(nu * y + nv * zy), -(nu * z + nv * zz)
+    bound = SAT_ROUND_OFF * (r + h + radius + margin + abs(px) + abs(py) + abs(pz))
+    write(out, distance - radius - margin, nx, ny, nz, radius * nx, radius * ny, radius * nz, bound)
+    out[11] = SURFACE
