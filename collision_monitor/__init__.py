@@ -12,7 +12,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from collision_monitor._version import VERSION as __version__
+from collision_monitor._version import VERSION as __version__  # noqa: N811
 
 _HOME = {
     "Monitor": "monitor",
