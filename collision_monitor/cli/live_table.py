@@ -44,7 +44,7 @@ class Picture:
         line = f"{self.elapsed:4.0f} s  {self.status.contacts} touching, {self.status.predictions} predicted"
         if self.predictions is not None and len(self.predictions.predictions):
             first = self.predictions.predictions[0]
-            line += f", next: {_pair(first, _names(self.predictions))} in {_time(first['lower'])}"
+            line += f", next: {_pair(first, _names(self.predictions))} in {_time(first['lower'])}{_doubt(first)}"
         return f"{line}  ({self._state()})"
 
     def _contact_table(self) -> Table:
@@ -117,6 +117,10 @@ def _names(message: codec.Contacts | codec.Predictions) -> dict[int, str]:
 def _pair(record: Any, names: dict[int, str]) -> str:
     a, b = int(record["id_a"]), int(record["id_b"])
     return f"{names.get(a, a)} – {names.get(b, b)}"
+
+
+def _doubt(impact: Any) -> str:
+    return "" if impact["status"] == PredictionStatus.HIT else " (unresolved)"
 
 
 def _time(seconds: float) -> str:

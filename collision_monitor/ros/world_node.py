@@ -63,15 +63,13 @@ class WorldNode(Node):
             f"{scene.name}: {len(scene.descriptions)} objects at {scene.rate:g} Hz to {self._states_out.topic_name}"
         )
         self._wait_for_listener(stop)
-        first_stamp = self.get_clock().now().nanoseconds
-        self._shapes_out.publish(
-            codec.encode_descriptions(first_stamp, self._frame_id, scene.descriptions, snapshot=True)
-        )
+        now = self.get_clock().now().nanoseconds
+        self._shapes_out.publish(codec.encode_descriptions(now, self._frame_id, scene.descriptions, snapshot=True))
         end = self._duration or math.inf
         states = scene.states()
         tick = messages = skipped = 0
         latest = 0.0
-        began = time.monotonic()
+        first_stamp, began = self.get_clock().now().nanoseconds, time.monotonic()
         while not scene.finished and tick * period < end and _sleep_until(began + tick * period, stop):
             messages += 1
             stamp = first_stamp + round(tick * period * 1e9)

@@ -8,13 +8,14 @@ import pytest
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
+from visualization_msgs.msg import Marker, MarkerArray
 
 from collision_monitor import codec, records
 from collision_monitor.codec import Removal
 from collision_monitor.description import ObjectDescription
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Sphere
-from collision_monitor.ros import main
+from collision_monitor.ros import main, qos
 from collision_monitor_msgs.msg import Contact, MonitorStatus
 
 BALL = ((Sphere(0.5), Pose()),)
@@ -229,3 +230,23 @@ def test_signals_end_it_cleanly_idle_and_under_load(start, team, tmp_path, numbe
     assert monitor.wait() == 0
     assert "Traceback" not in monitor.words
     assert (tmp_path / "run.mcap").read_bytes().endswith(b"\x89MCAP0\r\n")
+
+
+def test_markers_are_drawn_for_whoever_looks(start, team):
+    start("run")
+    team.meet()
+    pictures = []
+    team.node.create_subscription(MarkerArray, "/object_monitor/markers", pictures.append, qos.MARKERS)
+    team.describe(*map(ball, (1, 2, 3, 4)), ball(5), ObjectDescription(6, BALL, static=True, pose=Pose((0, -9, 0))))
+    team.status(lambda s: s.objects == 6)
+    timer = team.node.create_timer(0.05, lambda: team.say(*APPROACHING, *OVERLAPPING, state(5, (50, 0, 0))))
+    team.until(lambda: pictures)
+    team.node.destroy_timer(timer)
+    by_name = {marker.ns: marker for marker in pictures[-1].markers if marker.action == Marker.ADD}
+    assert {"static", "clear", "contact points", "contact normals", "predicted impacts"} < by_name.keys()
+    assert {round(p.x) for p in by_name["clear"].points} <= {49, 50, 51}
+    assert {round(p.y) for p in by_name["touching"].points} <= {9, 10, 11}
+    assert {round(p.y) for p in by_name["static"].points} <= {-10, -9, -8}
+    assert by_name["predicted impacts"].points[0].x == pytest.approx(1.5, abs=0.05)
+    assert {round(p.y) for p in by_name["predicted"].points} <= {-1, 0, 1}
+    assert by_name["time left"].text in ("0.98 s", "0.99 s", "1.00 s")
