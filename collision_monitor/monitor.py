@@ -22,7 +22,7 @@ from collision_monitor.geometry.shape_table import ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Shape, Sphere
 from collision_monitor.prediction import active_pairs, answers, candidates, tracking
 from collision_monitor.prediction.event_list import EventList
-from collision_monitor.prediction.motion import Bodies, grown, make_bodies
+from collision_monitor.prediction.motion import Bodies, enlarge, make_bodies, make_parts
 from collision_monitor.prediction.time_of_impact import IMPACT, make_scratch
 from collision_monitor.profiles import Profile
 from collision_monitor.records import Model
@@ -93,10 +93,8 @@ class Monitor:
         self._free: list[int] = []
         self._top = 0  # slots below have been used
         self._shapes = ShapeTableBuilder()
-        self._next_shape = np.full(64, -1, np.int32)
-        self._shape_index = np.zeros(64, np.uint32)
+        self._parts = make_parts(64)
         self._bodies: Bodies = make_bodies(64)
-        self._spin_radius = np.zeros(64)
         self._grid = make_hashed_grid(64)
         self._allowed: dict[int, frozenset[int]] = {}
         self._allowed_keys = np.zeros(0, np.uint64)
@@ -164,16 +162,17 @@ class Monitor:
             self._drop_shapes(i)
         self._link_shapes(i, slots)
         bodies, table = self._bodies, self._shapes.table
-        bodies.id[i], bodies.used[i] = d.object_id, True
+        bodies.used[i] = True
+        bodies.motion["id"][i] = d.object_id
         bodies.group[i], bodies.mask[i] = d.group, d.mask
-        bodies.radius[i] = max(float(np.linalg.norm(table.local_position[s]) + table.radius[s]) for s in slots)
+        radius = max(float(np.linalg.norm(table.local_position[s]) + table.radius[s]) for s in slots)
+        bodies.motion["radius"][i] = radius
         centred = len(slots) == 1 and isinstance(d.shapes[0][0], Sphere) and not table.local_position[slots[0]].any()
-        self._spin_radius[i] = 0.0 if centred else bodies.radius[i]
+        bodies.spin_radius[i] = 0.0 if centred else radius
         if d.static:
             assert d.pose is not None
             bodies.position[i], bodies.quaternion[i] = d.pose.position, d.pose.quaternion
             bodies.linear[i] = bodies.angular[i] = 0.0
-            bodies.tube_0[i] = bodies.tube_1[i] = 0.0
             bodies.seen[i] = True
         elif bodies.static[i]:
             bodies.seen[i] = False
@@ -193,7 +192,7 @@ class Monitor:
         remove_boxes(self._grid, np.array([i], np.int32))
         self._drop_shapes(i)
         self._bodies.used[i] = self._bodies.seen[i] = self._bodies.static[i] = False
-        self._bodies.version[i] += 1
+        self._bodies.motion["version"][i] += 1
         self._renewed.discard(i)
         self._free.append(i)
         del self._slots[object_id], self._names[object_id]
@@ -203,10 +202,11 @@ class Monitor:
     def _new_body(self) -> int:
         if self._free:
             return self._free.pop()
-        if self._top == len(self._bodies.id):
+        if self._top == len(self._bodies.used):
             capacity = 2 * self._top
-            self._bodies = grown(self._bodies, capacity)
-            self._spin_radius = np.resize(self._spin_radius, capacity)
+            bodies = make_bodies(capacity)
+            enlarge(self._bodies, bodies)
+            self._bodies = bodies
             old = self._grid
             inside = np.flatnonzero(old.level >= 0).astype(np.int32)
             self._grid = make_hashed_grid(capacity)
@@ -215,22 +215,23 @@ class Monitor:
         return self._top - 1
 
     def _link_shapes(self, i: int, slots: list[int]) -> None:
-        capacity = len(self._shapes.table.kind)
-        if len(self._next_shape) < capacity:
-            self._next_shape = np.concatenate([self._next_shape, np.full(capacity - len(self._next_shape), -1, np.int32)])
-            self._shape_index = np.concatenate(
-                [self._shape_index, np.zeros(capacity - len(self._shape_index), np.uint32)]
-            )
+        table = self._shapes.table
+        if len(self._parts.next) < len(table.kind):
+            parts = make_parts(len(table.kind))
+            enlarge(self._parts, parts)
+            self._parts = parts
         self._bodies.first_shape[i] = slots[0]
         for index, slot in enumerate(slots):
-            self._shape_index[slot] = index
-            self._next_shape[slot] = slots[index + 1] if index + 1 < len(slots) else -1
+            self._parts.index[slot] = index
+            self._parts.next[slot] = slots[index + 1] if index + 1 < len(slots) else -1
+            turned = not np.array_equal(table.local_rotation[slot], np.eye(3))
+            self._parts.placed[slot] = turned or table.local_position[slot].any()
 
     def _drop_shapes(self, i: int) -> None:
         slot = int(self._bodies.first_shape[i])
         while slot >= 0:
             self._shapes.remove(slot)
-            slot, self._next_shape[slot] = int(self._next_shape[slot]), -1
+            slot, self._parts.next[slot] = int(self._parts.next[slot]), -1
         self._bodies.first_shape[i] = -1
 
     def _allow(self, object_id: int, others: frozenset[int]) -> None:
@@ -261,7 +262,7 @@ class Monitor:
         self._pairs, self._pair_events = self._pairs[:0], self._pair_events[:0]
         self._events.clear()
         bodies.seen[:] = bodies.static & bodies.used
-        bodies.version[:] += 1
+        bodies.motion["version"] += 1
         remove_boxes(self._grid, np.arange(self._top, dtype=np.int32))
         self._renewed = {i for i in range(self._top) if bodies.used[i]}
 
@@ -392,8 +393,8 @@ class Monitor:
         if len(which) == 0:
             return np.zeros(0, IMPACT)
         tracking.restart_motion(
-            bodies, self._spin_radius, self._grid, which, now, p.horizon, 0.5 * p.horizon, p.contact_margin,
-            p.stale_acceleration, p.position_tolerance, p.velocity_tolerance, p.orientation_tolerance,
+            bodies, self._grid, which, now, p.horizon, p.contact_margin, p.stale_acceleration,
+            p.position_tolerance, p.velocity_tolerance, p.orientation_tolerance,
             p.angular_velocity_tolerance,
         )  # fmt: skip
         is_new = np.zeros(self._top, np.bool_)
@@ -406,7 +407,7 @@ class Monitor:
         work["candidate_pairs"] = n
         events = np.zeros(n + 1, IMPACT)
         hits, queries = candidates.predict_pairs(
-            self._shapes.table, self._next_shape, bodies, self._candidates[:n], now, p.contact_margin,
+            self._shapes.table, self._parts, bodies, self._candidates[:n], now, p.contact_margin,
             p.impact_tolerance, p.impact_iterations, events, self._scratch,
         )  # fmt: skip
         work["impact_queries"] += queries
@@ -416,15 +417,13 @@ class Monitor:
         """Slots of the bodies that left their predicted motion, or are not predicted far enough."""
         moved = np.empty(self._top, np.int32)
         p = self.profile
-        n = tracking.find_moved(
-            self._bodies, self._spin_radius, self._top, now, p.horizon, p.stale_acceleration, moved
-        )
+        n = tracking.find_moved(self._bodies, self._top, now, p.horizon, p.stale_acceleration, moved)
         return moved[:n]
 
     def _examine_active(self, new: NDArray[np.void], now: float, work: dict[str, int]) -> NDArray[np.void]:
         """Look at the pairs that are due or touch; the contacts (records.CONTACT). New events go into the list."""
         p, bodies = self.profile, self._bodies
-        due = self._events.update(new, bodies.version, now)
+        due = self._events.update(new, bodies.motion, now)
         work["events_due"] = len(due)
         room = len(self._pairs) + len(due)
         pairs = np.zeros(room, active_pairs.PAIR)
@@ -434,17 +433,17 @@ class Monitor:
         results = np.zeros((n + 1, active_pairs.RESULT))
         later = np.zeros(n, IMPACT)
         n, n_later, tests, queries = active_pairs.examine(
-            self._shapes.table, self._next_shape, bodies, pairs[:n], events[:n], now, p.contact_margin,
+            self._shapes.table, self._parts, bodies, pairs[:n], events[:n], now, p.contact_margin,
             p.stale_acceleration, p.impact_tolerance, p.impact_iterations, results, later, self._scratch,
         )  # fmt: skip
         work["narrow_phase_tests"] += tests
         work["impact_queries"] += queries
         self._pairs, self._pair_events = pairs[:n], events[:n]
         if n_later:
-            self._events.update(later[:n_later], bodies.version, now)
+            self._events.update(later[:n_later], bodies.motion, now)
         contacts = np.zeros(n, records.CONTACT)
         n = answers.write_contacts(
-            self._pairs, results, self._shape_index, now,
+            self._pairs, results, self._parts.index, now,
             contacts.view(np.float64).reshape(-1, 17),
             contacts.view(np.uint32).reshape(-1, 34),
             contacts.view(np.uint8).reshape(-1, 136),
@@ -473,7 +472,7 @@ class Monitor:
         within = int(np.searchsorted(pending["lower"], now + p.horizon, side="right"))
         predictions = np.zeros(within + len(self._pairs), records.PREDICTION)
         n, unresolved = answers.write_predictions(
-            self._pairs, self._pair_events, pending[:within], self._bodies, self._shape_index, now, p.horizon,
+            self._pairs, self._pair_events, pending[:within], self._bodies, self._parts.index, now, p.horizon,
             p.stale_after,
             predictions.view(np.float64).reshape(-1, 16),
             predictions.view(np.uint32).reshape(-1, 32),

@@ -137,7 +137,7 @@ def test_contacts_are_those_of_looking_at_every_pair() -> None:
         slot = int(monitor._bodies.first_shape[i])
         while slot >= 0:
             owner[slot] = i
-            slot = int(monitor._next_shape[slot])
+            slot = int(monitor._parts.next[slot])
     slots = sorted(owner)
     pairs = np.array([p for p in itertools.combinations(slots, 2) if owner[p[0]] != owner[p[1]]], np.int32)
     found = 0

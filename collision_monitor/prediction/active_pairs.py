@@ -9,7 +9,7 @@ import numpy as np
 
 from collision_monitor._jit import device, kernel
 from collision_monitor.narrow_phase.dispatch import contact_within
-from collision_monitor.prediction.motion import quaternion_to_matrix, turn_quaternion
+from collision_monitor.prediction.motion import place_shape, quaternion_to_matrix, turn_quaternion
 from collision_monitor.prediction.time_of_impact import CLEAR, body_impact, closing_speed
 from collision_monitor.records import ContactStatus, Phase
 
@@ -40,6 +40,14 @@ BEGIN: Final = int(Phase.BEGIN)
 END: Final = int(Phase.END)
 
 
+@device
+def _changed(bodies, event):  # type: ignore[no-untyped-def]
+    """Does the event rest on a motion that no longer holds?"""
+    return (
+        bodies.motion[event.i].version != event.version_i or bodies.motion[event.j].version != event.version_j
+    )
+
+
 @kernel
 def unite(bodies, pairs, events, due, order, new_pairs, new_events):  # type: ignore[no-untyped-def]
     """The active pairs with those that came due, by key; both have an event of their own at the same index.
@@ -51,9 +59,9 @@ def unite(bodies, pairs, events, due, order, new_pairs, new_events):  # type: ig
     while k < pairs.size or m < order.size:
         if k < pairs.size:
             i, j = pairs[k].i, pairs[k].j
-            key = (np.uint64(bodies.id[i]) << np.uint64(32)) | np.uint64(bodies.id[j])
+            key = (np.uint64(bodies.motion[i].id) << np.uint64(32)) | np.uint64(bodies.motion[j].id)
             gone = not (bodies.used[i] and bodies.used[j]) or key != pairs[k].key
-            changed = bodies.version[i] != events[k].version_i or bodies.version[j] != events[k].version_j
+            changed = _changed(bodies, events[k])
             if gone or pairs[k].leaving == 1 or (changed and pairs[k].touching == 0):
                 k += 1
                 continue
@@ -86,24 +94,7 @@ def _rotation_now(bodies, i, now, q, R):  # type: ignore[no-untyped-def]
 
 
 @device
-def _shape_pose(table, s, R, R_shape):  # type: ignore[no-untyped-def]
-    x, y, z = table.local_position[s, 0], table.local_position[s, 1], table.local_position[s, 2]
-    for r in range(3):
-        for c in range(3):
-            R_shape[r, c] = (
-                R[r, 0] * table.local_rotation[s, 0, c]
-                + R[r, 1] * table.local_rotation[s, 1, c]
-                + R[r, 2] * table.local_rotation[s, 2, c]
-            )
-    return (
-        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
-        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
-        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
-    )
-
-
-@device
-def body_contact(table, next_shape, bodies, i, j, now, margin, stale_acceleration, scratch, q, result):  # type: ignore[no-untyped-def]
+def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, scratch, q, result):  # type: ignore[no-untyped-def]
     """Do bodies i and j touch at `now`, from their last states? The deepest contact of their shapes into result.
 
     Not heard of for a time, a body may be off by what it could have accelerated: the bound says so, and a pair that
@@ -120,16 +111,16 @@ def body_contact(table, next_shape, bodies, i, j, now, margin, stale_acceleratio
     wanted = margin + widen
     best = inf
     tests = 0
-    if bodies.radius[i] + bodies.radius[j] < inf:
-        reach = bodies.radius[i] + bodies.radius[j] + wanted
+    reach = bodies.motion[i].radius + bodies.motion[j].radius + wanted
+    if reach < inf:
         if px * px + py * py + pz * pz > reach * reach * (1.0 + 1e-14):
             return False, 0
     a = bodies.first_shape[i]
     while a >= 0:
-        oa = _shape_pose(table, a, R_i, R_a)
+        oa = place_shape(table, parts, a, R_i, R_a)
         b = bodies.first_shape[j]
         while b >= 0:
-            ob = _shape_pose(table, b, R_j, R_b)
+            ob = place_shape(table, parts, b, R_j, R_b)
             x, y, z = px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]
             tests += 1
             limit = min(wanted, best)
@@ -141,11 +132,18 @@ def body_contact(table, next_shape, bodies, i, j, now, margin, stale_acceleratio
                 for c in range(15):
                     result[c] = out[c]
                 result[SHAPE_I], result[SHAPE_J] = a, b
-            b = next_shape[b]
-        a = next_shape[a]
+            b = parts.next[b]
+        a = parts.next[a]
     if best == inf:
         return False, tests
-    result[CLOSING] = closing_speed(bodies.linear, bodies.angular, i, j, px, py, pz, result)
+    v = (
+        bodies.linear[j, 0] - bodies.linear[i, 0],
+        bodies.linear[j, 1] - bodies.linear[i, 1],
+        bodies.linear[j, 2] - bodies.linear[i, 2],
+    )
+    wa = (bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2])
+    wb = (bodies.angular[j, 0], bodies.angular[j, 1], bodies.angular[j, 2])
+    result[CLOSING] = closing_speed(v, wa, wb, px, py, pz, result)
     result[BOUND] += widen
     result[STATUS] = TOUCHING if best <= margin else UNRESOLVED
     ti = age_i
@@ -158,7 +156,7 @@ def body_contact(table, next_shape, bodies, i, j, now, margin, stale_acceleratio
 
 @kernel
 def examine(
-    table, next_shape, bodies, pairs, events, now, margin, stale_acceleration, tolerance, budget, results, later, scratch
+    table, parts, bodies, pairs, events, now, margin, stale_acceleration, tolerance, budget, results, later, scratch
 ):  # fmt: skip  # type: ignore[no-untyped-def]
     """Look at every active pair at `now`: contact into results (n, RESULT), and what does not touch is predicted on.
 
@@ -170,18 +168,17 @@ def examine(
     for k in range(pairs.size):
         i, j = pairs[k].i, pairs[k].j
         touching, made = body_contact(
-            table, next_shape, bodies, i, j, now, margin, stale_acceleration, scratch, q, results[n]
+            table, parts, bodies, i, j, now, margin, stale_acceleration, scratch, q, results[n]
         )
         tests += made
         pair, event = pairs[k], events[k]
         stays = touching
         if not touching:
-            predicted = bodies.ref_time[i] == now or bodies.ref_time[j] == now
-            current = bodies.version[i] == event.version_i and bodies.version[j] == event.version_j
-            if current or not predicted:
-                end = min(bodies.cover[i], bodies.cover[j])
+            predicted = bodies.motion[i].time == now or bodies.motion[j].time == now
+            if not (predicted and _changed(bodies, event)):
+                end = min(bodies.motion[i].cover, bodies.motion[j].cover)
                 queries += body_impact(
-                    table, next_shape, bodies, i, j, now, end, margin, tolerance, budget, scratch, event
+                    table, parts, bodies, i, j, now, end, margin, tolerance, budget, scratch, event
                 )
                 if event.status != CLEAR:
                     if event.lower > now:

@@ -26,7 +26,7 @@ def find_candidates(bodies, grid, which, is_new, allowed, pairs):  # type: ignor
     is_new (N,) bool marks the bodies in `which`. Static pairs, groups that ignore each other and allowed pairs are
     left out. Returns how many there are; more than P: call again with a larger array.
     """
-    found = np.empty(bodies.id.size, np.int32)
+    found = np.empty(bodies.used.size, np.int32)
     n = 0
     for k in range(which.size):
         i = which[k]
@@ -38,7 +38,7 @@ def find_candidates(bodies, grid, which, is_new, allowed, pairs):  # type: ignor
                 continue
             if (bodies.group[i] & bodies.mask[j]) == 0 or (bodies.group[j] & bodies.mask[i]) == 0:
                 continue
-            if _allowed(allowed, bodies.id[i], bodies.id[j]):
+            if _allowed(allowed, bodies.motion[i].id, bodies.motion[j].id):
                 continue
             if n < pairs.shape[0]:
                 pairs[n, 0] = i
@@ -48,7 +48,7 @@ def find_candidates(bodies, grid, which, is_new, allowed, pairs):  # type: ignor
 
 
 @kernel
-def predict_pairs(table, next_shape, bodies, pairs, now, margin, tolerance, budget, events, scratch):  # type: ignore[no-untyped-def]
+def predict_pairs(table, parts, bodies, pairs, now, margin, tolerance, budget, events, scratch):  # type: ignore[no-untyped-def]
     """First impacts of pairs (P, 2) from `now` until both bodies' cover times, into events (IMPACT).
 
     Returns (how many impacts, distance queries made).
@@ -56,9 +56,9 @@ def predict_pairs(table, next_shape, bodies, pairs, now, margin, tolerance, budg
     n = queries = 0
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
-        end = min(bodies.cover[i], bodies.cover[j])
+        end = min(bodies.motion[i].cover, bodies.motion[j].cover)
         queries += body_impact(
-            table, next_shape, bodies, i, j, now, end, margin, tolerance, budget, scratch, events[n]
+            table, parts, bodies, i, j, now, end, margin, tolerance, budget, scratch, events[n]
         )
         if events[n].status != CLEAR:
             n += 1

@@ -52,15 +52,15 @@ def sort_order(events, order):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def merge(old, count, new, order, n_new, version, now, merged, due):  # type: ignore[no-untyped-def]
+def merge(old, count, new, order, n_new, motion, now, merged, due):  # type: ignore[no-untyped-def]
     """old[:count] and new[order[:n_new]] into merged, both sorted; those due by `now` into due instead.
 
-    Events whose bodies' version (N,) has changed are dropped. Returns (length of merged, length of due).
+    Events whose bodies' motion (N,) has changed are dropped. Returns (length of merged, length of due).
     """
     i = k = n = n_due = 0
     while i < count or k < n_new:
         if i < count and (
-            version[old[i].i] != old[i].version_i or version[old[i].j] != old[i].version_j
+            motion[old[i].i].version != old[i].version_i or motion[old[i].j].version != old[i].version_j
         ):
             i += 1
             continue
@@ -100,7 +100,7 @@ class EventList:
         """Forget all events."""
         self._count = 0
 
-    def update(self, new: Events, version: NDArray[np.uint32], now: float) -> Events:
+    def update(self, new: Events, motion: NDArray[np.void], now: float) -> Events:
         """Merge `new` in, drop what is outdated, and return what is due by `now`, in order (a view)."""
         need = self._count + len(new)
         if need > len(self._spare):
@@ -113,7 +113,7 @@ class EventList:
         order = np.empty(len(new), np.int64)
         sort_order(new, order)
         count, n_due = merge(
-            self._events, self._count, new, order, len(new), version, now, self._spare, self._due
+            self._events, self._count, new, order, len(new), motion, now, self._spare, self._due
         )
         self._events, self._spare, self._count = self._spare, self._events, count
         return self._due[:n_due]

@@ -1,7 +1,7 @@
 """Bodies and how they move: constant twist from a reference state, and how far the truth may be from it.
 
-The deviation of a body is bounded by a tube: every point of it stays within tube_0 + tube_1 * (t - ref_time) metres
-of where the reference motion puts it. While that holds, what was predicted from the reference holds too.
+The deviation of a body is bounded by a tube: every point of it stays within tube_0 + tube_1 * (t - time) metres of
+where the reference motion puts it. While that holds, what was predicted from the reference holds too.
 """
 
 from __future__ import annotations
@@ -11,78 +11,95 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from collision_monitor._jit import device
+from collision_monitor._jit import device, inlined
+
+MOTION = np.dtype(
+    [
+        ("x", np.float64),  # position at `time` (m)
+        ("y", np.float64),
+        ("z", np.float64),
+        ("vx", np.float64),  # m/s
+        ("vy", np.float64),
+        ("vz", np.float64),
+        ("radius", np.float64),  # of the sphere about the body's origin that holds all its shapes
+        ("time", np.float64),  # s after the monitor's origin, like all times
+        ("tube_0", np.float64),  # m
+        ("tube_1", np.float64),  # m/s
+        ("cover", np.float64),  # collisions are predicted until this time
+        ("wx", np.float64),  # rad/s
+        ("wy", np.float64),
+        ("wz", np.float64),
+        ("id", np.uint32),
+        ("version", np.uint32),  # counts up whenever the motion changes
+        ("rotation", np.float64, (3, 3)),  # at `time`
+    ]
+)
+"""The reference motion that predictions rest on, one record for each body: a prediction reads two of them whole."""
 
 
 class Bodies(NamedTuple):
-    """N slots of bodies, structure of arrays. Times are seconds after the monitor's origin. World frame."""
+    """N slots of bodies, structure of arrays but for the motions. World frame."""
 
-    id: Any  # (N,) uint32
     used: Any  # (N,) bool: the slot holds a body
     static: Any  # (N,) bool
     seen: Any  # (N,) bool: there is a state (always for static bodies)
     group: Any  # (N,) uint32
     mask: Any  # (N,) uint32
-    first_shape: Any  # (N,) int32: slot in the shape table; further shapes follow by next_shape
-    radius: Any  # (N,) float64: of the sphere about the body's origin that holds all its shapes
+    first_shape: Any  # (N,) int32: slot in the shape table; further shapes follow by Parts.next
+    spin_radius: Any  # (N,) float64: the farthest point that turning moves (m)
+    slack: Any  # (N,) float64: how far beyond the horizon it is predicted (s)
+    motion: Any  # (N,) MOTION
+    ref_quaternion: Any  # (N, 4): the reference motion's orientation at its time
     # the last state
     time: Any  # (N,) float64
     position: Any  # (N, 3)
     quaternion: Any  # (N, 4)
     linear: Any  # (N, 3)
     angular: Any  # (N, 3)
-    # the reference motion that predictions rest on
-    version: Any  # (N,) uint32: counts up whenever the reference changes
-    ref_time: Any  # (N,) float64
-    ref_position: Any  # (N, 3)
-    ref_quaternion: Any  # (N, 4)
-    ref_rotation: Any  # (N, 3, 3)
-    ref_linear: Any  # (N, 3)
-    ref_angular: Any  # (N, 3)
-    tube_0: Any  # (N,) float64, m
-    tube_1: Any  # (N,) float64, m/s
-    cover: Any  # (N,) float64: collisions are predicted until this time
+
+
+class Parts(NamedTuple):
+    """How the shapes in the table make up bodies; K slots like the table."""
+
+    next: Any  # (K,) int32: the body's next shape, -1 after the last
+    index: Any  # (K,) uint32: its place in the body's description
+    placed: Any  # (K,) bool: it has a pose of its own in the body's frame
 
 
 def make_bodies(capacity: int) -> Bodies:
     """Empty slots."""
     n = capacity
     return Bodies(
-        id=np.zeros(n, np.uint32),
         used=np.zeros(n, np.bool_),
         static=np.zeros(n, np.bool_),
         seen=np.zeros(n, np.bool_),
         group=np.zeros(n, np.uint32),
         mask=np.zeros(n, np.uint32),
         first_shape=np.full(n, -1, np.int32),
-        radius=np.zeros(n),
+        spin_radius=np.zeros(n),
+        slack=np.zeros(n),
+        motion=np.zeros(n, MOTION),
+        ref_quaternion=np.zeros((n, 4)),
         time=np.zeros(n),
         position=np.zeros((n, 3)),
         quaternion=np.zeros((n, 4)),
         linear=np.zeros((n, 3)),
         angular=np.zeros((n, 3)),
-        version=np.zeros(n, np.uint32),
-        ref_time=np.zeros(n),
-        ref_position=np.zeros((n, 3)),
-        ref_quaternion=np.zeros((n, 4)),
-        ref_rotation=np.zeros((n, 3, 3)),
-        ref_linear=np.zeros((n, 3)),
-        ref_angular=np.zeros((n, 3)),
-        tube_0=np.zeros(n),
-        tube_1=np.zeros(n),
-        cover=np.zeros(n),
     )
 
 
-def grown(bodies: Bodies, capacity: int) -> Bodies:
-    """The same bodies in more slots."""
-    new = make_bodies(capacity)
-    for source, target in zip(bodies, new, strict=True):
-        target[: len(source)] = source
-    return new
+def make_parts(capacity: int) -> Parts:
+    """No shapes."""
+    return Parts(np.full(capacity, -1, np.int32), np.zeros(capacity, np.uint32), np.zeros(capacity, np.bool_))
 
 
-@device
+def enlarge(source: NamedTuple, target: NamedTuple) -> None:
+    """Copy the arrays of `source` to the front of those of `target`."""
+    for old, new in zip(source, target, strict=True):
+        new[: len(old)] = old
+
+
+@inlined
 def quaternion_to_matrix(q, i, out):  # type: ignore[no-untyped-def]
     """Rotation matrix of the unit quaternion q[i] (x, y, z, w) into out (3, 3)."""
     x, y, z, w = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
@@ -97,25 +114,61 @@ def quaternion_to_matrix(q, i, out):  # type: ignore[no-untyped-def]
     out[2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
-@device
-def turned(R, wx, wy, wz, t, out):  # type: ignore[no-untyped-def]
-    """out (3, 3) = exp(t [w]x) R: the rotation after t seconds at angular velocity w in the world (Rodrigues)."""
-    rate = sqrt(wx * wx + wy * wy + wz * wz)
-    if rate * abs(t) == 0.0:
+@inlined
+def rotation_at(m, t, out):  # type: ignore[no-untyped-def]
+    """out (3, 3) = exp((t - m.time) [w]x) R: the rotation of the motion m (MOTION) at time t (Rodrigues' formula)."""
+    R = m.rotation
+    rate = sqrt(m.wx * m.wx + m.wy * m.wy + m.wz * m.wz)
+    angle = rate * (t - m.time)
+    if angle == 0.0:
         for i in range(3):
             for j in range(3):
                 out[i, j] = R[i, j]
         return
-    kx, ky, kz = wx / rate, wy / rate, wz / rate
-    s = sin(rate * t)
-    half = sin(0.5 * rate * t)
+    kx, ky, kz = m.wx / rate, m.wy / rate, m.wz / rate
+    half = sin(0.5 * angle)
     c = 2.0 * half * half  # 1 - cos, without cancellation
+    s = 2.0 * half * cos(0.5 * angle)
     for j in range(3):
         x, y, z = R[0, j], R[1, j], R[2, j]
         ax, ay, az = ky * z - kz * y, kz * x - kx * z, kx * y - ky * x
         out[0, j] = x + s * ax + c * (ky * az - kz * ay)
         out[1, j] = y + s * ay + c * (kz * ax - kx * az)
         out[2, j] = z + s * az + c * (kx * ay - ky * ax)
+
+
+@inlined
+def relative_position(A, B, t):  # type: ignore[no-untyped-def]
+    """Position of motion B relative to motion A at time t (m): positions are subtracted before anything is added."""
+    ta, tb = t - A.time, t - B.time
+    return (
+        B.x - A.x + (B.vx * tb - A.vx * ta),
+        B.y - A.y + (B.vy * tb - A.vy * ta),
+        B.z - A.z + (B.vz * tb - A.vz * ta),
+    )
+
+
+@inlined
+def place_shape(table, parts, s, R_body, R_shape):  # type: ignore[no-untyped-def]
+    """Rotation of shape s of a body turned by R_body into R_shape; returns its offset from the body in the world."""
+    if not parts.placed[s]:
+        for r in range(3):
+            for c in range(3):
+                R_shape[r, c] = R_body[r, c]
+        return 0.0, 0.0, 0.0
+    x, y, z = table.local_position[s, 0], table.local_position[s, 1], table.local_position[s, 2]
+    for r in range(3):
+        for c in range(3):
+            R_shape[r, c] = (
+                R_body[r, 0] * table.local_rotation[s, 0, c]
+                + R_body[r, 1] * table.local_rotation[s, 1, c]
+                + R_body[r, 2] * table.local_rotation[s, 2, c]
+            )
+    return (
+        R_body[0, 0] * x + R_body[0, 1] * y + R_body[0, 2] * z,
+        R_body[1, 0] * x + R_body[1, 1] * y + R_body[1, 2] * z,
+        R_body[2, 0] * x + R_body[2, 1] * y + R_body[2, 2] * z,
+    )
 
 
 @device

@@ -21,7 +21,7 @@ import numpy as np
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.shape_table import SPHERE
 from collision_monitor.narrow_phase.dispatch import WORK_SIZE, contact, separation
-from collision_monitor.prediction.motion import turned
+from collision_monitor.prediction.motion import place_shape, relative_position, rotation_at
 from collision_monitor.prediction.support import support_value
 from collision_monitor.records import Method, PredictionStatus
 
@@ -102,32 +102,6 @@ def sphere_interval(dx, dy, dz, vx, vy, vz, reach, growth, end):  # type: ignore
 
 
 @inlined
-def _place(table, bodies, i, s, t, R_body, R_shape):  # type: ignore[no-untyped-def]
-    """Body i's rotation at time t into R_body, its shape s's into R_shape; returns the shape's offset in the world."""
-    turned(
-        bodies.ref_rotation[i],
-        bodies.ref_angular[i, 0],
-        bodies.ref_angular[i, 1],
-        bodies.ref_angular[i, 2],
-        t - bodies.ref_time[i],
-        R_body,
-    )
-    lx, ly, lz = table.local_position[s, 0], table.local_position[s, 1], table.local_position[s, 2]
-    for r in range(3):
-        for c in range(3):
-            R_shape[r, c] = (
-                R_body[r, 0] * table.local_rotation[s, 0, c]
-                + R_body[r, 1] * table.local_rotation[s, 1, c]
-                + R_body[r, 2] * table.local_rotation[s, 2, c]
-            )
-    return (
-        R_body[0, 0] * lx + R_body[0, 1] * ly + R_body[0, 2] * lz,
-        R_body[1, 0] * lx + R_body[1, 1] * ly + R_body[1, 2] * lz,
-        R_body[2, 0] * lx + R_body[2, 1] * ly + R_body[2, 2] * lz,
-    )
-
-
-@inlined
 def _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, d):  # type: ignore[no-untyped-def]
     """Lower bound on the gap along n after d seconds; turn_*: n x w, h_*: the support values at d = 0."""
     value = gap + d * rate - curvature * d * d
@@ -141,10 +115,8 @@ def _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvatu
 
 
 @inlined
-def _safe_advance(table, a, b, R_a, R_b, n, turn_a, turn_b, rate, curvature, gap, remaining):  # type: ignore[no-untyped-def]
+def _safe_advance(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, remaining):  # type: ignore[no-untyped-def]
     """A time d in (0, remaining] up to which the gap along n stays positive; close to the last such time."""
-    h_a = support_value(table, a, R_a, n[0], n[1], n[2])
-    h_b = support_value(table, b, R_b, -n[0], -n[1], -n[2])
     high = remaining
     f_high = _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, high)
     if f_high >= 0.0:
@@ -171,66 +143,8 @@ def _safe_advance(table, a, b, R_a, R_b, n, turn_a, turn_b, rate, curvature, gap
 
 
 @inlined
-def shape_impact(table, bodies, i, j, a, b, begin, end, tube_0, tube_1, tolerance, budget, scratch):  # type: ignore[no-untyped-def]
-    """When the gap between shape a of body i and shape b of body j first is within the wanted one.
-
-    begin, end: seconds after the monitor's origin; the wanted gap is tube_0 + tube_1 (t - begin) (m).
-    Returns (status, t, queries): no time in [begin, t) is within the wanted gap; at t it is within tolerance of it
-    (HIT), t is end (CLEAR), or the budget of distance queries ran out (UNRESOLVED).
-    """
-    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
-    wa = (bodies.ref_angular[i, 0], bodies.ref_angular[i, 1], bodies.ref_angular[i, 2])
-    wb = (bodies.ref_angular[j, 0], bodies.ref_angular[j, 1], bodies.ref_angular[j, 2])
-    v = (
-        bodies.ref_linear[j, 0] - bodies.ref_linear[i, 0],
-        bodies.ref_linear[j, 1] - bodies.ref_linear[i, 1],
-        bodies.ref_linear[j, 2] - bodies.ref_linear[i, 2],
-    )
-    curvature = 0.5 * (_spin(table, a, wa) + _spin(table, b, wb))
-    t = begin
-    for query in range(1, budget + 1):
-        oa = _place(table, bodies, i, a, t, R_i, R_a)
-        ob = _place(table, bodies, j, b, t, R_j, R_b)
-        px, py, pz = relative_position(bodies, i, j, t)
-        gap = separation(
-            table, a, b, R_a, R_b, px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2], scratch.out, scratch.work
-        )
-        gap -= tube_0 + tube_1 * (t - begin)
-        if gap <= tolerance:
-            return HIT, t, query
-        n = (scratch.out[0], scratch.out[1], scratch.out[2])
-        turn_a = (n[1] * wa[2] - n[2] * wa[1], n[2] * wa[0] - n[0] * wa[2], n[0] * wa[1] - n[1] * wa[0])
-        turn_b = (n[1] * wb[2] - n[2] * wb[1], n[2] * wb[0] - n[0] * wb[2], n[0] * wb[1] - n[1] * wb[0])
-        rate = n[0] * v[0] + n[1] * v[1] + n[2] * v[2] - tube_1
-        rate -= turn_a[0] * oa[0] + turn_a[1] * oa[1] + turn_a[2] * oa[2]
-        rate += turn_b[0] * ob[0] + turn_b[1] * ob[1] + turn_b[2] * ob[2]
-        # aim at half the tolerance, so that the last advance ends inside it
-        d = _safe_advance(
-            table, a, b, R_a, R_b, n, turn_a, turn_b, rate, curvature, gap - 0.5 * tolerance, end - t
-        )
-        if d >= end - t:
-            return CLEAR, end, query
-        if t + d <= t:  # the resolution of the time is reached before the gap is
-            return UNRESOLVED, t, query
-        t += d
-    return UNRESOLVED, t, budget
-
-
-@inlined
-def relative_position(bodies, i, j, t):  # type: ignore[no-untyped-def]
-    """Position of body j relative to body i at time t (m): positions are subtracted before anything is added."""
-    ti, tj = t - bodies.ref_time[i], t - bodies.ref_time[j]
-    return (
-        bodies.ref_position[j, 0] - bodies.ref_position[i, 0] + (bodies.ref_linear[j, 0] * tj - bodies.ref_linear[i, 0] * ti),
-        bodies.ref_position[j, 1] - bodies.ref_position[i, 1] + (bodies.ref_linear[j, 1] * tj - bodies.ref_linear[i, 1] * ti),
-        bodies.ref_position[j, 2] - bodies.ref_position[i, 2] + (bodies.ref_linear[j, 2] * tj - bodies.ref_linear[i, 2] * ti),
-    )
-
-
-@inlined
-def _spin(table, s, w):  # type: ignore[no-untyped-def]
+def _spin(table, s, rate2):  # type: ignore[no-untyped-def]
     """|w|^2 times the farthest point of the shape from its body's origin: bound on the acceleration of its support."""
-    rate2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
     if rate2 == 0.0:
         return 0.0
     x, y, z = table.local_position[s, 0], table.local_position[s, 1], table.local_position[s, 2]
@@ -241,43 +155,107 @@ def _spin(table, s, w):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _contact_at(table, bodies, i, j, a, b, t, scratch):  # type: ignore[no-untyped-def]
-    """Contact of shape a of body i with shape b of body j at time t, into scratch.out; returns the signed distance.
+def shape_impact(table, parts, A, B, a, b, begin, end, tube_0, tube_1, tolerance, budget, scratch):  # type: ignore[no-untyped-def]
+    """When the gap between shape a in motion A and shape b in motion B (MOTION) first is within the wanted one.
 
-    out as narrow_phase.dispatch.contact gives it, but relative to body i's origin; out[15]: closing speed (m/s).
+    begin, end: seconds after the monitor's origin; the wanted gap is tube_0 + tube_1 (t - begin) (m).
+    Returns (status, t, queries): no time in [begin, t) is within the wanted gap; at t it is within tolerance of it
+    (HIT), t is end (CLEAR), or the budget of distance queries ran out (UNRESOLVED). scratch.out[0]: the time in which
+    the gap would close at the rate it has at t, inf where it does not close.
     """
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
-    oa = _place(table, bodies, i, a, t, R_i, R_a)
-    ob = _place(table, bodies, j, b, t, R_j, R_b)
-    px, py, pz = relative_position(bodies, i, j, t)
+    vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
+    curvature = 0.5 * _spin(table, a, A.wx * A.wx + A.wy * A.wy + A.wz * A.wz)
+    curvature += 0.5 * _spin(table, b, B.wx * B.wx + B.wy * B.wy + B.wz * B.wz)
+    t = begin
+    status, query = UNRESOLVED, 0
+    while query < budget:
+        query += 1
+        rotation_at(A, t, R_i)
+        rotation_at(B, t, R_j)
+        oa = place_shape(table, parts, a, R_i, R_a)
+        ob = place_shape(table, parts, b, R_j, R_b)
+        px, py, pz = relative_position(A, B, t)
+        gap = separation(
+            table, a, b, R_a, R_b, px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2], out, scratch.work
+        )
+        gap -= tube_0 + tube_1 * (t - begin)
+        n = (out[0], out[1], out[2])
+        turn_a = (n[1] * A.wz - n[2] * A.wy, n[2] * A.wx - n[0] * A.wz, n[0] * A.wy - n[1] * A.wx)
+        turn_b = (n[1] * B.wz - n[2] * B.wy, n[2] * B.wx - n[0] * B.wz, n[0] * B.wy - n[1] * B.wx)
+        rate = n[0] * vx + n[1] * vy + n[2] * vz - tube_1
+        rate -= turn_a[0] * oa[0] + turn_a[1] * oa[1] + turn_a[2] * oa[2]
+        rate += turn_b[0] * ob[0] + turn_b[1] * ob[1] + turn_b[2] * ob[2]
+        h_a = support_value(table, a, R_a, n[0], n[1], n[2])
+        h_b = support_value(table, b, R_b, -n[0], -n[1], -n[2])
+        if gap <= tolerance:
+            status = HIT
+            d = 1e-6 * (end - begin)
+            after = _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, 0.0, 0.0, d)
+            reach = max(gap, 0.0) + tolerance + 2.0 * (tube_0 + tube_1 * (t - begin))
+            out[0] = reach * d / -after if after < 0.0 else inf
+            break
+        # aim at half the tolerance, so that the last advance ends inside it
+        d = _safe_advance(
+            table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap - 0.5 * tolerance, end - t
+        )
+        if d >= end - t:
+            return CLEAR, end, query
+        if t + d <= t:  # the resolution of the time is reached before the gap is
+            out[0] = inf
+            break
+        t += d
+        out[0] = inf
+    return status, t, query
+
+
+@inlined
+def _contact_at(table, parts, A, B, a, b, t, scratch):  # type: ignore[no-untyped-def]
+    """Contact of shape a in motion A with shape b in motion B at time t, into scratch.out; returns the signed distance.
+
+    out as narrow_phase.dispatch.contact gives it, but relative to A's origin; out[15]: closing speed (m/s).
+    """
+    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
+    out = scratch.out
+    rotation_at(A, t, R_i)
+    rotation_at(B, t, R_j)
+    oa = place_shape(table, parts, a, R_i, R_a)
+    ob = place_shape(table, parts, b, R_j, R_b)
+    px, py, pz = relative_position(A, B, t)
     contact(table, a, b, R_a, R_b, px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2], out, scratch.work)
     for k in range(3):
         out[4 + k] += oa[k]
         out[7 + k] += oa[k]
-    out[15] = closing_speed(bodies.ref_linear, bodies.ref_angular, i, j, px, py, pz, out)
+    v = (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
+    out[15] = closing_speed(v, (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz), px, py, pz, out)
     return out[0]
 
 
 @inlined
-def closing_speed(linear, angular, i, j, px, py, pz, out):  # type: ignore[no-untyped-def]
-    """Speed (m/s) at which the witness points of a contact approach along its normal; p: body j relative to body i."""
+def closing_speed(v, wa, wb, px, py, pz, out):  # type: ignore[no-untyped-def]
+    """Speed (m/s) at which the witness points of a contact (out) approach along its normal.
+
+    v: velocity of B relative to A; wa, wb: angular velocities; p: position of B relative to A.
+    """
     ax, ay, az = out[4], out[5], out[6]
     bx, by, bz = out[7] - px, out[8] - py, out[9] - pz
-    vx = linear[j, 0] - linear[i, 0] + (angular[j, 1] * bz - angular[j, 2] * by) - (angular[i, 1] * az - angular[i, 2] * ay)
-    vy = linear[j, 1] - linear[i, 1] + (angular[j, 2] * bx - angular[j, 0] * bz) - (angular[i, 2] * ax - angular[i, 0] * az)
-    vz = linear[j, 2] - linear[i, 2] + (angular[j, 0] * by - angular[j, 1] * bx) - (angular[i, 0] * ay - angular[i, 1] * ax)
+    vx = v[0] + (wb[1] * bz - wb[2] * by) - (wa[1] * az - wa[2] * ay)
+    vy = v[1] + (wb[2] * bx - wb[0] * bz) - (wa[2] * ax - wa[0] * az)
+    vz = v[2] + (wb[0] * by - wb[1] * bx) - (wa[0] * ay - wa[1] * ax)
     return -(vx * out[1] + vy * out[2] + vz * out[3])
 
 
 @inlined
-def _touching_by(table, bodies, i, j, a, b, t, end, tube_0, tube_1, begin, margin, tolerance, scratch):  # type: ignore[no-untyped-def]
+def _touching_by(table, parts, A, B, a, b, t, guess, end, tube_0, tube_1, begin, margin, tolerance, scratch):  # type: ignore[no-untyped-def]
     """A time in [t, end] at which they overlap by more than the tube, whatever the motions inside it; inf: none found.
 
-    Newton steps on the signed distance from the safe time t. The contact at that time is left in scratch.out.
+    Newton steps on the signed distance, the first one to t + guess. The contact there is left in scratch.out.
     """
+    if t + guess <= end:
+        t += guess
     for _ in range(12):
-        distance = _contact_at(table, bodies, i, j, a, b, t, scratch)
+        distance = _contact_at(table, parts, A, B, a, b, t, scratch)
         excess = distance - margin + tube_0 + tube_1 * (t - begin)
         if excess <= 0.0:
             return t
@@ -289,90 +267,80 @@ def _touching_by(table, bodies, i, j, a, b, t, end, tube_0, tube_1, begin, margi
 
 
 @device
-def body_impact(table, next_shape, bodies, i, j, begin, end, margin, tolerance, budget, scratch, event):  # type: ignore[no-untyped-def]
+def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budget, scratch, event):  # type: ignore[no-untyped-def]
     """First impact of bodies i and j in [begin, end] into the IMPACT record `event`; returns distance queries made.
 
     event.status = CLEAR where there is none. Overlapping or within `margin` (m) already is an impact at begin.
     The reference motions and their tubes are read from `bodies`; ids decide which body counts as i.
     """
-    if bodies.id[i] > bodies.id[j]:
+    if bodies.motion[i].id > bodies.motion[j].id:
         i, j = j, i
-    event.i, event.j = i, j
-    event.key = (np.uint64(bodies.id[i]) << np.uint64(32)) | np.uint64(bodies.id[j])
-    event.version_i, event.version_j = bodies.version[i], bodies.version[j]
-    event.status, event.method = CLEAR, CONSERVATIVE_ADVANCEMENT
-    event.lower = event.upper = inf
-    event.shape_i, event.shape_j = -1, -1
-    tube_1 = bodies.tube_1[i] + bodies.tube_1[j]
-    tube_0 = bodies.tube_0[i] + bodies.tube_0[j]
-    tube_0 += bodies.tube_1[i] * (begin - bodies.ref_time[i]) + bodies.tube_1[j] * (begin - bodies.ref_time[j])
-    px, py, pz = relative_position(bodies, i, j, begin)
-    vx = bodies.ref_linear[j, 0] - bodies.ref_linear[i, 0]
-    vy = bodies.ref_linear[j, 1] - bodies.ref_linear[i, 1]
-    vz = bodies.ref_linear[j, 2] - bodies.ref_linear[i, 2]
+    A, B = bodies.motion[i], bodies.motion[j]
+    event.status = CLEAR
+    tube_1 = A.tube_1 + B.tube_1
+    tube_0 = A.tube_0 + B.tube_0 + A.tube_1 * (begin - A.time) + B.tube_1 * (begin - B.time)
+    px, py, pz = relative_position(A, B, begin)
+    vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
     # the time in which the bounding spheres overlap holds every impact
     first, last = 0.0, end - begin
-    reach = bodies.radius[i] + bodies.radius[j] + margin
+    reach = A.radius + B.radius + margin
     if reach < inf:
         first, last = sphere_interval(px, py, pz, vx, vy, vz, reach + tube_0, tube_1, last)
         if first > last:
             return 0
+    event.i, event.j = i, j
+    event.key = (np.uint64(A.id) << np.uint64(32)) | np.uint64(B.id)
+    event.version_i, event.version_j = A.version, B.version
     a, b = bodies.first_shape[i], bodies.first_shape[j]
-    if (
-        table.kind[a] == SPHERE
-        and table.kind[b] == SPHERE
-        and next_shape[a] < 0
-        and next_shape[b] < 0
-        and _centred(table, a)
-        and _centred(table, b)
-    ):
-        _sphere_impact(bodies, i, j, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, begin, first, end, event)
+    if bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0 and reach < inf:
+        _sphere_impact(A, B, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, begin, first, end, event)
         return 1
+    event.method = CONSERVATIVE_ADVANCEMENT
     queries = 0
     stop = begin + last
+    lower, guess = inf, inf
     while a >= 0:
         b = bodies.first_shape[j]
         while b >= 0:
             status, t, n = shape_impact(
-                table, bodies, i, j, a, b, begin + first, stop,
+                table, parts, A, B, a, b, begin + first, stop,
                 tube_0 + tube_1 * first + margin, tube_1, tolerance, budget, scratch,
             )  # fmt: skip
             queries += n
-            if status != CLEAR and t < event.lower:
-                event.lower, event.status = t, status
+            if status != CLEAR and t < lower:
+                lower, guess = t, scratch.out[0]
+                event.status = status
                 event.shape_i, event.shape_j = a, b
                 stop = t
-            b = next_shape[b]
-        a = next_shape[a]
+            b = parts.next[b]
+        a = parts.next[a]
     if event.status == CLEAR:
         return queries
     a, b = event.shape_i, event.shape_j
-    t = _touching_by(table, bodies, i, j, a, b, event.lower, end, tube_0, tube_1, begin, margin, tolerance, scratch)
-    event.upper = t
-    event.status = HIT if t < inf else UNRESOLVED
-    at = t if t < inf else event.lower
-    _set_geometry(event, bodies, i, at, scratch.out)
+    sure = _touching_by(
+        table, parts, A, B, a, b, lower, guess, end, tube_0, tube_1, begin, margin, tolerance, scratch
+    )
+    if sure == inf:
+        _contact_at(table, parts, A, B, a, b, lower, scratch)
+    event.lower, event.upper = lower, sure
+    event.status = HIT if sure < inf else UNRESOLVED
+    _set_geometry(event, A, sure if sure < inf else lower, scratch.out)
     return queries
 
 
 @inlined
-def _centred(table, s):  # type: ignore[no-untyped-def]
-    return table.local_position[s, 0] == 0.0 and table.local_position[s, 1] == 0.0 and table.local_position[s, 2] == 0.0
-
-
-@inlined
-def _set_geometry(event, bodies, i, t, out):  # type: ignore[no-untyped-def]
-    """Where and how they meet, from a contact at time t relative to body i."""
-    ti = t - bodies.ref_time[i]
-    event.point_x = bodies.ref_position[i, 0] + bodies.ref_linear[i, 0] * ti + 0.5 * (out[4] + out[7])
-    event.point_y = bodies.ref_position[i, 1] + bodies.ref_linear[i, 1] * ti + 0.5 * (out[5] + out[8])
-    event.point_z = bodies.ref_position[i, 2] + bodies.ref_linear[i, 2] * ti + 0.5 * (out[6] + out[9])
+def _set_geometry(event, A, t, out):  # type: ignore[no-untyped-def]
+    """Where and how they meet, from a contact at time t relative to A's origin."""
+    ta = t - A.time
+    event.point_x = A.x + A.vx * ta + 0.5 * (out[4] + out[7])
+    event.point_y = A.y + A.vy * ta + 0.5 * (out[5] + out[8])
+    event.point_z = A.z + A.vz * ta + 0.5 * (out[6] + out[9])
     event.normal_x, event.normal_y, event.normal_z = out[1], out[2], out[3]
     event.closing_speed = out[15]
 
 
 @inlined
-def _sphere_impact(bodies, i, j, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, begin, first, end, event):  # type: ignore[no-untyped-def]
+def _sphere_impact(A, B, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, begin, first, end, event):  # type: ignore[no-untyped-def]
     """Two spheres: closed form for both ends of the interval."""
     event.method = CLOSED_FORM
     event.shape_i, event.shape_j = a, b
@@ -392,10 +360,10 @@ def _sphere_impact(bodies, i, j, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tu
         nx, ny, nz = dx / length, dy / length, dz / length
     else:
         nx, ny, nz = 0.0, 0.0, 1.0
-    ti = begin + t - bodies.ref_time[i]
-    half = bodies.radius[i] / (bodies.radius[i] + bodies.radius[j]) * length
-    event.point_x = bodies.ref_position[i, 0] + bodies.ref_linear[i, 0] * ti + half * nx
-    event.point_y = bodies.ref_position[i, 1] + bodies.ref_linear[i, 1] * ti + half * ny
-    event.point_z = bodies.ref_position[i, 2] + bodies.ref_linear[i, 2] * ti + half * nz
+    ta = begin + t - A.time
+    share = A.radius / (A.radius + B.radius) * length
+    event.point_x = A.x + A.vx * ta + share * nx
+    event.point_y = A.y + A.vy * ta + share * ny
+    event.point_z = A.z + A.vz * ta + share * nz
     event.normal_x, event.normal_y, event.normal_z = nx, ny, nz
     event.closing_speed = -(vx * nx + vy * ny + vz * nz)

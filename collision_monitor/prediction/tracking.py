@@ -22,6 +22,10 @@ OLD: Final = 4
 STATE_NUMBERS: Final = 20
 """float64 numbers at the front of a records.STATE; id and flags follow."""
 
+FIRST_SLACK: Final = 0.5
+SHORTEST_SLACK: Final = 0.0625
+"""How far beyond the horizon a body is predicted, in horizons: at first, and at least."""
+
 GOLDEN_RATIO: Final = 0.6180339887498949
 PLASTIC_RATIO: Final = 0.7548776662466927
 """Multiples of these, modulo 1, fill the unit interval evenly."""
@@ -99,96 +103,99 @@ def _estimate_twist(bodies, i, numbers, k, x, y, z, w, elapsed):  # type: ignore
 
 
 @kernel
-def find_moved(bodies, spin_radius, count, now, horizon, stale_acceleration, moved):  # type: ignore[no-untyped-def]
+def find_moved(bodies, count, now, horizon, stale_acceleration, moved):  # type: ignore[no-untyped-def]
     """Slots among the first `count` whose predictions no longer hold at `now`, into moved; returns how many.
 
     A body's surface may be off its reference by tube_0 now and drift by tube_1 a second; both are checked, with the
-    drift that an unheard-of body may have made. spin_radius (N,): the farthest point that turning moves (m).
+    drift that an unheard-of body may have made. Its slack is halved where it left its motion and doubled where that
+    held until it was predicted no further: who turns often is not predicted far.
     """
     n = 0
     turned = np.empty(4)
     for i in range(count):
         if not bodies.used[i] or not bodies.seen[i] or bodies.static[i]:
             continue
-        if bodies.cover[i] < now + horizon:
-            moved[n] = i
-            n += 1
-            continue
+        m = bodies.motion[i]
         age = now - bodies.time[i]
-        since = now - bodies.ref_time[i]
-        apart = 0.0
-        drift = 0.0
-        for c in range(3):
-            d = bodies.position[i, c] - bodies.ref_position[i, c]
-            d += bodies.linear[i, c] * age - bodies.ref_linear[i, c] * since
-            apart += d * d
-            d = bodies.linear[i, c] - bodies.ref_linear[i, c]
-            drift += d * d
-        apart, drift = sqrt(apart), sqrt(drift)
+        since = now - m.time
+        dx = bodies.position[i, 0] - m.x + (bodies.linear[i, 0] * age - m.vx * since)
+        dy = bodies.position[i, 1] - m.y + (bodies.linear[i, 1] * age - m.vy * since)
+        dz = bodies.position[i, 2] - m.z + (bodies.linear[i, 2] * age - m.vz * since)
+        apart = sqrt(dx * dx + dy * dy + dz * dz)
+        dx, dy, dz = bodies.linear[i, 0] - m.vx, bodies.linear[i, 1] - m.vy, bodies.linear[i, 2] - m.vz
+        drift = sqrt(dx * dx + dy * dy + dz * dz)
         if age > 0.0:
             apart += 0.5 * stale_acceleration * age * age
             drift += stale_acceleration * age
-        r = spin_radius[i]
-        if r > 0.0 and apart <= bodies.tube_0[i] and drift <= bodies.tube_1[i]:
-            wx, wy, wz = bodies.ref_angular[i, 0], bodies.ref_angular[i, 1], bodies.ref_angular[i, 2]
-            dx, dy, dz = bodies.angular[i, 0] - wx, bodies.angular[i, 1] - wy, bodies.angular[i, 2] - wz
+        r = bodies.spin_radius[i]
+        if r > 0.0 and apart <= m.tube_0 and drift <= m.tube_1:
+            dx, dy, dz = bodies.angular[i, 0] - m.wx, bodies.angular[i, 1] - m.wy, bodies.angular[i, 2] - m.wz
             off = sqrt(dx * dx + dy * dy + dz * dz)
             drift += r * off
             # turned back to the last state's time: the difference from there to now is bounded by the rate's
-            turn_quaternion(bodies.ref_quaternion, i, wx, wy, wz, since - age, turned)
+            turn_quaternion(bodies.ref_quaternion, i, m.wx, m.wy, m.wz, since - age, turned)
             apart += r * (angle_between(bodies.quaternion, i, turned[0], turned[1], turned[2], turned[3]) + off * age)
-        if not (apart <= bodies.tube_0[i] and drift <= bodies.tube_1[i]):
-            moved[n] = i
-            n += 1
+        if not (apart <= m.tube_0 and drift <= m.tube_1):
+            bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
+        elif m.cover < now + horizon:
+            bodies.slack[i] = min(2.0 * bodies.slack[i], horizon)
+        else:
+            continue
+        moved[n] = i
+        n += 1
     return n
 
 
 @kernel
 def restart_motion(
-    bodies, spin_radius, grid, which, now, horizon, slack, margin, stale_acceleration,
+    bodies, grid, which, now, horizon, margin, stale_acceleration,
     position_tolerance, velocity_tolerance, orientation_tolerance, angular_velocity_tolerance,
 ):  # fmt: skip  # type: ignore[no-untyped-def]
     """Make the last state of each body in `which` (M,) its reference from `now` on and put what it sweeps in the grid.
 
-    Cover times are spread over (1/8, 1] of `slack` by the body's slot and version, so that they do not expire together.
+    Cover times are spread over (1/2, 1] of the slack by the body's slot and version, so that they do not expire
+    together.
     """
     q = np.empty(4)
     for k in range(which.size):
         i = which[k]
-        bodies.version[i] += np.uint32(1)
+        m = bodies.motion[i]
+        m.version += np.uint32(1)
         age = 0.0 if bodies.static[i] else now - bodies.time[i]
-        for c in range(3):
-            bodies.ref_position[i, c] = bodies.position[i, c] + bodies.linear[i, c] * age
-            bodies.ref_linear[i, c] = bodies.linear[i, c]
-            bodies.ref_angular[i, c] = bodies.angular[i, c]
-        turn_quaternion(
-            bodies.quaternion, i, bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2], age, q
-        )
+        m.vx, m.vy, m.vz = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
+        m.wx, m.wy, m.wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
+        m.x = bodies.position[i, 0] + m.vx * age
+        m.y = bodies.position[i, 1] + m.vy * age
+        m.z = bodies.position[i, 2] + m.vz * age
+        turn_quaternion(bodies.quaternion, i, m.wx, m.wy, m.wz, age, q)
         for c in range(4):
             bodies.ref_quaternion[i, c] = q[c]
-        quaternion_to_matrix(bodies.ref_quaternion, i, bodies.ref_rotation[i])
-        bodies.ref_time[i] = now
-        if bodies.static[i]:
-            bodies.cover[i] = np.inf
-            sweep = 0.0
-        else:
-            spread = (i * GOLDEN_RATIO + bodies.version[i] * PLASTIC_RATIO) % 1.0
-            sweep = horizon + slack * (0.125 + 0.875 * spread)
-            bodies.cover[i] = now + sweep
-            r = spin_radius[i]
-            bodies.tube_0[i] = position_tolerance + r * orientation_tolerance
-            bodies.tube_1[i] = velocity_tolerance + r * angular_velocity_tolerance
+        quaternion_to_matrix(bodies.ref_quaternion, i, m.rotation)
+        m.time = now
+        sweep = 0.0
+        m.cover = np.inf
+        m.tube_0 = m.tube_1 = 0.0
+        if not bodies.static[i]:
+            if bodies.slack[i] == 0.0:
+                bodies.slack[i] = FIRST_SLACK * horizon
+            spread = (i * GOLDEN_RATIO + m.version * PLASTIC_RATIO) % 1.0
+            sweep = horizon + bodies.slack[i] * (0.5 + 0.5 * spread)
+            m.cover = now + sweep
+            r = bodies.spin_radius[i]
+            m.tube_0 = position_tolerance + r * orientation_tolerance
+            m.tube_1 = velocity_tolerance + r * angular_velocity_tolerance
             if age > 0.0:
-                bodies.tube_0[i] += 2.0 * stale_acceleration * age * age
-                bodies.tube_1[i] += 2.0 * stale_acceleration * age
-        half = bodies.radius[i] + margin + bodies.tube_0[i] + bodies.tube_1[i] * sweep
+                m.tube_0 += 2.0 * stale_acceleration * age * age
+                m.tube_1 += 2.0 * stale_acceleration * age
+        half = m.radius + margin + m.tube_0 + m.tube_1 * sweep
+        ahead = 0.5 * sweep
         put_box(
             grid,
             i,
-            bodies.ref_position[i, 0] + 0.5 * sweep * bodies.linear[i, 0],
-            bodies.ref_position[i, 1] + 0.5 * sweep * bodies.linear[i, 1],
-            bodies.ref_position[i, 2] + 0.5 * sweep * bodies.linear[i, 2],
-            half + 0.5 * sweep * abs(bodies.linear[i, 0]),
-            half + 0.5 * sweep * abs(bodies.linear[i, 1]),
-            half + 0.5 * sweep * abs(bodies.linear[i, 2]),
+            m.x + ahead * m.vx,
+            m.y + ahead * m.vy,
+            m.z + ahead * m.vz,
+            half + ahead * abs(m.vx),
+            half + ahead * abs(m.vy),
+            half + ahead * abs(m.vz),
         )

@@ -11,8 +11,9 @@ from collision_monitor.geometry.shape_table import ShapeTableBuilder
 from collision_monitor.geometry.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, HalfSpace, Shape, Sphere
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.prediction.candidates import predict_pairs
-from collision_monitor.prediction.motion import make_bodies
+from collision_monitor.prediction.motion import make_bodies, make_parts
 from collision_monitor.prediction.time_of_impact import HIT, IMPACT, UNRESOLVED, make_scratch
+from collision_monitor.records import ShapeType
 
 TOLERANCE = 1e-6
 HORIZON = 2.0
@@ -28,40 +29,47 @@ class PairScene:
             builder.append(a)
             builder.append(b)
         self.table = builder.table
-        self.next_shape = np.full(len(self.table.kind), -1, np.int32)
-        self.bodies = b = make_bodies(n)
+        self.parts = make_parts(len(self.table.kind))
+        self.bodies = make_bodies(n)
         self.pairs = np.arange(n, dtype=np.int32).reshape(-1, 2)
-        b.id[:] = np.arange(n)
-        b.used[:] = b.seen[:] = True
-        b.first_shape[:] = np.arange(n)
-        b.radius[:] = self.table.radius[:n]
-        b.cover[:] = HORIZON
-        b.tube_0[:] = b.tube_1[:] = tube
-        b.ref_position[1::2] = rng.normal(0, 1.2, (n // 2, 3))
-        b.ref_linear[:] = rng.normal(0, 1, (n, 3))
-        b.ref_angular[:] = rng.normal(0, 2, (n, 3))
+        self.bodies.first_shape[:] = np.arange(n)
+        self.bodies.spin_radius[:] = np.where(self.table.kind[:n] == ShapeType.SPHERE, 0.0, self.table.radius[:n])
+        m = self.motion = self.bodies.motion
+        m["id"] = np.arange(n)
+        m["radius"] = self.table.radius[:n]
+        m["cover"] = HORIZON
+        m["tube_0"] = m["tube_1"] = tube
+        self.position = np.zeros((n, 3))
+        self.position[1::2] = rng.normal(0, 1.2, (n // 2, 3))
+        self.linear = rng.normal(0, 1, (n, 3))
+        self.angular = rng.normal(0, 2, (n, 3))
         q = rng.normal(0, 1, (n, 4))
-        self.place(q / np.linalg.norm(q, axis=1, keepdims=True))
+        self.quaternion = q / np.linalg.norm(q, axis=1, keepdims=True)
 
-    def place(self, quaternion: NDArray[np.float64]) -> None:
-        self.bodies.ref_quaternion[:] = quaternion
-        self.bodies.ref_rotation[:] = rotation_matrix(quaternion)
+    def stand_still(self) -> None:
+        self.position[:] = self.linear[:] = self.angular[:] = 0.0
+        self.quaternion[:] = 0.0, 0.0, 0.0, 1.0
 
     def impacts(self, budget: int = 256, tolerance: float = TOLERANCE) -> NDArray[np.void]:
+        m = self.motion
+        m["x"], m["y"], m["z"] = self.position.T
+        m["vx"], m["vy"], m["vz"] = self.linear.T
+        m["wx"], m["wy"], m["wz"] = self.angular.T
+        m["rotation"] = rotation_matrix(self.quaternion)
         events = np.zeros(len(self.pairs) + 1, IMPACT)
         hits, _ = predict_pairs(
-            self.table, self.next_shape, self.bodies, self.pairs, 0.0, 0.0, tolerance, budget, events, make_scratch()
+            self.table, self.parts, self.bodies, self.pairs, 0.0, 0.0, tolerance, budget, events, make_scratch()
         )
         return events[:hits]
 
     def distances(self, t: NDArray[np.float64] | float) -> NDArray[np.float64]:
         """Signed distance of every pair at the time t, or at a time of its own."""
-        b = self.bodies
         times = np.broadcast_to(t, len(self.pairs)).repeat(2)[:, None]
         position = np.zeros((len(self.table.kind), 3))
         rotation = np.zeros((len(self.table.kind), 3, 3))
-        position[: len(b.id)] = b.ref_position + b.ref_linear * times
-        rotation[: len(b.id)] = rotation_matrix(multiply(from_rotation_vector(b.ref_angular * times), b.ref_quaternion))
+        n = len(self.motion)
+        position[:n] = self.position + self.linear * times
+        rotation[:n] = rotation_matrix(multiply(from_rotation_vector(self.angular * times), self.quaternion))
         return contact_batch(self.table, position, rotation, self.pairs)[:, 0]
 
 
@@ -93,7 +101,7 @@ def test_no_impact_is_missed_and_none_is_late(kind_a: str, kind_b: str, tube: fl
     rng = np.random.default_rng(len(kind_a) * 31 + len(kind_b))
     scene = PairScene([(KINDS[kind_a](rng), KINDS[kind_b](rng)) for _ in range(100)], rng, tube)
     if kind_b == "half-space":
-        scene.bodies.ref_linear[1::2] = scene.bodies.ref_angular[1::2] = 0.0
+        scene.linear[1::2] = scene.angular[1::2] = 0.0
     events = scene.impacts()
     lower = np.full(len(scene.pairs), np.inf)
     lower[events["i"] // 2] = events["lower"]
@@ -124,13 +132,12 @@ def test_the_tube_holds_for_every_motion_inside_it() -> None:
     for seed in range(8):
         shaken = PairScene([(Sphere(1.0), Sphere(1.0))] * 200, np.random.default_rng(seed))
         shaken.table = scene.table
-        b, s = shaken.bodies, scene.bodies
-        for name in ("radius", "ref_position", "ref_linear", "ref_angular", "ref_quaternion", "ref_rotation"):
-            getattr(b, name)[:] = getattr(s, name)
-        direction = rng.normal(0, 1, b.ref_position.shape)
+        shaken.motion["radius"], shaken.bodies.spin_radius[:] = scene.motion["radius"], scene.bodies.spin_radius
+        direction = rng.normal(0, 1, scene.position.shape)
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-        b.ref_position[:] += tube * direction
-        b.ref_linear[:] += tube * rng.choice([-1, 1], (len(direction), 1)) * direction
+        shaken.position = scene.position + tube * direction
+        shaken.linear = scene.linear + tube * rng.choice([-1, 1], (len(direction), 1)) * direction
+        shaken.angular, shaken.quaternion = scene.angular, scene.quaternion
         truth = shaken.impacts(tolerance=1e-9)
         stated = {int(e["key"]): e for e in events}
         for impact in truth[truth["status"] == HIT]:
@@ -144,11 +151,10 @@ def test_the_tube_holds_for_every_motion_inside_it() -> None:
 def test_spheres_meet_when_the_closed_form_says() -> None:
     rng = np.random.default_rng(0)
     scene = PairScene([(Sphere(0.5), Sphere(0.25))] * 3, rng)
-    b = scene.bodies
-    b.ref_position[:] = b.ref_linear[:] = 0.0
-    b.ref_position[1], b.ref_linear[1] = (3, 0, 0), (-1.5, 0, 0)  # head on: (3 - 0.75) / 1.5
-    b.ref_position[3], b.ref_linear[3] = (3, 0.75 + 1e-6, 0), (-1.5, 0, 0)  # passes a micrometre away
-    b.ref_position[5], b.ref_linear[5] = (0.75, 0, 0), (1, 0, 0)  # touches and parts
+    scene.stand_still()
+    scene.position[1], scene.linear[1] = (3, 0, 0), (-1.5, 0, 0)  # head on: (3 - 0.75) / 1.5
+    scene.position[3], scene.linear[3] = (3, 0.75 + 1e-6, 0), (-1.5, 0, 0)  # passes a micrometre away
+    scene.position[5], scene.linear[5] = (0.75, 0, 0), (1, 0, 0)  # touches and parts
     events = scene.impacts()
     assert [int(e["i"]) // 2 for e in events] == [0, 2]
     assert events[0]["lower"] <= 1.5 <= events[0]["upper"]
@@ -161,11 +167,9 @@ def test_spheres_meet_when_the_closed_form_says() -> None:
 def test_a_spinning_rod_finds_the_ball() -> None:
     rng = np.random.default_rng(0)
     scene = PairScene([(Box((2.0, 0.02, 0.02)), Sphere(0.05))], rng)
-    b = scene.bodies
-    b.ref_position[:] = b.ref_linear[:] = b.ref_angular[:] = 0.0
-    scene.place(np.tile([0.0, 0, 0, 1], (2, 1)))
-    b.ref_position[1] = (0.0, 0.9, 0.0)
-    b.ref_angular[0] = (0, 0, 2.0)
+    scene.stand_still()
+    scene.position[1] = (0.0, 0.9, 0.0)
+    scene.angular[0] = (0, 0, 2.0)
     (event,) = scene.impacts()
     # the rod's flank is 0.01 from its axis, the ball's centre 0.9 from the pivot
     expected = (np.pi / 2 - np.arcsin(0.06 / 0.9)) / 2.0
@@ -176,10 +180,8 @@ def test_a_spinning_rod_finds_the_ball() -> None:
 def test_a_thin_plate_stops_a_fast_bullet() -> None:
     rng = np.random.default_rng(0)
     scene = PairScene([(Box((1.0, 1.0, 0.001)), Sphere(0.0005))], rng)
-    b = scene.bodies
-    b.ref_position[:] = b.ref_linear[:] = b.ref_angular[:] = 0.0
-    scene.place(np.tile([0.0, 0, 0, 1], (2, 1)))
-    b.ref_position[1], b.ref_linear[1] = (0.2, 0.1, 700.0), (0, 0, -1000.0)
+    scene.stand_still()
+    scene.position[1], scene.linear[1] = (0.2, 0.1, 700.0), (0, 0, -1000.0)
     (event,) = scene.impacts()
     expected = (700.0 - 0.0005 - 0.0005) / 1000.0
     assert event["lower"] <= expected + 1e-15 and event["upper"] >= expected - 1e-15
