@@ -42,9 +42,15 @@ def _cache_root() -> Path:
 
 
 if not os.environ.get("NUMBA_CACHE_DIR"):
-    numba.config.CACHE_DIR = str(_cache_root() / _source_digest())  # type: ignore[attr-defined]
+    numba.config.CACHE_DIR = str(_cache_root() / _source_digest())
 
-_OPTIONS: dict[str, Any] = {"cache": True, "fastmath": False, "error_model": "numpy", "nogil": True, "boundscheck": False}
+_OPTIONS: dict[str, Any] = {
+    "cache": True,
+    "fastmath": False,
+    "error_model": "numpy",
+    "nogil": True,
+    "boundscheck": False,
+}
 
 
 def kernel(function: F) -> F:
@@ -65,8 +71,8 @@ def device(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """A device function that is always inlined: for small ones whose array arguments cost more to pass than to use."""
-    compiled: F = numba.njit(forceinline=True, **_BORROWING)(function)
+    """A device function that numba inlines into its callers: where arguments cost more to pass than to use."""
+    compiled: F = numba.njit(inline="always", **_BORROWING)(function)
     return compiled
 
 

@@ -12,6 +12,7 @@ from typing import Any, Final
 from collision_monitor._jit import device
 from collision_monitor.narrow_phase.answer import EDGES, FACES, MAX_FACES, MAX_VERTICES, SIMPLEX
 from collision_monitor.narrow_phase.gjk import WEIGHTS, closest_on_triangle
+from collision_monitor.narrow_phase.segment import across
 from collision_monitor.narrow_phase.support import support_difference
 from collision_monitor.tolerances import EPSILON, FLAT, SLIVER_SIN2
 
@@ -49,10 +50,10 @@ def _set_face(work: Any, f: int, i: int, j: int, k: int) -> None:
     work[J + f] = j
     work[K + f] = k
     if n2 > SLIVER_SIN2 * product:
-        length = sqrt(n2)
-        nx /= length
-        ny /= length
-        nz /= length
+        inverse = 1.0 / sqrt(n2)
+        nx *= inverse
+        ny *= inverse
+        nz *= inverse
         a = SIMPLEX + 8 * i
         work[D + f] = nx * work[a] + ny * work[a + 1] + nz * work[a + 2]
     else:
@@ -64,12 +65,45 @@ def _set_face(work: Any, f: int, i: int, j: int, k: int) -> None:
 
 
 @device
-def _off_line(work: Any, at: int) -> float:
-    """Squared distance of the row `at` from the line through the first two points."""
-    ex, ey, ez = work[SIMPLEX + 8] - work[SIMPLEX], work[SIMPLEX + 9] - work[SIMPLEX + 1], work[SIMPLEX + 10] - work[SIMPLEX + 2]
-    x, y, z = work[at] - work[SIMPLEX], work[at + 1] - work[SIMPLEX + 1], work[at + 2] - work[SIMPLEX + 2]
-    cx, cy, cz = ey * z - ez * y, ez * x - ex * z, ex * y - ey * x
-    return (cx * cx + cy * cy + cz * cz) / (ex * ex + ey * ey + ez * ez)
+def _probe(work: Any, count: int, step: int) -> Any:
+    """Unit direction to look in for a point off the first `count` simplex points: 6 steps, then 4, then 2."""
+    s = 1.0 if step % 2 == 0 else -1.0
+    if count == 1:
+        return (
+            s if step // 2 == 0 else 0.0,
+            s if step // 2 == 1 else 0.0,
+            s if step // 2 == 2 else 0.0,
+        )
+    if count == 2:
+        x, y, z = (
+            work[SIMPLEX + 8] - work[SIMPLEX],
+            work[SIMPLEX + 9] - work[SIMPLEX + 1],
+            work[SIMPLEX + 10] - work[SIMPLEX + 2],
+        )
+        ux, uy, uz = across(x, y, z, 0.0, 0.0, 0.0)
+        if step >= 2:
+            ux, uy, uz = y * uz - z * uy, z * ux - x * uz, x * uy - y * ux
+    else:
+        ux, uy, uz, _ = _normal(work, 0, 1, 2)
+    length = s * sqrt(ux * ux + uy * uy + uz * uz)
+    return ux / length, uy / length, uz / length
+
+
+@device
+def _off(work: Any, count: int, nx: float, ny: float, nz: float) -> float:
+    """How far the spare row is off the point, line or plane of the first `count` simplex points; n is the plane's."""
+    x = work[SIMPLEX + 32] - work[SIMPLEX]
+    y = work[SIMPLEX + 33] - work[SIMPLEX + 1]
+    z = work[SIMPLEX + 34] - work[SIMPLEX + 2]
+    if count == 3:
+        return abs(x * nx + y * ny + z * nz)
+    if count == 2:
+        ex = work[SIMPLEX + 8] - work[SIMPLEX]
+        ey = work[SIMPLEX + 9] - work[SIMPLEX + 1]
+        ez = work[SIMPLEX + 10] - work[SIMPLEX + 2]
+        f = sqrt(ex * ex + ey * ey + ez * ez)
+        x, y, z = (ey * z - ez * y) / f, (ez * x - ex * z) / f, (ex * y - ey * x) / f
+    return sqrt(x * x + y * y + z * z)
 
 
 @device
@@ -111,84 +145,41 @@ def epa(
     witness on A. Ends when upper - lower <= tolerance * size (m), or when the scratch memory is full.
     """
     flat = FLAT * size
-    # the simplex becomes a tetrahedron
-    if count == 1:
-        farthest = 0.0
-        for k in range(6):
-            s = 1.0 if k % 2 == 0 else -1.0
-            x, y, z = support_difference(
-                ka, a0, a1, a2, sa, na, kb, b0, b1, b2, sb, nb, vertices, work,
-                s if k // 2 == 0 else 0.0, s if k // 2 == 1 else 0.0, s if k // 2 == 2 else 0.0, SIMPLEX + 16,
-            )  # fmt: skip
-            x, y, z = x - work[SIMPLEX], y - work[SIMPLEX + 1], z - work[SIMPLEX + 2]
-            if x * x + y * y + z * z > farthest:
-                farthest = x * x + y * y + z * z
-                for m in range(8):
-                    work[SIMPLEX + 8 + m] = work[SIMPLEX + 16 + m]
-        if farthest <= flat * flat:
-            return 0.0, 0.0, 0.0, 0.0, 1.0, work[SIMPLEX + 3], work[SIMPLEX + 4], work[SIMPLEX + 5]
-        work[WEIGHTS + 1] = 0.0
-        count = 2
-    if count == 2:
-        ex, ey, ez = work[SIMPLEX + 8] - work[SIMPLEX], work[SIMPLEX + 9] - work[SIMPLEX + 1], work[SIMPLEX + 10] - work[SIMPLEX + 2]
-        if abs(ex) <= abs(ey) and abs(ex) <= abs(ez):
-            ux, uy, uz = 0.0, ez, -ey
-        elif abs(ey) <= abs(ez):
-            ux, uy, uz = -ez, 0.0, ex
-        else:
-            ux, uy, uz = ey, -ex, 0.0
-        vx, vy, vz = ey * uz - ez * uy, ez * ux - ex * uz, ex * uy - ey * ux
-        farthest = 0.0
-        for k in range(4):
-            s = 1.0 if k % 2 == 0 else -1.0
-            x, y, z = (s * ux, s * uy, s * uz) if k < 2 else (s * vx, s * vy, s * vz)
-            support_difference(
-                ka, a0, a1, a2, sa, na, kb, b0, b1, b2, sb, nb, vertices, work, x, y, z, SIMPLEX + 24
-            )
-            d2 = _off_line(work, SIMPLEX + 24)
-            if d2 > farthest:
-                farthest = d2
-                for m in range(8):
-                    work[SIMPLEX + 16 + m] = work[SIMPLEX + 24 + m]
-        if farthest <= flat * flat:
-            # a segment: any direction across it parts the cores
-            length = sqrt(ux * ux + uy * uy + uz * uz)
-            wa, wb = work[WEIGHTS], work[WEIGHTS + 1]
-            return (
-                0.0, 0.0, ux / length, uy / length, uz / length,
-                wa * work[SIMPLEX + 3] + wb * work[SIMPLEX + 11],
-                wa * work[SIMPLEX + 4] + wb * work[SIMPLEX + 12],
-                wa * work[SIMPLEX + 5] + wb * work[SIMPLEX + 13],
-            )  # fmt: skip
-        work[WEIGHTS + 2] = 0.0
-        count = 3
-    if count == 3:
-        x, y, z, _ = _normal(work, 0, 1, 2)
-        length = sqrt(x * x + y * y + z * z)
-        x, y, z = x / length, y / length, z / length
-        base = x * work[SIMPLEX] + y * work[SIMPLEX + 1] + z * work[SIMPLEX + 2]
-        found = False
-        upper, side = inf, 1.0
-        for k in range(2):
-            s = 1.0 if k == 0 else -1.0
-            wx, wy, wz = support_difference(
-                ka, a0, a1, a2, sa, na, kb, b0, b1, b2, sb, nb, vertices, work, s * x, s * y, s * z, SIMPLEX + 24
-            )
-            h = s * (x * wx + y * wy + z * wz)
-            if h - s * base > flat:
-                found = True
-                break
-            if h < upper:
-                upper, side = h, s
-        if not found:
-            # B - A is a flat piece: the depth is that of its plane
-            wa, wb, wc = work[WEIGHTS], work[WEIGHTS + 1], work[WEIGHTS + 2]
-            return (
-                upper, min(upper, -flat), -side * x, -side * y, -side * z,
-                wa * work[SIMPLEX + 3] + wb * work[SIMPLEX + 11] + wc * work[SIMPLEX + 19],
-                wa * work[SIMPLEX + 4] + wb * work[SIMPLEX + 12] + wc * work[SIMPLEX + 20],
-                wa * work[SIMPLEX + 5] + wb * work[SIMPLEX + 13] + wc * work[SIMPLEX + 21],
-            )  # fmt: skip
+    # The simplex grows to a tetrahedron by the farthest of a few support points: along the axes from a point,
+    # across a line, to both sides of a plane. Where none is off it, B - A is flat, and its thin direction is the answer.
+    step = 0
+    farthest = 0.0
+    upper = inf
+    mx = my = mz = 0.0
+    spare = SIMPLEX + 32
+    while count < 4:
+        x, y, z = _probe(work, count, step)
+        wx, wy, wz = support_difference(
+            ka, a0, a1, a2, sa, na, kb, b0, b1, b2, sb, nb, vertices, work, x, y, z, spare
+        )
+        h = x * wx + y * wy + z * wz
+        if h < upper:
+            upper = h
+            mx, my, mz = x, y, z
+        off = _off(work, count, x, y, z)
+        if off > farthest:
+            farthest = off
+            for m in range(8):
+                work[SIMPLEX + 8 * count + m] = work[spare + m]
+        step += 1
+        if step == 8 - 2 * count:
+            if farthest <= flat:
+                ax = ay = az = 0.0
+                for k in range(count):
+                    ax += work[WEIGHTS + k] * work[SIMPLEX + 8 * k + 3]
+                    ay += work[WEIGHTS + k] * work[SIMPLEX + 8 * k + 4]
+                    az += work[WEIGHTS + k] * work[SIMPLEX + 8 * k + 5]
+                return upper, min(upper, -flat), -mx, -my, -mz, ax, ay, az
+            work[WEIGHTS + count] = 0.0
+            count += 1
+            step = 0
+            farthest = 0.0
+            upper = inf
     x, y, z, _ = _normal(work, 0, 1, 2)
     fourth = SIMPLEX + 24
     side = (
@@ -207,7 +198,6 @@ def epa(
     upper = inf
     lower_cap = inf
     lower = -inf
-    mx = my = mz = 0.0
     plane = 0.0
     visible = 8.0 * EPSILON * size
     while points < MAX_VERTICES:

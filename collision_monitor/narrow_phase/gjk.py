@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from collision_monitor._jit import device
 from collision_monitor.narrow_phase.answer import SIMPLEX
+from collision_monitor.narrow_phase.sphere_sphere import direction
 from collision_monitor.narrow_phase.support import support_difference
 from collision_monitor.tolerances import EPSILON, FLAT, GJK_RELATIVE, THIN_SIN2, TOUCHING
 
@@ -200,25 +201,15 @@ def gjk(
     The direction is the one that proves the lower bound. 0 points: the search ended early, because the lower
     bound passed `limit` (m). A lower bound <= 0 means that the cores overlap or touch within round-off.
     """
-    x, y, z = work[9], work[10], work[11]
-    if not (abs(x) + abs(y) + abs(z) > 0.0):
-        z = 1.0
-    x, y, z = support_difference(
-        ka, a0, a1, a2, sa, na, kb, b0, b1, b2, sb, nb, vertices, work, -x, -y, -z, SIMPLEX
-    )
-    work[WEIGHTS] = 1.0
-    count = 1
-    squared = x * x + y * y + z * z
-    touching = TOUCHING * size
+    _, x, y, z = direction(work[9], work[10], work[11])
+    length = 1.0
+    squared = inf
+    count = 0
     lower = -inf
     lx = ly = lz = 0.0
     for _ in range(MAX_ITERATIONS):
-        length = sqrt(squared)
-        if length <= touching:
-            return count, length, 0.0, 0.0, 0.0, 1.0
-        at = SIMPLEX + 8 * count
         wx, wy, wz = support_difference(
-            ka, a0, a1, a2, sa, na, kb, b0, b1, b2, sb, nb, vertices, work, -x, -y, -z, at
+            ka, a0, a1, a2, sa, na, kb, b0, b1, b2, sb, nb, vertices, work, -x, -y, -z, SIMPLEX + 8 * count
         )
         bound = (x * wx + y * wy + z * wz) / length
         if bound > lower:
@@ -226,9 +217,13 @@ def gjk(
             lx, ly, lz = x / length, y / length, z / length
             if lower > limit:
                 return 0, length, lower, lx, ly, lz
-        if length - lower <= GJK_RELATIVE * length + 4.0 * EPSILON * size:
+        if count > 0 and length - lower <= GJK_RELATIVE * length + 4.0 * EPSILON * size:
             break
-        inside, nx, ny, nz = _reduce(work, count + 1, size)
+        if count == 0:
+            inside, nx, ny, nz = False, wx, wy, wz
+            work[NEW_WEIGHTS] = 1.0
+        else:
+            inside, nx, ny, nz = _reduce(work, count + 1, size)
         if inside and lower <= 0.0:
             return 4, 0.0, 0.0, 0.0, 0.0, 1.0
         shorter = nx * nx + ny * ny + nz * nz
@@ -238,4 +233,7 @@ def gjk(
         count = _keep(work, count + 1)
         x, y, z = nx, ny, nz
         squared = shorter
-    return count, sqrt(squared), lower, lx, ly, lz
+        length = sqrt(squared)
+        if length <= TOUCHING * size:
+            return count, length, 0.0, 0.0, 0.0, 1.0
+    return count, length, lower, lx, ly, lz

@@ -9,18 +9,18 @@ from __future__ import annotations
 from math import copysign, sqrt
 from typing import Any
 
-from collision_monitor._jit import device
+from collision_monitor._jit import inlined
 from collision_monitor.geometry.shape_table import BOX, CAPSULE, CONE, CYLINDER, SPHERE
 from collision_monitor.narrow_phase.vertex_scan import farthest_vertex
 
 
-@device
+@inlined
 def core_radius(kind: int, s0: float) -> float:
     """Radius (m) by which the core of a shape is grown: 0 but for spheres and capsules."""
     return s0 if kind == SPHERE or kind == CAPSULE else 0.0
 
 
-@device
+@inlined
 def support(
     kind: int, s0: float, s1: float, s2: float, vertices: Any, start: int, count: int, dx: float, dy: float, dz: float
 ) -> Any:
@@ -49,7 +49,7 @@ def support(
     return vertices[0, best], vertices[1, best], vertices[2, best], best
 
 
-@device
+@inlined
 def support_difference(
     ka: int,
     a0: float,
