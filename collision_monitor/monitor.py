@@ -62,7 +62,7 @@ class StepStatus:
 
 @dataclass(frozen=True, eq=False)
 class StepResult:
-    """The answers of one step: `contacts` (records.CONTACT), sorted by ids; `predictions` (records.PREDICTION), soonest first.
+    """The answers of one step: `contacts` (records.CONTACT) by ids, `predictions` (records.PREDICTION) soonest first.
 
     accepted is False where the whole step was refused for its stamp; the answers are then those of the last time.
     """

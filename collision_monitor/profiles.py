@@ -53,7 +53,9 @@ class Profile:
     stale_acceleration: float = _setting(
         1.0, 0.0, 1e4, "m/s^2", "How hard an object may accelerate while it is not heard of: widens its bounds."
     )
-    max_time_step: float = _setting(10.0, 1e-3, 1e9, "s", "A stamp that jumps by more is refused unless the next agrees.")
+    max_time_step: float = _setting(
+        10.0, 1e-3, 1e9, "s", "A stamp that jumps by more is refused unless the next agrees."
+    )
     threads: int = _setting(1, 1, 64, "1", "Threads of the kernels; the answers are the same bytes for any number.")
 
     def __post_init__(self) -> None:

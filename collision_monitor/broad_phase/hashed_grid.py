@@ -58,7 +58,7 @@ def make_hashed_grid(capacity: int) -> HashedGrid:
 
 
 @device
-def _level_of(width):  # type: ignore[no-untyped-def]
+def _level_of(width):
     """The finest level whose cells are at least `width` wide."""
     if not width < 2.0**62:
         return LEVELS - 1
@@ -67,12 +67,12 @@ def _level_of(width):  # type: ignore[no-untyped-def]
 
 
 @device
-def _coordinate(x, cell):  # type: ignore[no-untyped-def]
+def _coordinate(x, cell):
     return np.int64(min(max(np.floor(x / cell), -FARTHEST_CELL), FARTHEST_CELL))
 
 
 @device
-def _bucket(level, x, y, z, mask):  # type: ignore[no-untyped-def]
+def _bucket(level, x, y, z, mask):
     h = np.uint64(x) * np.uint64(0x9E3779B97F4A7C15)
     h = (h ^ (h >> np.uint64(29)) ^ np.uint64(y)) * np.uint64(0xBF58476D1CE4E5B9)
     h = (h ^ (h >> np.uint64(32)) ^ np.uint64(z)) * np.uint64(0x94D049BB133111EB)
@@ -81,7 +81,7 @@ def _bucket(level, x, y, z, mask):  # type: ignore[no-untyped-def]
 
 
 @device
-def remove_box(grid, i):  # type: ignore[no-untyped-def]
+def remove_box(grid, i):
     """Take box i out; nothing happens where it is not in."""
     level = grid.level[i]
     if level < 0:
@@ -105,7 +105,7 @@ def remove_box(grid, i):  # type: ignore[no-untyped-def]
 
 
 @device
-def put_box(grid, i, cx, cy, cz, hx, hy, hz):  # type: ignore[no-untyped-def]
+def put_box(grid, i, cx, cy, cz, hx, hy, hz):
     """Put box i (centre, half extents; m) in, or move it there."""
     remove_box(grid, i)
     level = _level_of(2.0 * max(hx, hy, hz))
@@ -132,7 +132,7 @@ def put_box(grid, i, cx, cy, cz, hx, hy, hz):  # type: ignore[no-untyped-def]
 
 
 @device
-def _overlap(grid, i, j):  # type: ignore[no-untyped-def]
+def _overlap(grid, i, j):
     return (
         abs(grid.centre[i, 0] - grid.centre[j, 0]) <= grid.half[i, 0] + grid.half[j, 0]
         and abs(grid.centre[i, 1] - grid.centre[j, 1]) <= grid.half[i, 1] + grid.half[j, 1]
@@ -141,7 +141,7 @@ def _overlap(grid, i, j):  # type: ignore[no-untyped-def]
 
 
 @device
-def query_box(grid, i, found):  # type: ignore[no-untyped-def]
+def query_box(grid, i, found):
     """The boxes that overlap box i, into found[0:n], in no particular order; returns n.
 
     n can be larger than found.size: then the rest was counted but not written.
@@ -192,7 +192,7 @@ def query_box(grid, i, found):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_boxes(grid, which, centre, half):  # type: ignore[no-untyped-def]
+def put_boxes(grid, which, centre, half):
     """Put boxes `which` (M,) at centre, half (N, 3), indexed by box number."""
     for k in range(which.size):
         i = which[k]
@@ -200,14 +200,14 @@ def put_boxes(grid, which, centre, half):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def remove_boxes(grid, which):  # type: ignore[no-untyped-def]
+def remove_boxes(grid, which):
     """Take boxes `which` (M,) out."""
     for k in range(which.size):
         remove_box(grid, which[k])
 
 
 @kernel
-def query_boxes(grid, which, pairs):  # type: ignore[no-untyped-def]
+def query_boxes(grid, which, pairs):
     """All (i, j) with i in `which` (M,) and j overlapping it, into pairs (P, 2); returns how many there are.
 
     More than P: call again with a larger array.

@@ -36,7 +36,9 @@ def unit_quaternion(value: ArrayLike) -> Array:
     q = vector(value, "quaternion", 4)
     norm = float(np.linalg.norm(q))
     if abs(norm - 1.0) > UNIT_QUATERNION:
-        raise PoseError(f"quaternion: expected unit length within {UNIT_QUATERNION:g}, got {q.tolist()} of length {norm:g}")
+        raise PoseError(
+            f"quaternion: expected unit length within {UNIT_QUATERNION:g}, got {q.tolist()} of length {norm:g}"
+        )
     q = q / norm
     q.setflags(write=False)
     return q

@@ -111,15 +111,19 @@ class ConvexHull(Shape):
 
     def __post_init__(self) -> None:
         points = _points(self.points, "ConvexHull points", 3, 4)
-        spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-        if spread[2] <= 1e-12 * spread[0]:
-            raise ShapeError("ConvexHull points: expected a solid, got points that lie in one plane (use a Box or a Mesh)")
+        scale = np.abs(points).max()
+        spread = np.linalg.svd((points - points.mean(axis=0)) / (scale or 1.0), compute_uv=False)
+        if not spread[2] > 1e-12 * spread[0]:
+            raise ShapeError("ConvexHull points: expected a solid, got points in one plane (use a Box or a Mesh)")
         object.__setattr__(self, "points", points)
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh(Shape):
-    """A triangle surface, convex or not: vertices (n, 3) in m, faces (m, 3) of vertex indices, counter-clockwise from outside."""
+    """A triangle surface, convex or not: vertices (n, 3) in m, faces (m, 3) of vertex indices.
+
+    Faces are counter-clockwise seen from outside.
+    """
 
     vertices: Any
     faces: Any
@@ -129,7 +133,8 @@ class Mesh(Shape):
         try:
             faces = np.array(self.faces)
         except (TypeError, ValueError):
-            raise ShapeError(f"Mesh faces: expected an array of shape (m, 3), got {type(self.faces).__name__}") from None
+            got = type(self.faces).__name__
+            raise ShapeError(f"Mesh faces: expected an array of shape (m, 3), got {got}") from None
         if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0 or not np.issubdtype(faces.dtype, np.integer):
             raise ShapeError(f"Mesh faces: expected integers of shape (m, 3), m >= 1, got {faces.dtype} {faces.shape}")
         if faces.min() < 0 or faces.max() >= len(vertices):
@@ -154,10 +159,13 @@ class HalfSpace(Shape):
             normal = np.array(self.normal, dtype=np.float64)
             offset = float(self.offset)
         except (TypeError, ValueError):
-            raise ShapeError(f"HalfSpace: expected a normal (3) and an offset, got {self.normal!r}, {self.offset!r}") from None
+            got = f"{self.normal!r}, {self.offset!r}"
+            raise ShapeError(f"HalfSpace: expected a normal (3) and an offset, got {got}") from None
         length = float(np.linalg.norm(normal)) if normal.shape == (3,) else 0.0
         if not (length > 0.0 and np.isfinite(length) and np.isfinite(offset)):
-            raise ShapeError(f"HalfSpace: expected a non-zero, finite normal and a finite offset, got {self.normal}, {offset}")
+            raise ShapeError(
+                f"HalfSpace: expected a non-zero, finite normal and a finite offset, got {self.normal}, {offset}"
+            )
         normal = normal / length
         normal.setflags(write=False)
         object.__setattr__(self, "normal", normal)

@@ -41,15 +41,13 @@ END: Final = int(Phase.END)
 
 
 @device
-def _changed(bodies, event):  # type: ignore[no-untyped-def]
+def _changed(bodies, event):
     """Does the event rest on a motion that no longer holds?"""
-    return (
-        bodies.motion[event.i].version != event.version_i or bodies.motion[event.j].version != event.version_j
-    )
+    return bodies.motion[event.i].version != event.version_i or bodies.motion[event.j].version != event.version_j
 
 
 @kernel
-def unite(bodies, pairs, events, due, order, new_pairs, new_events):  # type: ignore[no-untyped-def]
+def unite(bodies, pairs, events, due, order, new_pairs, new_events):
     """The active pairs with those that came due, by key; both have an event of their own at the same index.
 
     Left out are pairs that do not touch and whose motion has changed (they were predicted anew), and pairs of bodies
@@ -85,7 +83,7 @@ def unite(bodies, pairs, events, due, order, new_pairs, new_events):  # type: ig
 
 
 @device
-def _rotation_now(bodies, i, now, q, R):  # type: ignore[no-untyped-def]
+def _rotation_now(bodies, i, now, q, R):
     """Rotation of body i at `now`, from its last state, into R; returns the time since that state."""
     age = 0.0 if bodies.static[i] else now - bodies.time[i]
     turn_quaternion(bodies.quaternion, i, bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2], age, q[0])
@@ -94,7 +92,7 @@ def _rotation_now(bodies, i, now, q, R):  # type: ignore[no-untyped-def]
 
 
 @device
-def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, scratch, q, result):  # type: ignore[no-untyped-def]
+def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, scratch, q, result):
     """Do bodies i and j touch at `now`, from their last states? The deepest contact of their shapes into result.
 
     Not heard of for a time, a body may be off by what it could have accelerated: the bound says so, and a pair that
@@ -112,9 +110,8 @@ def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, sc
     best = inf
     tests = 0
     reach = bodies.motion[i].radius + bodies.motion[j].radius + wanted
-    if reach < inf:
-        if px * px + py * py + pz * pz > reach * reach * (1.0 + 1e-14):
-            return False, 0
+    if px * px + py * py + pz * pz > reach * reach * (1.0 + 1e-14):
+        return False, 0
     a = bodies.first_shape[i]
     while a >= 0:
         oa = place_shape(table, parts, a, R_i, R_a)
@@ -157,7 +154,7 @@ def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, sc
 @kernel
 def examine(
     table, parts, bodies, pairs, events, now, margin, stale_acceleration, tolerance, budget, results, later, scratch
-):  # fmt: skip  # type: ignore[no-untyped-def]
+):  # fmt: skip
     """Look at every active pair at `now`: contact into results (n, RESULT), and what does not touch is predicted on.
 
     Pairs that stay active, or have just ended, are moved to the front of pairs and events; those that are certified
@@ -177,9 +174,7 @@ def examine(
             predicted = bodies.motion[i].time == now or bodies.motion[j].time == now
             if not (predicted and _changed(bodies, event)):
                 end = min(bodies.motion[i].cover, bodies.motion[j].cover)
-                queries += body_impact(
-                    table, parts, bodies, i, j, now, end, margin, tolerance, budget, scratch, event
-                )
+                queries += body_impact(table, parts, bodies, i, j, now, end, margin, tolerance, budget, scratch, event)
                 if event.status != CLEAR:
                     if event.lower > now:
                         later[n_later] = event

@@ -21,7 +21,7 @@ assert PREDICTION.itemsize == 8 * PREDICTION_NUMBERS + 24
 
 
 @kernel
-def write_contacts(pairs, results, shape_index, now, floats, words, octets):  # type: ignore[no-untyped-def]
+def write_contacts(pairs, results, shape_index, now, floats, words, octets):
     """Contacts of the pairs that touch or have just ended; returns how many.
 
     floats (n, 17), words (n, 34), octets (n, 136): one array of records.CONTACT seen as float64, uint32 and uint8.
@@ -61,7 +61,7 @@ def write_contacts(pairs, results, shape_index, now, floats, words, octets):  # 
 
 
 @kernel
-def write_predictions(pairs, active, pending, bodies, shape_index, now, horizon, stale_after, floats, words, octets):  # type: ignore[no-untyped-def]
+def write_predictions(pairs, active, pending, bodies, shape_index, now, horizon, stale_after, floats, words, octets):
     """Predictions of the active pairs that do not touch, then of the pending events within the horizon.
 
     floats (n, 16), words (n, 32), octets (n, 128): one array of records.PREDICTION. Returns (how many, unresolved).
@@ -100,7 +100,7 @@ def write_predictions(pairs, active, pending, bodies, shape_index, now, horizon,
 
 
 @kernel
-def chain_digest(digest, words):  # type: ignore[no-untyped-def]
+def chain_digest(digest, words):
     """64-bit digest of `digest` and then words (n,) uint64, in order; four independent lanes, mixed at the end.
 
     It tells equal answers from unequal ones; it is not meant to resist someone who forges them.

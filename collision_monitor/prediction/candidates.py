@@ -10,7 +10,7 @@ from collision_monitor.prediction.time_of_impact import CLEAR, body_impact
 
 
 @device
-def _allowed(allowed, id_a, id_b):  # type: ignore[no-untyped-def]
+def _allowed(allowed, id_a, id_b):
     """Is the pair in the sorted keys (smaller id << 32 | larger id)?"""
     if allowed.size == 0:
         return False
@@ -20,7 +20,7 @@ def _allowed(allowed, id_a, id_b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def find_candidates(bodies, grid, which, is_new, allowed, pairs):  # type: ignore[no-untyped-def]
+def find_candidates(bodies, grid, which, is_new, allowed, pairs):
     """Pairs of each body in `which` (M,) with all it could meet, each pair once, into pairs (P, 2).
 
     is_new (N,) bool marks the bodies in `which`. Static pairs, groups that ignore each other and allowed pairs are
@@ -48,7 +48,7 @@ def find_candidates(bodies, grid, which, is_new, allowed, pairs):  # type: ignor
 
 
 @kernel
-def predict_pairs(table, parts, bodies, pairs, now, margin, tolerance, budget, events, scratch):  # type: ignore[no-untyped-def]
+def predict_pairs(table, parts, bodies, pairs, now, margin, tolerance, budget, events, scratch):
     """First impacts of pairs (P, 2) from `now` until both bodies' cover times, into events (IMPACT).
 
     Returns (how many impacts, distance queries made).
@@ -57,9 +57,7 @@ def predict_pairs(table, parts, bodies, pairs, now, margin, tolerance, budget, e
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
         end = min(bodies.motion[i].cover, bodies.motion[j].cover)
-        queries += body_impact(
-            table, parts, bodies, i, j, now, end, margin, tolerance, budget, scratch, events[n]
-        )
+        queries += body_impact(table, parts, bodies, i, j, now, end, margin, tolerance, budget, scratch, events[n])
         if events[n].status != CLEAR:
             n += 1
     return n, queries

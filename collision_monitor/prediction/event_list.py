@@ -17,12 +17,12 @@ Events = NDArray[np.void]
 
 
 @device
-def _before(a, b):  # type: ignore[no-untyped-def]
+def _before(a, b):
     return a.lower < b.lower or (a.lower == b.lower and a.key < b.key)
 
 
 @kernel
-def sort_order(events, order):  # type: ignore[no-untyped-def]
+def sort_order(events, order):
     """The order of events by (lower, key) into order (n,) int64: merge sort from runs sorted by insertion."""
     n = events.size
     for start in range(0, n, 16):
@@ -52,16 +52,14 @@ def sort_order(events, order):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def merge(old, count, new, order, n_new, motion, now, merged, due):  # type: ignore[no-untyped-def]
+def merge(old, count, new, order, n_new, motion, now, merged, due):
     """old[:count] and new[order[:n_new]] into merged, both sorted; those due by `now` into due instead.
 
     Events whose bodies' motion (N,) has changed are dropped. Returns (length of merged, length of due).
     """
     i = k = n = n_due = 0
     while i < count or k < n_new:
-        if i < count and (
-            motion[old[i].i].version != old[i].version_i or motion[old[i].j].version != old[i].version_j
-        ):
+        if i < count and (motion[old[i].i].version != old[i].version_i or motion[old[i].j].version != old[i].version_j):
             i += 1
             continue
         if k >= n_new or (i < count and not _before(new[order[k]], old[i])):
@@ -112,8 +110,6 @@ class EventList:
             self._due = np.zeros(size, IMPACT)
         order = np.empty(len(new), np.int64)
         sort_order(new, order)
-        count, n_due = merge(
-            self._events, self._count, new, order, len(new), motion, now, self._spare, self._due
-        )
+        count, n_due = merge(self._events, self._count, new, order, len(new), motion, now, self._spare, self._due)
         self._events, self._spare, self._count = self._spare, self._events, count
         return self._due[:n_due]

@@ -100,7 +100,7 @@ def enlarge(source: NamedTuple, target: NamedTuple) -> None:
 
 
 @inlined
-def quaternion_to_matrix(q, i, out):  # type: ignore[no-untyped-def]
+def quaternion_to_matrix(q, i, out):
     """Rotation matrix of the unit quaternion q[i] (x, y, z, w) into out (3, 3)."""
     x, y, z, w = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
     out[0, 0] = 1.0 - 2.0 * (y * y + z * z)
@@ -115,7 +115,7 @@ def quaternion_to_matrix(q, i, out):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def rotation_at(m, t, out):  # type: ignore[no-untyped-def]
+def rotation_at(m, t, out):
     """out (3, 3) = exp((t - m.time) [w]x) R: the rotation of the motion m (MOTION) at time t (Rodrigues' formula)."""
     R = m.rotation
     rate = sqrt(m.wx * m.wx + m.wy * m.wy + m.wz * m.wz)
@@ -138,7 +138,7 @@ def rotation_at(m, t, out):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def relative_position(A, B, t):  # type: ignore[no-untyped-def]
+def relative_position(A, B, t):
     """Position of motion B relative to motion A at time t (m): positions are subtracted before anything is added."""
     ta, tb = t - A.time, t - B.time
     return (
@@ -149,7 +149,7 @@ def relative_position(A, B, t):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def place_shape(table, parts, s, R_body, R_shape):  # type: ignore[no-untyped-def]
+def place_shape(table, parts, s, R_body, R_shape):
     """Rotation of shape s of a body turned by R_body into R_shape; returns its offset from the body in the world."""
     if not parts.placed[s]:
         for r in range(3):
@@ -172,7 +172,7 @@ def place_shape(table, parts, s, R_body, R_shape):  # type: ignore[no-untyped-de
 
 
 @device
-def turn_quaternion(q, i, wx, wy, wz, t, out):  # type: ignore[no-untyped-def]
+def turn_quaternion(q, i, wx, wy, wz, t, out):
     """out (4,) = the orientation q[i] after t seconds at angular velocity w in the world."""
     x, y, z, w = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
     rate = sqrt(wx * wx + wy * wy + wz * wz)
@@ -189,7 +189,7 @@ def turn_quaternion(q, i, wx, wy, wz, t, out):  # type: ignore[no-untyped-def]
 
 
 @device
-def angle_between(a, i, bx, by, bz, bw):  # type: ignore[no-untyped-def]
+def angle_between(a, i, bx, by, bz, bw):
     """Upper bound on the angle (rad) between the orientations a[i] and b; exact to second order for small angles."""
     dot = a[i, 0] * bx + a[i, 1] * by + a[i, 2] * bz + a[i, 3] * bw
     sign = 1.0 if dot >= 0.0 else -1.0

@@ -9,7 +9,7 @@ from collision_monitor.geometry.shape_table import BOX, CAPSULE, CONE, CONVEX_HU
 
 
 @inlined
-def support_value(table, slot, R, mx, my, mz):  # type: ignore[no-untyped-def]
+def support_value(table, slot, R, mx, my, mz):
     """max of m . x over the points x of a shape turned by R (3, 3), margin included. m need not be of unit length."""
     kind = table.kind[slot]
     s0 = table.size[slot, 0]

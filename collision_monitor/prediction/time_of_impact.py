@@ -20,7 +20,8 @@ import numpy as np
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.shape_table import SPHERE
-from collision_monitor.narrow_phase.dispatch import WORK_SIZE, contact, separation
+from collision_monitor.narrow_phase.answer import WORK_SIZE
+from collision_monitor.narrow_phase.dispatch import contact, separation
 from collision_monitor.prediction.motion import place_shape, relative_position, rotation_at
 from collision_monitor.prediction.support import support_value
 from collision_monitor.records import Method, PredictionStatus
@@ -70,7 +71,7 @@ def make_scratch() -> Scratch:
 
 
 @device
-def sphere_interval(dx, dy, dz, vx, vy, vz, reach, growth, end):  # type: ignore[no-untyped-def]
+def sphere_interval(dx, dy, dz, vx, vy, vz, reach, growth, end):
     """First and last time in [0, end] at which |d + v t| <= reach + growth t; (inf, -inf): never.
 
     Closed form; the root is taken as c / (-b + sqrt(D)), which does not cancel (Numerical Recipes 5.6).
@@ -102,7 +103,7 @@ def sphere_interval(dx, dy, dz, vx, vy, vz, reach, growth, end):  # type: ignore
 
 
 @inlined
-def _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, d):  # type: ignore[no-untyped-def]
+def _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, d):
     """Lower bound on the gap along n after d seconds; turn_*: n x w, h_*: the support values at d = 0."""
     value = gap + d * rate - curvature * d * d
     if table.kind[a] != SPHERE and (turn_a[0] != 0.0 or turn_a[1] != 0.0 or turn_a[2] != 0.0):
@@ -115,7 +116,7 @@ def _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvatu
 
 
 @inlined
-def _safe_advance(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, remaining):  # type: ignore[no-untyped-def]
+def _safe_advance(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, remaining):
     """A time d in (0, remaining] up to which the gap along n stays positive; close to the last such time."""
     high = remaining
     f_high = _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, high)
@@ -143,7 +144,7 @@ def _safe_advance(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curv
 
 
 @inlined
-def _spin(table, s, rate2):  # type: ignore[no-untyped-def]
+def _spin(table, s, rate2):
     """|w|^2 times the farthest point of the shape from its body's origin: bound on the acceleration of its support."""
     if rate2 == 0.0:
         return 0.0
@@ -155,7 +156,7 @@ def _spin(table, s, rate2):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def shape_impact(table, parts, A, B, a, b, begin, end, tube_0, tube_1, tolerance, budget, scratch):  # type: ignore[no-untyped-def]
+def shape_impact(table, parts, A, B, a, b, begin, end, tube_0, tube_1, tolerance, budget, scratch):
     """When the gap between shape a in motion A and shape b in motion B (MOTION) first is within the wanted one.
 
     begin, end: seconds after the monitor's origin; the wanted gap is tube_0 + tube_1 (t - begin) (m).
@@ -211,7 +212,7 @@ def shape_impact(table, parts, A, B, a, b, begin, end, tube_0, tube_1, tolerance
 
 
 @inlined
-def _contact_at(table, parts, A, B, a, b, t, scratch):  # type: ignore[no-untyped-def]
+def _contact_at(table, parts, A, B, a, b, t, scratch):
     """Contact of shape a in motion A with shape b in motion B at time t, into scratch.out; returns the signed distance.
 
     out as narrow_phase.dispatch.contact gives it, but relative to A's origin; out[15]: closing speed (m/s).
@@ -233,7 +234,7 @@ def _contact_at(table, parts, A, B, a, b, t, scratch):  # type: ignore[no-untype
 
 
 @inlined
-def closing_speed(v, wa, wb, px, py, pz, out):  # type: ignore[no-untyped-def]
+def closing_speed(v, wa, wb, px, py, pz, out):
     """Speed (m/s) at which the witness points of a contact (out) approach along its normal.
 
     v: velocity of B relative to A; wa, wb: angular velocities; p: position of B relative to A.
@@ -247,7 +248,7 @@ def closing_speed(v, wa, wb, px, py, pz, out):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _touching_by(table, parts, A, B, a, b, t, guess, end, tube_0, tube_1, begin, margin, tolerance, scratch):  # type: ignore[no-untyped-def]
+def _touching_by(table, parts, A, B, a, b, t, guess, end, tube_0, tube_1, begin, margin, tolerance, scratch):
     """A time in [t, end] at which they overlap by more than the tube, whatever the motions inside it; inf: none found.
 
     Newton steps on the signed distance, the first one to t + guess. The contact there is left in scratch.out.
@@ -267,7 +268,7 @@ def _touching_by(table, parts, A, B, a, b, t, guess, end, tube_0, tube_1, begin,
 
 
 @device
-def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budget, scratch, event):  # type: ignore[no-untyped-def]
+def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budget, scratch, event):
     """First impact of bodies i and j in [begin, end] into the IMPACT record `event`; returns distance queries made.
 
     event.status = CLEAR where there is none. Overlapping or within `margin` (m) already is an impact at begin.
@@ -317,9 +318,7 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
     if event.status == CLEAR:
         return queries
     a, b = event.shape_i, event.shape_j
-    sure = _touching_by(
-        table, parts, A, B, a, b, lower, guess, end, tube_0, tube_1, begin, margin, tolerance, scratch
-    )
+    sure = _touching_by(table, parts, A, B, a, b, lower, guess, end, tube_0, tube_1, begin, margin, tolerance, scratch)
     if sure == inf:
         _contact_at(table, parts, A, B, a, b, lower, scratch)
     event.lower, event.upper = lower, sure
@@ -329,7 +328,7 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
 
 
 @inlined
-def _set_geometry(event, A, t, out):  # type: ignore[no-untyped-def]
+def _set_geometry(event, A, t, out):
     """Where and how they meet, from a contact at time t relative to A's origin."""
     ta = t - A.time
     event.point_x = A.x + A.vx * ta + 0.5 * (out[4] + out[7])
@@ -340,7 +339,7 @@ def _set_geometry(event, A, t, out):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _sphere_impact(A, B, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, begin, first, end, event):  # type: ignore[no-untyped-def]
+def _sphere_impact(A, B, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, begin, first, end, event):
     """Two spheres: closed form for both ends of the interval."""
     event.method = CLOSED_FORM
     event.shape_i, event.shape_j = a, b

@@ -35,7 +35,7 @@ _DISCONTINUITY: Final = int(StateFlag.DISCONTINUITY)
 
 
 @kernel
-def take_states(bodies, slots, numbers, flags, time, verdicts):  # type: ignore[no-untyped-def]
+def take_states(bodies, slots, numbers, flags, time, verdicts):
     """Store states as the bodies' last ones.
 
     slots (M,) int32, -1: unknown id; numbers (M, 21) float64: the rows of records.STATE; flags (M,) uint32;
@@ -85,11 +85,12 @@ def take_states(bodies, slots, numbers, flags, time, verdicts):  # type: ignore[
 
 
 @device
-def _estimate_twist(bodies, i, numbers, k, x, y, z, w, elapsed):  # type: ignore[no-untyped-def]
+def _estimate_twist(bodies, i, numbers, k, x, y, z, w, elapsed):
     """Twist from the last pose to this one: difference of positions, logarithm of the relative rotation."""
     for c in range(3):
         bodies.linear[i, c] = (numbers[k, c] - bodies.position[i, c]) / elapsed
-    px, py, pz, pw = -bodies.quaternion[i, 0], -bodies.quaternion[i, 1], -bodies.quaternion[i, 2], bodies.quaternion[i, 3]
+    px, py, pz = -bodies.quaternion[i, 0], -bodies.quaternion[i, 1], -bodies.quaternion[i, 2]
+    pw = bodies.quaternion[i, 3]
     rx = w * px + x * pw + y * pz - z * py
     ry = w * py - x * pz + y * pw + z * px
     rz = w * pz + x * py - y * px + z * pw
@@ -103,7 +104,7 @@ def _estimate_twist(bodies, i, numbers, k, x, y, z, w, elapsed):  # type: ignore
 
 
 @kernel
-def find_moved(bodies, count, now, horizon, stale_acceleration, moved):  # type: ignore[no-untyped-def]
+def find_moved(bodies, count, now, horizon, stale_acceleration, moved):
     """Slots among the first `count` whose predictions no longer hold at `now`, into moved; returns how many.
 
     A body's surface may be off its reference by tube_0 now and drift by tube_1 a second; both are checked, with the
@@ -134,7 +135,8 @@ def find_moved(bodies, count, now, horizon, stale_acceleration, moved):  # type:
             drift += r * off
             # turned back to the last state's time: the difference from there to now is bounded by the rate's
             turn_quaternion(bodies.ref_quaternion, i, m.wx, m.wy, m.wz, since - age, turned)
-            apart += r * (angle_between(bodies.quaternion, i, turned[0], turned[1], turned[2], turned[3]) + off * age)
+            angle = angle_between(bodies.quaternion, i, turned[0], turned[1], turned[2], turned[3])
+            apart += r * (angle + off * age)
         if not (apart <= m.tube_0 and drift <= m.tube_1):
             bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
         elif m.cover < now + horizon:
@@ -150,7 +152,7 @@ def find_moved(bodies, count, now, horizon, stale_acceleration, moved):  # type:
 def restart_motion(
     bodies, grid, which, now, horizon, margin, stale_acceleration,
     position_tolerance, velocity_tolerance, orientation_tolerance, angular_velocity_tolerance,
-):  # fmt: skip  # type: ignore[no-untyped-def]
+):  # fmt: skip
     """Make the last state of each body in `which` (M,) its reference from `now` on and put what it sweeps in the grid.
 
     Cover times are spread over (1/2, 1] of the slack by the body's slot and version, so that they do not expire

@@ -39,7 +39,10 @@ SCENES = {
         rng.uniform(0, 20, (n, 3)),
         np.where(np.arange(n)[:, None] == 3, [200.0, 0.05, 1.5], rng.uniform(0.05, 0.1, (n, 3))),
     ),
-    "flat, touching, equal": lambda rng, n: (rng.integers(0, 5, (n, 3)).astype(float), np.full((n, 3), 0.5) * [1, 1, 0]),
+    "flat, touching, equal": lambda rng, n: (
+        rng.integers(0, 5, (n, 3)).astype(float),
+        np.full((n, 3), 0.5) * [1, 1, 0],
+    ),
     "far out and without end": lambda rng, n: (
         rng.choice([-1e18, 0.0, 1e18], (n, 3)),
         np.where(rng.random((n, 1)) < 0.1, np.inf, rng.uniform(0, 1e3, (n, 3))),
