@@ -1,0 +1,438 @@
+"""Broad phase for bodies that are all new: bodies are counted into cells, sorted by cell, and compared row by row.
+
+Bodies of similar size share a class, and each class has its own cells, as wide as its largest body. A body looks for
+partners in its own class and the coarser ones, so every pair is met once, from its smaller body. Cells are a dense
+array where their number is a small multiple of the bodies', else hashed, so that empty space costs nothing. The cells
+of a row along x stand side by side in both, so the three cells that a body reaches in a row are one range of bodies.
+Source: lecture slides "Efficient collision detection: spatial partitioning" (uniform, hashed and multiresolution
+grids); counting sort by cell: Green, "Particle simulation using CUDA", 2010.
+"""
+
+from __future__ import annotations
+
+from math import frexp
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from collision_monitor._jit import device, inlined, kernel
+from collision_monitor.errors import InputError
+from collision_monitor.tolerances import EPSILON
+
+MAX_CLASSES: Final = 32
+"""Size classes; the last takes all that is smaller than the others."""
+
+CROWDING: Final = 8.0
+"""Sizes are put in one class while cells fitted to its largest hold at most so many times the candidates that cells
+fitted to each body would. Larger: small bodies among large ones compare with too many. Smaller: more classes."""
+
+DENSE: Final = 4
+"""Cells per body up to which a class has an array of cells: filling the array must not cost more than the search."""
+
+FEWEST_CELLS: Final = 64
+"""Cells that any class may have, however few its bodies."""
+
+FARTHEST_CELL: Final = 2.0**52
+"""Hashed cell coordinates end here, where float64 still counts them one by one; beyond, bodies share cells."""
+
+LARGEST: Final = 2.0**200
+"""Half extents and positions (m) beyond this are compared with everything: the products of cells stay finite."""
+
+PAD: Final = 16
+"""Places behind the last sorted body that a vector may read."""
+
+_OCTAVES: Final = 512
+_HASHED, _DENSE, _WHOLE = 0, 1, 2
+_ABSENT: Final = 2 * (MAX_CLASSES + 1)
+_FIRST, _COUNT, _BASE, _MODE, _NX, _NY, _NZ = range(7)
+_INVERSE, _REACH = range(2)
+
+
+class Grid(NamedTuple):
+    """Scratch memory for N bodies. Classes: the bodies that start a search first, the unbounded first among them."""
+
+    klass: Any  # (N,) uint8
+    bucket: Any  # (N,) int32: the body's cell, over all classes
+    start: Any  # (T + 2,) int32: where each cell's bodies start in `order`
+    order: Any  # (N,) int32: the bodies by cell
+    layout: Any  # (_ABSENT + 1, 7) int64: by class first place, count, first cell, mode, cells along x (or mask), y, z
+    scale: Any  # (_ABSENT + 1, 2) float64: 1 / cell width (1/m), largest half extent with its round-off (m)
+    origin: Any  # (3,) float64: lower corner of the dense cells (m)
+    centre: Any  # (3, N + PAD) float64, sorted by cell
+
+
+def make_grid(capacity: int) -> Grid:
+    """Scratch memory for up to `capacity` bodies."""
+    cells = DENSE * capacity + (_ABSENT + 1) * FEWEST_CELLS
+    return Grid(
+        klass=np.zeros(capacity, np.uint8),
+        bucket=np.zeros(capacity, np.int32),
+        start=np.zeros(cells + 2, np.int32),
+        order=np.zeros(capacity, np.int32),
+        layout=np.zeros((_ABSENT + 1, 7), np.int64),
+        scale=np.zeros((_ABSENT + 1, 2)),
+        origin=np.zeros(3),
+        centre=np.zeros((3, capacity + PAD)),
+    )
+
+
+@device
+def classify(size: Any, starts: Any, octave: Any, cubes: Any, grid: Any) -> None:
+    """Put bodies with half extent `size` (N,) m into classes; NaN: absent, beyond LARGEST: unbounded.
+
+    octave (_OCTAVES, 2) and cubes (_OCTAVES,) are scratch: counts and class, sum of cubes relative to the octave's.
+    """
+    octave[:] = 0
+    cubes[:] = 0.0
+    for i in range(size.size):
+        if size[i] <= LARGEST:
+            mantissa, exponent = frexp(size[i])
+            k = min(max(exponent + _OCTAVES // 2, 0), _OCTAVES - 1)
+            octave[k, 0] += 1
+            cubes[k] += mantissa * mantissa * mantissa
+    number = 0
+    count, cube = 0, 0.0
+    top = -1
+    for k in range(_OCTAVES - 1, -1, -1):
+        if octave[k, 0] == 0:
+            continue
+        shrink = 0.5 ** (3 * min(max(top - k, 0), 100))
+        merged = count + octave[k, 0]
+        if top < 0 or (number < MAX_CLASSES and merged > CROWDING * (cube + shrink * cubes[k])):
+            number += 1
+            top, count, cube = k, 0, 0.0
+            shrink = 1.0
+        count += octave[k, 0]
+        cube += shrink * cubes[k]
+        octave[k, 1] = number
+    for i in range(size.size):
+        rest = 0 if starts[i] else MAX_CLASSES + 1
+        if size[i] <= LARGEST:
+            k = min(max(frexp(size[i])[1] + _OCTAVES // 2, 0), _OCTAVES - 1)
+            grid.klass[i] = rest + octave[k, 1]
+        elif size[i] > LARGEST:
+            grid.klass[i] = rest
+        else:
+            grid.klass[i] = _ABSENT
+
+
+@inlined
+def _hash(y: Any, z: Any) -> Any:
+    h = np.uint64(y) * np.uint64(0x9E3779B97F4A7C15)
+    h = (h ^ (h >> np.uint64(29)) ^ np.uint64(z)) * np.uint64(0xBF58476D1CE4E5B9)
+    h = (h ^ (h >> np.uint64(32))) * np.uint64(0x94D049BB133111EB)
+    return np.int64(h >> np.uint64(34))
+
+
+@inlined
+def _dense(x: float, origin: float, inverse: float) -> Any:
+    return np.int64((x - origin) * inverse)
+
+
+@inlined
+def _hashed(x: float, inverse: float) -> Any:
+    return np.int64(min(max(np.floor(x * inverse), -FARTHEST_CELL), FARTHEST_CELL))
+
+
+@device
+def plan_cells(size: Any, centre: Any, grid: Any) -> Any:
+    """Choose the cells of each class from the bodies' half extents `size` (N,) and centres (N, 3).
+
+    Returns the number of cells over all classes; the last one holds the bodies that are absent.
+    """
+    n = size.size
+    layout, scale, origin = grid.layout, grid.scale, grid.origin
+    layout[:] = 0
+    scale[:] = 0.0
+    lx = ly = lz = np.inf
+    hx = hy = hz = -np.inf
+    for i in range(n):
+        k = grid.klass[i]
+        layout[k, _COUNT] += 1
+        scale[k, _REACH] = max(scale[k, _REACH], size[i])
+        if k != 0 and k != MAX_CLASSES + 1 and k != _ABSENT:
+            x, y, z = centre[i, 0], centre[i, 1], centre[i, 2]
+            lx, ly, lz = min(lx, x), min(ly, y), min(lz, z)
+            hx, hy, hz = max(hx, x), max(hy, y), max(hz, z)
+    origin[0], origin[1], origin[2] = lx, ly, lz
+    # round-off of a difference of two coordinates, and of the multiplication by 1 / cell width
+    slack = 8.0 * EPSILON * max(abs(lx), abs(ly), abs(lz), abs(hx), abs(hy), abs(hz))
+    first = cells = np.int64(0)
+    for k in range(_ABSENT + 1):
+        count = layout[k, _COUNT]
+        layout[k, _FIRST] = first
+        layout[k, _BASE] = cells
+        layout[k, _MODE] = _WHOLE
+        first += count
+        if count == 0:
+            continue
+        if k == 0 or k == MAX_CLASSES + 1 or k == _ABSENT:
+            scale[k, _REACH] = np.inf
+            cells += 1
+            continue
+        reach = scale[k, _REACH] * (1.0 + 16.0 * EPSILON) + slack
+        scale[k, _REACH] = reach
+        inverse = 1.0 / max(2.0 * reach, 1e-150)
+        scale[k, _INVERSE] = inverse
+        nx = np.floor((hx - lx) * inverse) + 1.0
+        ny = np.floor((hy - ly) * inverse) + 1.0
+        nz = np.floor((hz - lz) * inverse) + 1.0
+        if nx * ny * nz <= max(DENSE * count, FEWEST_CELLS):
+            layout[k, _MODE] = _DENSE
+            layout[k, _NX] = np.int64(nx)
+            layout[k, _NY] = np.int64(ny)
+            layout[k, _NZ] = np.int64(nz)
+            cells += np.int64(nx * ny * nz)
+        else:
+            buckets = np.int64(FEWEST_CELLS)
+            while buckets < 2 * count:
+                buckets *= 2
+            layout[k, _MODE] = _HASHED
+            layout[k, _NX] = buckets - 1
+            cells += buckets
+    return cells
+
+
+@device
+def find_buckets(centre: Any, grid: Any, begin: int, end: int) -> None:
+    """The cell of the bodies begin ... end - 1."""
+    ox, oy, oz = grid.origin[0], grid.origin[1], grid.origin[2]
+    for i in range(begin, end):
+        k = grid.klass[i]
+        bucket = grid.layout[k, _BASE]
+        mode = grid.layout[k, _MODE]
+        inverse = grid.scale[k, _INVERSE]
+        if mode == _DENSE:
+            x = _dense(centre[i, 0], ox, inverse)
+            y = _dense(centre[i, 1], oy, inverse)
+            z = _dense(centre[i, 2], oz, inverse)
+            bucket += (z * grid.layout[k, _NY] + y) * grid.layout[k, _NX] + x
+        elif mode == _HASHED:
+            row = _hash(_hashed(centre[i, 1], inverse), _hashed(centre[i, 2], inverse))
+            bucket += (_hashed(centre[i, 0], inverse) + row) & grid.layout[k, _NX]
+        grid.bucket[i] = bucket
+
+
+@device
+def sort_by_cell(n: int, cells: int, grid: Any) -> None:
+    """Counting sort: grid.order, and grid.start so that cell c holds the places start[c] ... start[c + 1] - 1."""
+    start, bucket, order = grid.start, grid.bucket, grid.order
+    start[: cells + 2] = 0
+    for i in range(n):
+        start[bucket[i] + 2] += 1
+    total = 0
+    for c in range(2, cells + 2):
+        total += start[c]
+        start[c] = total
+    for i in range(n):
+        place = start[bucket[i] + 1]
+        order[place] = i
+        start[bucket[i] + 1] = place + 1
+
+
+@device
+def gather_centres(centre: Any, grid: Any, begin: int, end: int) -> None:
+    """Centres of the places begin ... end - 1, in the order of the cells."""
+    for p in range(begin, end):
+        i = grid.order[p]
+        grid.centre[0, p] = centre[i, 0]
+        grid.centre[1, p] = centre[i, 1]
+        grid.centre[2, p] = centre[i, 2]
+
+
+@inlined
+def searches(a: int, b: int) -> bool:
+    """Whether bodies of class a look for partners in class b."""
+    return b <= a or b > MAX_CLASSES
+
+
+@inlined
+def keep_overlapping(grid: Any, extent: Any, balls: bool, p: int, low: int, high: int, found: Any, n: int) -> int:
+    """Append the places low ... high - 1 whose bounds overlap those of place p to found[n:]; returns the new n.
+
+    extent (3, N): half extents of boxes, or with `balls` radii of spheres in row 0. No branch depends on the outcome.
+    """
+    cx, cy, cz = grid.centre[0, p], grid.centre[1, p], grid.centre[2, p]
+    if balls:
+        for q in range(low, high):
+            x, y, z = grid.centre[0, q] - cx, grid.centre[1, q] - cy, grid.centre[2, q] - cz
+            r = extent[0, p] + extent[0, q]
+            found[n] = q
+            n += x * x + y * y + z * z <= r * r
+    else:
+        hx, hy, hz = extent[0, p], extent[1, p], extent[2, p]
+        for q in range(low, high):
+            found[n] = q
+            n += (
+                (abs(grid.centre[0, q] - cx) <= hx + extent[0, q])
+                & (abs(grid.centre[1, q] - cy) <= hy + extent[1, q])
+                & (abs(grid.centre[2, q] - cz) <= hz + extent[2, q])
+            )
+    return n
+
+
+@inlined
+def _of_row(grid: Any, inverse: float, y: int, z: int, found: Any, begin: int, n: int) -> int:
+    """Keep those of found[begin:n] whose cell is in the row (y, z); other rows can hash to the same cells."""
+    kept = begin
+    for m in range(begin, n):
+        q = found[m]
+        if _hashed(grid.centre[1, q], inverse) == y and _hashed(grid.centre[2, q], inverse) == z:
+            found[kept] = q
+            kept += 1
+    return kept
+
+
+@inlined
+def _clamped(x: float, origin: float, inverse: float, last: int) -> Any:
+    return np.int64(min(max((x - origin) * inverse, 0.0), np.float64(last)))
+
+
+@inlined
+def partners(grid: Any, extent: Any, balls: bool, a: int, b: int, p: int, found: Any, n: int) -> int:
+    """Append to found[n:] the places of class b that overlap place p of class a, each pair of one class once.
+
+    extent, balls: as in `keep_overlapping`. `found` must have room for one more than all bodies of the class.
+    """
+    first, count = grid.layout[b, _FIRST], grid.layout[b, _COUNT]
+    mode = grid.layout[b, _MODE]
+    base = grid.layout[b, _BASE]
+    nx, ny, nz = grid.layout[b, _NX], grid.layout[b, _NY], grid.layout[b, _NZ]
+    inverse, reach = grid.scale[b, _INVERSE], grid.scale[b, _REACH]
+    cx, cy, cz = grid.centre[0, p], grid.centre[1, p], grid.centre[2, p]
+    rx = extent[0, p] * (1.0 + 16.0 * EPSILON) + reach
+    ry = rx if balls else extent[1, p] * (1.0 + 16.0 * EPSILON) + reach
+    rz = rx if balls else extent[2, p] * (1.0 + 16.0 * EPSILON) + reach
+    if mode == _DENSE:
+        ox, oy, oz = grid.origin[0], grid.origin[1], grid.origin[2]
+        x0 = _clamped(cx - rx, ox, inverse, nx - 1)
+        x1 = _clamped(cx + rx, ox, inverse, nx - 1)
+        y0 = _clamped(cy - ry, oy, inverse, ny - 1)
+        y1 = _clamped(cy + ry, oy, inverse, ny - 1)
+        z0 = _clamped(cz - rz, oz, inverse, nz - 1)
+        z1 = _clamped(cz + rz, oz, inverse, nz - 1)
+        if a == b:
+            # the rows behind this one look back from there
+            z0 = _dense(cz, oz, inverse)
+            own = _dense(cy, oy, inverse)
+            row = base + (z0 * ny + own) * nx
+            n = keep_overlapping(grid, extent, balls, p, p + 1, grid.start[row + x1 + 1], found, n)
+            for y in range(own + 1, y1 + 1):
+                row = base + (z0 * ny + y) * nx
+                n = keep_overlapping(grid, extent, balls, p, grid.start[row + x0], grid.start[row + x1 + 1], found, n)
+            z0 += 1
+        for z in range(z0, z1 + 1):
+            for y in range(y0, y1 + 1):
+                row = base + (z * ny + y) * nx
+                n = keep_overlapping(grid, extent, balls, p, grid.start[row + x0], grid.start[row + x1 + 1], found, n)
+        return n
+    rows = (2.0 * ry * inverse + 2.0) * (2.0 * rz * inverse + 2.0)
+    if mode == _WHOLE or (a != b and not rows * (2.0 * rx * inverse + 2.0) < count):
+        low = p + 1 if a == b else first
+        return keep_overlapping(grid, extent, balls, p, low, first + count, found, n)
+    x0, x1 = _hashed(cx - rx, inverse), _hashed(cx + rx, inverse)
+    y0, y1 = _hashed(cy - ry, inverse), _hashed(cy + ry, inverse)
+    z0, z1 = _hashed(cz - rz, inverse), _hashed(cz + rz, inverse)
+    own_y, own_z = _hashed(cy, inverse), _hashed(cz, inverse)
+    if a == b:
+        z0 = own_z
+    for z in range(z0, z1 + 1):
+        for y in range(own_y if a == b and z == own_z else y0, y1 + 1):
+            begin = n
+            x = x0 + _hash(y, z)
+            end = x + (x1 - x0) + 1
+            while x < end:
+                # the run of cells goes on at the first one where the table ends
+                cell = x & nx
+                run = min(end - x, nx + 1 - cell)
+                low = grid.start[base + cell]
+                if a == b and z == own_z and y == own_y:
+                    low = max(low, p + 1)
+                n = keep_overlapping(grid, extent, balls, p, low, grid.start[base + cell + run], found, n)
+                x += run
+            n = _of_row(grid, inverse, y, z, found, begin, n)
+    return n
+
+
+@device
+def sort_pairs(pairs: Any, count: int, other: Any, places: Any) -> None:
+    """Sort pairs[:count] of numbers below places.size - 1 by first, then second: two stable counting sorts."""
+    for column in (1, 0):
+        source, target = (pairs, other) if column == 1 else (other, pairs)
+        places[:] = 0
+        for k in range(count):
+            places[source[k, column] + 1] += 1
+        for i in range(1, places.size):
+            places[i] += places[i - 1]
+        for k in range(count):
+            i = source[k, column]
+            target[places[i], 0] = source[k, 0]
+            target[places[i], 1] = source[k, 1]
+            places[i] += 1
+
+
+@kernel
+def _box_pairs(centre: Any, half: Any, starts: Any, grid: Any, pairs: Any) -> int:
+    """Pairs into pairs (P, 2), sorted unless there are more than P; returns how many there are."""
+    n = centre.shape[0]
+    size = np.empty(n)
+    for i in range(n):
+        size[i] = max(half[i, 0], half[i, 1], half[i, 2])
+        far = max(abs(centre[i, 0]), abs(centre[i, 1]), abs(centre[i, 2]))
+        if not far <= LARGEST:
+            size[i] = np.inf
+        total = half[i, 0] + half[i, 1] + half[i, 2] + centre[i, 0] + centre[i, 1] + centre[i, 2]
+        if total != total or not min(half[i, 0], half[i, 1], half[i, 2]) >= 0.0:
+            size[i] = np.nan
+    classify(size, starts, np.empty((_OCTAVES, 2), np.int64), np.empty(_OCTAVES), grid)
+    cells = plan_cells(size, centre, grid)
+    find_buckets(centre, grid, 0, n)
+    sort_by_cell(n, cells, grid)
+    gather_centres(centre, grid, 0, n)
+    extent = np.zeros((3, n + PAD))
+    for p in range(n):
+        for c in range(3):
+            extent[c, p] = half[grid.order[p], c]
+    found = np.empty(n + PAD, np.int32)
+    total = 0
+    for a in range(MAX_CLASSES + 1):
+        first = grid.layout[a, _FIRST]
+        for b in range(_ABSENT):
+            if grid.layout[a, _COUNT] == 0 or grid.layout[b, _COUNT] == 0 or not searches(a, b):
+                continue
+            for p in range(first, first + grid.layout[a, _COUNT]):
+                count = partners(grid, extent, False, a, b, p, found, 0)
+                i = grid.order[p]
+                for m in range(count):
+                    if total < pairs.shape[0]:
+                        j = grid.order[found[m]]
+                        pairs[total, 0] = min(i, j)
+                        pairs[total, 1] = max(i, j)
+                    total += 1
+    if total <= pairs.shape[0]:
+        sort_pairs(pairs, total, np.empty((total, 2), np.int32), np.empty(n + 1, np.int32))
+    return total
+
+
+def box_pairs(centre: ArrayLike, half: ArrayLike, starts: ArrayLike | None = None) -> NDArray[np.int32]:
+    """Pairs (M, 2), i < j, sorted, of axis-aligned boxes that overlap or touch: |centre difference| <= sum of halves.
+
+    centre, half extents: (N, 3) m; half extents may be infinite, and a box with a NaN or a negative half extent meets
+    nothing. starts (N,) bool: pairs in which neither box starts are left out, and not visited. Raises InputError.
+    """
+    centre = np.ascontiguousarray(centre, dtype=np.float64)
+    half = np.ascontiguousarray(half, dtype=np.float64)
+    n = len(centre)
+    if centre.shape != (n, 3) or half.shape != (n, 3):
+        raise InputError(f"expected centres and half extents of shape (N, 3), got {centre.shape} and {half.shape}")
+    starting = np.ones(n, np.bool_) if starts is None else np.ascontiguousarray(starts, dtype=np.bool_)
+    if starting.shape != (n,):
+        raise InputError(f"starts: expected {n} flags, one for each box, got an array of shape {starting.shape}")
+    grid = make_grid(n)
+    pairs = np.empty((4 * n + 16, 2), np.int32)
+    count = _box_pairs(centre, half, starting, grid, pairs)
+    if count > len(pairs):
+        pairs = np.empty((count, 2), np.int32)
+        _box_pairs(centre, half, starting, grid, pairs)
+    return pairs[:count]
