@@ -42,11 +42,17 @@ LARGEST: Final = 2.0**200
 PAD: Final = 16
 """Places behind the last sorted body that a vector may read."""
 
+STARTING: Final = MAX_CLASSES + 1
+"""Classes of bodies that start a search: class 0 is the unbounded ones, then from large to small."""
+
+CLASSES: Final = 2 * STARTING
+"""With the classes of those that do not, in the same order."""
+
 _OCTAVES: Final = 512
 _HASHED, _DENSE, _WHOLE = 0, 1, 2
-_ABSENT: Final = 2 * (MAX_CLASSES + 1)
+_ABSENT: Final = CLASSES
 _FIRST, _COUNT, _BASE, _MODE, _NX, _NY, _NZ = range(7)
-_INVERSE, _REACH = range(2)
+_INVERSE, _REACH, _LARGEST = range(3)
 
 
 class Grid(NamedTuple):
@@ -57,7 +63,7 @@ class Grid(NamedTuple):
     start: Any  # (T + 2,) int32: where each cell's bodies start in `order`
     order: Any  # (N,) int32: the bodies by cell
     layout: Any  # (_ABSENT + 1, 7) int64: by class first place, count, first cell, mode, cells along x (or mask), y, z
-    scale: Any  # (_ABSENT + 1, 2) float64: 1 / cell width (1/m), largest half extent with its round-off (m)
+    scale: Any  # (_ABSENT + 1, 3) float64: 1 / cell width (1/m), largest half extent (m) with round-off, and without
     origin: Any  # (3,) float64: lower corner of the dense cells (m)
     centre: Any  # (3, N + PAD) float64, sorted by cell
 
@@ -71,7 +77,7 @@ def make_grid(capacity: int) -> Grid:
         start=np.zeros(cells + 2, np.int32),
         order=np.zeros(capacity, np.int32),
         layout=np.zeros((_ABSENT + 1, 7), np.int64),
-        scale=np.zeros((_ABSENT + 1, 2)),
+        scale=np.zeros((_ABSENT + 1, 3)),
         origin=np.zeros(3),
         centre=np.zeros((3, capacity + PAD)),
     )
@@ -107,7 +113,7 @@ def classify(size: Any, starts: Any, octave: Any, cubes: Any, grid: Any) -> None
         cube += shrink * cubes[k]
         octave[k, 1] = number
     for i in range(size.size):
-        rest = 0 if starts[i] else MAX_CLASSES + 1
+        rest = 0 if starts[i] else STARTING
         if size[i] <= LARGEST:
             k = min(max(frexp(size[i])[1] + _OCTAVES // 2, 0), _OCTAVES - 1)
             grid.klass[i] = rest + octave[k, 1]
@@ -136,26 +142,24 @@ def _hashed(x: float, inverse: float) -> Any:
 
 
 @device
-def plan_cells(size: Any, centre: Any, grid: Any) -> Any:
-    """Choose the cells of each class from the bodies' half extents `size` (N,) and centres (N, 3).
+def measure_classes(size: Any, grid: Any) -> None:
+    """Count the bodies of each class and find its largest half extent; after `classify`."""
+    grid.layout[:] = 0
+    grid.scale[:] = 0.0
+    for i in range(size.size):
+        k = grid.klass[i]
+        grid.layout[k, _COUNT] += 1
+        grid.scale[k, _LARGEST] = max(grid.scale[k, _LARGEST], size[i])
+
+
+@device
+def plan_cells(lx: float, ly: float, lz: float, hx: float, hy: float, hz: float, grid: Any) -> Any:
+    """Choose the cells of each class, for centres between the corners l and h (m); after `measure_classes`.
 
     Returns the number of cells over all classes; the last one holds the bodies that are absent.
     """
-    n = size.size
-    layout, scale, origin = grid.layout, grid.scale, grid.origin
-    layout[:] = 0
-    scale[:] = 0.0
-    lx = ly = lz = np.inf
-    hx = hy = hz = -np.inf
-    for i in range(n):
-        k = grid.klass[i]
-        layout[k, _COUNT] += 1
-        scale[k, _REACH] = max(scale[k, _REACH], size[i])
-        if k != 0 and k != MAX_CLASSES + 1 and k != _ABSENT:
-            x, y, z = centre[i, 0], centre[i, 1], centre[i, 2]
-            lx, ly, lz = min(lx, x), min(ly, y), min(lz, z)
-            hx, hy, hz = max(hx, x), max(hy, y), max(hz, z)
-    origin[0], origin[1], origin[2] = lx, ly, lz
+    layout, scale = grid.layout, grid.scale
+    grid.origin[0], grid.origin[1], grid.origin[2] = lx, ly, lz
     # round-off of a difference of two coordinates, and of the multiplication by 1 / cell width
     slack = 8.0 * EPSILON * max(abs(lx), abs(ly), abs(lz), abs(hx), abs(hy), abs(hz))
     first = cells = np.int64(0)
@@ -167,11 +171,11 @@ def plan_cells(size: Any, centre: Any, grid: Any) -> Any:
         first += count
         if count == 0:
             continue
-        if k == 0 or k == MAX_CLASSES + 1 or k == _ABSENT:
+        if k == 0 or k == STARTING or k == _ABSENT:
             scale[k, _REACH] = np.inf
             cells += 1
             continue
-        reach = scale[k, _REACH] * (1.0 + 16.0 * EPSILON) + slack
+        reach = scale[k, _LARGEST] * (1.0 + 16.0 * EPSILON) + slack
         scale[k, _REACH] = reach
         inverse = 1.0 / max(2.0 * reach, 1e-150)
         scale[k, _INVERSE] = inverse
@@ -242,9 +246,15 @@ def gather_centres(centre: Any, grid: Any, begin: int, end: int) -> None:
 
 
 @inlined
-def searches(a: int, b: int) -> bool:
-    """Whether bodies of class a look for partners in class b."""
-    return b <= a or b > MAX_CLASSES
+def searches(grid: Any, a: int, b: int) -> bool:
+    """Whether bodies of class a look for partners in class b: the coarser ones, and all that rest."""
+    return (b <= a or b >= STARTING) and grid.layout[a, _COUNT] > 0 and grid.layout[b, _COUNT] > 0
+
+
+@inlined
+def places(grid: Any, a: int) -> Any:
+    """First place of class a, and the one behind its last."""
+    return grid.layout[a, _FIRST], grid.layout[a, _FIRST] + grid.layout[a, _COUNT]
 
 
 @inlined
@@ -356,20 +366,20 @@ def partners(grid: Any, extent: Any, balls: bool, a: int, b: int, p: int, found:
 
 
 @device
-def sort_pairs(pairs: Any, count: int, other: Any, places: Any) -> None:
-    """Sort pairs[:count] of numbers below places.size - 1 by first, then second: two stable counting sorts."""
+def sort_pairs(pairs: Any, count: int, other: Any, begins: Any) -> None:
+    """Sort pairs[:count] of numbers below begins.size - 1 by first, then second: two stable counting sorts."""
     for column in (1, 0):
         source, target = (pairs, other) if column == 1 else (other, pairs)
-        places[:] = 0
+        begins[:] = 0
         for k in range(count):
-            places[source[k, column] + 1] += 1
-        for i in range(1, places.size):
-            places[i] += places[i - 1]
+            begins[source[k, column] + 1] += 1
+        for i in range(1, begins.size):
+            begins[i] += begins[i - 1]
         for k in range(count):
             i = source[k, column]
-            target[places[i], 0] = source[k, 0]
-            target[places[i], 1] = source[k, 1]
-            places[i] += 1
+            target[begins[i], 0] = source[k, 0]
+            target[begins[i], 1] = source[k, 1]
+            begins[i] += 1
 
 
 @kernel
@@ -377,16 +387,22 @@ def _box_pairs(centre: Any, half: Any, starts: Any, grid: Any, pairs: Any) -> in
     """Pairs into pairs (P, 2), sorted unless there are more than P; returns how many there are."""
     n = centre.shape[0]
     size = np.empty(n)
+    lx = ly = lz = np.inf
+    hx = hy = hz = -np.inf
     for i in range(n):
+        x, y, z = centre[i, 0], centre[i, 1], centre[i, 2]
         size[i] = max(half[i, 0], half[i, 1], half[i, 2])
-        far = max(abs(centre[i, 0]), abs(centre[i, 1]), abs(centre[i, 2]))
-        if not far <= LARGEST:
+        if not max(abs(x), abs(y), abs(z)) <= LARGEST:
             size[i] = np.inf
-        total = half[i, 0] + half[i, 1] + half[i, 2] + centre[i, 0] + centre[i, 1] + centre[i, 2]
+        total = half[i, 0] + half[i, 1] + half[i, 2] + x + y + z
         if total != total or not min(half[i, 0], half[i, 1], half[i, 2]) >= 0.0:
             size[i] = np.nan
+        if size[i] <= LARGEST:
+            lx, ly, lz = min(lx, x), min(ly, y), min(lz, z)
+            hx, hy, hz = max(hx, x), max(hy, y), max(hz, z)
     classify(size, starts, np.empty((_OCTAVES, 2), np.int64), np.empty(_OCTAVES), grid)
-    cells = plan_cells(size, centre, grid)
+    measure_classes(size, grid)
+    cells = plan_cells(lx, ly, lz, hx, hy, hz, grid)
     find_buckets(centre, grid, 0, n)
     sort_by_cell(n, cells, grid)
     gather_centres(centre, grid, 0, n)
@@ -396,12 +412,12 @@ def _box_pairs(centre: Any, half: Any, starts: Any, grid: Any, pairs: Any) -> in
             extent[c, p] = half[grid.order[p], c]
     found = np.empty(n + PAD, np.int32)
     total = 0
-    for a in range(MAX_CLASSES + 1):
-        first = grid.layout[a, _FIRST]
-        for b in range(_ABSENT):
-            if grid.layout[a, _COUNT] == 0 or grid.layout[b, _COUNT] == 0 or not searches(a, b):
+    for a in range(STARTING):
+        first, end = places(grid, a)
+        for b in range(CLASSES):
+            if not searches(grid, a, b):
                 continue
-            for p in range(first, first + grid.layout[a, _COUNT]):
+            for p in range(first, end):
                 count = partners(grid, extent, False, a, b, p, found, 0)
                 i = grid.order[p]
                 for m in range(count):
