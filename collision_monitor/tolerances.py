@@ -33,10 +33,10 @@ SAT_ROUND_OFF: Final = 64 * EPSILON
 
 HULL_DROP: Final = 1e-14
 """A point that stands out of its hull by less than this part of the hull's size is dropped with the interior ones.
-Larger: visible corners vanish. Smaller: round-off keeps points that lie in a face, and each costs time in every test."""
+Larger: visible corners vanish. Smaller: round-off keeps points that lie in a face, and each costs time."""
 
 FEATURE_TIE: Final = 1e-9
-"""An edge or face counts as touching as a whole when its ends differ by less than this part of the size along the normal.
+"""An edge or face counts as touching as a whole when its ends differ by less than this part of the size in depth.
 Larger: witness points leave the surface visibly. Smaller: resting faces are reported as a vertex that jumps about."""
 
 SEGMENT_PARALLEL_SIN2: Final = 1e-20
@@ -48,16 +48,21 @@ TOUCHING: Final = 1e-10
 """GJK hands a pair over to EPA when the cores are closer than this part of their size:
 below it the direction of the difference vector is round-off, and a face normal is exact."""
 
-GJK_RELATIVE: Final = 1e-12
+GJK_RELATIVE: Final = 1e-10
 """GJK ends when the certified lower bound is within this part of the distance.
 Larger: error bounds grow. Smaller: curved shapes take more iterations for nothing anyone can measure."""
 
 EPA_POLYTOPE: Final = 1e-12
-"""EPA ends when the depth is certified to this part of the size: for polytopes it is reached exactly, in finitely many steps."""
+"""EPA ends when the depth is certified to this part of the size: polytopes reach it exactly, in finitely many steps."""
 
 EPA_CURVED: Final = 1e-6
 """The same for pairs with a cylinder or a cone, whose surface EPA approaches by flat faces:
 each further factor of 4 costs about 3 iterations. The bound reached is reported."""
+
+EPA_CURVED_POINTS: Final = 256
+"""Support points after which EPA settles for the bound it has with a cylinder or a cone. Far fewer do but where a whole
+circle of directions ties (a capsule along a cone's axis): there the bound is then 1e-4 of the size, after 0.5 ms.
+Larger: one such pair can take milliseconds. Smaller: its bound grows with the inverse square."""
 
 FLAT: Final = 1e-12
 """A simplex thinner than this part of the size counts as flat: which side of it the origin is on would be noise."""

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull as Qhull  # type: ignore[import-untyped]
+from scipy.spatial import ConvexHull as Qhull
 from scipy.spatial import QhullError
 
 from collision_monitor._jit import device
@@ -208,7 +208,7 @@ class ShapeTableBuilder:
 
 
 @device
-def bounds(table, slot, R, out):  # type: ignore[no-untyped-def]
+def bounds(table: Any, slot: int, R: Any, out: Any) -> None:
     """Tight axis-aligned bounds of a shape under rotation R_WA (3, 3), about its origin and with its margin.
 
     out[0:3] = lower, out[3:6] = upper (m). A half-space is unbounded: -inf and inf.

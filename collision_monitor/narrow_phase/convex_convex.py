@@ -11,11 +11,11 @@ from typing import Any
 
 from collision_monitor._jit import device
 from collision_monitor.geometry.shape_table import CONE, CYLINDER
-from collision_monitor.narrow_phase.answer import SIMPLEX, write
+from collision_monitor.narrow_phase.answer import MAX_VERTICES, SIMPLEX, write
 from collision_monitor.narrow_phase.epa import epa
 from collision_monitor.narrow_phase.gjk import WEIGHTS, gjk
 from collision_monitor.narrow_phase.support import core_radius
-from collision_monitor.tolerances import EPA_CURVED, EPA_POLYTOPE, SAT_ROUND_OFF, TOUCHING
+from collision_monitor.tolerances import EPA_CURVED, EPA_CURVED_POINTS, EPA_POLYTOPE, SAT_ROUND_OFF, TOUCHING
 
 
 @device
@@ -94,7 +94,8 @@ def convex_contact(
         upper, lower, x, y, z, qx, qy, qz = epa(
             ka, table.size[a, 0], table.size[a, 1], table.size[a, 2], table.vertex_start[a], table.vertex_count[a],
             kb, table.size[b, 0], table.size[b, 1], table.size[b, 2], table.vertex_start[b], table.vertex_count[b],
-            table.vertices, work, size, count, EPA_CURVED if curved else EPA_POLYTOPE,
+            table.vertices, work, size, count,
+            EPA_CURVED if curved else EPA_POLYTOPE, EPA_CURVED_POINTS if curved else MAX_VERTICES,
         )  # fmt: skip
         distance = -upper
         bound = abs(upper - lower) + TOUCHING * size

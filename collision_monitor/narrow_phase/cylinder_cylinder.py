@@ -32,7 +32,7 @@ def is_parallel(table: Any, a: int, RA: Any, RB: Any) -> bool:
 def parallel_cylinders_contact(
     table: Any, a: int, b: int, RB: Any, px: float, py: float, pz: float, out: Any
 ) -> None:
-    """Contact of a with the cylinder b where `is_parallel` holds. Touching faces meet in the middle of what they share."""
+    """Contact of a with cylinder b where `is_parallel` holds. Touching faces meet in the middle of what they share."""
     kind = table.kind[a]
     round_a = table.margin[a] + core_radius(kind, table.size[a, 0])
     round_b = table.margin[b]

@@ -10,7 +10,7 @@ from math import inf, sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device
-from collision_monitor.narrow_phase.answer import EDGES, FACES, MAX_FACES, MAX_VERTICES, SIMPLEX
+from collision_monitor.narrow_phase.answer import EDGES, FACES, MAX_FACES, SIMPLEX
 from collision_monitor.narrow_phase.gjk import WEIGHTS, closest_on_triangle
 from collision_monitor.narrow_phase.segment import across
 from collision_monitor.narrow_phase.support import support_difference
@@ -138,15 +138,16 @@ def epa(
     size: float,
     count: int,
     tolerance: float,
+    most: int,
 ) -> Any:
     """Depth of two cores that overlap or touch, from the `count` simplex points that GJK left, in A's frame.
 
     Returns (upper, lower, nx, ny, nz, ax, ay, az): bounds of the depth (m), the unit direction from A to B, the
-    witness on A. Ends when upper - lower <= tolerance * size (m), or when the scratch memory is full.
+    witness on A. Ends when upper - lower <= tolerance * size (m), or with `most` (<= MAX_VERTICES) points.
     """
     flat = FLAT * size
     # The simplex grows to a tetrahedron by the farthest of a few support points: along the axes from a point,
-    # across a line, to both sides of a plane. Where none is off it, B - A is flat, and its thin direction is the answer.
+    # across a line, to both sides of a plane. Where none is off it, B - A is flat: its thin direction is the answer.
     step = 0
     farthest = 0.0
     upper = inf
@@ -200,7 +201,7 @@ def epa(
     lower = -inf
     plane = 0.0
     visible = 8.0 * EPSILON * size
-    while points < MAX_VERTICES:
+    while points < most:
         near = 0
         for f in range(1, faces):
             if work[D + f] < work[D + near]:

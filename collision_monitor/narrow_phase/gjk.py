@@ -41,7 +41,7 @@ def _segment(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -
 def _triangle(
     ax: float, ay: float, az: float, bx: float, by: float, bz: float, cx: float, cy: float, cz: float
 ) -> Any:
-    """Weights of a, b and the newest point c in the closest point to the origin; and whether it lies inside the face."""
+    """Weights of a, b and the newest point c in the point closest to the origin; whether it lies inside the face."""
     ux, uy, uz = bx - ax, by - ay, bz - az
     vx, vy, vz = cx - ax, cy - ay, cz - az
     nx = uy * vz - uz * vy

@@ -1,4 +1,6 @@
-"""Closest points of two segments, and a direction across one. (Ericson, Real-Time Collision Detection, 5.1.9; Lumelsky, 1985)"""
+"""Closest points of two segments, and a direction across one.
+
+(Ericson, Real-Time Collision Detection, 5.1.9; Lumelsky, 1985)"""
 
 from __future__ import annotations
 

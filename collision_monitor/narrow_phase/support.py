@@ -1,7 +1,8 @@
 """Support functions: the farthest point of a core shape in a direction, in the shape's own frame.
 
 A core is the shape without its radius: a point for a sphere, a segment for a capsule, else the shape itself.
-(Ericson, Real-Time Collision Detection, 9.5.4; van den Bergen, Collision Detection in Interactive 3D Environments, 4.3.4)
+(Ericson, Real-Time Collision Detection, 9.5.4; van den Bergen, Collision Detection in
+Interactive 3D Environments, 4.3.4)
 """
 
 from __future__ import annotations

@@ -38,15 +38,17 @@ def _better(builder: Any, value: Any, index: Any, other_value: Any, other_index:
     return builder.select(take, other_value, value), builder.select(take, other_index, index)
 
 
-@intrinsic
-def farthest_vertex(typing_context, vertices, start, count, dx, dy, dz):  # type: ignore[no-untyped-def]
+@intrinsic  # type: ignore[untyped-decorator]
+def farthest_vertex(
+    typing_context: Any, vertices: Any, start: Any, count: Any, dx: Any, dy: Any, dz: Any
+) -> Any:
     """Index into vertices (3, V) of the first one of start ... start + count with the greatest d.v.
 
     count is a positive multiple of LANES, as the shape table pads it.
     """
     signature = types.int64(vertices, types.int64, types.int64, types.float64, types.float64, types.float64)
 
-    def codegen(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array = context.make_array(signature.args[0])(context, builder, arguments[0])
         start, count = arguments[1], arguments[2]
         direction = [_spread(builder, d, _DOUBLES) for d in arguments[3:]]

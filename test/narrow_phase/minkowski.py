@@ -1,4 +1,4 @@
-"""Slow and obvious answers: the Minkowski difference of two point sets, by qhull, and the distance to it by a QP-free search."""
+"""Slow and obvious answers: the Minkowski difference of two point sets by qhull, and the distance to its faces."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _closest_on_triangle(a, b, c) -> np.ndarray:
 
 
 def polytope_signed_distance(points_a: np.ndarray, points_b: np.ndarray) -> float:
-    """Signed distance of the hulls of two point sets (n, 3) in one frame, from every face of the Minkowski difference."""
+    """Signed distance of the hulls of two point sets (n, 3), from every face of the Minkowski difference."""
     difference = (points_b[:, None, :] - points_a[None, :, :]).reshape(-1, 3)
     hull = ConvexHull(difference)
     if (hull.equations[:, 3] <= 0).all():

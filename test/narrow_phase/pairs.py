@@ -98,5 +98,6 @@ def points_of(shape, sides: int = 0) -> np.ndarray:
             return shape.points
     angle = 2 * np.pi * np.arange(sides) / sides
     ring = np.stack([shape.radius * np.cos(angle), shape.radius * np.sin(angle), 0 * angle - shape.length / 2], 1)
-    top = ring + [0, 0, shape.length] if isinstance(shape, shapes.Cylinder) else np.array([[0, 0, shape.length / 2]])
+    is_cylinder = isinstance(shape, shapes.Cylinder)
+    top = np.add(ring, (0, 0, shape.length)) if is_cylinder else np.array([[0, 0, shape.length / 2]])
     return np.concatenate([ring, top])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,12 @@ from collision_monitor.geometry.pose import rotation_matrix
 from collision_monitor.geometry.shapes import Box, Capsule, Cone, Cylinder, HalfSpace, Sphere
 
 CASES = Path(__file__).parents[3] / "shared" / "conformance" / "cases.json"
+
+OTHER_NORMAL = {
+    8,  # a box in the middle of a box: +x and -x are equally near
+    22,  # cones side by side: the way out across the slant (0.0894) is shorter than the expected one along x (0.1)
+    26,  # a cylinder beside a cone: the same
+}
 
 pytestmark = pytest.mark.skipif(not CASES.exists(), reason="the conformance cases are not here")
 
@@ -73,16 +78,6 @@ def test_case(case, swap, moved):
         wanted = np.array(expected["normal"], float)
         wanted /= np.linalg.norm(wanted)
         alike = sign * float(n @ wanted)
-        # where several directions are as good, any of them is right: then the depth was the test
         if expected.get("normal_sign_free"):
             alike = abs(alike)
-        if not alike == pytest.approx(1, abs=max(1e-6, tolerance)):
-            assert "depth" in expected or expected.get("collide") is True
-            TIES[case["id"]] += 1
-
-
-TIES: Counter[int] = Counter()
-
-
-def test_most_normals_are_the_expected_ones():
-    assert len(TIES) <= 8, TIES
+        assert alike == pytest.approx(1, abs=max(1e-6, tolerance)) or case["id"] in OTHER_NORMAL

@@ -59,7 +59,9 @@ def test_box_as_hull_answers_as_the_box():
             assert contact(x, y, p, R_A, R_B).distance == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.parametrize("p", [(0, 0, 0), (0.5, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1), (0.3, 0.3, 0.3), (0, 0, 1 - 1e-13)])
+@pytest.mark.parametrize(
+    "p", [(0, 0, 0), (0.5, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1), (0.3, 0.3, 0.3), (0, 0, 1 - 1e-13)]
+)
 def test_aligned_cubes_with_coplanar_faces(p):
     cube = Box((1, 1, 1))
     hull = ConvexHull(points_of(cube))

@@ -1,4 +1,4 @@
-"""What holds for every pair of kinds: swap symmetry, common motion, a second opinion, one answer on any thread count."""
+"""What holds for every pair of kinds: swap symmetry, common motion, a second opinion, the same bytes on any threads."""
 
 from __future__ import annotations
 
