@@ -31,13 +31,15 @@ def _run(body: Callable[[StopRequest], None], args: Sequence[str] | None) -> int
     except CollisionMonitorError as error:
         print(f"collision-monitor: error: {error}", file=sys.stderr)
         return BAD_INPUT
+    except KeyboardInterrupt:  # see StopRequest.interrupting
+        return 0
     return 0
 
 
 def _monitor(stop: StopRequest) -> None:
     from collision_monitor.ros.node import MonitorNode
 
-    node = MonitorNode()
+    node = MonitorNode(stop)
     try:
         spin(node, stop, events=node.settings.executor == "events")
     finally:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 from contextlib import suppress
 from typing import Any, Final
@@ -21,6 +22,7 @@ from collision_monitor.pipeline import Outputs, Pipeline
 from collision_monitor.ros import qos
 from collision_monitor.ros.markers import MarkerView
 from collision_monitor.ros.parameters import read_monitor_parameters
+from collision_monitor.ros.process import StopRequest
 from collision_monitor.ros.step_times import StepTimes
 from collision_monitor.session import Recorder, Recording
 from collision_monitor_msgs.msg import (
@@ -43,18 +45,21 @@ MARKER_PERIOD: Final = 100_000_000
 LOG_PERIOD: Final = 5_000_000_000
 """ns between two lines for people."""
 
+COMPILER_PATIENCE: Final = 3.0
+"""s until people are told why nothing happens yet; compiled kernels are loaded well within it."""
+
 
 class MonitorNode(Node):
     """Subscribes to shapes and states, publishes contacts, predictions, status and markers. Raises ProfileError."""
 
-    def __init__(self) -> None:
+    def __init__(self, stop: StopRequest) -> None:
         super().__init__("object_monitor", automatically_declare_parameters_from_overrides=True)
         try:
             self.settings = read_monitor_parameters(self)
         except CollisionMonitorError:
             self.destroy_node()
             raise
-        warm_up.main()  # before anything arrives: a message that waits for the compiler is a message lost
+        self._warm_up(stop)
         self._pipeline = Pipeline(self.settings.profile, frame_id=self.settings.frame_id)
         self._times = StepTimes(self.settings.profile.max_time_step)
         self._markers = MarkerView(self.settings.frame_id)
@@ -80,6 +85,17 @@ class MonitorNode(Node):
             f"profile {self.settings.profile.name}, frame {self.settings.frame_id}, "
             + (f"recording to {self._recorder.path}" if self._recorder else "not recording")
         )
+
+    def _warm_up(self, stop: StopRequest) -> None:
+        """Before anything arrives: a message that waits for the compiler is a message lost."""
+        text = "compiling the kernels, once for this machine and version: this takes a minute or two"
+        patience = threading.Timer(COMPILER_PATIENCE, self.get_logger().info, [text])
+        patience.start()
+        try:
+            with stop.interrupting():
+                warm_up.main()
+        finally:
+            patience.cancel()
 
     def _start_recording(self) -> Recorder | None:
         """None where no recording is wanted or it cannot start: then the status says why, and monitoring goes on."""

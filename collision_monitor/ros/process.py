@@ -28,6 +28,7 @@ class StopRequest:
 
     def __init__(self) -> None:
         self.received = False
+        self._interrupts = False
 
     def install(self) -> StopRequest:
         """Take over both signals; call it before the slow imports so that an early Ctrl-C is clean as well."""
@@ -37,6 +38,19 @@ class StopRequest:
 
     def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
         self.received = True
+        if self._interrupts:
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def interrupting(self) -> Iterator[None]:
+        """For long work with nothing to be finished: a signal raises KeyboardInterrupt instead of waiting."""
+        self._interrupts = True
+        try:
+            if self.received:
+                raise KeyboardInterrupt
+            yield
+        finally:
+            self._interrupts = False
 
 
 def stay_on_this_machine() -> None:

@@ -2,6 +2,7 @@
 
 import math
 import signal
+import time
 
 import numpy as np
 import pytest
@@ -250,3 +251,14 @@ def test_markers_are_drawn_for_whoever_looks(start, team):
     assert by_name["predicted impacts"].points[0].x == pytest.approx(1.5, abs=0.05)
     assert {round(p.y) for p in by_name["predicted"].points} <= {-1, 0, 1}
     assert by_name["time left"].text in ("0.98 s", "0.99 s", "1.00 s")
+
+
+def test_a_signal_ends_it_while_the_kernels_compile(start, monkeypatch, tmp_path):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "empty"))
+    monitor = start("run")
+    deadline = time.monotonic() + 60.0
+    while "compiling the kernels" not in monitor.words:
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    assert monitor.stop(signal.SIGTERM) == 0
+    assert "Traceback" not in monitor.words
