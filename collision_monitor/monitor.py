@@ -7,6 +7,7 @@ when -> the event list -> the pairs that are due -> contacts and predictions out
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor import records
+from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.broad_phase.hashed_grid import make_hashed_grid, put_boxes, remove_boxes
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import CollisionMonitorError, InputError, Refusal, UnsupportedError
@@ -23,17 +25,23 @@ from collision_monitor.geometry.shapes import HalfSpace, Shape, Sphere
 from collision_monitor.prediction import active_pairs, answers, candidates, tracking
 from collision_monitor.prediction.event_list import EventList
 from collision_monitor.prediction.motion import Bodies, enlarge, make_bodies, make_parts
-from collision_monitor.prediction.time_of_impact import IMPACT, make_scratch
+from collision_monitor.prediction.time_of_impact import IMPACT, Scratch, make_scratch
 from collision_monitor.profiles import Profile
 from collision_monitor.records import Model
 
 NANOSECOND = 1e-9
 
+MOST_QUERIES = 0.125
+"""Part of the bodies up to which each is looked up in the hashed grid; for more, a new grid is built and swept once."""
+
+FEWEST_PAIRS_FOR_THREADS = 500
+"""Handing work to a thread costs as much as predicting some 100 pairs."""
+
 _VERDICTS = {
     tracking.UNKNOWN_ID: (Refusal.UNKNOWN_ID, "expected the id of an object that was described, got {id}"),
     tracking.NON_FINITE: (
         Refusal.NON_FINITE,
-        "object {id}: expected finite numbers up to 1e18 in pose and twist, got {row}",
+        "object {id}: expected finite numbers up to 1e18 in pose and twist and standard deviations >= 0, got {row}",
     ),
     tracking.QUATERNION: (Refusal.QUATERNION, "object {id}: expected a unit quaternion within 1e-3, got {quaternion}"),
     tracking.OLD: (Refusal.OLD, "object {id}: expected a state newer than its last one, or the object is static"),
@@ -103,7 +111,8 @@ class Monitor:
         self._jump_ns: int | None = None  # a refused stamp; the next message may confirm it
         self._renewed: set[int] = set()  # slots whose description changed: predicted anew in the next step
         self._events = EventList()
-        self._scratch = make_scratch()
+        self._scratch = [make_scratch() for _ in range(self.profile.threads)]
+        self._pool = ThreadPoolExecutor(self.profile.threads) if self.profile.threads > 1 else None
         self._pairs = np.zeros(0, active_pairs.PAIR)
         self._pair_events = np.zeros(0, IMPACT)
         self._orphans: list[tuple[int, float]] = []  # contacts (key, since) that ended because an object was removed
@@ -207,10 +216,12 @@ class Monitor:
             bodies = make_bodies(capacity)
             enlarge(self._bodies, bodies)
             self._bodies = bodies
-            old = self._grid
-            inside = np.flatnonzero(old.level >= 0).astype(np.int32)
+            box = self._grid.box
+            inside = np.flatnonzero(box["level"] >= 0).astype(np.int32)
+            centre = np.stack([box["x"], box["y"], box["z"]], axis=1)
+            half = np.stack([box["hx"], box["hy"], box["hz"]], axis=1)
             self._grid = make_hashed_grid(capacity)
-            put_boxes(self._grid, inside, old.centre, old.half)
+            put_boxes(self._grid, inside, centre, half)
         self._top += 1
         return self._top - 1
 
@@ -364,7 +375,7 @@ class Monitor:
             if len(rows):
                 row = states[rows[0]]
                 told = {"id": int(row["id"]), "quaternion": row["quaternion"].tolist()}
-                told["row"] = [*row["position"].tolist(), *row["linear"].tolist(), *row["angular"].tolist()]
+                told["row"] = row.item()[:-2]
                 self.refuse(reason, text.format(**told), len(rows))
 
     def _slots_of(self, ids: NDArray[np.uint32]) -> NDArray[np.int32]:
@@ -397,21 +408,46 @@ class Monitor:
             p.position_tolerance, p.velocity_tolerance, p.orientation_tolerance,
             p.angular_velocity_tolerance,
         )  # fmt: skip
-        is_new = np.zeros(self._top, np.bool_)
-        is_new[which] = True
-        while True:
-            n = candidates.find_candidates(bodies, self._grid, which, is_new, self._allowed_keys, self._candidates)
-            if n <= len(self._candidates):
-                break
-            self._candidates = np.zeros((2 * n, 2), np.int32)
-        work["candidate_pairs"] = n
-        events = np.zeros(n + 1, IMPACT)
-        hits, queries = candidates.predict_pairs(
-            self._shapes.table, self._parts, bodies, self._candidates[:n], now, p.contact_margin,
-            p.impact_tolerance, p.impact_iterations, events, self._scratch,
-        )  # fmt: skip
+        pairs = self._partners(which)
+        pairs = pairs[: candidates.keep_checked(bodies, self._allowed_keys, pairs)]
+        work["candidate_pairs"] = len(pairs)
+        events, queries = self._first_impacts(pairs, now)
         work["impact_queries"] += queries
-        return events[:hits]
+        return events
+
+    def _partners(self, which: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Pairs (P, 2) of the bodies in `which` with all whose swept boxes meet theirs."""
+        is_new = np.zeros(len(self._grid.box), np.bool_)
+        is_new[which] = True
+        if len(which) > MOST_QUERIES * self._top:
+            box = self._grid.box[: self._top]
+            centre = np.stack([box["x"], box["y"], box["z"]], axis=1)
+            half = np.stack([box["hx"], box["hy"], box["hz"]], axis=1)
+            half[box["level"] < 0] = np.nan  # not in the grid: meets nothing
+            return box_pairs(centre, half, is_new[: self._top])
+        while True:
+            n = candidates.find_partners(self._grid, which, is_new, self._candidates)
+            if n <= len(self._candidates):
+                return self._candidates[:n]
+            self._candidates = np.zeros((2 * n, 2), np.int32)
+
+    def _first_impacts(self, pairs: NDArray[np.int32], now: float) -> tuple[NDArray[np.void], int]:
+        """First impacts (IMPACT) of pairs (P, 2) in their order, on all threads; and the distance queries made."""
+        p = self.profile
+
+        def part(pairs: NDArray[np.int32], scratch: Scratch) -> tuple[NDArray[np.void], int]:
+            events = np.empty(len(pairs) + 1, IMPACT)
+            hits, queries = candidates.predict_pairs(
+                self._shapes.table, self._parts, self._bodies, pairs, now, p.contact_margin,
+                p.impact_tolerance, p.impact_iterations, events, scratch,
+            )  # fmt: skip
+            return events[:hits], queries
+
+        if self._pool is None or len(pairs) < FEWEST_PAIRS_FOR_THREADS:
+            return part(pairs, self._scratch[0])
+        # the kernels hold no lock; the parts are put together in order, so the answer is the same for any number
+        parts = list(self._pool.map(part, np.array_split(pairs, len(self._scratch)), self._scratch))
+        return np.concatenate([events for events, _ in parts]), sum(queries for _, queries in parts)
 
     def _moved(self, now: float) -> NDArray[np.int32]:
         """Slots of the bodies that left their predicted motion, or are not predicted far enough."""
@@ -434,7 +470,7 @@ class Monitor:
         later = np.zeros(n, IMPACT)
         n, n_later, tests, queries = active_pairs.examine(
             self._shapes.table, self._parts, bodies, pairs[:n], events[:n], now, p.contact_margin,
-            p.stale_acceleration, p.impact_tolerance, p.impact_iterations, results, later, self._scratch,
+            p.stale_acceleration, p.impact_tolerance, p.impact_iterations, results, later, self._scratch[0],
         )  # fmt: skip
         work["narrow_phase_tests"] += tests
         work["impact_queries"] += queries

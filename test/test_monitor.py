@@ -249,6 +249,13 @@ class TestRefusals:
         assert touching(result) == {(1, 2)}
         assert np.isfinite(result.contacts["signed_distance"]).all()
 
+    def test_a_negative_standard_deviation_is_refused_and_an_unknown_one_is_not(self, monitor: Monitor) -> None:
+        states = np.zeros(2, records.STATE)
+        states["id"], states["quaternion"][:, 3] = (1, 2), 1.0
+        states["position_stddev"] = -1.0, np.nan
+        monitor.step(SECOND // 10, states)
+        assert monitor.refused[Refusal.NON_FINITE] == 1 and "object 1" in monitor.last_refusal
+
     def test_unknown_removed_and_old(self, monitor: Monitor) -> None:
         monitor.remove(3)
         result = monitor.step(SECOND // 10, [1, 2, 3, 77], still(0, 0.9, 5, 5))

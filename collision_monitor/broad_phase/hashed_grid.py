@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from collision_monitor._jit import device, kernel
+from collision_monitor._jit import device, inlined, kernel
 
 LEVELS: Final = 128
 LEVEL_OFFSET: Final = 64
@@ -23,36 +23,46 @@ FARTHEST_CELL: Final = 2.0**62
 """Cell coordinates are clipped here, so that no position overflows an int64; clipped boxes share cells."""
 
 
-class HashedGrid(NamedTuple):
-    """Capacity N boxes, B buckets (a power of two). -1 ends a chain; level -1: the box is not in the grid."""
+BOX = np.dtype(
+    [
+        ("x", np.float64),  # centre (m)
+        ("y", np.float64),
+        ("z", np.float64),
+        ("hx", np.float64),  # half extents (m)
+        ("hy", np.float64),
+        ("hz", np.float64),
+        ("cell_x", np.int64),
+        ("cell_y", np.int64),
+        ("cell_z", np.int64),
+        ("level", np.int32),  # -1: the box is not in the grid
+        ("next", np.int32),  # in the bucket; -1 ends a chain
+        ("previous", np.int32),  # or -2 - bucket for the first
+        ("level_next", np.int32),  # all boxes of a level are chained too
+        ("level_previous", np.int32),  # -1 for the first
+    ],
+    align=True,
+)
+"""One box, all that a look at it reads side by side."""
 
-    head: Any  # (B,) int32: first box of the bucket
-    next: Any  # (N,) int32
-    previous: Any  # (N,) int32: box before, or -2 - bucket for the first
-    level: Any  # (N,) int32
-    cell: Any  # (N, 3) int64
-    centre: Any  # (N, 3) float64
-    half: Any  # (N, 3) float64: half extents
-    level_head: Any  # (LEVELS,) int32: all boxes of a level are chained too
-    level_next: Any  # (N,) int32
-    level_previous: Any  # (N,) int32: box before, or -1
+
+class HashedGrid(NamedTuple):
+    """Capacity N boxes, B buckets (a power of two)."""
+
+    box: Any  # (N,) BOX
+    head: Any  # (B,) int32: first box of the bucket, -1: none
+    level_head: Any  # (LEVELS,) int32
     level_count: Any  # (LEVELS,) int32
 
 
 def make_hashed_grid(capacity: int) -> HashedGrid:
     """An empty grid for box numbers 0 … capacity - 1."""
     buckets = 1 << max(4, (2 * capacity - 1).bit_length())
+    box = np.zeros(capacity, BOX)
+    box["level"] = -1
     return HashedGrid(
+        box=box,
         head=np.full(buckets, -1, np.int32),
-        next=np.full(capacity, -1, np.int32),
-        previous=np.full(capacity, -1, np.int32),
-        level=np.full(capacity, -1, np.int32),
-        cell=np.zeros((capacity, 3), np.int64),
-        centre=np.zeros((capacity, 3)),
-        half=np.zeros((capacity, 3)),
         level_head=np.full(LEVELS, -1, np.int32),
-        level_next=np.full(capacity, -1, np.int32),
-        level_previous=np.full(capacity, -1, np.int32),
         level_count=np.zeros(LEVELS, np.int32),
     )
 
@@ -71,7 +81,7 @@ def _coordinate(x, cell):
     return np.int64(min(max(np.floor(x / cell), -FARTHEST_CELL), FARTHEST_CELL))
 
 
-@device
+@inlined
 def _bucket(level, x, y, z, mask):
     h = np.uint64(x) * np.uint64(0x9E3779B97F4A7C15)
     h = (h ^ (h >> np.uint64(29)) ^ np.uint64(y)) * np.uint64(0xBF58476D1CE4E5B9)
@@ -83,61 +93,54 @@ def _bucket(level, x, y, z, mask):
 @device
 def remove_box(grid, i):
     """Take box i out; nothing happens where it is not in."""
-    level = grid.level[i]
-    if level < 0:
+    box = grid.box[i]
+    if box.level < 0:
         return
-    before, after = grid.previous[i], grid.next[i]
-    if before < -1:
-        grid.head[-2 - before] = after
+    if box.previous < -1:
+        grid.head[-2 - box.previous] = box.next
     else:
-        grid.next[before] = after
-    if after >= 0:
-        grid.previous[after] = before
-    before, after = grid.level_previous[i], grid.level_next[i]
-    if before < 0:
-        grid.level_head[level] = after
+        grid.box[box.previous].next = box.next
+    if box.next >= 0:
+        grid.box[box.next].previous = box.previous
+    if box.level_previous < 0:
+        grid.level_head[box.level] = box.level_next
     else:
-        grid.level_next[before] = after
-    if after >= 0:
-        grid.level_previous[after] = before
-    grid.level_count[level] -= 1
-    grid.level[i] = -1
+        grid.box[box.level_previous].level_next = box.level_next
+    if box.level_next >= 0:
+        grid.box[box.level_next].level_previous = box.level_previous
+    grid.level_count[box.level] -= 1
+    box.level = -1
 
 
 @device
 def put_box(grid, i, cx, cy, cz, hx, hy, hz):
     """Put box i (centre, half extents; m) in, or move it there."""
     remove_box(grid, i)
+    box = grid.box[i]
     level = _level_of(2.0 * max(hx, hy, hz))
     size = 2.0 ** (level - LEVEL_OFFSET)
     x, y, z = _coordinate(cx, size), _coordinate(cy, size), _coordinate(cz, size)
     bucket = _bucket(level, x, y, z, grid.head.size - 1)
-    grid.level[i] = level
-    grid.cell[i, 0], grid.cell[i, 1], grid.cell[i, 2] = x, y, z
-    grid.centre[i, 0], grid.centre[i, 1], grid.centre[i, 2] = cx, cy, cz
-    grid.half[i, 0], grid.half[i, 1], grid.half[i, 2] = hx, hy, hz
-    first = grid.head[bucket]
-    grid.next[i] = first
-    grid.previous[i] = -2 - bucket
-    if first >= 0:
-        grid.previous[first] = i
+    box.level = level
+    box.cell_x, box.cell_y, box.cell_z = x, y, z
+    box.x, box.y, box.z = cx, cy, cz
+    box.hx, box.hy, box.hz = hx, hy, hz
+    box.next = grid.head[bucket]
+    box.previous = -2 - bucket
+    if box.next >= 0:
+        grid.box[box.next].previous = i
     grid.head[bucket] = i
-    first = grid.level_head[level]
-    grid.level_next[i] = first
-    grid.level_previous[i] = -1
-    if first >= 0:
-        grid.level_previous[first] = i
+    box.level_next = grid.level_head[level]
+    box.level_previous = -1
+    if box.level_next >= 0:
+        grid.box[box.level_next].level_previous = i
     grid.level_head[level] = i
     grid.level_count[level] += 1
 
 
-@device
-def _overlap(grid, i, j):
-    return (
-        abs(grid.centre[i, 0] - grid.centre[j, 0]) <= grid.half[i, 0] + grid.half[j, 0]
-        and abs(grid.centre[i, 1] - grid.centre[j, 1]) <= grid.half[i, 1] + grid.half[j, 1]
-        and abs(grid.centre[i, 2] - grid.centre[j, 2]) <= grid.half[i, 2] + grid.half[j, 2]
-    )
+@inlined
+def _overlap(a, b):
+    return abs(a.x - b.x) <= a.hx + b.hx and abs(a.y - b.y) <= a.hy + b.hy and abs(a.z - b.z) <= a.hz + b.hz
 
 
 @device
@@ -147,6 +150,7 @@ def query_box(grid, i, found):
     n can be larger than found.size: then the rest was counted but not written.
     """
     n = 0
+    box = grid.box[i]
     for level in range(LEVELS):
         count = grid.level_count[level]
         if count == 0:
@@ -154,40 +158,38 @@ def query_box(grid, i, found):
         size = 2.0 ** (level - LEVEL_OFFSET)
         # a box of this level reaches at most half a cell from its centre; the outermost level holds any size
         reach = 0.5 * size if level < LEVELS - 1 else np.inf
-        x0 = np.floor((grid.centre[i, 0] - grid.half[i, 0] - reach) / size)
-        x1 = np.floor((grid.centre[i, 0] + grid.half[i, 0] + reach) / size)
-        y0 = np.floor((grid.centre[i, 1] - grid.half[i, 1] - reach) / size)
-        y1 = np.floor((grid.centre[i, 1] + grid.half[i, 1] + reach) / size)
-        z0 = np.floor((grid.centre[i, 2] - grid.half[i, 2] - reach) / size)
-        z1 = np.floor((grid.centre[i, 2] + grid.half[i, 2] + reach) / size)
+        x0, x1 = np.floor((box.x - box.hx - reach) / size), np.floor((box.x + box.hx + reach) / size)
+        y0, y1 = np.floor((box.y - box.hy - reach) / size), np.floor((box.y + box.hy + reach) / size)
+        z0, z1 = np.floor((box.z - box.hz - reach) / size), np.floor((box.z + box.hz + reach) / size)
         cells = (x1 - x0 + 1.0) * (y1 - y0 + 1.0) * (z1 - z0 + 1.0)
         outermost = max(abs(x0), abs(x1), abs(y0), abs(y1), abs(z0), abs(z1))
         if not (cells <= 2.0 * count and outermost < FARTHEST_CELL):
             j = grid.level_head[level]
             while j >= 0:
-                if j != i and _overlap(grid, i, j):
+                if j != i and _overlap(box, grid.box[j]):
                     if n < found.size:
                         found[n] = j
                     n += 1
-                j = grid.level_next[j]
+                j = grid.box[j].level_next
             continue
         for x in range(np.int64(x0), np.int64(x1) + 1):
             for y in range(np.int64(y0), np.int64(y1) + 1):
                 for z in range(np.int64(z0), np.int64(z1) + 1):
                     j = grid.head[_bucket(level, x, y, z, grid.head.size - 1)]
                     while j >= 0:
+                        other = grid.box[j]
                         if (
-                            j != i
-                            and grid.level[j] == level
-                            and grid.cell[j, 0] == x
-                            and grid.cell[j, 1] == y
-                            and grid.cell[j, 2] == z
-                            and _overlap(grid, i, j)
+                            _overlap(box, other)
+                            and other.cell_x == x
+                            and other.cell_y == y
+                            and other.cell_z == z
+                            and other.level == level
+                            and j != i
                         ):
                             if n < found.size:
                                 found[n] = j
                             n += 1
-                        j = grid.next[j]
+                        j = other.next
     return n
 
 
@@ -212,7 +214,7 @@ def query_boxes(grid, which, pairs):
 
     More than P: call again with a larger array.
     """
-    found = np.empty(grid.next.size, np.int32)
+    found = np.empty(grid.box.size, np.int32)
     n = 0
     for k in range(which.size):
         i = which[k]

@@ -20,13 +20,12 @@ def _allowed(allowed, id_a, id_b):
 
 
 @kernel
-def find_candidates(bodies, grid, which, is_new, allowed, pairs):
-    """Pairs of each body in `which` (M,) with all it could meet, each pair once, into pairs (P, 2).
+def find_partners(grid, which, is_new, pairs):
+    """Pairs of each body in `which` (M,) with all whose swept box meets its own, each pair once, into pairs (P, 2).
 
-    is_new (N,) bool marks the bodies in `which`. Static pairs, groups that ignore each other and allowed pairs are
-    left out. Returns how many there are; more than P: call again with a larger array.
+    is_new (N,) bool marks the bodies in `which`. Returns how many there are; more than P: call again with more room.
     """
-    found = np.empty(bodies.used.size, np.int32)
+    found = np.empty(grid.box.size, np.int32)
     n = 0
     for k in range(which.size):
         i = which[k]
@@ -34,16 +33,30 @@ def find_candidates(bodies, grid, which, is_new, allowed, pairs):
             j = found[m]
             if is_new[j] and j < i:
                 continue
-            if bodies.static[i] and bodies.static[j]:
-                continue
-            if (bodies.group[i] & bodies.mask[j]) == 0 or (bodies.group[j] & bodies.mask[i]) == 0:
-                continue
-            if _allowed(allowed, bodies.motion[i].id, bodies.motion[j].id):
-                continue
             if n < pairs.shape[0]:
                 pairs[n, 0] = i
                 pairs[n, 1] = j
             n += 1
+    return n
+
+
+@kernel
+def keep_checked(bodies, allowed, pairs):
+    """Move the pairs (P, 2) that are checked to the front; returns how many.
+
+    Static pairs, groups that ignore each other and allowed pairs are left out.
+    """
+    n = 0
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        if bodies.static[i] and bodies.static[j]:
+            continue
+        if (bodies.group[i] & bodies.mask[j]) == 0 or (bodies.group[j] & bodies.mask[i]) == 0:
+            continue
+        if _allowed(allowed, bodies.motion[i].id, bodies.motion[j].id):
+            continue
+        pairs[n, 0], pairs[n, 1] = i, j
+        n += 1
     return n
 
 

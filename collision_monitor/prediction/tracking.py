@@ -49,9 +49,10 @@ def take_states(bodies, slots, numbers, flags, time, verdicts):
             continue
         known_twist = (flags[k] & _TWIST_UNKNOWN) == 0
         usable = True
-        for c in range(STATE_NUMBERS):
-            if c < 7 or (c < 13 and known_twist):
-                usable &= abs(numbers[k, c]) <= LARGEST_INPUT
+        for c in range(13 if known_twist else 7):
+            usable &= abs(numbers[k, c]) <= LARGEST_INPUT
+        for c in range(16, STATE_NUMBERS):  # standard deviations; NaN: unknown
+            usable &= not (numbers[k, c] < 0.0 or numbers[k, c] > LARGEST_INPUT)
         if not usable:
             verdicts[k] = NON_FINITE
             continue
