@@ -78,5 +78,7 @@ def inlined(function: F) -> F:
 
 def parallel_kernel(function: F) -> F:
     """Compile a kernel whose `prange` loops run on all threads; each iteration must write places of its own."""
-    compiled: F = numba.njit(parallel=True, **_OPTIONS)(function)
+    # only what is written as a loop: numba would also move and merge loops across calls whose side effects it misses
+    others = ("comprehension", "reduction", "inplace_binop", "setitem", "numpy", "stencil", "fusion")
+    compiled: F = numba.njit(parallel=dict.fromkeys(others, False), **_OPTIONS)(function)
     return compiled
