@@ -1,0 +1,68 @@
+"""The door of the pure geometry: finite arrays of points of the expected shape, or an error that says what was."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from collision_monitor.errors import InputError, ShapeError
+
+Array = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+Signs = NDArray[np.int8]
+
+
+def coordinates(value: ArrayLike, what: str, *widths: int) -> Array:
+    """Points or vectors (..., width), width one of `widths` (2 or 3 unless told), at least one. Raises InputError."""
+    widths = widths or (2, 3)
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{what}: expected numbers, got {value!r:.100}") from None
+    if array.ndim == 0 or array.shape[-1] not in widths or array.size == 0:
+        shapes = " or ".join(f"(..., {width})" for width in widths)
+        raise InputError(f"{what}: expected at least one point, shape {shapes}, got shape {array.shape}")
+    if not np.isfinite(array).all():
+        raise InputError(f"{what}: expected finite coordinates, got NaN or infinity")
+    return array
+
+
+def numbers(value: ArrayLike, what: str, least: float = -np.inf) -> Array:
+    """Finite numbers (...) of at least `least`. Raises InputError."""
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{what}: expected numbers, got {value!r:.100}") from None
+    if not np.isfinite(array).all() or (array < least).any():
+        bound = f" >= {least:g}" if least > -np.inf else ""
+        raise InputError(f"{what}: expected finite numbers{bound}, got {value!r:.100}")
+    return array
+
+
+def point_set(value: ArrayLike, what: str, *widths: int, least: int = 1) -> Array:
+    """A set of at least `least` points (n, width). Raises ShapeError."""
+    try:
+        points = coordinates(value, what, *widths)
+    except InputError as error:
+        raise ShapeError(str(error)) from None
+    if points.ndim != 2 or len(points) < least:
+        raise ShapeError(f"{what}: expected at least {least} points, shape (n, {points.shape[-1]}), got {points.shape}")
+    return points
+
+
+def triangles(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> tuple[Array, Indices]:
+    """A triangle mesh: vertices (n, 3), faces (m, 3) of vertex indices, m >= 1. Raises ShapeError."""
+    points = point_set(vertices, f"{what} vertices", 3, least=3)
+    try:
+        indices = np.asarray(faces)
+    except (TypeError, ValueError):
+        raise ShapeError(f"{what} faces: expected integers of shape (m, 3), got {type(faces).__name__}") from None
+    if indices.ndim != 2 or indices.shape[1] != 3 or len(indices) == 0 or not np.issubdtype(indices.dtype, np.integer):
+        got = f"{indices.dtype} {indices.shape}"
+        raise ShapeError(f"{what} faces: expected integers of shape (m, 3), m >= 1, got {got}")
+    if indices.min() < 0 or indices.max() >= len(points):
+        raise ShapeError(
+            f"{what} faces: expected indices from 0 to {len(points) - 1}, got {indices.min()} to {indices.max()}"
+        )
+    return points, indices.astype(np.int64)
