@@ -1,0 +1,123 @@
+"""Four bounding spheres of a set of points, from the quickest to the smallest.
+
+(Slides "Bounding sphere": the centre is half-way between the maximally separated pair, or the centroid; then point by
+point the sphere is altered to fit.)
+All of them work on points (n, 2 or 3) and end with the distance of the farthest point, rounded up.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import ConvexHull as Qhull
+from scipy.spatial import QhullError
+from scipy.spatial.distance import cdist
+
+from collision_monitor.geometry.bounding_volumes import BoundingSphere
+from collision_monitor.geometry.coordinates import Array, point_set
+from collision_monitor.tolerances import EPSILON
+
+OUTSIDE: Final = 1e-12
+"""A point farther out than this part of the radius makes the minimal sphere grow.
+Smaller: where five or more points are on the sphere, round-off takes them in turns. Larger: the sphere is larger than
+the smallest by as much."""
+
+
+def sphere_from_centroid(points: ArrayLike) -> BoundingSphere:
+    """Centre at the mean of the points. O(n); up to twice the smallest radius where points crowd at one end."""
+    points = point_set(points, "points")
+    return _around(points, points[0] + (points - points[0]).mean(axis=0))
+
+
+def sphere_from_widest_pair(points: ArrayLike) -> BoundingSphere:
+    """Centre half-way between the two points farthest apart. O(h²) for h points on the hull."""
+    points = point_set(points, "points")
+    outer = _outer(points)
+    offset = outer - outer[0]
+    # row by row: the whole table of distances would not fit into memory for large sets
+    widest, pair = -1.0, (0, 0)
+    for first in range(0, len(outer), 256):
+        apart = cdist(offset[first : first + 256], offset)
+        i, j = np.unravel_index(apart.argmax(), apart.shape)
+        if apart[i, j] > widest:
+            widest, pair = float(apart[i, j]), (first + int(i), int(j))
+    return _around(points, 0.5 * outer[pair[0]] + 0.5 * outer[pair[1]])
+
+
+def sphere_grown(points: ArrayLike) -> BoundingSphere:
+    """Grown point by point from a wide pair: a point outside moves and grows the sphere just so far as to reach it.
+
+    The pair is the point farthest from the first one, and the one farthest from that.
+    O(n); about 5 % larger than the smallest. Depends on the points' order. (Ritter, An efficient bounding sphere, 1990)
+    """
+    points = point_set(points, "points")
+    p = points[np.linalg.norm(points - points[0], axis=1).argmax()]
+    q = points[np.linalg.norm(points - p, axis=1).argmax()]
+    center, radius = 0.5 * p + 0.5 * q, 0.5 * float(np.linalg.norm(q - p))
+    k = 0
+    while k < len(points):
+        distance = np.linalg.norm(points[k:] - center, axis=1)
+        outside = np.flatnonzero(distance > radius)
+        if not len(outside):
+            break
+        k += int(outside[0])
+        away = float(distance[outside[0]])
+        radius, shift = 0.5 * (radius + away), 0.5 * (away - radius)
+        center = center + shift / away * (points[k] - center)
+        k += 1
+    return _around(points, center)
+
+
+def minimal_sphere(points: ArrayLike) -> BoundingSphere:
+    """The smallest sphere, to about 1e-12 of its radius. Expected O(n). (Welzl, Smallest enclosing disks, 1991)"""
+    points = point_set(points, "points")
+    outer = np.unique(_outer(points), axis=0)
+    base = outer.mean(axis=0)
+    size = float(np.abs(outer - base).max()) or 1.0
+    # a random order makes the expected time linear; a fixed seed makes the answer reproducible
+    shuffled = np.random.default_rng(0).permutation((outer - base) / size)
+    center, _ = _smallest(shuffled, np.zeros((0, points.shape[1])))
+    return _around(points, base + size * center)
+
+
+def _smallest(points: Array, touching: Array) -> tuple[Array, float]:
+    """Centre and radius of the smallest sphere around points that has the points of `touching` on its surface."""
+    center, radius = _through(touching) if len(touching) else (points[0], 0.0)
+    if len(touching) == points.shape[1] + 1:
+        return center, radius
+    k = 0
+    while k < len(points):
+        distance = np.linalg.norm(points[k:] - center, axis=1)
+        outside = np.flatnonzero(distance > radius * (1 + OUTSIDE))
+        if not len(outside):
+            break
+        k += int(outside[0])
+        # a point outside the smallest sphere of those before it is on the surface of the next one
+        center, radius = _smallest(points[:k], np.vstack([touching, points[k]]))
+        k += 1
+    return center, radius
+
+
+def _through(touching: Array) -> tuple[Array, float]:
+    """Centre and radius of the smallest sphere through up to 3 points in the plane, 4 in space."""
+    edges = touching[1:] - touching[0]
+    weights = np.linalg.lstsq(2 * edges @ edges.T, (edges * edges).sum(axis=1), rcond=None)[0]
+    offset = weights @ edges
+    return touching[0] + offset, float(np.linalg.norm(offset))
+
+
+def _outer(points: Array) -> Array:
+    """The hull's corners, on which the widest pair and the smallest sphere depend; all points where they are flat."""
+    if len(points) <= 64:
+        return points
+    try:
+        return np.asarray(points[np.sort(Qhull(points).vertices)])
+    except QhullError:
+        return points
+
+
+def _around(points: Array, center: Array) -> BoundingSphere:
+    distance = float(np.linalg.norm(points - center, axis=1).max())
+    return BoundingSphere(center, np.asarray(distance * (1 + 4 * EPSILON)))

@@ -1,0 +1,117 @@
+"""Oriented bounding boxes of a set of points: along the principal axes, and of minimum volume.
+
+(Slides "OBB – oriented bounding boxes", "Oriented bounding box")
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import ConvexHull as Qhull
+from scipy.spatial import QhullError
+
+from collision_monitor.errors import ShapeError
+from collision_monitor.geometry.bounding_volumes import Obb, convex_hull
+from collision_monitor.geometry.coordinates import Array, point_set
+from collision_monitor.tolerances import EPSILON
+
+EDGE_DIRECTIONS: Final = 32
+"""Up to this many different edge directions of the hull, the normals across each two of them are tried too (496).
+Larger: seconds for hulls of hundreds of corners, to gain a percent. Smaller: a tetrahedron's box is twice too large."""
+
+DISTINCT: Final = 1e-9
+"""Directions closer than this are one."""
+
+
+def obb_pca(points: ArrayLike) -> Obb:
+    """Box along the eigenvectors of the points' covariance (n, 3). O(n); loose where the points crowd or form a cube.
+
+    (Gottschalk, Lin and Manocha, OBBTree, 1996)
+    """
+    points = point_set(points, "points", 3)
+    offset = points - points.mean(axis=0)
+    _, axes = np.linalg.eigh(offset.T @ offset)
+    return _along(points, axes)
+
+
+def obb_minimum_volume(points: ArrayLike) -> Obb:
+    """The smallest box found by rotating boxes that lie flush with the hull of points (n, 3).
+
+    A face of the box is laid on each face of the hull, and on each plane along two hull edges where there are few; the
+    box is then turned about that face's normal until a side lies along an edge, which is the best turn (rotating
+    calipers). Last, this is repeated about the winner's own axes until nothing is gained. The true minimum has two
+    faces flush with edges (O'Rourke, 1985), which this finds in most cases but does not prove; never larger than the
+    box by PCA or the axis-aligned one. Points in one plane fall back to the best turn about its normal.
+    """
+    points = point_set(points, "points", 3)
+    try:
+        hull = convex_hull(points)
+    except ShapeError:
+        return _flat(points)
+    vertices = hull.vertices - hull.vertices.mean(axis=0)
+    a, b, c = vertices[hull.faces.T]
+    edges = _distinct(np.concatenate([b - a, c - b, a - c]))
+    normals = _distinct(np.cross(b - a, c - a))
+    if len(edges) <= EDGE_DIRECTIONS:
+        i, j = np.triu_indices(len(edges), 1)
+        normals = _distinct(np.concatenate([normals, np.cross(edges[i], edges[j])]))
+    candidates = [_turned(vertices, edges, normal) for normal in normals]
+    candidates += [_measured(vertices, obb_pca(points).rotation), _measured(vertices, np.eye(3))]
+    volume, axes = min(candidates, key=lambda candidate: candidate[0])
+    while True:
+        turned = min((_turned(vertices, edges, axis) for axis in axes.T), key=lambda candidate: candidate[0])
+        if turned[0] >= volume * (1 - 1e-12):
+            return _along(points, axes)
+        volume, axes = turned
+
+
+def _flat(points: Array) -> Obb:
+    """The box of points in one plane, turned about its normal; of points on one line, along it."""
+    axes = obb_pca(points).rotation  # the eigenvalues ascend: the first axis is the normal
+    offset = points - points.mean(axis=0)
+    try:
+        a, b = np.moveaxis((offset @ axes[:, 1:])[Qhull(offset @ axes[:, 1:]).simplices], 1, 0)
+    except QhullError:
+        return _along(points, axes)
+    edges = _distinct((b - a) @ axes[:, 1:].T)
+    across = np.cross(axes[:, 0], edges)
+    best = int((np.ptp(edges @ offset.T, axis=1) * np.ptp(across @ offset.T, axis=1)).argmin())
+    return _along(points, np.column_stack([axes[:, 0], edges[best], across[best]]))
+
+
+def _turned(vertices: Array, edges: Array, normal: Array) -> tuple[float, Array]:
+    """Volume and axes of the smallest box with one axis along `normal` and a side along a projected edge."""
+    sides = edges - (edges @ normal)[:, None] * normal
+    length = np.linalg.norm(sides, axis=1, keepdims=True)
+    sides = sides[length[:, 0] > DISTINCT] / length[length[:, 0] > DISTINCT]
+    across = np.cross(normal, sides)
+    area = np.ptp(sides @ vertices.T, axis=1) * np.ptp(across @ vertices.T, axis=1)
+    best = int(area.argmin())
+    axes = np.column_stack([normal, sides[best], across[best]])
+    return float(area[best] * np.ptp(vertices @ normal)), axes
+
+
+def _measured(vertices: Array, axes: Array) -> tuple[float, Array]:
+    return float(np.ptp(vertices @ axes, axis=0).prod()), axes
+
+
+def _distinct(directions: Array) -> Array:
+    """Unit directions (m, 3), each once whichever its sign or length; those of no length are dropped."""
+    length = np.linalg.norm(directions, axis=1)
+    directions = directions[length > DISTINCT * length.max()] / length[length > DISTINCT * length.max(), None]
+    largest = np.take_along_axis(directions, np.abs(directions).argmax(axis=1)[:, None], axis=1)
+    directions = directions * np.sign(largest)
+    _, first = np.unique(np.round(directions / DISTINCT), axis=0, return_index=True)
+    return np.asarray(directions[np.sort(first)])
+
+
+def _along(points: Array, axes: Array) -> Obb:
+    """The box of points along orthonormal axes (3, 3, in columns), right-handed, its half extents rounded up."""
+    axes = axes * np.array([1.0, 1.0, np.copysign(1.0, np.linalg.det(axes))])
+    base = 0.5 * points.min(axis=0) + 0.5 * points.max(axis=0)
+    dots = (points - base) @ axes
+    center = base + axes @ (0.5 * (dots.min(axis=0) + dots.max(axis=0)))
+    half = np.abs((points - center) @ axes).max(axis=0)
+    return Obb(center, axes, half + 8 * EPSILON * half.max())
