@@ -1,0 +1,87 @@
+"""The ordered cascade for two polyhedra: bounding volumes, then vertices, then edges against faces.
+
+(Slide "Order tests according to computational complexity and power of detection")
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from collision_monitor.errors import ShapeError
+from collision_monitor.geometry.bounding_tests import aabb_aabb
+from collision_monitor.geometry.bounding_volumes import aabb
+from collision_monitor.geometry.coordinates import Array, Indices, triangles
+from collision_monitor.geometry.point_in_polygon import Location
+from collision_monitor.geometry.polyhedra import edge_face, is_closed, locate_in_polyhedron, mesh_edges
+
+
+class Stage(Enum):
+    """The stage that settled it."""
+
+    BOUNDING_VOLUMES = "bounding volumes"
+    VERTICES = "vertices"
+    EDGES_AND_FACES = "edges against faces"
+
+
+class Collision(NamedTuple):
+    """collides: touching counts. stage: where it was settled.
+
+    vertices_a, vertices_b (k,): those of A in B and of B in A. edges_a, edges_b (k, 3): of each crossing the edge's two
+    vertices and the other one's face. Only the stage that settled it fills its own.
+    """
+
+    collides: bool
+    stage: Stage
+    vertices_a: Indices
+    vertices_b: Indices
+    edges_a: Indices
+    edges_b: Indices
+
+
+def collide(vertices_a: ArrayLike, faces_a: ArrayLike, vertices_b: ArrayLike, faces_b: ArrayLike) -> Collision:
+    """Whether two closed meshes, convex or not, in one frame (vertices (n, 3), faces (m, 3)), have a point in common.
+
+    Each stage ends the test if it settles it: boxes apart, a vertex of one inside the other, an edge through a face.
+    The last one also finds crossed bars, which have no vertex in each other. Exact. Raises ShapeError.
+    """
+    points_a, corners_a = triangles(vertices_a, faces_a, "mesh A")
+    points_b, corners_b = triangles(vertices_b, faces_b, "mesh B")
+    for faces, name in ((corners_a, "A"), (corners_b, "B")):
+        if not is_closed(faces):
+            raise ShapeError(f"mesh {name}: expected a closed surface, got edges that belong to an odd number of faces")
+    none, no_edges = np.zeros(0, np.int64), np.zeros((0, 3), np.int64)
+    used_a, used_b = np.unique(corners_a), np.unique(corners_b)
+    box_a, box_b = aabb(points_a[used_a]), aabb(points_b[used_b])
+    if not aabb_aabb(box_a, box_b):
+        return Collision(False, Stage.BOUNDING_VOLUMES, none, none, no_edges, no_edges)
+    inside_b = _inside(points_a, used_a, points_b, corners_b)
+    inside_a = _inside(points_b, used_b, points_a, corners_a)
+    if len(inside_a) or len(inside_b):
+        return Collision(True, Stage.VERTICES, inside_b, inside_a, no_edges, no_edges)
+    edges_a = _crossings(points_a, mesh_edges(corners_a), points_b, corners_b)
+    edges_b = _crossings(points_b, mesh_edges(corners_b), points_a, corners_a)
+    return Collision(bool(len(edges_a) or len(edges_b)), Stage.EDGES_AND_FACES, none, none, edges_a, edges_b)
+
+
+def _inside(points: Array, used: Indices, vertices: Array, faces: Indices) -> Indices:
+    return used[locate_in_polyhedron(points[used], vertices, faces) != Location.OUTSIDE]
+
+
+def _crossings(points: Array, edges: Indices, vertices: Array, faces: Indices) -> Indices:
+    """Edges that meet faces, as rows (edge vertex, edge vertex, face)."""
+    p, q = points[edges[:, 0]], points[edges[:, 1]]
+    low, high = np.minimum(p, q), np.maximum(p, q)
+    face_low, face_high = vertices[faces].min(axis=1), vertices[faces].max(axis=1)
+    found = [np.zeros((0, 3), np.int64)]
+    for first in range(0, len(edges), 1024):  # so that the table of edges against faces stays small
+        some = slice(first, first + 1024)
+        i, j = np.nonzero(((low[some, None] <= face_high) & (face_low <= high[some, None])).all(axis=-1))
+        if len(i):
+            i = i + first
+            meets = edge_face(p[i], q[i], *vertices[faces[j].T]).meets
+            found.append(np.column_stack([edges[i[meets]], j[meets]]))
+    return np.concatenate(found)

@@ -1,0 +1,135 @@
+"""Which features of two polyhedra touch: the six pairs of the lecture, for "vertex 3 of A on face 7 of B".
+
+(Slide "Collision detection for rigid bodies": Vertex - Face, Vertex - Edge, Vertex - Vertex, Edge - Edge, Edge - Face,
+Face - Face)
+"""
+
+from __future__ import annotations
+
+from enum import Enum, IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from collision_monitor.errors import InputError
+from collision_monitor.geometry.coordinates import Array, Indices, coordinates, triangles
+from collision_monitor.geometry.points import closest_point_on_segment, distance
+from collision_monitor.tolerances import FEATURE_TIE
+
+
+class FeatureType(IntEnum):
+    """What of a polyhedron touches; the numbers of Contact.msg."""
+
+    VERTEX = 1
+    EDGE = 2
+    FACE = 3
+
+
+class FeaturePair(Enum):
+    """The six pairs, without regard to which body has which."""
+
+    VV = "vertex-vertex"
+    VE = "vertex-edge"
+    VF = "vertex-face"
+    EE = "edge-edge"
+    EF = "edge-face"
+    FF = "face-face"
+
+
+class Feature(NamedTuple):
+    """type; vertices: index of the vertex, the edge's two, or the face's three; face: index of the face, else -1."""
+
+    type: FeatureType
+    vertices: tuple[int, ...]
+    face: int
+
+    def __str__(self) -> str:
+        number = self.face if self.type is FeatureType.FACE else "-".join(map(str, self.vertices))
+        return f"{self.type.name.lower()} {number}"
+
+
+class FeatureContact(NamedTuple):
+    """The features of A and of B that touch."""
+
+    a: Feature
+    b: Feature
+
+    @property
+    def pair(self) -> FeaturePair:
+        """Which of the six pairs it is."""
+        return FeaturePair["".join(t.name[0] for t in sorted((self.a.type, self.b.type)))]
+
+    def __str__(self) -> str:
+        return f"{self.a} of A on {self.b} of B"
+
+
+def classify_contact(
+    point_a: ArrayLike,
+    vertices_a: ArrayLike,
+    faces_a: ArrayLike,
+    point_b: ArrayLike,
+    vertices_b: ArrayLike,
+    faces_b: ArrayLike,
+    normal: ArrayLike,
+) -> FeatureContact:
+    """The features at the witness points (3,) of two meshes in one frame, for a contact normal (3,) from A to B."""
+    normal = coordinates(normal, "normal", 3)
+    return FeatureContact(
+        feature_at(point_a, normal, vertices_a, faces_a), feature_at(point_b, -normal, vertices_b, faces_b)
+    )
+
+
+def feature_at(
+    point: ArrayLike, normal: ArrayLike, vertices: ArrayLike, faces: ArrayLike, tolerance: float = FEATURE_TIE
+) -> Feature:
+    """The largest feature of a mesh that touches as a whole at a surface point (3,), for a contact normal (3,).
+
+    A face at the point touches as a whole where it faces along the normal, an edge where it lies across it. If none
+    does, it is the vertex at the point; and where there is none either, what the point is on. The lowest index wins.
+    `tolerance`: part of the mesh's size. Raises InputError where the point is off the surface.
+    """
+    vertices, faces = triangles(vertices, faces)
+    point, normal = coordinates(point, "point", 3), coordinates(normal, "normal", 3)
+    reach = tolerance * float(np.ptp(vertices, axis=0).max())
+    normal = normal / np.linalg.norm(normal)
+    height = (vertices - point) @ normal
+    corner = vertices[faces]
+    near = np.flatnonzero(_distance_to_triangles(point, *np.moveaxis(corner, 1, 0)) <= reach)
+    if not len(near):
+        raise InputError(f"contact: expected a point on the mesh's surface, got {point.tolist()}")
+    touching = np.abs(height) <= reach
+    upward = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) @ normal > 0.0
+    whole = near[touching[faces[near]].all(axis=1) & upward[near]]
+    if len(whole):
+        return _face(faces, int(whole[0]))
+    edges = np.unique(np.sort(faces[near][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+    on_edge = distance(point, closest_point_on_segment(point, *np.moveaxis(vertices[edges], 1, 0))[0]) <= reach
+    across = edges[on_edge & touching[edges].all(axis=1)]
+    if len(across):
+        return Feature(FeatureType.EDGE, (int(across[0, 0]), int(across[0, 1])), -1)
+    corners = np.unique(faces[near])
+    at = corners[distance(point, vertices[corners]) <= reach]
+    if len(at):
+        return Feature(FeatureType.VERTEX, (int(at[0]),), -1)
+    if on_edge.any():
+        edge = edges[np.flatnonzero(on_edge)[0]]
+        return Feature(FeatureType.EDGE, (int(edge[0]), int(edge[1])), -1)
+    return _face(faces, int(near[0]))
+
+
+def _face(faces: Indices, index: int) -> Feature:
+    i, j, k = (int(vertex) for vertex in faces[index])
+    return Feature(FeatureType.FACE, (i, j, k), index)
+
+
+def _distance_to_triangles(point: Array, a: Array, b: Array, c: Array) -> Array:
+    """Distances (m,) of a point (3,) to triangles (m, 3): to the plane where the foot is inside, else to the sides."""
+    sides = ((a, b), (b, c), (c, a))
+    to_sides = np.min([distance(point, closest_point_on_segment(point, p, q)[0]) for p, q in sides], axis=0)
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal, axis=1)
+    above = np.all([(np.cross(q - p, point - p) * normal).sum(axis=1) >= 0.0 for p, q in sides], axis=0)
+    inside = above & (length > 0.0)
+    height = np.abs(((point - a) * normal).sum(axis=1)) / np.where(length > 0.0, length, 1.0)
+    return np.where(inside, height, to_sides)

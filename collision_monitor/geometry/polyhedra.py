@@ -1,0 +1,159 @@
+"""Polyhedra as closed triangle meshes: is a point inside, does an edge cross a face. All decisions are exact.
+
+A mesh is vertices (n, 3) in m and faces (m, 3) of vertex indices, counter-clockwise from outside.
+(Slides "Collision detection: polyhedra")
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from collision_monitor.errors import InputError, ShapeError
+from collision_monitor.geometry.coordinates import Array, Booleans, Indices, Signs, coordinates, triangles
+from collision_monitor.geometry.lines import segments_intersect
+from collision_monitor.geometry.orientation import orient2d, orient3d
+from collision_monitor.geometry.point_in_polygon import Location
+
+
+def mesh_edges(faces: ArrayLike) -> Indices:
+    """The edges (k, 2) of a mesh's faces (m, 3), each once, smaller vertex index first, sorted."""
+    faces = np.asarray(faces, dtype=np.int64)
+    return np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+
+
+def is_closed(faces: ArrayLike) -> bool:
+    """Whether faces (m, 3) enclose a volume without a gap: each edge belongs to an even number of them."""
+    faces = np.asarray(faces, dtype=np.int64)
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    return bool((np.unique(edges, axis=0, return_counts=True)[1] % 2 == 0).all())
+
+
+def locate_in_convex_polyhedron(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> Signs:
+    """Location (...) of points (..., 3) in a convex polyhedron: on the inner side of the planes of all faces.
+
+    (Slide "A vertex is inside a convex polyhedron if it's on the 'inside' side of all faces".) Flat ones are skipped.
+    """
+    p = coordinates(points, "points", 3)[..., None, :]
+    vertices, faces = triangles(vertices, faces)
+    a, b, c = (vertices[corner] for corner in faces.T)
+    return np.asarray(np.sign(-orient3d(a, b, c, p)[..., ~flat_triangles(a, b, c)]).min(axis=-1)).astype(np.int8)
+
+
+def locate_in_polyhedron(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> Signs:
+    """Location (...) of points (..., 3) in any closed polyhedron, by the parity of a ray towards +z.
+
+    (Slide "A vertex is inside a concave polyhedron if a semi-infinite ray from the vertex intersects an odd number of
+    faces".) A ray through an edge or a vertex, or along a face, is no special case: the ray is thought to be moved by
+    (e, e²) in x and y for an infinitely small e, which leaves none. A point on a face is found before, exactly.
+    Raises ShapeError for a mesh that is not closed.
+    """
+    points = coordinates(points, "points", 3)
+    vertices, faces = triangles(vertices, faces)
+    if not is_closed(faces):
+        raise ShapeError("mesh: expected a closed surface, got edges that belong to an odd number of faces")
+    a, b, c = (vertices[corner] for corner in faces.T)
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    p = points.reshape(-1, 3)
+    on_face, odd = np.zeros(len(p), bool), np.zeros(len(p), bool)
+    for first in range(0, len(p), 1024):  # so that the table of points against faces stays small
+        some = slice(first, first + 1024)
+        beside = (low[:, :2] <= p[some, None, :2]) & (p[some, None, :2] <= high[:, :2])
+        below = p[some, None, 2] <= high[:, 2]
+        i, j = np.nonzero(beside.all(axis=-1) & below)
+        q, corners = p[some][i], (a[j], b[j], c[j])
+        height = np.asarray(orient3d(*corners, q))
+        in_plane = height == 0.0
+        touching = np.zeros(len(i), bool)
+        touching[in_plane] = _in_flat_triangle(q[in_plane], *(corner[in_plane] for corner in corners))
+        turn = _perturbed_turn(q, *corners)
+        on_face[some] = np.bincount(i, touching, len(p[some])) > 0
+        # the ray meets the face where its point is behind the face that looks up, or before the one that looks down
+        odd[some] = np.bincount(i, turn * height < 0.0, len(p[some])) % 2 == 1
+    location = np.where(on_face, Location.BOUNDARY, np.where(odd, Location.INSIDE, Location.OUTSIDE))
+    return location.reshape(points.shape[:-1]).astype(np.int8)
+
+
+class EdgeFace(NamedTuple):
+    """meets (...): the edge and the face have a point in common; its t (...) and the point (..., 3), else NaN."""
+
+    meets: Booleans
+    t: Array
+    point: Array
+
+
+def edge_face(p: ArrayLike, q: ArrayLike, a: ArrayLike, b: ArrayLike, c: ArrayLike) -> EdgeFace:
+    """Where edges p, q meet triangles a, b, c (..., 3 each), ends and boundary included; whether they do is exact.
+
+    (Slide "Edge intersection face test": the edge's ends are on opposite sides of the face's plane, and the point where
+    the edge meets the plane is inside the face.) For an edge in the face's plane, t is that of an end inside, or NaN.
+    A triangle without area meets nothing: in a closed mesh its neighbours answer for it.
+    """
+    points = [coordinates(x, name, 3) for x, name in ((p, "p"), (q, "q"), (a, "a"), (b, "b"), (c, "c"))]
+    try:
+        p, q, a, b, c = np.broadcast_arrays(*points)
+    except ValueError:
+        raise InputError(f"expected shapes that broadcast, got {[point.shape for point in points]}") from None
+    shape = p.shape[:-1]
+    p, q, a, b, c = (point.reshape(-1, 3) for point in (p, q, a, b, c))
+    before, after = np.asarray(orient3d(a, b, c, p)), np.asarray(orient3d(a, b, c, q))
+    in_plane = (before == 0.0) & (after == 0.0)
+    meets = (np.sign(before) * np.sign(after) <= 0.0) & ~in_plane
+    # the line through p and q passes all three sides of the triangle on one hand
+    turns = np.zeros((3, len(p)))
+    k = np.flatnonzero(meets)
+    for side, (start, end) in enumerate(((a, b), (b, c), (c, a))):
+        turns[side, k] = orient3d(p[k], q[k], start[k], end[k])
+    meets &= (turns >= 0.0).all(axis=0) | (turns <= 0.0).all(axis=0)
+    t = np.where(meets, before / np.where(meets, before - after, 1.0), np.nan)
+    k = np.flatnonzero(in_plane)
+    k = k[~flat_triangles(a[k], b[k], c[k])]
+    if len(k):
+        meets[k], t[k] = _coplanar(*(x[k] for x in (p, q, a, b, c)))
+    point = np.where((t > 0.5)[:, None], q - (1 - t)[:, None] * (q - p), p + t[:, None] * (q - p))
+    return EdgeFace(meets.reshape(shape), t.reshape(shape), point.reshape((*shape, 3)))
+
+
+def flat_triangles(a: Array, b: Array, c: Array) -> Booleans:
+    """Whether triangles (..., 3) have no area, exactly: their shadows on all three coordinate planes have none."""
+    return np.asarray(np.all([orient2d(a[..., k], b[..., k], c[..., k]) == 0.0 for k in _PLANES], axis=0))
+
+
+_PLANES = ([0, 1], [1, 2], [2, 0])
+
+
+def _perturbed_turn(p: Array, a: Array, b: Array, c: Array) -> Array:
+    """1 where the triangle faces up and, seen from above, holds p moved by (e, e²); -1 where it faces down; else 0."""
+    signs = []
+    for start, end in ((a, b), (b, c), (c, a)):
+        sign = np.sign(orient2d(start[:, :2], end[:, :2], p[:, :2]))
+        along = np.sign(end - start)
+        # d/de of the determinant, then d/de²
+        sign = np.where(sign == 0.0, -along[:, 1], sign)
+        signs.append(np.where(sign == 0.0, along[:, 0], sign))
+    same = (signs[0] == signs[1]) & (signs[1] == signs[2])
+    return np.where(same, signs[0], 0.0)
+
+
+def _in_flat_triangle(p: Array, a: Array, b: Array, c: Array) -> Booleans:
+    """Whether p (m, 3), known to be in the plane of a, b, c (m, 3), is in the triangle: so are all its shadows."""
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    inside = ((low <= p) & (p <= high)).all(axis=1)
+    for k in _PLANES:
+        turns = [orient2d(start[:, k], end[:, k], p[:, k]) for start, end in ((a, b), (b, c), (c, a))]
+        inside &= np.all([turn >= 0.0 for turn in turns], axis=0) | np.all([turn <= 0.0 for turn in turns], axis=0)
+    return np.asarray(inside)
+
+
+def _coplanar(p: Array, q: Array, a: Array, b: Array, c: Array) -> tuple[Booleans, Array]:
+    """Whether edges p, q (m, 3) in the plane of triangles with an area meet them, and t of an end inside or NaN."""
+    p_inside, q_inside = _in_flat_triangle(p, a, b, c), _in_flat_triangle(q, a, b, c)
+    t = np.where(p_inside, 0.0, np.where(q_inside, 1.0, np.nan))
+    # two coplanar segments meet where their shadows do, on a coordinate plane that the triangle is not upright on
+    shadows = np.array([orient2d(a[:, k], b[:, k], c[:, k]) != 0.0 for k in _PLANES])
+    planes = np.array(_PLANES)[shadows.argmax(axis=0)]
+    p, q, a, b, c = (np.take_along_axis(x, planes, axis=1) for x in (p, q, a, b, c))
+    crosses = np.any([segments_intersect(p, q, start, end) for start, end in ((a, b), (b, c), (c, a))], axis=0)
+    return p_inside | q_inside | crosses, t
