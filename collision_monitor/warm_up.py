@@ -8,23 +8,28 @@ from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.monitor import Monitor
 
+OBJECTS = 70  # more than the arrays have room for at first: growing them is warmed up too
+
 
 def main() -> None:
     """Step a small scene through all that a step can do; the compiled kernels stay in the cache."""
     monitor = Monitor()
-    monitor.add(0, Box((10, 10, 1)), static=True, pose=Pose((0, 0, -0.5)))
-    for object_id in (1, 2, 3):
-        monitor.add(object_id, Sphere(0.5) if object_id == 1 else Box((1, 1, 1)))
-    poses = np.zeros((3, 7))
+    monitor.add(OBJECTS, Box((500, 10, 1)), static=True, pose=Pose((0, 0, -0.5)))
+    for object_id in range(OBJECTS):
+        monitor.add(object_id, Box((1, 1, 1)) if object_id % 2 else Sphere(0.5))
+    poses = np.zeros((OBJECTS, 7))
     poses[:, 6] = 1.0
+    poses[:, 0] = 0.9 * np.arange(OBJECTS)
     poses[:, 2] = 2.0
-    twists = np.zeros((3, 6))
+    twists = np.zeros((OBJECTS, 6))
     twists[:, 2] = -1.0
-    for step in range(4):
-        poses[:, 0] = (0.0, 0.8, 3.0 - step)
-        monitor.step(step * 1_000_000_000, [1, 2, 3], poses, twists)
+    twists[0] = (1.0, 0.0, -1.0, 0.5, 0.0, 0.0)
+    for step in range(20):
+        monitor.step(step * 100_000_000, np.arange(OBJECTS), poses, twists)
+        poses[:, :3] += 0.1 * twists[:, :3]
+        twists[step, :] *= -1.0  # one leaves its motion
     monitor.remove(1)
-    monitor.step(4_000_000_000, [2, 3], poses[1:], twists[1:])
+    monitor.step(3_000_000_000, np.arange(2, OBJECTS), poses[2:], twists[2:])
 
 
 if __name__ == "__main__":

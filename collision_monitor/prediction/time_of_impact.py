@@ -117,29 +117,32 @@ def _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvatu
 
 @inlined
 def _safe_advance(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, remaining):
-    """A time d in (0, remaining] up to which the gap along n stays positive; close to the last such time."""
-    high = remaining
-    f_high = _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, high)
-    if f_high >= 0.0:
-        return remaining
+    """A time d in (0, remaining] up to which the gap along n stays positive; close to the last such time.
+
+    The bound is looked at in turn from outside, where it is negative, and at the root of the chord, where it is not.
+    """
     low, f_low = 0.0, gap
-    for _ in range(5):
-        middle = low + (high - low) * (f_low / (f_low - f_high))  # root of the chord: below the concave bound
-        f = _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, middle)
-        if not middle > low:
-            break
-        drop = f_low - f
-        if drop > 0.0:
+    high, f_high = remaining, 0.0
+    d, outside = remaining, True
+    for _ in range(11):
+        f = _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, d)
+        if outside:
+            if f >= 0.0:
+                return d
+            high, f_high = d, f
+        else:
             # beyond the two points their line lies above the bound: its root is past the last safe time
-            far = middle + f * ((middle - low) / drop)
+            drop = f_low - f
+            far = d + f * ((d - low) / drop) if drop > 0.0 else high
+            low, f_low = d, f  # f may be a rounding below 0: half the tolerance is there for it
+            if f <= 0.05 * gap:
+                break
             if far < high:
-                high = far
-                f_high = _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, high)
-        low, f_low = middle, f  # f may be a rounding below 0: half the tolerance is there for it
-        if f <= 0.05 * gap or f_high >= 0.0:
+                d, outside = far, True
+                continue
+        d, outside = low + (high - low) * (f_low / (f_low - f_high)), False  # below the concave bound: safe
+        if not d > low:
             break
-    if f_high >= 0.0:
-        return high
     return low
 
 
@@ -161,8 +164,7 @@ def shape_impact(table, parts, A, B, a, b, begin, end, tube_0, tube_1, tolerance
 
     begin, end: seconds after the monitor's origin; the wanted gap is tube_0 + tube_1 (t - begin) (m).
     Returns (status, t, queries): no time in [begin, t) is within the wanted gap; at t it is within tolerance of it
-    (HIT), t is end (CLEAR), or the budget of distance queries ran out (UNRESOLVED). scratch.out[0]: the time in which
-    the gap would close at the rate it has at t, inf where it does not close.
+    (HIT), t is end (CLEAR), or the budget of distance queries ran out (UNRESOLVED).
     """
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
@@ -192,10 +194,6 @@ def shape_impact(table, parts, A, B, a, b, begin, end, tube_0, tube_1, tolerance
         h_b = support_value(table, b, R_b, -n[0], -n[1], -n[2])
         if gap <= tolerance:
             status = HIT
-            d = 1e-6 * (end - begin)
-            after = _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, 0.0, 0.0, d)
-            reach = max(gap, 0.0) + tolerance + 2.0 * (tube_0 + tube_1 * (t - begin))
-            out[0] = reach * d / -after if after < 0.0 else inf
             break
         # aim at half the tolerance, so that the last advance ends inside it
         d = _safe_advance(
@@ -204,14 +202,12 @@ def shape_impact(table, parts, A, B, a, b, begin, end, tube_0, tube_1, tolerance
         if d >= end - t:
             return CLEAR, end, query
         if t + d <= t:  # the resolution of the time is reached before the gap is
-            out[0] = inf
             break
         t += d
-        out[0] = inf
     return status, t, query
 
 
-@inlined
+@device
 def _contact_at(table, parts, A, B, a, b, t, scratch):
     """Contact of shape a in motion A with shape b in motion B at time t, into scratch.out; returns the signed distance.
 
@@ -248,13 +244,11 @@ def closing_speed(v, wa, wb, px, py, pz, out):
 
 
 @inlined
-def _touching_by(table, parts, A, B, a, b, t, guess, end, tube_0, tube_1, begin, margin, tolerance, scratch):
+def _touching_by(table, parts, A, B, a, b, t, end, tube_0, tube_1, begin, margin, tolerance, scratch):
     """A time in [t, end] at which they overlap by more than the tube, whatever the motions inside it; inf: none found.
 
-    Newton steps on the signed distance, the first one to t + guess. The contact there is left in scratch.out.
+    Newton steps on the signed distance. The contact at that time is left in scratch.out.
     """
-    if t + guess <= end:
-        t += guess
     for _ in range(12):
         distance = _contact_at(table, parts, A, B, a, b, t, scratch)
         excess = distance - margin + tube_0 + tube_1 * (t - begin)
@@ -299,7 +293,7 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
     event.method = CONSERVATIVE_ADVANCEMENT
     queries = 0
     stop = begin + last
-    lower, guess = inf, inf
+    lower = inf
     while a >= 0:
         b = bodies.first_shape[j]
         while b >= 0:
@@ -309,7 +303,7 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
             )  # fmt: skip
             queries += n
             if status != CLEAR and t < lower:
-                lower, guess = t, scratch.out[0]
+                lower = t
                 event.status = status
                 event.shape_i, event.shape_j = a, b
                 stop = t
@@ -318,7 +312,7 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
     if event.status == CLEAR:
         return queries
     a, b = event.shape_i, event.shape_j
-    sure = _touching_by(table, parts, A, B, a, b, lower, guess, end, tube_0, tube_1, begin, margin, tolerance, scratch)
+    sure = _touching_by(table, parts, A, B, a, b, lower, end, tube_0, tube_1, begin, margin, tolerance, scratch)
     if sure == inf:
         _contact_at(table, parts, A, B, a, b, lower, scratch)
     event.lower, event.upper = lower, sure
