@@ -383,6 +383,13 @@ def sort_pairs(pairs: Any, count: int, other: Any, begins: Any) -> None:
 
 
 @kernel
+def classify_bodies(size: Any, starts: Any, grid: Any) -> None:
+    """Put bodies with half extents `size` (N,) into classes once, for many frames."""
+    classify(size, starts, np.empty((_OCTAVES, 2), np.int64), np.empty(_OCTAVES), grid)
+    measure_classes(size, grid)
+
+
+@kernel
 def _box_pairs(centre: Any, half: Any, starts: Any, grid: Any, pairs: Any) -> int:
     """Pairs into pairs (P, 2), sorted unless there are more than P; returns how many there are."""
     n = centre.shape[0]

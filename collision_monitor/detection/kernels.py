@@ -1,0 +1,354 @@
+"""One frame of full detection: every pose is new, every pair that touches is found, nothing is carried over.
+
+The frame is cut into blocks of bodies, and each stage runs block by block, on one thread or on several: poses, cells,
+sort by cell (one thread), gather, search with the narrow phase, sort of the hits (one thread), output.
+Each pair is computed from its two poses alone and the hits are sorted: the answer's bytes do not depend on the blocks.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numba import prange
+
+from collision_monitor._jit import device, inlined, kernel, parallel_kernel
+from collision_monitor.broad_phase.dense_grid import (
+    CLASSES,
+    PAD,
+    STARTING,
+    Grid,
+    find_buckets,
+    gather_centres,
+    partners,
+    places,
+    plan_cells,
+    searches,
+    sort_by_cell,
+)
+from collision_monitor.geometry.shape_table import ShapeTable
+from collision_monitor.narrow_phase.answer import CONTACT_SIZE, WORK_SIZE
+from collision_monitor.narrow_phase.box_box import axis_direction, sat, touching_features
+from collision_monitor.narrow_phase.dispatch import contact_within
+from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact
+from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
+
+SPHERES, BOXES, ANY = 0, 1, 2
+"""Which narrow phase: only spheres, only boxes without margin, or the table of pair tests."""
+
+CHUNK: Final = 256
+"""Candidates that are collected before the narrow phase runs over them: both loops stay in the caches."""
+
+COLUMNS: Final = 14
+"""Of the output: signed distance, error bound, normal, point, point on A, point on B."""
+
+
+class Frame(NamedTuple):
+    """Memory of one detector for N bodies in B blocks; sorted: by cell, in the order of the grid's places."""
+
+    radius: Any  # (N,) float64: bounding radius with half the contact margin
+    bounds: Any  # (B, 6) float64: lower and upper corner of each block's positions
+    extent: Any  # (3, N + PAD) float64: sorted bounding radii in row 0
+    size: Any  # (N, 3) float64: sorted, half extents of boxes or the radius of spheres
+    rotation: Any  # (N, 3, 3) float64, sorted
+    found: Any  # (B, N + CHUNK + PAD) int32: places of candidates
+    owner: Any  # (B, N + CHUNK + PAD) int32: and of the bodies that they are candidates of
+    work: Any  # (B, WORK_SIZE) float64
+    begins: Any  # (N + 1,) int32: scratch of the final sort
+    hits: Any  # (B,) int64: contacts of each block
+    good: Any  # (B,) bool: whether all the input of the block was
+
+
+class Hits(NamedTuple):
+    """Contacts of a frame before they are sorted; grown when a frame has more."""
+
+    pair: Any  # (B, H + 1, 2) int32; the last place takes what does not fit
+    contact: Any  # (B, H + 1, CONTACT_SIZE) float64
+    order: Any  # (2, B * H) int32
+
+
+def make_frame(radius: Any, blocks: int) -> Frame:
+    """Memory for bodies with bounding radii (N,)."""
+    n = len(radius)
+    return Frame(
+        radius=radius,
+        bounds=np.zeros((blocks, 6)),
+        extent=np.zeros((3, n + PAD)),
+        size=np.zeros((n, 3)),
+        rotation=np.zeros((n, 3, 3)),
+        found=np.zeros((blocks, n + CHUNK + PAD), np.int32),
+        owner=np.zeros((blocks, n + CHUNK + PAD), np.int32),
+        work=np.zeros((blocks, WORK_SIZE)),
+        begins=np.zeros(n + 1, np.int32),
+        hits=np.zeros(blocks, np.int64),
+        good=np.zeros(blocks, np.bool_),
+    )
+
+
+def make_hits(blocks: int, capacity: int) -> Hits:
+    """Room for `capacity` contacts in each block."""
+    return Hits(
+        pair=np.zeros((blocks, capacity + 1, 2), np.int32),
+        contact=np.zeros((blocks, capacity + 1, CONTACT_SIZE)),
+        order=np.zeros((2, blocks * capacity), np.int32),
+    )
+
+
+# A stage does its block b of n things and keeps what it found in frame[b]: an assignment to an element of a tuple's
+# array is lost when it stands in the parallel loop itself.
+
+
+@inlined
+def _block(b: int, frame: Any, n: int) -> Any:
+    """Begin and end of block b of n things."""
+    blocks = frame.bounds.shape[0]
+    return b * n // blocks, (b + 1) * n // blocks
+
+
+@device
+def _bounds(positions: Any, frame: Any, b: int) -> None:
+    """Corners of the positions, and whether all are finite and within LARGEST_INPUT."""
+    begin, end = _block(b, frame, positions.shape[0])
+    lx = ly = lz = np.inf
+    hx = hy = hz = -np.inf
+    good = True
+    for i in range(begin, end):
+        x, y, z = positions[i, 0], positions[i, 1], positions[i, 2]
+        good &= (abs(x) <= LARGEST_INPUT) & (abs(y) <= LARGEST_INPUT) & (abs(z) <= LARGEST_INPUT)
+        lx, ly, lz = min(lx, x), min(ly, y), min(lz, z)
+        hx, hy, hz = max(hx, x), max(hy, y), max(hz, z)
+    out = frame.bounds[b]
+    out[0], out[1], out[2], out[3], out[4], out[5] = lx, ly, lz, hx, hy, hz
+    frame.good[b] = good
+
+
+@device
+def _cells(grid: Any, frame: Any) -> Any:
+    """Plan the cells within the bounds of all blocks."""
+    lx, ly, lz = frame.bounds[0, 0], frame.bounds[0, 1], frame.bounds[0, 2]
+    hx, hy, hz = frame.bounds[0, 3], frame.bounds[0, 4], frame.bounds[0, 5]
+    for b in range(1, frame.bounds.shape[0]):
+        lx, ly, lz = min(lx, frame.bounds[b, 0]), min(ly, frame.bounds[b, 1]), min(lz, frame.bounds[b, 2])
+        hx, hy, hz = max(hx, frame.bounds[b, 3]), max(hy, frame.bounds[b, 4]), max(hz, frame.bounds[b, 5])
+    return plan_cells(lx, ly, lz, hx, hy, hz, grid)
+
+
+@device
+def _buckets(positions: Any, grid: Any, frame: Any, b: int) -> None:
+    begin, end = _block(b, frame, positions.shape[0])
+    find_buckets(positions, grid, begin, end)
+
+
+@device
+def _gather(table: Any, path: int, positions: Any, quaternions: Any, grid: Any, frame: Any, b: int) -> None:
+    """What the search reads, in the order of the cells, and whether all quaternions are of unit length."""
+    begin, end = _block(b, frame, positions.shape[0])
+    gather_centres(positions, grid, begin, end)
+    good = True
+    for p in range(begin, end):
+        i = grid.order[p]
+        frame.extent[0, p] = frame.radius[i]
+        x, y, z, w = quaternions[i, 0], quaternions[i, 1], quaternions[i, 2], quaternions[i, 3]
+        squared = x * x + y * y + z * z + w * w
+        good &= abs(sqrt(squared) - 1.0) <= UNIT_QUATERNION
+        if path == SPHERES:
+            frame.size[p, 0] = table.size[i, 0] + table.margin[i]
+            continue
+        if path == BOXES:
+            frame.size[p, 0], frame.size[p, 1], frame.size[p, 2] = table.size[i, 0], table.size[i, 1], table.size[i, 2]
+        s = 2.0 / squared
+        R = frame.rotation[p]
+        R[0, 0] = 1.0 - s * (y * y + z * z)
+        R[0, 1] = s * (x * y - w * z)
+        R[0, 2] = s * (x * z + w * y)
+        R[1, 0] = s * (x * y + w * z)
+        R[1, 1] = 1.0 - s * (x * x + z * z)
+        R[1, 2] = s * (y * z - w * x)
+        R[2, 0] = s * (x * z - w * y)
+        R[2, 1] = s * (y * z + w * x)
+        R[2, 2] = 1.0 - s * (x * x + y * y)
+    frame.good[b] = good
+
+
+@inlined
+def _boxes(a: Any, b: Any, RA: Any, RB: Any, px: float, py: float, pz: float, out: Any, work: Any) -> bool:
+    gap, axis, sign = sat(a[0], a[1], a[2], b[0], b[1], b[2], RA, RB, px, py, pz)
+    if gap > 0.0:
+        return False
+    nx, ny, nz = axis_direction(axis, sign, RA, RB)
+    touching_features(a, b, RA, RB, px, py, pz, gap, nx, ny, nz, out, work)
+    return True
+
+
+@device
+def _narrow(
+    table: Any, path: int, limit: float, grid: Any, frame: Any, found: Any, owner: Any, count: int, hits: int,
+    pair: Any, contact: Any, work: Any,
+) -> int:  # fmt: skip
+    """Test candidates found[:count] of owner[:count]; append contacts from place `hits` on, return the new number."""
+    order, centre, size, rotation = grid.order, grid.centre, frame.size, frame.rotation
+    last = pair.shape[0] - 1
+    for k in range(count):
+        p, q = owner[k], found[k]
+        i, j = order[p], order[q]
+        if i > j:
+            i, j, p, q = j, i, q, p
+        px, py, pz = centre[0, q] - centre[0, p], centre[1, q] - centre[1, p], centre[2, q] - centre[2, p]
+        at = min(hits, last)
+        out = contact[at]
+        if path == SPHERES:
+            sphere_sphere_contact(size[p, 0], size[q, 0], px, py, pz, out)
+            touching = out[0] <= limit
+        elif path == BOXES:
+            touching = _boxes(size[p], size[q], rotation[p], rotation[q], px, py, pz, out, work)
+        else:
+            touching = contact_within(table, i, j, rotation[p], rotation[q], px, py, pz, limit, out, work)
+        if touching:
+            pair[at, 0] = i
+            pair[at, 1] = j
+            hits += 1
+    return hits
+
+
+@device
+def _search(table: Any, path: int, limit: float, grid: Any, frame: Any, hits: Any, b: int) -> None:
+    """Contacts of a block of places with all that they look for, and how many there are."""
+    begin, end = _block(b, frame, grid.order.size)
+    found, owner, work = frame.found[b], frame.owner[b], frame.work[b]
+    pair, contact = hits.pair[b], hits.contact[b]
+    n = count = 0
+    for a in range(STARTING):
+        first, behind = places(grid, a)
+        first, behind = max(first, begin), min(behind, end)
+        if first >= behind:
+            continue
+        for c in range(CLASSES):
+            if not searches(grid, a, c):
+                continue
+            for p in range(first, behind):
+                m = partners(grid, frame.extent, True, a, c, p, found, n)
+                for k in range(n, m):
+                    owner[k] = p
+                n = m
+                if n >= CHUNK:
+                    count = _narrow(table, path, limit, grid, frame, found, owner, n, count, pair, contact, work)
+                    n = 0
+    frame.hits[b] = _narrow(table, path, limit, grid, frame, found, owner, n, count, pair, contact, work)
+
+
+@device
+def _sort_hits(frame: Any, hits: Any) -> int:
+    """Places of the hits in `pair`, by first and second body, into order[0]: two stable counting sorts."""
+    begins, order, pair = frame.begins, hits.order, hits.pair
+    stride = pair.shape[1]
+    total = 0
+    for b in range(frame.hits.size):
+        for k in range(frame.hits[b]):
+            order[0, total] = b * stride + k
+            total += 1
+    for step in range(2):
+        column = 1 - step
+        source, target = step, 1 - step
+        begins[:] = 0
+        for k in range(total):
+            at = order[source, k]
+            begins[pair[at // stride, at % stride, column] + 1] += 1
+        for i in range(1, begins.size):
+            begins[i] += begins[i - 1]
+        for k in range(total):
+            at = order[source, k]
+            body = pair[at // stride, at % stride, column]
+            order[target, begins[body]] = at
+            begins[body] += 1
+    return total
+
+
+@device
+def _write(positions: Any, frame: Any, hits: Any, total: int, pairs: Any, contacts: Any, part: int) -> None:
+    """A block of the sorted hits into the arrays of the answer, witness points in the world."""
+    begin, end = _block(part, frame, total)
+    stride = hits.pair.shape[1]
+    for k in range(begin, end):
+        at = hits.order[0, k]
+        b, h = at // stride, at % stride
+        i = hits.pair[b, h, 0]
+        pairs[k, 0] = i
+        pairs[k, 1] = hits.pair[b, h, 1]
+        contacts[k, 0] = hits.contact[b, h, 0]
+        contacts[k, 1] = hits.contact[b, h, 10]
+        for c in range(3):
+            on_a = positions[i, c] + hits.contact[b, h, 4 + c]
+            on_b = positions[i, c] + hits.contact[b, h, 7 + c]
+            contacts[k, 2 + c] = hits.contact[b, h, 1 + c]
+            contacts[k, 5 + c] = on_a + 0.5 * (on_b - on_a)
+            contacts[k, 8 + c] = on_a
+            contacts[k, 11 + c] = on_b
+
+
+BAD_POSITION: Final = -1
+BAD_QUATERNION: Final = -2
+
+
+@device
+def _finish(frame: Any, hits: Any, pairs: Any) -> int:
+    """The sorted number of hits, or minus what a block needs room for less 3, where there are too many."""
+    most = total = 0
+    for b in range(frame.hits.size):
+        most = max(most, frame.hits[b])
+        total += frame.hits[b]
+    if most >= hits.pair.shape[1] or total > pairs.shape[0]:
+        return -3 - max(most, total)
+    return _sort_hits(frame, hits)
+
+
+@kernel
+def detect(path: int, limit: float, positions: Any, quaternions: Any, pairs: Any, contacts: Any, *memory: Any) -> int:
+    """Detect on one thread; returns the number of contacts, or what is wrong (see BAD_POSITION and `_finish`).
+
+    memory: the arrays of the shape table, the grid, the frame and the hits. Arrays that are handed over one by one
+    cost 20 ns each, those in a named tuple 200 ns.
+    """
+    table, grid = ShapeTable(*memory[:10]), Grid(*memory[10:18])
+    frame, hits = Frame(*memory[18:29]), Hits(*memory[29:32])
+    _bounds(positions, frame, 0)
+    if not frame.good[0]:
+        return BAD_POSITION
+    cells = _cells(grid, frame)
+    _buckets(positions, grid, frame, 0)
+    sort_by_cell(positions.shape[0], cells, grid)
+    _gather(table, path, positions, quaternions, grid, frame, 0)
+    if not frame.good[0]:
+        return BAD_QUATERNION
+    _search(table, path, limit, grid, frame, hits, 0)
+    total = _finish(frame, hits, pairs)
+    _write(positions, frame, hits, total, pairs, contacts, 0)
+    return total
+
+
+@parallel_kernel
+def detect_parallel(
+    path: int, limit: float, positions: Any, quaternions: Any, pairs: Any, contacts: Any, *memory: Any
+) -> int:
+    """The same on as many threads as there are blocks."""
+    table, grid = ShapeTable(*memory[:10]), Grid(*memory[10:18])
+    frame, hits = Frame(*memory[18:29]), Hits(*memory[29:32])
+    blocks = frame.bounds.shape[0]
+    for b in prange(blocks):
+        _bounds(positions, frame, b)
+    if not frame.good.all():
+        return BAD_POSITION
+    cells = _cells(grid, frame)
+    for b in prange(blocks):
+        _buckets(positions, grid, frame, b)
+    sort_by_cell(positions.shape[0], cells, grid)
+    for b in prange(blocks):
+        _gather(table, path, positions, quaternions, grid, frame, b)
+    if not frame.good.all():
+        return BAD_QUATERNION
+    for b in prange(blocks):
+        _search(table, path, limit, grid, frame, hits, b)
+    total = _finish(frame, hits, pairs)
+    for b in prange(blocks):
+        _write(positions, frame, hits, total, pairs, contacts, b)
+    return total

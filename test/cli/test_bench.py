@@ -1,0 +1,84 @@
+"""`collision-monitor bench`: its numbers, its formats and its errors."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from collision_monitor._version import VERSION
+from collision_monitor.cli.main import main
+from collision_monitor.errors import InputError
+from collision_monitor.world.moving_bodies import SCENES, load_bodies, make_bodies
+
+KEYS = {"scene", "n", "seed", "threads", "frames", "median_ms", "p99_ms", "min_ms", "pairs", "version"}
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_json_is_one_line_with_everything(scene: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "--scene", scene, "--n", "200", "--seed", "3", "--threads", "1", "--json"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("\n") == 1
+    result = json.loads(out)
+    assert result.keys() == KEYS
+    assert (result["scene"], result["n"], result["seed"], result["threads"]) == (scene, 200, 3, 1)
+    assert (result["frames"], result["version"]) == (10, VERSION)
+    assert 0 < result["min_ms"] <= result["median_ms"] <= result["p99_ms"]
+    assert 20 <= result["pairs"] <= 80  # about a quarter of the objects, less at the open boundary
+
+
+def test_a_line_for_people(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "--n", "50", "--threads", "1", "--frames", "5"]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("boxes, 50 objects, 1 thread: ")
+    assert "over 3 frames" in out and "colliding pairs" in out
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_saved_scene_gives_the_same_pairs(scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "scene.npz"
+    made = make_bodies(scene, 150, seed=2)
+    made.save(file)
+    loaded = load_bodies(file)
+    assert np.array_equal(loaded.positions, made.positions) and np.array_equal(loaded.quaternions, made.quaternions)
+    assert [repr(shape) for shape in loaded.shapes] == [repr(shape) for shape in made.shapes]
+    main(["bench", "--scene-file", str(file), "--threads", "1", "--json"])
+    main(["bench", "--scene", scene, "--n", "150", "--seed", "2", "--threads", "1", "--json"])
+    first, second = (json.loads(line) for line in capsys.readouterr().out.splitlines())
+    assert first["pairs"] == second["pairs"] and first["scene"] == scene
+
+
+def test_the_density_does_not_depend_on_the_number() -> None:
+    for scene in SCENES:
+        few, many = (make_bodies(scene, n).arrays["rho"] for n in (500, 4000))
+        assert few == pytest.approx(many, rel=0.15)
+
+
+def test_bad_arguments_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = tmp_path / "text.npz"
+    text.write_text("no scene")
+    other = tmp_path / "other.npz"
+    np.savez(other, kind=np.zeros(3, np.uint8), size=np.ones((3, 3)), pos=np.zeros((2, 4, 3)), quat=np.zeros((2, 3, 4)))
+    partial = tmp_path / "partial.npz"
+    np.savez(partial, kind=np.zeros(3, np.uint8))
+    for arguments, expected in (
+        (["--scene", "rabbits"], "scene: expected one of boxes, spheres, mixed, hulls, got 'rabbits'"),
+        (["--n", "0"], "n: expected a whole number from 1, got 0"),
+        (["--seed", "-1"], "seed: expected a whole number from 0, got -1"),
+        (["--frames", "-2"], "frames: expected a whole number from 1, got -2"),
+        (["--n", "5", "--threads", "1000"], "threads: expected 1 to"),
+        (["--scene-file", str(tmp_path / "none.npz")], "none.npz: expected a scene"),
+        (["--scene-file", str(text)], "text.npz: expected a scene"),
+        (["--scene-file", str(other)], "3 bodies do not go with size"),
+        (["--scene-file", str(partial)], "no entry 'size'"),
+    ):
+        assert main(["bench", *arguments]) == 1
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and expected in error
+
+
+def test_scenes_are_refused_by_name() -> None:
+    with pytest.raises(InputError, match="expected one of boxes"):
+        make_bodies("box", 10)
