@@ -21,6 +21,13 @@ EDGE_DIRECTIONS: Final = 32
 """Up to this many different edge directions of the hull, the normals across each two of them are tried too (496).
 Larger: seconds for hulls of hundreds of corners, to gain a percent. Smaller: a tetrahedron's box is twice too large."""
 
+OUTLINE: Final = 128
+"""From this many edges on it is quicker to find the outline first than to turn the box to every edge."""
+
+FACE_NORMALS: Final = 256
+"""At most this many of the hull's faces, the largest first, get a box laid on them.
+Larger: seconds for round hulls of a thousand faces, whose boxes are all alike. Smaller: the best face may be missed."""
+
 DISTINCT: Final = 1e-9
 """Directions closer than this are one."""
 
@@ -39,7 +46,7 @@ def obb_pca(points: ArrayLike) -> Obb:
 def obb_minimum_volume(points: ArrayLike) -> Obb:
     """The smallest box found by rotating boxes that lie flush with the hull of points (n, 3).
 
-    A face of the box is laid on each face of the hull, and on each plane along two hull edges where there are few; the
+    A face of the box is laid on each face of the hull (the 256 largest), and on each plane along two hull edges where there are few; the
     box is then turned about that face's normal until a side lies along an edge, which is the best turn (rotating
     calipers). Last, this is repeated about the winner's own axes until nothing is gained. The true minimum has two
     faces flush with edges (O'Rourke, 1985), which this finds in most cases but does not prove; never larger than the
@@ -53,7 +60,9 @@ def obb_minimum_volume(points: ArrayLike) -> Obb:
     vertices = hull.vertices - hull.vertices.mean(axis=0)
     a, b, c = vertices[hull.faces.T]
     edges = _distinct(np.concatenate([b - a, c - b, a - c]))
-    normals = _distinct(np.cross(b - a, c - a))
+    across = np.cross(b - a, c - a)
+    largest = np.argsort(-np.linalg.norm(across, axis=1), kind="stable")
+    normals = _distinct(across[largest])[:FACE_NORMALS]
     if len(edges) <= EDGE_DIRECTIONS:
         i, j = np.triu_indices(len(edges), 1)
         normals = _distinct(np.concatenate([normals, np.cross(edges[i], edges[j])]))
@@ -83,6 +92,9 @@ def _flat(points: Array) -> Obb:
 
 def _turned(vertices: Array, edges: Array, normal: Array) -> tuple[float, Array]:
     """Volume and axes of the smallest box with one axis along `normal` and a side along a projected edge."""
+    height = float(np.ptp(vertices @ normal))
+    if len(edges) > OUTLINE:
+        vertices, edges = _outline(vertices, edges, normal)
     sides = edges - (edges @ normal)[:, None] * normal
     length = np.linalg.norm(sides, axis=1, keepdims=True)
     sides = sides[length[:, 0] > DISTINCT] / length[length[:, 0] > DISTINCT]
@@ -90,7 +102,17 @@ def _turned(vertices: Array, edges: Array, normal: Array) -> tuple[float, Array]
     area = np.ptp(sides @ vertices.T, axis=1) * np.ptp(across @ vertices.T, axis=1)
     best = int(area.argmin())
     axes = np.column_stack([normal, sides[best], across[best]])
-    return float(area[best] * np.ptp(vertices @ normal)), axes
+    return float(area[best]) * height, axes
+
+
+def _outline(vertices: Array, edges: Array, normal: Array) -> tuple[Array, Array]:
+    """The corners and edges that are on the outline when seen along `normal`; all where that is a line."""
+    u = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    try:
+        around = vertices[Qhull(vertices @ np.column_stack([u, np.cross(normal, u)])).vertices]
+    except QhullError:
+        return vertices, edges
+    return around, np.roll(around, -1, axis=0) - around
 
 
 def _measured(vertices: Array, axes: Array) -> tuple[float, Array]:

@@ -49,6 +49,14 @@ def test_never_looser_than_the_others_and_never_below_the_hull(seed, count, expo
     assert volume <= by_trimesh * (1 + 1e-9)
 
 
+def test_a_round_hull_of_thousands_of_faces():
+    directions = np.random.default_rng(0).normal(size=(1500, 3))
+    points = directions / np.linalg.norm(directions, axis=1, keepdims=True) * [3, 2, 1]
+    box = obb_minimum_volume(points @ rotation(2).T)
+    assert len(convex_hull(points).faces) > 2900
+    assert np.allclose(np.sort(box.half_extents), [1, 2, 3], rtol=0.02)
+
+
 def test_flat_points_get_the_smallest_rectangle():
     rectangle = np.array([[0, 0, 0], [3, 0, 0], [3, 1, 0], [0, 1, 0], [1, 0.5, 0], [0.2, 0.1, 0]]) @ rotation(5).T
     box = obb_minimum_volume(rectangle)
