@@ -1,0 +1,154 @@
+"""Draws the pictures of docs/geometry.md with the package's own functions.
+
+    python docs/draw_geometry.py
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.patches import Circle, Polygon
+from numpy.typing import NDArray
+from scipy.spatial import HalfspaceIntersection
+
+from collision_monitor.geometry.bounding_spheres import (
+    minimal_sphere,
+    sphere_from_centroid,
+    sphere_from_widest_pair,
+)
+from collision_monitor.geometry.bounding_volumes import aabb, convex_hull, kdop
+from collision_monitor.geometry.oriented_boxes import obb_minimum_volume, obb_pca
+from collision_monitor.geometry.polygon_polygon import project, sat_2d
+
+Array = NDArray[np.float64]
+IMAGES = Path(__file__).parent / "images"
+POINTS, FILL, A, B, GAP = "#333333", "#0072b2", "#0072b2", "#d55e00", "#009e73"
+
+mpl.rcParams.update({"svg.hashsalt": "collision_monitor", "font.size": 9, "axes.titlesize": 10})
+
+
+def around(points: Array) -> Array:
+    """Points (n, 2) in order around their middle."""
+    offset = points - points.mean(axis=0)
+    return points[np.argsort(np.arctan2(offset[:, 1], offset[:, 0]))]
+
+
+def area(polygon: Array) -> float:
+    """m² of a convex polygon in order."""
+    following = np.roll(polygon, -1, axis=0)
+    return 0.5 * abs(float((polygon[:, 0] * following[:, 1] - polygon[:, 1] * following[:, 0]).sum()))
+
+
+def bounding_volumes() -> None:
+    """Each bounding volume of one set of points in the plane, with its area relative to the hull's."""
+    rng = np.random.default_rng(4)
+    turn = np.array([[0.8, -0.6], [0.6, 0.8]])
+    points = np.vstack([rng.uniform([0, 0], [4, 0.9], (40, 2)), rng.uniform([3.1, 0], [4, 2.2], (25, 2))]) @ turn.T
+    # volumes in space, of the same points on two floors, seen from above
+    floors = np.vstack([np.column_stack([points, np.full(len(points), z)]) for z in (0.0, 1.0)])
+    hull = around(np.unique(convex_hull(floors).vertices[:, :2], axis=0))
+    box = aabb(points)
+    slabs = kdop(floors, [[1, 0, 0], [0, 1, 0], [1, 1, 0], [1, -1, 0]])
+    flat = slabs.directions[:, :2]
+    planes = np.vstack([np.column_stack([flat, -slabs.upper]), np.column_stack([-flat, slabs.lower])])
+    corners = HalfspaceIntersection(planes, points.mean(axis=0)).intersections
+    polygons = {
+        "AABB": around(np.array([box.lower, [box.upper[0], box.lower[1]], box.upper, [box.lower[0], box.upper[1]]])),
+        "OBB, PCA": around(np.unique(obb_pca(floors).corners[:, :2].round(9), axis=0)),
+        "OBB, minimum volume": around(np.unique(obb_minimum_volume(floors).corners[:, :2].round(9), axis=0)),
+        "8-DOP in the plane": around(np.unique(corners.round(9), axis=0)),
+        "convex hull": hull,
+    }
+    circles = {
+        "sphere from the centroid": sphere_from_centroid(points),
+        "sphere from the widest pair": sphere_from_widest_pair(points),
+        "minimal sphere (Welzl)": minimal_sphere(points),
+    }
+    figure, axes = plt.subplots(2, 4, figsize=(10, 5.4), constrained_layout=True, sharex=True, sharey=True)
+    for axis, (name, circle) in zip(axes.flat, circles.items(), strict=False):
+        axis.add_patch(Circle(tuple(circle.center), float(circle.radius), fc=FILL, alpha=0.18))
+        axis.add_patch(Circle(tuple(circle.center), float(circle.radius), fill=False, ec=FILL))
+        axis.plot(*circle.center, "+", color=FILL, ms=9)
+        axis.set_title(f"{name}: {float(circle.volume) / area(hull):.2f}")
+    for axis, (name, polygon) in zip(axes.flat[3:], polygons.items(), strict=True):
+        axis.add_patch(Polygon(polygon, fc=FILL, alpha=0.18))
+        axis.add_patch(Polygon(polygon, fill=False, ec=FILL))
+        axis.set_title(f"{name}: {area(polygon) / area(hull):.2f}")
+    for axis in axes.flat:
+        axis.plot(*points.T, ".", color=POINTS, ms=3)
+        axis.set_aspect("equal")
+        axis.set_axis_off()
+    save(figure, "bounding_volumes")
+
+
+def draw_axis(plot: Any, normal: Array, at: float, a: Array, b: Array, found: bool) -> None:
+    """One axis of SAT with both projections on it, `at` metres across it from the origin."""
+    along, across = normal, np.array([-normal[1], normal[0]])
+    (low_a, high_a), (low_b, high_b) = project(a, normal), project(b, normal)
+    ends = np.array([min(low_a, low_b) - 0.25, max(high_a, high_b) + 0.25])
+    line = ends[:, None] * along + at * across
+    plot.plot(*line.T, color="#888888", lw=0.8)
+    plot.annotate("", line[1], line[0], arrowprops={"arrowstyle": "->", "color": "#888888", "lw": 0.8})
+    for (low, high), color, shift in (((low_a, high_a), A, 0.06), ((low_b, high_b), B, -0.06)):
+        bar = np.array([low, high])[:, None] * along + (at + shift) * across
+        plot.plot(*bar.T, color=color, lw=3, solid_capstyle="butt")
+    if found:
+        gap = np.array([high_a, low_b])[:, None] * along + at * across
+        plot.plot(*gap.T, color=GAP, lw=4, solid_capstyle="butt", zorder=5)
+        for end in (high_a, low_b):  # the two lines between which nothing is
+            strip = np.array([at, at + 4.2 * np.sign(-at)])[:, None] * across + end * along
+            plot.plot(*strip.T, color=GAP, lw=0.8, ls="--")
+
+
+def separating_axes() -> None:
+    """SAT of two polygons apart, which ends at the first separating axis, and overlapping, with the translation."""
+    a = np.array([[0.0, 0], [2.2, 0.2], [2.5, 1.4], [1.1, 2.3], [0, 1.5]])
+    triangle = np.array([[0.0, 0.3], [1.7, -0.5], [1.4, 1.5]])
+    figure, plots = plt.subplots(1, 2, figsize=(10, 4.9), constrained_layout=True)
+    for plot, shift, title in (
+        (plots[0], np.array([2.45, 1.55]), "apart"),
+        (plots[1], np.array([1.7, 0.7]), "overlapping"),
+    ):
+        b = triangle + shift
+        answer = sat_2d(a, b)
+        edges = np.vstack([np.roll(a, -1, axis=0) - a, np.roll(b, -1, axis=0) - b])
+        normals = np.column_stack([edges[:, 1], -edges[:, 0]]) / np.linalg.norm(edges, axis=1, keepdims=True)
+        shown = [0, answer.edge]
+        for edge in shown:
+            normal = answer.axis if edge == answer.edge else normals[edge]
+            across = np.array([-normal[1], normal[0]])
+            beside = (np.vstack([a, b]) @ across).min() - 0.45
+            draw_axis(plot, normal, beside, a, b, found=edge == answer.edge and not answer.overlaps)
+        for polygon, color, name in ((a, A, "A"), (b, B, "B")):
+            plot.add_patch(Polygon(polygon, fc=color, alpha=0.25))
+            plot.add_patch(Polygon(polygon, fill=False, ec=color, lw=1.4))
+            plot.text(*polygon.mean(axis=0), name, color=color, ha="center", va="center", fontsize=13)
+        if answer.overlaps:
+            moved = b - answer.distance * answer.axis
+            plot.add_patch(Polygon(moved, fill=False, ec=B, ls=":", lw=1.2))
+            plot.annotate("", moved[1], b[1], arrowprops={"arrowstyle": "->", "color": GAP, "lw": 2})
+            note = f"depth {-answer.distance:.2f} m; all {answer.tested} axes overlap;\narrow: minimum translation"
+        else:
+            note = f"gap {answer.distance:.2f} m on axis {answer.tested} of 8, where the test ends"
+        plot.set_title(f"{title}: {note}")
+        plot.set_aspect("equal")
+        plot.set_axis_off()
+    save(figure, "sat_2d")
+
+
+def save(figure: Any, name: str) -> None:
+    """As SVG without a date, so that the same picture is the same file."""
+    IMAGES.mkdir(exist_ok=True)
+    figure.savefig(IMAGES / f"{name}.svg", metadata={"Date": None})
+    plt.close(figure)
+
+
+if __name__ == "__main__":
+    bounding_volumes()
+    separating_axes()
