@@ -40,9 +40,10 @@ def closest_points(
 ) -> ClosestPoints:
     """Minimise |p + alpha u - (q + beta v)| over the extents (line: all, ray: >= 0, segment: 0 … 1); all (..., 3).
 
-    The slides only check that the unbounded solution is in range; where it is not, the minimum lies on the boundary,
-    so that the ends are tried too. Parallel ones answer with the middle of where they run beside each other, or where
-    that is infinite, with its end or the solution of least norm. A zero direction is a point. (Ericson, 5.1.8–5.1.9)
+    The slides only check that the unbounded solution is in range. Where it is not, alpha is clamped, beta is the best
+    for it, clamped too, and alpha the best for that: the minimum of this convex problem (Ericson, 5.1.8–5.1.9).
+    Parallel ones answer with the middle of where they run beside each other, or where that is infinite, with its end or
+    the solution of least norm. A zero direction is a point.
     """
     vectors = (coordinates(p, "p", 3), coordinates(u, "u", 3), coordinates(q, "q", 3), coordinates(v, "v", 3))
     try:
@@ -64,15 +65,7 @@ def closest_points(
     alpha = np.where(parallel, _beside(u, v, w, first, second), _on_lines(u, v, w))
     alpha = np.clip(alpha, low_a, high_a)
     beta = on_b(alpha)
-    ends_a = [np.full(w.shape[:-1], end) for end in first.value if np.isfinite(end)]
-    ends_b = [np.full(w.shape[:-1], end) for end in second.value if np.isfinite(end)]
-    alphas = np.stack([alpha, on_a(beta), *ends_a, *map(on_a, ends_b)])
-    betas = np.stack([beta, beta, *map(on_b, ends_a), *ends_b])
-    apart = np.linalg.norm(alphas[..., None] * u - (w + betas[..., None] * v), axis=-1)
-    # an end wins only where it is nearer by more than round-off: parallel ones keep their middle
-    apart[0] -= 1e-15 * (np.abs(w).max(axis=-1) + np.abs(u).max(axis=-1) + np.abs(v).max(axis=-1))
-    best = apart.argmin(axis=0)[None]
-    alpha, beta = np.take_along_axis(alphas, best, 0)[0], np.take_along_axis(betas, best, 0)[0]
+    alpha = on_a(beta)  # moves only where beta was clamped
     offset = alpha[..., None] * u - (w + beta[..., None] * v)
     point_a, point_b = p + alpha[..., None] * u, q + beta[..., None] * v
     return ClosestPoints(

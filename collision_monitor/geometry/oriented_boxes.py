@@ -46,11 +46,11 @@ def obb_pca(points: ArrayLike) -> Obb:
 def obb_minimum_volume(points: ArrayLike) -> Obb:
     """The smallest box found by rotating boxes that lie flush with the hull of points (n, 3).
 
-    A face of the box is laid on each face of the hull (the 256 largest), and on each plane along two hull edges where there are few; the
-    box is then turned about that face's normal until a side lies along an edge, which is the best turn (rotating
-    calipers). Last, this is repeated about the winner's own axes until nothing is gained. The true minimum has two
-    faces flush with edges (O'Rourke, 1985), which this finds in most cases but does not prove; never larger than the
-    box by PCA or the axis-aligned one. Points in one plane fall back to the best turn about its normal.
+    A face of the box is laid on each face of the hull (the 256 largest), and on each plane along two hull edges where
+    there are few. The box is then turned about that face's normal until a side lies along an edge, which is the best
+    turn (rotating calipers). Last, this is repeated about the winner's own axes until nothing is gained. The true
+    minimum has two faces flush with edges (O'Rourke, 1985), which this finds in most cases but does not prove; it is
+    never larger than the box by PCA or the axis-aligned one. Points in one plane get the best turn about its normal.
     """
     points = point_set(points, "points", 3)
     try:

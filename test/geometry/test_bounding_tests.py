@@ -153,6 +153,15 @@ def test_a_box_between_the_arms_of_a_polygon():
     assert obb_polygon(box._replace(half_extents=np.array([0.5, 0.4, 0.4])), fork)  # touching
 
 
+def test_a_corner_below_a_wide_polygon_is_parted_by_the_polygons_own_normal():
+    box = Obb(np.zeros(3), np.eye(3), np.ones(3))
+    u, v = np.array([1, -1, 0]), np.array([1, 1, -2])
+    wide = np.array([50 * u, -50 * u, 50 * v]) - 10 * v
+    assert not obb_polygon(box, wide + 1.01)  # the plane x + y + z = 3.03
+    assert obb_polygon(box, wide + 1.0)  # through the box's corner
+    assert obb_polygon(box, wide + 0.99)
+
+
 def test_polygons_that_are_none_are_refused():
     box = Obb(np.zeros(3), np.eye(3), np.ones(3))
     with pytest.raises(ShapeError, match="one plane"):

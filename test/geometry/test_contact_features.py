@@ -99,6 +99,13 @@ def test_concave_meshes_by_the_place_too():
     assert (vertices[list(top.vertices)][:, 2] == 3).all()
 
 
+def test_each_side_of_a_plate_without_thickness():
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    plate = corners, np.array([[0, 1, 2], [0, 2, 3], [0, 2, 1], [0, 3, 2]])
+    assert feature_at([0.5, 0.25, 0], [0, 0, 1], *plate).face == 0
+    assert feature_at([0.5, 0.25, 0], [0, 0, -1], *plate).face == 2
+
+
 def test_points_off_the_surface_are_refused():
     vertices, faces = cube()
     with pytest.raises(InputError, match="surface"):
