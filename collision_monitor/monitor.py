@@ -110,6 +110,7 @@ class Monitor:
         self._now_ns = 0
         self._jump_ns: int | None = None  # a refused stamp; the next message may confirm it
         self._renewed: set[int] = set()  # slots whose description changed: predicted anew in the next step
+        self._buffer = np.empty(64, records.STATE)
         self._events = EventList()
         self._scratch = [make_scratch() for _ in range(self.profile.threads)]
         self._pool = ThreadPoolExecutor(self.profile.threads) if self.profile.threads > 1 else None
@@ -310,7 +311,11 @@ class Monitor:
         if given.dtype == records.STATE:
             if given.ndim != 1:
                 raise InputError(f"states: expected one dimension, got shape {given.shape}")
-            return np.array(given)  # a copy: aligned, contiguous, and the caller's to change
+            if len(given) > len(self._buffer):
+                self._buffer = np.empty(2 * len(given), records.STATE)
+            states = self._buffer[: len(given)]
+            states[:] = given  # message bytes need not be aligned
+            return states
         try:
             pose = np.asarray(poses, dtype=np.float64)
             twist = np.zeros((len(given), 6)) if twists is None else np.asarray(twists, dtype=np.float64)
@@ -462,12 +467,12 @@ class Monitor:
         due = self._events.update(new, bodies.motion, now)
         work["events_due"] = len(due)
         room = len(self._pairs) + len(due)
-        pairs = np.zeros(room, active_pairs.PAIR)
-        events = np.zeros(room, IMPACT)
+        pairs = np.empty(room, active_pairs.PAIR)
+        events = np.empty(room, IMPACT)
         order = np.argsort(due["key"], kind="stable")
         n = active_pairs.unite(bodies, self._pairs, self._pair_events, due, order, pairs, events)
-        results = np.zeros((n + 1, active_pairs.RESULT))
-        later = np.zeros(n, IMPACT)
+        results = np.empty((n + 1, active_pairs.RESULT))
+        later = np.empty(n, IMPACT)
         n, n_later, tests, queries = active_pairs.examine(
             self._shapes.table, self._parts, bodies, pairs[:n], events[:n], now, p.contact_margin,
             p.stale_acceleration, p.impact_tolerance, p.impact_iterations, results, later, self._scratch[0],
@@ -477,7 +482,7 @@ class Monitor:
         self._pairs, self._pair_events = pairs[:n], events[:n]
         if n_later:
             self._events.update(later[:n_later], bodies.motion, now)
-        contacts = np.zeros(n, records.CONTACT)
+        contacts = np.empty(n, records.CONTACT)
         n = answers.write_contacts(
             self._pairs, results, self._parts.index, now,
             contacts.view(np.float64).reshape(-1, 17),
@@ -506,7 +511,7 @@ class Monitor:
         p = self.profile
         pending = self._events.events
         within = int(np.searchsorted(pending["lower"], now + p.horizon, side="right"))
-        predictions = np.zeros(within + len(self._pairs), records.PREDICTION)
+        predictions = np.empty(within + len(self._pairs), records.PREDICTION)
         n, unresolved = answers.write_predictions(
             self._pairs, self._pair_events, pending[:within], self._bodies, self._parts.index, now, p.horizon,
             p.stale_after,

@@ -163,16 +163,18 @@ def shape_impact(table, parts, A, B, a, b, begin, end, tube_0, tube_1, tolerance
     """When the gap between shape a in motion A and shape b in motion B (MOTION) first is within the wanted one.
 
     begin, end: seconds after the monitor's origin; the wanted gap is tube_0 + tube_1 (t - begin) (m).
-    Returns (status, t, queries): no time in [begin, t) is within the wanted gap; at t it is within tolerance of it
-    (HIT), t is end (CLEAR), or the budget of distance queries ran out (UNRESOLVED).
+    Returns (status, t, queries, guess): no time in [begin, t) is within the wanted gap; at t it is within tolerance of it
+    (HIT), t is end (CLEAR), or the budget of distance queries ran out (UNRESOLVED). guess: how
+    long after t they overlap by as much as they should, from how fast the gap closed last; 0 where nothing tells.
     """
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
     vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
     curvature = 0.5 * _spin(table, a, A.wx * A.wx + A.wy * A.wy + A.wz * A.wz)
     curvature += 0.5 * _spin(table, b, B.wx * B.wx + B.wy * B.wy + B.wz * B.wz)
-    t = begin
-    status, query = UNRESOLVED, 0
+    t = t_before = begin
+    gap_before = inf
+    status, query, guess = UNRESOLVED, 0, 0.0
     while query < budget:
         query += 1
         rotation_at(A, t, R_i)
@@ -184,6 +186,13 @@ def shape_impact(table, parts, A, B, a, b, begin, end, tube_0, tube_1, tolerance
             table, a, b, R_a, R_b, px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2], out, scratch.work
         )
         gap -= tube_0 + tube_1 * (t - begin)
+        if gap <= tolerance:
+            if t > t_before:
+                wanted = gap + tolerance + 2.0 * (tube_0 + tube_1 * (t - begin))
+                guess = wanted * (t - t_before) / (gap_before - gap)
+            status = HIT
+            break
+        t_before, gap_before = t, gap
         n = (out[0], out[1], out[2])
         turn_a = (n[1] * A.wz - n[2] * A.wy, n[2] * A.wx - n[0] * A.wz, n[0] * A.wy - n[1] * A.wx)
         turn_b = (n[1] * B.wz - n[2] * B.wy, n[2] * B.wx - n[0] * B.wz, n[0] * B.wy - n[1] * B.wx)
@@ -192,19 +201,16 @@ def shape_impact(table, parts, A, B, a, b, begin, end, tube_0, tube_1, tolerance
         rate += turn_b[0] * ob[0] + turn_b[1] * ob[1] + turn_b[2] * ob[2]
         h_a = support_value(table, a, R_a, n[0], n[1], n[2])
         h_b = support_value(table, b, R_b, -n[0], -n[1], -n[2])
-        if gap <= tolerance:
-            status = HIT
-            break
         # aim at half the tolerance, so that the last advance ends inside it
         d = _safe_advance(
             table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap - 0.5 * tolerance, end - t
         )
         if d >= end - t:
-            return CLEAR, end, query
+            return CLEAR, end, query, guess
         if t + d <= t:  # the resolution of the time is reached before the gap is
             break
         t += d
-    return status, t, query
+    return status, t, query, guess
 
 
 @device
@@ -244,20 +250,27 @@ def closing_speed(v, wa, wb, px, py, pz, out):
 
 
 @inlined
-def _touching_by(table, parts, A, B, a, b, t, end, tube_0, tube_1, begin, margin, tolerance, scratch):
-    """A time in [t, end] at which they overlap by more than the tube, whatever the motions inside it; inf: none found.
+def _touching_by(table, parts, A, B, a, b, start, guess, end, tube_0, tube_1, begin, margin, tolerance, scratch):
+    """A time in [start, end] at which they overlap by more than the tube, whatever the motions inside it; inf: none.
 
-    Newton steps on the signed distance. The contact at that time is left in scratch.out.
+    Newton steps on the signed distance, the first one to start + guess where that helps. The contact at the time found
+    is left in scratch.out.
     """
+    guessed = 0.0 < guess < end - start
+    t = start + guess if guessed else start
     for _ in range(12):
         distance = _contact_at(table, parts, A, B, a, b, t, scratch)
         excess = distance - margin + tube_0 + tube_1 * (t - begin)
         if excess <= 0.0:
             return t
         speed = scratch.out[15] - tube_1
-        if speed <= 0.0 or t >= end:
+        if speed > 0.0 and t < end:
+            t = min(end, t + 1.001 * (excess + tolerance) / speed)
+        elif guessed:
+            t = start
+        else:
             return inf
-        t = min(end, t + 1.001 * (excess + tolerance) / speed)
+        guessed = False
     return inf
 
 
@@ -293,17 +306,17 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
     event.method = CONSERVATIVE_ADVANCEMENT
     queries = 0
     stop = begin + last
-    lower = inf
+    lower, guess = inf, 0.0
     while a >= 0:
         b = bodies.first_shape[j]
         while b >= 0:
-            status, t, n = shape_impact(
+            status, t, n, soon = shape_impact(
                 table, parts, A, B, a, b, begin + first, stop,
                 tube_0 + tube_1 * first + margin, tube_1, tolerance, budget, scratch,
             )  # fmt: skip
             queries += n
             if status != CLEAR and t < lower:
-                lower = t
+                lower, guess = t, soon
                 event.status = status
                 event.shape_i, event.shape_j = a, b
                 stop = t
@@ -312,7 +325,7 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
     if event.status == CLEAR:
         return queries
     a, b = event.shape_i, event.shape_j
-    sure = _touching_by(table, parts, A, B, a, b, lower, end, tube_0, tube_1, begin, margin, tolerance, scratch)
+    sure = _touching_by(table, parts, A, B, a, b, lower, guess, end, tube_0, tube_1, begin, margin, tolerance, scratch)
     if sure == inf:
         _contact_at(table, parts, A, B, a, b, lower, scratch)
     event.lower, event.upper = lower, sure
