@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
 import signal
 import subprocess
 import sys
@@ -14,6 +16,17 @@ LINES = 8
 """Of the process's last words, in an error."""
 PATIENCE = 10.0
 """s from the request to stop until the process is killed."""
+
+
+PR_SET_PDEATHSIG = 1
+"""From <linux/prctl.h>: the signal that this process gets when its parent ends, however that ends."""
+_prctl = getattr(ctypes.CDLL(None), "prctl", None)  # looked up here: little may be done between fork and exec
+
+
+def _end_with_parent() -> None:
+    """In the new process, before it becomes another program: let it stop as by Ctrl-C where its parent is killed."""
+    if _prctl is not None:
+        _prctl(PR_SET_PDEATHSIG, signal.SIGINT)
 
 
 class ProcessError(CollisionMonitorError):
@@ -31,7 +44,18 @@ class Child:
             stdin=subprocess.DEVNULL,
             stdout=self._words,
             stderr=self._words,
+            preexec_fn=_end_with_parent,
         )
+
+    @property
+    def pid(self) -> int:
+        """Of the process."""
+        return self._process.pid
+
+    def words(self) -> str:
+        """What it has printed so far, both streams."""
+        file = self._words.fileno()  # pread, because the process shares our place in the file
+        return os.pread(file, os.fstat(file).st_size, 0).decode(errors="replace")
 
     def running(self) -> bool:
         """Raises ProcessError where it has failed."""
@@ -53,8 +77,7 @@ class Child:
         self.running()
 
     def _error(self, what: str) -> ProcessError:
-        self._words.seek(0)
-        lines = self._words.read().decode(errors="replace").splitlines()[-LINES:]
+        lines = self.words().splitlines()[-LINES:]
         said = "".join(f"\n  {line}" for line in lines) or " nothing"
         return ProcessError(f"collision-monitor {self._name}: {what}; it said:{said}")
 

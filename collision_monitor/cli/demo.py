@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import random
-import socket
 import time
 from datetime import datetime
 from pathlib import Path
@@ -13,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from collision_monitor.cli.child import Child, ProcessError
 from collision_monitor.errors import InputError
+from collision_monitor.ros.domain import free_domain
 from collision_monitor.ros.process import StopRequest, ros_context, stay_on_this_machine
 
 if TYPE_CHECKING:
@@ -57,7 +56,7 @@ def demo(args: argparse.Namespace) -> int:
         raise InputError(f"--duration: expected a positive number of seconds, got {args.duration}")
     session = _new_file(args.output, args.scene)
     stay_on_this_machine()
-    os.environ.setdefault("ROS_DOMAIN_ID", str(_free_domain()))
+    os.environ.setdefault("ROS_DOMAIN_ID", str(free_domain()))
 
     _watch(args, session, stop)
     if stop.received:
@@ -155,20 +154,6 @@ def _new_file(chosen: Path | None, scene: str) -> Path:
     except OSError as error:
         raise InputError(f"--output: expected to be able to write {chosen.parent}, got: {error.strerror}") from None
     return chosen
-
-
-def _free_domain() -> int:
-    """A ROS domain that nobody on this machine uses: its first participant would hold this port (DDSI-RTPS 9.6.1)."""
-    domains = list(range(1, 102))
-    random.shuffle(domains)
-    for domain in domains:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            try:
-                probe.bind(("", 7400 + 250 * domain + 10))
-            except OSError:
-                continue
-            return domain
-    raise ProcessError("expected a free ROS domain from 1 to 101, all are in use; choose one with ROS_DOMAIN_ID")
 
 
 def _replay(session: Path) -> int:
