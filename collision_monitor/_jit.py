@@ -22,13 +22,12 @@ _PACKAGE = Path(__file__).parent
 
 
 def _source_digest() -> str:
-    """Digest of every kernel source and of the compiler, as the name of the cache folder."""
+    """Digest of every module with kernels, of the constants they use and of the compiler: names the cache folder."""
     digest = hashlib.blake2b(f"{numba.__version__} {sys.version_info[:2]}".encode(), digest_size=8)
-    for folder in ("geometry", "broad_phase", "narrow_phase", "prediction"):
-        for path in sorted((_PACKAGE / folder).glob("*.py")):
-            digest.update(path.read_bytes())
-    for name in ("_jit.py", "tolerances.py", "records.py"):
-        digest.update((_PACKAGE / name).read_bytes())
+    for path in sorted(_PACKAGE.rglob("*.py")):
+        source = path.read_bytes()
+        if b"_jit" in source or b"numba" in source or path.name in ("tolerances.py", "records.py"):
+            digest.update(source)
     return digest.hexdigest()
 
 

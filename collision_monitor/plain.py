@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.monitor import Monitor
+from collision_monitor.monitor import Monitor, StepResult
 from collision_monitor.profiles import Profile
+from collision_monitor.records import Phase, PredictionStatus
 
 
 class PlainMonitor(Monitor):
@@ -25,3 +28,33 @@ class PlainMonitor(Monitor):
     def _moved(self, now: float) -> NDArray[np.int32]:
         bodies, top = self._bodies, self._top
         return np.flatnonzero(bodies.used[:top] & bodies.seen[:top] & ~bodies.static[:top]).astype(np.int32)
+
+
+def _by_pair(answers: NDArray[np.void]) -> dict[tuple[int, int], Any]:
+    return {(int(answer["id_a"]), int(answer["id_b"])): answer for answer in answers}
+
+
+def disagreements(mine: StepResult, plain: StepResult, horizon: float) -> list[str]:
+    """What `mine` says beyond its own bounds against plain recomputation from the same states, as sentences.
+
+    Both must tell the same contacts. A collision that is certain in one must be stated in the other, and the two
+    intervals of its time must meet; near the horizon (s) one may not see it yet.
+    """
+    found = []
+    touching = [_by_pair(result.contacts[result.contacts["phase"] != Phase.END]).keys() for result in (mine, plain)]
+    found += [f"{pair} touches in one answer only" for pair in sorted(touching[0] ^ touching[1])]
+    stated, true = _by_pair(mine.predictions), _by_pair(plain.predictions)
+    found += [f"{pair} touches and is predicted" for pair in sorted(stated.keys() & touching[0])]
+    for pair, truth in true.items():
+        if truth["status"] != PredictionStatus.HIT or truth["upper"] >= horizon:
+            continue
+        answer = stated.get(pair)
+        if answer is None:
+            found.append(f"{pair} is missed: it collides in {truth['lower']:.6g} s")
+        elif answer["lower"] > truth["upper"] or answer["upper"] < truth["lower"]:
+            told, really = [(float(each["lower"]), float(each["upper"])) for each in (answer, truth)]
+            found.append(f"{pair} is predicted in {told} s and collides in {really} s")
+    for pair, answer in stated.items():
+        if answer["status"] == PredictionStatus.HIT and answer["upper"] < horizon and pair not in true:
+            found.append(f"{pair} is certain to collide in {answer['lower']:.6g} s and never does")
+    return found

@@ -168,11 +168,15 @@ def _install_package(ros: machine.RosInstall | None, log: IO[str]) -> None:
 
 
 def _warm_up_inputs(ros: machine.RosInstall | None) -> str:
-    package = ROOT / "collision_monitor"
-    kernels = [package / f"{name}.py" for name in ("warm_up", "_jit", "records", "tolerances")]
-    for folder in ("geometry", "broad_phase", "narrow_phase", "prediction"):
-        kernels += sorted((package / folder).rglob("*.py"))
-    return _digest(files=[path for path in kernels if path.exists()])
+    # the rule of collision_monitor/_jit.py, which names the folder of the compiled kernels
+    sources = sorted((ROOT / "collision_monitor").rglob("*.py"))
+    constants = ("tolerances.py", "records.py", "warm_up.py")
+    kernels = [path for path in sources if path.name in constants or _has_kernels(path.read_bytes())]
+    return _digest(files=kernels)
+
+
+def _has_kernels(source: bytes) -> bool:
+    return b"_jit" in source or b"numba" in source
 
 
 def _warm_up(ros: machine.RosInstall | None, log: IO[str]) -> None:
