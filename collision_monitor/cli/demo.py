@@ -41,6 +41,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--objects", type=int, metavar="N", help="how many move (default: the scene's own number)")
     parser.add_argument("--duration", type=float, default=10.0, metavar="S", help="seconds (default: 10)")
     parser.add_argument("--seed", type=int, default=1, metavar="K", help="of the scene's random numbers (default: 1)")
+    parser.add_argument("--path", metavar="FILE", help="recorded tracks, for the scene `trajectory`")
     parser.add_argument("--output", type=Path, metavar="PATH", help="session file (default: sessions/SCENE-DATE.mcap)")
     parser.add_argument("--capture", type=Path, metavar="FILE", help="save the last picture of the table as SVG")
     parser.set_defaults(command=demo)
@@ -68,6 +69,8 @@ def demo(args: argparse.Namespace) -> int:
 def _watch(args: argparse.Namespace, session: Path, stop: StopRequest) -> None:
     """From the start of both processes to the finished session file."""
     scene = ["world", args.scene, "--duration", str(args.duration), "--seed", str(args.seed)]
+    if args.path:
+        scene += ["--path", args.path]
     if args.objects is not None:
         scene += ["--objects", str(args.objects)]
     with Child("run", "--record", str(session)) as monitor, ros_context([]):
