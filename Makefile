@@ -11,7 +11,7 @@ unexport PYTHONPATH
 endif
 unexport PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup demo test lint clean
+.PHONY: help setup demo test lint bench bench-peers clean
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -30,5 +30,11 @@ lint: setup ## ruff and mypy --strict
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
 
+bench: setup ## time all contacts of a frame, ours and every installed peer; make bench ARGS=--quick takes a minute
+	@$(BIN)/python benchmarks/run.py $(ARGS)
+
+bench-peers: ## install the systems that bench compares with
+	@sh benchmarks/install_peers.sh
+
 clean: ## remove everything that was set up or built
-	rm -rf .venv build install log .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
+	rm -rf .venv .venv-peers build install log .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info

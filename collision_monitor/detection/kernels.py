@@ -311,18 +311,24 @@ def detect(path: int, limit: float, positions: Any, quaternions: Any, pairs: Any
     """
     table, grid = ShapeTable(*memory[:10]), Grid(*memory[10:18])
     frame, hits = Frame(*memory[18:29]), Hits(*memory[29:32])
-    _bounds(positions, frame, 0)
-    if not frame.good[0]:
+    blocks = frame.bounds.shape[0]
+    for b in range(blocks):
+        _bounds(positions, frame, b)
+    if not frame.good.all():
         return BAD_POSITION
     cells = _cells(grid, frame)
-    _buckets(positions, grid, frame, 0)
+    for b in range(blocks):
+        _buckets(positions, grid, frame, b)
     sort_by_cell(positions.shape[0], cells, grid)
-    _gather(table, path, positions, quaternions, grid, frame, 0)
-    if not frame.good[0]:
+    for b in range(blocks):
+        _gather(table, path, positions, quaternions, grid, frame, b)
+    if not frame.good.all():
         return BAD_QUATERNION
-    _search(table, path, limit, grid, frame, hits, 0)
+    for b in range(blocks):
+        _search(table, path, limit, grid, frame, hits, b)
     total = _finish(frame, hits, pairs)
-    _write(positions, frame, hits, total, pairs, contacts, 0)
+    for b in range(blocks):
+        _write(positions, frame, hits, total, pairs, contacts, b)
     return total
 
 
@@ -330,25 +336,25 @@ def detect(path: int, limit: float, positions: Any, quaternions: Any, pairs: Any
 def detect_parallel(
     path: int, limit: float, positions: Any, quaternions: Any, pairs: Any, contacts: Any, *memory: Any
 ) -> int:
-    """The same on as many threads as there are blocks."""
+    """The same on as many threads as there are blocks. b is cast, so that both share their compiled stages."""
     table, grid = ShapeTable(*memory[:10]), Grid(*memory[10:18])
     frame, hits = Frame(*memory[18:29]), Hits(*memory[29:32])
     blocks = frame.bounds.shape[0]
     for b in prange(blocks):
-        _bounds(positions, frame, b)
+        _bounds(positions, frame, np.int64(b))
     if not frame.good.all():
         return BAD_POSITION
     cells = _cells(grid, frame)
     for b in prange(blocks):
-        _buckets(positions, grid, frame, b)
+        _buckets(positions, grid, frame, np.int64(b))
     sort_by_cell(positions.shape[0], cells, grid)
     for b in prange(blocks):
-        _gather(table, path, positions, quaternions, grid, frame, b)
+        _gather(table, path, positions, quaternions, grid, frame, np.int64(b))
     if not frame.good.all():
         return BAD_QUATERNION
     for b in prange(blocks):
-        _search(table, path, limit, grid, frame, hits, b)
+        _search(table, path, limit, grid, frame, hits, np.int64(b))
     total = _finish(frame, hits, pairs)
     for b in prange(blocks):
-        _write(positions, frame, hits, total, pairs, contacts, b)
+        _write(positions, frame, hits, total, pairs, contacts, np.int64(b))
     return total

@@ -1,0 +1,183 @@
+"""Full detection, ours and every peer that is installed, one after the other on the same saved scenes.
+
+    python benchmarks/run.py                 everything: about half an hour
+    python benchmarks/run.py --quick         a few peers, small scenes: about a minute
+    python benchmarks/run.py --scenes boxes --n 10000 --only native-fcl,native-bullet
+
+Prints milliseconds per frame and how many times as long each peer takes; writes results.json and results.png into
+benchmarks/results/. `make bench-peers` installs the peers; --peers names their runner, which is not in this repository.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from collision_monitor._version import VERSION
+from collision_monitor.cli.bench import CHECKED
+from collision_monitor.detection import Detector
+from collision_monitor.errors import CollisionMonitorError
+from collision_monitor.world.moving_bodies import SCENES, load_bodies, make_bodies
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "benchmarks" / "results"
+PEERS_FOLDER = ROOT / ".venv-peers"
+QUICK = "native-fcl,native-bullet,native-coal,rapier-sensor,mujoco"
+
+
+def peers_python() -> str:
+    """The Python that has the peers' packages."""
+    own = PEERS_FOLDER / "bin" / "python"
+    return str(own) if own.exists() else sys.executable
+
+
+def run_peers(runner: Path, scene: str, n: int, args: argparse.Namespace, folder: Path) -> list[dict[str, Any]]:
+    """The peers' results for one scene, which they leave in `folder`."""
+    answer = folder / "peers.json"
+    command = [peers_python(), str(runner), "--scene", scene, "--n", str(n), "--seed", str(args.seed)]
+    command += ["--peers", args.only, "--budget", str(args.budget), "--json", str(answer), "--save-scenes", str(folder)]
+    command += ["--node-dir", str(PEERS_FOLDER)]
+    result = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"})
+    if result.returncode:
+        print(f"the peers' runner failed: {result.stderr.strip().splitlines()[-1:]}", file=sys.stderr)
+        return []
+    rows: list[dict[str, Any]] = json.loads(answer.read_text())
+    return rows
+
+
+def run_ours(file: Path, threads: int) -> dict[str, Any]:
+    """Our result, from a process of its own like the peers'."""
+    command = [sys.executable, "-m", "collision_monitor", "bench", "--scene-file", str(file), "--json"]
+    result = subprocess.run([*command, "--threads", str(threads)], capture_output=True, text=True)
+    if result.returncode:
+        raise SystemExit(f"collision-monitor bench failed: {result.stderr.strip()}")
+    row: dict[str, Any] = json.loads(result.stdout)
+    return row
+
+
+def check(runner: Path, file: Path, folder: Path) -> dict[str, Any]:
+    """Our pairs and depths against the peers' reference."""
+    scene = load_bodies(file)
+    contacts = Detector(scene.shapes).detect(scene.positions[CHECKED], scene.quaternions[CHECKED])
+    ours = folder / "ours.npz"
+    np.savez(ours, pairs=contacts.pairs, depth=-contacts.signed_distance)
+    command = [peers_python(), str(ROOT / "benchmarks" / "check_pairs.py"), str(runner), str(file), str(ours)]
+    result = subprocess.run(command, capture_output=True, text=True)
+    answer: dict[str, Any] = json.loads(result.stdout) if result.returncode == 0 else {"reference": None}
+    return answer
+
+
+def show(scene: str, n: int, ours: list[dict[str, Any]], peers: list[dict[str, Any]], checked: dict[str, Any]) -> None:
+    """The table of one scene."""
+    best = min(row["median_ms"] for row in ours)
+    print(f"\n{scene}, {n} objects: {ours[0]['pairs']} colliding pairs", end="")
+    if checked.get("reference"):
+        print(
+            f"; against {checked['reference']}: {checked['missing']} missing, {checked['extra']} extra, "
+            f"depths within {checked['worst_depth_difference_m']:.1e} m",
+            end="",
+        )
+    print(f"\n  {'':28s}{'ms':>10s}{'ratio':>8s}")
+    for row in ours:
+        name = f"ours, {row['threads']} thread{'s'[: row['threads'] > 1]}"
+        print(f"  {name:28s}{row['median_ms']:10.4f}{row['median_ms'] / best:8.1f}")
+    for row in sorted((row for row in peers if "error" not in row), key=lambda row: row["total_ms"]):
+        print(f"  {row['peer']:28s}{row['total_ms']:10.4f}{row['total_ms'] / best:8.1f}")
+    failed = [row["peer"] for row in peers if "error" in row]
+    if failed:
+        print(f"  without a result: {', '.join(failed)}")
+
+
+def plot(results: list[dict[str, Any]], file: Path) -> None:
+    """Time against number of objects, log-log, one panel for each scene."""
+    import matplotlib
+
+    matplotlib.use("agg")
+    from matplotlib import pyplot
+
+    scenes = [scene for scene in SCENES if any(entry["scene"] == scene for entry in results)]
+    figure, axes = pyplot.subplots(1, len(scenes), figsize=(4.2 * len(scenes), 4.6), sharey=True, squeeze=False)
+    for axis, scene in zip(axes[0], scenes, strict=True):
+        curves: dict[str, list[tuple[int, float]]] = {}
+        for entry in results:
+            if entry["scene"] == scene:
+                for row in entry["ours"]:
+                    curves.setdefault(f"ours, {row['threads']} thr.", []).append((entry["n"], row["median_ms"]))
+                for row in entry["peers"]:
+                    if "error" not in row:
+                        curves.setdefault(row["peer"], []).append((entry["n"], row["total_ms"]))
+        last = {name: max(points) for name, points in curves.items()}
+        for name in sorted(curves, key=lambda name: (not name.startswith("ours"), -last[name][1])):
+            style = {"linewidth": 2.6, "color": "black"} if name.startswith("ours") else {"linewidth": 1.0}
+            dashes = "--" if name == "ours, 1 thr." else "-"
+            axis.plot(*zip(*sorted(curves[name]), strict=True), dashes, marker="o", markersize=3, label=name, **style)
+        axis.set(xscale="log", yscale="log", title=scene, xlabel="objects")
+        axis.grid(which="both", linewidth=0.3)
+        axis.legend(fontsize=6)
+    axes[0][0].set_ylabel("ms per frame, every pose new")
+    figure.tight_layout()
+    figure.savefig(file, dpi=90)
+
+
+def main() -> int:
+    """Run it all; the exit code is 0 also where a peer fails."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help=f"100 and 1,000 objects, {QUICK}")
+    parser.add_argument("--peers", type=Path, default=ROOT.parent / "shared" / "bench" / "peers.py", metavar="PEERS.PY")
+    parser.add_argument("--only", metavar="A,B", help="these peers (default: all)")
+    parser.add_argument("--scenes", default=",".join(SCENES), metavar="A,B")
+    parser.add_argument("--n", metavar="N,M", help="numbers of objects (default: 100,1000,10000)")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--budget", type=float, help="seconds of frames for each peer and scene (default: 20)")
+    parser.add_argument("--out", type=Path, default=RESULTS, metavar="FOLDER")
+    args = parser.parse_args()
+    args.only = args.only or (QUICK if args.quick else "all")
+    args.budget = args.budget or (1.0 if args.quick else 20.0)
+    numbers = [int(n) for n in (args.n or ("100,1000" if args.quick else "100,1000,10000")).split(",")]
+    threads = sorted({1, min(2, os.cpu_count() or 1)})
+    there = args.peers.is_file()
+    if not there:
+        print(f"no peers: their runner is not at {args.peers} (name it with --peers); ours alone", file=sys.stderr)
+    args.out.mkdir(parents=True, exist_ok=True)
+    results = []
+    for scene in args.scenes.split(","):
+        for n in numbers:
+            with tempfile.TemporaryDirectory() as name:
+                folder = Path(name)
+                peers = run_peers(args.peers, scene, n, args, folder) if there else []
+                file = folder / f"{scene}_{n}_seed{args.seed}.npz"
+                if not file.exists():
+                    make_bodies(scene, n, args.seed).save(file)
+                ours = [run_ours(file, count) for count in threads]
+                checked = check(args.peers, file, folder) if there else {}
+            show(scene, n, ours, peers, checked)
+            results.append({"scene": scene, "n": n, "ours": ours, "check": checked, "peers": peers})
+    about = {
+        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "version": VERSION,
+        "python": platform.python_version(),
+        "processors": os.cpu_count(),
+        "load": os.getloadavg()[0],
+        "command": " ".join(["python", "benchmarks/run.py", *sys.argv[1:]]),
+    }
+    (args.out / "results.json").write_text(json.dumps({"about": about, "results": results}, indent=1) + "\n")
+    plot(results, args.out / "results.png")
+    print(f"\nwritten: {args.out / 'results.json'}, {args.out / 'results.png'}")
+    return 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except CollisionMonitorError as error:
+        sys.exit(f"error: {error}")
