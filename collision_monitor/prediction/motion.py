@@ -6,12 +6,13 @@ where the reference motion puts it. While that holds, what was predicted from th
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
+from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.prediction.trigonometry import sin_cos
 
 MOTION = np.dtype(
     [
@@ -126,9 +127,9 @@ def rotation_at(m, t, out):
                 out[i, j] = R[i, j]
         return
     kx, ky, kz = m.wx / rate, m.wy / rate, m.wz / rate
-    half = sin(0.5 * angle)
-    c = 2.0 * half * half  # 1 - cos, without cancellation
-    s = 2.0 * half * cos(0.5 * angle)
+    half_sine, half_cosine = sin_cos(0.5 * angle)
+    c = 2.0 * half_sine * half_sine  # 1 - cos, without cancellation
+    s = 2.0 * half_sine * half_cosine
     for j in range(3):
         x, y, z = R[0, j], R[1, j], R[2, j]
         ax, ay, az = ky * z - kz * y, kz * x - kx * z, kx * y - ky * x
@@ -179,8 +180,8 @@ def turn_quaternion(q, i, wx, wy, wz, t, out):
     if rate * abs(t) == 0.0:
         out[0], out[1], out[2], out[3] = x, y, z, w
         return
-    s = sin(0.5 * rate * t) / rate
-    c = cos(0.5 * rate * t)
+    s, c = sin_cos(0.5 * rate * t)
+    s /= rate
     ax, ay, az = s * wx, s * wy, s * wz
     out[0] = c * x + ax * w + ay * z - az * y
     out[1] = c * y - ax * z + ay * w + az * x
