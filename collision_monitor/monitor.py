@@ -464,7 +464,8 @@ class Monitor:
     def _examine_active(self, new: NDArray[np.void], now: float, work: dict[str, int]) -> NDArray[np.void]:
         """Look at the pairs that are due or touch; the contacts (records.CONTACT). New events go into the list."""
         p, bodies = self.profile, self._bodies
-        due = self._events.update(new, bodies.motion, now)
+        is_due = new["lower"] <= now
+        due = np.concatenate([self._events.take_due(bodies.motion, now), new[is_due]])
         work["events_due"] = len(due)
         room = len(self._pairs) + len(due)
         pairs = np.empty(room, active_pairs.PAIR)
@@ -480,8 +481,7 @@ class Monitor:
         work["narrow_phase_tests"] += tests
         work["impact_queries"] += queries
         self._pairs, self._pair_events = pairs[:n], events[:n]
-        if n_later:
-            self._events.update(later[:n_later], bodies.motion, now)
+        self._events.add(np.concatenate([new[~is_due], later[:n_later]]), bodies.motion)
         contacts = np.empty(n, records.CONTACT)
         n = answers.write_contacts(
             self._pairs, results, self._parts.index, now,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, kernel
+from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.prediction.time_of_impact import IMPACT
 
 Events = NDArray[np.void]
@@ -51,65 +51,72 @@ def sort_order(events, order):
         order[:] = source.copy()
 
 
-@kernel
-def merge(old, count, new, order, n_new, motion, now, merged, due):
-    """old[:count] and new[order[:n_new]] into merged, both sorted; those due by `now` into due instead.
+@inlined
+def _holds(motion, event):
+    """Does the event rest on motions that have not changed since?"""
+    return motion[event.i].version == event.version_i and motion[event.j].version == event.version_j
 
-    Events whose bodies' motion (N,) has changed are dropped. Returns (length of merged, length of due).
-    """
-    i = k = n = n_due = 0
-    while i < count or k < n_new:
-        if i < count and (motion[old[i].i].version != old[i].version_i or motion[old[i].j].version != old[i].version_j):
-            i += 1
-            continue
-        if k >= n_new or (i < count and not _before(new[order[k]], old[i])):
-            event = old[i]
-            i += 1
-        else:
-            event = new[order[k]]
-            k += 1
-        if event.lower <= now:
-            due[n_due] = event
-            n_due += 1
-        else:
-            merged[n] = event
+
+@kernel
+def take_due(events, motion, now, due):
+    """Events at the front (sorted) that are due by `now` and still hold, into due; returns (how many passed, due)."""
+    passed = n = 0
+    while passed < events.size and events[passed].lower <= now:
+        if _holds(motion, events[passed]):
+            due[n] = events[passed]
             n += 1
-    return n, n_due
+        passed += 1
+    return passed, n
+
+
+@kernel
+def merge(old, new, order, motion, merged):
+    """old, and new in its order, both sorted, into merged; what no longer holds is left out. Returns the length."""
+    i = k = n = 0
+    while i < old.size or k < new.size:
+        if i < old.size and not _holds(motion, old[i]):
+            i += 1
+        elif k >= new.size or (i < old.size and not _before(new[order[k]], old[i])):
+            merged[n] = old[i]
+            i += 1
+            n += 1
+        else:
+            merged[n] = new[order[k]]
+            k += 1
+            n += 1
+    return n
 
 
 class EventList:
     """Predicted impacts (time_of_impact.IMPACT), sorted by (lower, key). Grows as needed."""
 
     def __init__(self) -> None:
-        self._events: Events = np.zeros(256, IMPACT)
-        self._spare: Events = np.zeros(256, IMPACT)
-        self._due: Events = np.zeros(256, IMPACT)
-        self._count = 0
+        self._room: Events = np.empty(256, IMPACT)
+        self._spare: Events = np.empty(256, IMPACT)
+        self.events: Events = self._room[:0]
+        """The pending events in order; a view that the next `add` replaces."""
 
     def __len__(self) -> int:
-        return self._count
-
-    @property
-    def events(self) -> Events:
-        """The pending events in order; a view that the next update replaces."""
-        return self._events[: self._count]
+        return len(self.events)
 
     def clear(self) -> None:
         """Forget all events."""
-        self._count = 0
+        self.events = self._room[:0]
 
-    def update(self, new: Events, motion: NDArray[np.void], now: float) -> Events:
-        """Merge `new` in, drop what is outdated, and return what is due by `now`, in order (a view)."""
-        need = self._count + len(new)
+    def take_due(self, motion: NDArray[np.void], now: float) -> Events:
+        """Take off and return what is due by `now` and whose bodies' motion (N,) still holds, in order."""
+        due = np.empty(int(np.searchsorted(self.events["lower"], now, side="right")), IMPACT)
+        passed, n = take_due(self.events, motion, now, due)
+        self.events = self.events[passed:]
+        return due[:n]
+
+    def add(self, new: Events, motion: NDArray[np.void]) -> None:
+        """Merge `new` in, in any order, and drop what no longer holds."""
+        need = len(self.events) + len(new)
         if need > len(self._spare):
-            size = 2 * need
-            self._spare = np.zeros(size, IMPACT)
-            grown = np.zeros(size, IMPACT)
-            grown[: self._count] = self._events[: self._count]
-            self._events = grown
-            self._due = np.zeros(size, IMPACT)
+            self._spare = np.empty(2 * need, IMPACT)
         order = np.empty(len(new), np.int64)
         sort_order(new, order)
-        count, n_due = merge(self._events, self._count, new, order, len(new), motion, now, self._spare, self._due)
-        self._events, self._spare, self._count = self._spare, self._events, count
-        return self._due[:n_due]
+        n = merge(self.events, new, order, motion, self._spare)
+        self._room, self._spare = self._spare, self._room
+        self.events = self._room[:n]

@@ -163,9 +163,9 @@ def shape_impact(table, parts, A, B, a, b, begin, end, tube_0, tube_1, tolerance
     """When the gap between shape a in motion A and shape b in motion B (MOTION) first is within the wanted one.
 
     begin, end: seconds after the monitor's origin; the wanted gap is tube_0 + tube_1 (t - begin) (m).
-    Returns (status, t, queries, guess): no time in [begin, t) is within the wanted gap; at t it is within tolerance of it
-    (HIT), t is end (CLEAR), or the budget of distance queries ran out (UNRESOLVED). guess: how
-    long after t they overlap by as much as they should, from how fast the gap closed last; 0 where nothing tells.
+    Returns (status, t, queries, guess): no time in [begin, t) is within the wanted gap; at t it is within tolerance of
+    it (HIT), t is end (CLEAR), or the budget of distance queries ran out (UNRESOLVED). guess: how long after t they
+    overlap by as much as they should, from how fast the gap closed last; 0 where nothing tells.
     """
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
