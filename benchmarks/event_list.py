@@ -46,6 +46,8 @@ class Boxes:
         self.linear, self.angular = rng.uniform(-1, 1, (n, 3)), rng.uniform(-1, 1, (n, 3))
 
     def states(self, noise: float) -> NDArray[np.void]:
+        """All states (records.STATE), shaken by up to `noise` in every part."""
+
         def shake() -> NDArray[np.float64]:
             return noise * self.rng.uniform(-1, 1, self.position.shape) / np.sqrt(3) if noise else np.zeros(3)
 
@@ -57,6 +59,7 @@ class Boxes:
         return states
 
     def move(self, dt: float, turning: float) -> None:
+        """dt seconds on; then this part of the boxes takes another course."""
         self.position += self.linear * dt
         self.quaternion = multiply(from_rotation_vector(self.angular * dt), self.quaternion)
         chosen = self.rng.random(len(self.size)) < turning
@@ -64,6 +67,7 @@ class Boxes:
             velocity[chosen] = self.rng.uniform(-1, 1, (int(chosen.sum()), 3))
 
     def walls(self) -> None:
+        """Turn round whoever has left the cube."""
         out = (self.position < 0) & (self.linear < 0) | (self.position > self.side) & (self.linear > 0)
         self.linear[out] *= -1
 
@@ -119,6 +123,7 @@ def run(move: str, args: argparse.Namespace) -> dict[str, object]:
 
 
 def main() -> int:
+    """Exit code 3 where the two do not agree."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--objects", type=int, default=10_000)
     parser.add_argument("--seconds", type=float, default=5.0, help="simulated time at 100 Hz")
