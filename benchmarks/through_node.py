@@ -30,7 +30,7 @@ from collision_monitor.cli.child import Child, ProcessError
 from collision_monitor.codec.cdr import Reader
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.ros.domain import free_domain
-from collision_monitor.ros.process import ros_context
+from collision_monitor.ros.process import ros_context, stay_on_this_machine
 from collision_monitor.world import describe
 
 CASES = ((1_000, 100.0), (10_000, 20.0))
@@ -151,7 +151,7 @@ def measure(scene: str, objects: int, rate: float, duration: float, seed: int) -
         status = listener.status
         listener.close()
     if said is None or status is None or not listener.arrivals:
-        raise ProcessError(f"expected states and answers, got {len(listener.arrivals)} answers; is {scene!r} too short?")
+        raise ProcessError(f"expected states and answers, got {len(listener.arrivals)} answers: too short to measure")
     step, stamp, arrived = np.array(listener.arrivals).T
     latency = (arrived - stamp) * 1e-6
     return Measurement(
@@ -247,6 +247,7 @@ def main() -> int:
         if not args.duration > 0.0:
             raise InputError(f"--duration: expected a positive number of seconds, got {args.duration}")
         os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        stay_on_this_machine()
         os.environ["ROS_DOMAIN_ID"] = str(free_domain())
         measurements = [measure(args.scene, n, rate, args.duration, args.seed) for n, rate in cases]
     except CollisionMonitorError as error:

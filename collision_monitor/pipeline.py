@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from collision_monitor._version import VERSION
 from collision_monitor.codec import (
+    Descriptions,
     Removal,
     States,
     Status,
@@ -55,20 +56,24 @@ class Pipeline:
         self.messages_lost = 0
         self._sequence: int | None = None
         self._static: set[int] = set()
-        self._removed: dict[int, str] = {}  # since the last step: names that its answers may still need
+        self._names: dict[int, str] = {}  # also of what was removed since the last step, whose contacts end in the next
+        self._removed: set[int] = set()
         self._last: StepResult | None = None
 
     # -- in
 
-    def on_shapes(self, data: bytes) -> None:
-        """An ObjectDescriptionArray: add, replace, remove. An object that cannot be is refused, the others not."""
+    def on_shapes(self, data: bytes) -> Descriptions | None:
+        """An ObjectDescriptionArray: add, replace, remove. An object that cannot be is refused, the others not.
+
+        Returns the message as it was read; None: it was refused as a whole.
+        """
         try:
             message = decode_descriptions(data)
         except MessageError as error:
             self.monitor.refuse(Refusal.MALFORMED, str(error))
-            return
+            return None
         if not self._is_our_frame(message.frame_id, "ObjectDescriptionArray"):
-            return
+            return None
         for _, text in message.refused:
             self.monitor.refuse(Refusal.SHAPE, text)
         if message.snapshot:
@@ -81,6 +86,7 @@ class Pipeline:
                 self._remove(each.object_id)
             else:
                 self._describe(each)
+        return message
 
     def on_states(self, data: bytes) -> Outputs | None:
         """An ObjectStateArray: one step. None: the message was refused as a whole and there is no new answer."""
@@ -156,20 +162,15 @@ class Pipeline:
             self.monitor.refuse(Refusal.SHAPE, str(error))
             return
         (self._static.add if it.static else self._static.discard)(it.object_id)
+        self._names[it.object_id] = it.name
+        self._removed.discard(it.object_id)
 
     def _remove(self, object_id: int) -> None:
         """Removing what is not there is no error: the sender's wish is met."""
         with suppress(InputError):
-            self._removed[object_id] = self.monitor.name(object_id)
             self.monitor.remove(object_id)
             self._static.discard(object_id)
-
-    def _name(self, object_id: int) -> str:
-        """Also of an object whose contact ended because it was removed."""
-        try:
-            return self.monitor.name(object_id)
-        except InputError:
-            return self._removed[object_id]
+            self._removed.add(object_id)
 
     def _count_lost(self, sequence: int) -> None:
         last, self._sequence = self._sequence, sequence
@@ -195,13 +196,14 @@ class Pipeline:
             result=result,
             digest=self.monitor.digest,
         )
-        self._removed.clear()
+        while self._removed:
+            del self._names[self._removed.pop()]
         return outputs
 
     def _mentioned(self, answers: Records) -> tuple[NDArray[np.uint32], list[str]]:
         """The ids in `answers`, ascending, and their names."""
         ids = np.unique(np.concatenate([answers["id_a"], answers["id_b"]]))
-        return ids, [self._name(object_id) for object_id in ids.tolist()]
+        return ids, list(map(self._names.__getitem__, ids.tolist()))
 
 
 def _with_stddevs(message: States) -> Records:

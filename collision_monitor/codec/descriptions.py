@@ -15,6 +15,8 @@ from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Sphere
 
 _ADD, _REMOVE = 0, 1
+_IDENTITY = Pose()
+_IDENTITY_BYTES = np.concatenate([_IDENTITY.position, _IDENTITY.quaternion]).astype("<f8").tobytes()
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,7 @@ def _change(raw: _Raw) -> Change:
         raise InputError(f"operation: expected 0 (ADD) or 1 (REMOVE), got {raw.operation}")
     if len(raw.shape_poses) not in (0, len(raw.shapes)):
         raise ShapeError(f"shape_poses: expected none or {len(raw.shapes)}, as shapes, got {len(raw.shape_poses)}")
-    poses = [_pose(row) for row in raw.shape_poses] or [Pose()] * len(raw.shapes)
+    poses = [_pose(row) for row in raw.shape_poses] or [_IDENTITY] * len(raw.shapes)
     return ObjectDescription(
         object_id=raw.object_id,
         shapes=[(make_shape(*shape), pose) for shape, pose in zip(raw.shapes, poses, strict=True)],
@@ -128,6 +130,8 @@ def _change(raw: _Raw) -> Change:
 
 
 def _pose(row: Floats) -> Pose:
+    if row.tobytes() == _IDENTITY_BYTES:  # most shapes stand in their object's origin: one pose serves them all
+        return _IDENTITY
     return Pose(row[:3], row[3:])
 
 

@@ -6,6 +6,7 @@ Quaternions are (x, y, z, w), as in ROS. A rotation matrix R_WA takes vectors of
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -88,10 +89,12 @@ class Pose:
         object.__setattr__(self, "position", vector(self.position, "position"))
         object.__setattr__(self, "quaternion", unit_quaternion(self.quaternion))
 
-    @property
+    @cached_property
     def rotation(self) -> Array:
-        """R_WA (3, 3): takes the body's vectors to the world."""
-        return rotation_matrix(self.quaternion)
+        """R_WA (3, 3), read-only: takes the body's vectors to the world."""
+        matrix = rotation_matrix(self.quaternion)
+        matrix.setflags(write=False)
+        return matrix
 
     def __matmul__(self, other: Pose) -> Pose:
         """X_WB = X_WA @ X_AB."""

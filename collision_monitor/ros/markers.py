@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.codec import Descriptions, Removal
+from collision_monitor.description import ObjectDescription
 from collision_monitor.geometry.pose import Pose, rotation_matrix
 from collision_monitor.monitor import StepResult
 from collision_monitor.records import Phase
@@ -30,10 +31,13 @@ Vertices = NDArray[np.float64]
 
 
 class MarkerView:
-    """Remembers shapes and last poses; draws when asked."""
+    """Remembers shapes and last poses; builds surfaces only when asked to draw."""
 
     def __init__(self, frame_id: str) -> None:
         self._frame_id = frame_id
+        self._described: dict[int, ObjectDescription] = {}
+        self._unbuilt: set[int] = set()
+        self._changed = False
         self._surfaces: dict[int, Vertices] = {}
         self._static: dict[int, Vertices] = {}
         self._ids = np.empty(0, np.uint32)
@@ -43,36 +47,45 @@ class MarkerView:
 
     def describe(self, message: Descriptions) -> None:
         """Take in new and changed objects, forget removed ones."""
+        self._changed = True
         if message.snapshot:
-            keep = {description.object_id for description in message.objects}
-            for object_id in (self._surfaces.keys() | self._static.keys()) - keep:
+            keep = {each.object_id for each in message.objects} | {object_id for object_id, _ in message.refused}
+            for object_id in self._described.keys() - keep:
                 self._forget(object_id)
-        for description in message.objects:
-            self._forget_shape(description.object_id)
-            if isinstance(description, Removal):
-                self._forget(description.object_id)
-                continue
-            parts = [_placed(triangles(shape).reshape(-1, 3), pose) for shape, pose in description.shapes]
-            vertices = np.concatenate(parts)
-            if description.static and description.pose is not None:
-                self._static[description.object_id] = _placed(vertices, description.pose)
+        for each in message.objects:
+            if isinstance(each, Removal):
+                self._forget(each.object_id)
             else:
-                self._surfaces[description.object_id] = vertices
+                self._described[each.object_id] = each
+                self._unbuilt.add(each.object_id)
+
+    def _forget(self, object_id: int) -> None:
+        for known in (self._described, self._surfaces, self._static, self._poses):
+            known.pop(object_id, None)
+        self._unbuilt.discard(object_id)
+
+    def _build(self) -> None:
+        """Surfaces of what changed since the last picture."""
+        for object_id in self._unbuilt:
+            it = self._described[object_id]
+            self._surfaces.pop(object_id, None)
+            self._static.pop(object_id, None)
+            vertices = np.concatenate([_placed(triangles(shape).reshape(-1, 3), pose) for shape, pose in it.shapes])
+            if it.static and it.pose is not None:
+                self._static[object_id] = _placed(vertices, it.pose)
+            else:
+                self._surfaces[object_id] = vertices
+        self._unbuilt.clear()
         self._ids = np.array(sorted(self._surfaces), np.uint32)
         surfaces = [self._surfaces[int(i)] for i in self._ids]
         self._vertices = np.concatenate(surfaces) if surfaces else np.empty((0, 3))
         self._owner = np.repeat(np.arange(len(surfaces)), [len(s) for s in surfaces])
-
-    def _forget_shape(self, object_id: int) -> None:
-        self._surfaces.pop(object_id, None)
-        self._static.pop(object_id, None)
-
-    def _forget(self, object_id: int) -> None:
-        self._forget_shape(object_id)
-        self._poses.pop(object_id, None)
+        self._changed = False
 
     def draw(self, states: NDArray[np.void], result: StepResult) -> bytes:
         """MarkerArray bytes; `states`: those of the step (records.STATE). Objects without a state are left out."""
+        if self._changed:
+            self._build()
         for state in states:
             self._poses[int(state["id"])] = np.r_[state["position"], state["quaternion"]]
         contacts = result.contacts[result.contacts["phase"] != Phase.END]

@@ -5,10 +5,10 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import threading
 import time
-from contextlib import suppress
 from typing import Any, Final
 
 from rclpy.clock import Clock
@@ -17,7 +17,7 @@ from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
 
 from collision_monitor import codec, warm_up
-from collision_monitor.errors import CollisionMonitorError, MessageError, Refusal, SessionError
+from collision_monitor.errors import CollisionMonitorError, Refusal, SessionError
 from collision_monitor.pipeline import Outputs, Pipeline
 from collision_monitor.ros import qos
 from collision_monitor.ros.markers import MarkerView
@@ -79,6 +79,7 @@ class MonitorNode(Node):
         self.create_subscription(ObjectDescriptionArray, self._shapes_topic, self._on_shapes, qos.SHAPES, raw=True)
         self.create_subscription(ObjectStateArray, self._states_topic, self._on_states, qos.STATES, raw=True)
         self.create_timer(WATCHDOG_PERIOD, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        _keep_from_collector()
         self._publish_status()
         self.get_logger().info(
             f"listening on {self._states_topic} and {self._shapes_topic}, "
@@ -124,18 +125,21 @@ class MonitorNode(Node):
 
     def _on_shapes(self, data: bytes) -> None:
         received = self._now()
-        self._pipeline.on_shapes(data)
-        with suppress(MessageError):  # the pipeline has counted it
-            self._markers.describe(codec.decode_descriptions(data))
+        message = self._pipeline.on_shapes(data)
         self._record(self._shapes_topic, data, received, received)
+        if message is not None:
+            self._markers.describe(message)
+            _keep_from_collector()
+        if time.monotonic_ns() - self._last_status >= STATUS_PERIOD:
+            self._publish_status()  # so that the sender learns when its shapes are known
 
     def _on_states(self, data: bytes) -> None:
         began = time.monotonic_ns()
         received = self._now()
         outputs = self._pipeline.on_states(data)
         if outputs is not None:
+            self._predictions_out.publish(outputs.predictions)  # first: a warning is worth more the earlier it comes
             self._contacts_out.publish(outputs.contacts)
-            self._predictions_out.publish(outputs.predictions)
         ended = time.monotonic_ns()
         if outputs is None:
             self._record(self._states_topic, data, received, received)
@@ -214,3 +218,9 @@ class MonitorNode(Node):
         if self._recorder is not None:
             self._recorder.close()
         self.destroy_node()
+
+
+def _keep_from_collector() -> None:
+    """Let no later step wait while Python searches modules, kernels and descriptions for garbage: 0.1 s at times."""
+    gc.collect()
+    gc.freeze()

@@ -11,6 +11,7 @@ import signal
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
@@ -53,9 +54,18 @@ class StopRequest:
             self._interrupts = False
 
 
+PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
+"""The environment variables by which Fast DDS is configured, before and since its version 3."""
+
+
 def stay_on_this_machine() -> None:
-    """Keep DDS on loopback unless the user chose a discovery range; rclpy reads it when a context is made."""
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    """Keep DDS on loopback unless the user chose a discovery range, with room for large messages unless the user chose
+    another configuration of Fast DDS. Both are read when the context is made.
+    """
+    if os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST") != "LOCALHOST":
+        return
+    if not any(name in os.environ for name in PROFILES):
+        os.environ[PROFILES[0]] = str(Path(__file__).with_name("shared_memory.xml"))
 
 
 @contextmanager

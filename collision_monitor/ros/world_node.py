@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import time
 
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from collision_monitor import codec
@@ -16,12 +17,15 @@ from collision_monitor.ros import qos
 from collision_monitor.ros.parameters import ParameterReader
 from collision_monitor.ros.process import WAKE_UP, StopRequest
 from collision_monitor.world import make_scene, scene_names
-from collision_monitor_msgs.msg import ObjectDescriptionArray, ObjectStateArray
+from collision_monitor_msgs.msg import MonitorStatus, ObjectDescriptionArray, ObjectStateArray
 
 PARAMETERS = ("scene", "objects", "rate", "duration", "seed", "path", "monitor", "frame_id")
 
 LISTENER_PATIENCE = 4.0
 """s: on a busy machine DDS can lose its first announcement, and makes the next one 3 s later."""
+
+SHAPES_PATIENCE = 10.0
+"""s for the monitor to take in the shapes; ten thousand take it a second."""
 
 
 class WorldNode(Node):
@@ -65,6 +69,7 @@ class WorldNode(Node):
         self._wait_for_listener(stop)
         now = self.get_clock().now().nanoseconds
         self._shapes_out.publish(codec.encode_descriptions(now, self._frame_id, scene.descriptions, snapshot=True))
+        self._wait_for_shapes_taken(stop)
         end = self._duration or math.inf
         states = scene.states()
         tick = messages = skipped = 0
@@ -90,6 +95,27 @@ class WorldNode(Node):
         patience = time.monotonic() + LISTENER_PATIENCE
         while not self._states_out.get_subscription_count() and time.monotonic() < patience and not stop.received:
             time.sleep(0.01)
+
+    def _wait_for_shapes_taken(self, stop: StopRequest) -> None:
+        """Until the monitor's status counts as many objects: states that come meanwhile would wait, and then be lost.
+
+        Without a monitor, or with one that refuses some of the objects, play all the same.
+        """
+        topic = f"/{self._monitor}/status"
+        known: list[int] = []
+        subscription = self.create_subscription(
+            MonitorStatus, topic, lambda data: known.append(codec.decode_status(data).objects), qos.STATUS, raw=True
+        )
+        executor = SingleThreadedExecutor()
+        executor.add_node(self)
+        patience = time.monotonic() + SHAPES_PATIENCE
+        while self.count_publishers(topic) and len(self._scene.descriptions) not in known:
+            if time.monotonic() > patience or stop.received:
+                break
+            executor.spin_once(timeout_sec=WAKE_UP)
+        executor.remove_node(self)
+        executor.shutdown()
+        self.destroy_subscription(subscription)
 
 
 def _sleep_until(deadline: float, stop: StopRequest) -> bool:
