@@ -185,20 +185,20 @@ class Monitor:
             bodies.linear[i] = bodies.angular[i] = 0.0
             bodies.seen[i] = True
         elif bodies.static[i]:
-            bodies.seen[i] = False
+            bodies.seen[i] = False  # it moves now, and where to is not known yet
+            remove_boxes(self._grid, np.array([i], np.int32))
         bodies.static[i] = d.static
+        bodies.motion["version"][i] += 1
         self._names[d.object_id] = d.name
         self._allow(d.object_id, frozenset(d.allowed))
+        self._end_pairs([k for k in self._pairs_of(i) if not self._is_checked(self._pairs[k])])
         self._renewed.add(i)
         self._ids = np.zeros(0, np.uint32)
 
     def remove(self, object_id: int) -> None:
         """Forget an object; its contacts end. Raises InputError for an unknown id."""
         i = self._slot(object_id)
-        mine = (self._pairs["i"] == i) | (self._pairs["j"] == i)
-        for pair in self._pairs[mine & (self._pairs["touching"] == 1)]:
-            self._orphans.append((int(pair["key"]), float(pair["since"])))
-        self._pairs, self._pair_events = self._pairs[~mine], self._pair_events[~mine]
+        self._end_pairs(self._pairs_of(i))
         remove_boxes(self._grid, np.array([i], np.int32))
         self._drop_shapes(i)
         self._bodies.used[i] = self._bodies.seen[i] = self._bodies.static[i] = False
@@ -208,6 +208,24 @@ class Monitor:
         del self._slots[object_id], self._names[object_id]
         self._allow(object_id, frozenset())
         self._ids = np.zeros(0, np.uint32)
+
+    def _pairs_of(self, i: int) -> list[int]:
+        """Where the body in slot i is among the active pairs."""
+        indices: list[int] = np.flatnonzero((self._pairs["i"] == i) | (self._pairs["j"] == i)).tolist()
+        return indices
+
+    def _is_checked(self, pair: np.void) -> bool:
+        slots = np.array([[pair["i"], pair["j"]]], np.int32)
+        seen = self._bodies.seen[slots].all()
+        return bool(seen) and candidates.keep_checked(self._bodies, self._allowed_keys, slots) == 1
+
+    def _end_pairs(self, indices: list[int]) -> None:
+        """Take active pairs out; what touches is reported as ended in the next step."""
+        for pair in self._pairs[indices]:
+            if pair["touching"]:
+                self._orphans.append((int(pair["key"]), float(pair["since"])))
+        self._pairs = np.delete(self._pairs, indices)
+        self._pair_events = np.delete(self._pair_events, indices)
 
     def _new_body(self) -> int:
         if self._free:
@@ -269,9 +287,8 @@ class Monitor:
 
     def _restart_clock(self) -> None:
         bodies = self._bodies
-        for pair in self._pairs[self._pairs["touching"] == 1]:
-            self._orphans.append((int(pair["key"]), float("nan")))
-        self._pairs, self._pair_events = self._pairs[:0], self._pair_events[:0]
+        self._pairs["since"] = np.nan  # of another clock
+        self._end_pairs(list(range(len(self._pairs))))
         self._events.clear()
         bodies.seen[:] = bodies.static & bodies.used
         bodies.motion["version"] += 1

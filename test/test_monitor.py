@@ -340,6 +340,33 @@ def test_masks_allowed_pairs_and_new_descriptions() -> None:
     assert [pair(c) for c in ended] == [(1, 2), (2, 3)] and np.isnan(ended[0]["signed_distance"])
 
 
+def test_a_new_description_ends_what_it_no_longer_allows_to_be_said() -> None:
+    monitor = Monitor()
+    for object_id in (1, 2):
+        monitor.add(object_id, Sphere(0.5))
+    monitor.add(3, Sphere(0.5), static=True, pose=Pose((3.5, 0, 0)))
+    moving = [[1, 0, 0, 0, 0, 0]] * 2
+    result = monitor.step(0, [1, 2], still(0, 0.9), moving)
+    assert touching(result) == {(1, 2)} and [pair(p) for p in result.predictions] == [(2, 3)]
+    monitor.add(1, Sphere(0.5), allowed=(2,))
+    result = monitor.step(SECOND // 100, [1, 2], still(0.01, 0.91), moving)
+    assert [(pair(c), int(c["phase"])) for c in result.contacts] == [((1, 2), records.Phase.END)]
+    assert len(monitor.step(SECOND // 50, [1, 2], still(0.02, 0.92), moving).contacts) == 0
+    # a static object that becomes a moving one has not been seen: nothing is said of where it stood
+    monitor.add(3, Sphere(0.5))
+    result = monitor.step(SECOND // 20, [1, 2], still(0.05, 0.95), moving)
+    assert result.status.objects_unseen == 1 and len(result.predictions) == 0
+    monitor.add(1, Sphere(0.5), group=2, mask=4)
+    assert touching(monitor.step(SECOND // 10, [1, 2], still(0.1, 1.0), moving)) == set()
+    monitor.add(1, Sphere(0.5))
+    result = monitor.step(SECOND // 5, [1, 2, 3], still(0.2, 1.1, 1.2), [*moving, [0] * 6])
+    assert touching(result) == {(1, 2), (1, 3), (2, 3)}
+    assert {int(c["phase"]) for c in result.contacts} == {records.Phase.BEGIN}
+    monitor.add(3, Box((0.1, 0.1, 0.1)))  # only another shape: it goes on touching without a new BEGIN
+    result = monitor.step(SECOND // 4, [1, 2, 3], still(0.25, 1.15, 0.7), [*moving, [0] * 6])
+    assert {pair(c): int(c["phase"]) for c in result.contacts}[(2, 3)] == records.Phase.PERSIST
+
+
 def test_objects_come_and_go_without_a_trace() -> None:
     rng = np.random.default_rng(0)
     monitor = Monitor()
