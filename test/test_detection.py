@@ -114,10 +114,10 @@ def test_earlier_contacts_stay_as_they_were() -> None:
 @pytest.mark.parametrize("scene", [spheres, boxes, mixed])
 def test_two_threads_give_the_same_bytes(scene) -> None:
     rng = np.random.default_rng(5)
-    shapes = [shape for _ in range(10) for shape in scene(rng)]
+    shapes = [shape for _ in range(12) for shape in scene(rng)]
     one, two = Detector(shapes), Detector(shapes, threads=2)
     for _ in range(3):
-        positions = rng.uniform(0, 12, (len(shapes), 3))
+        positions = rng.uniform(0, 13, (len(shapes), 3))
         quaternions = rng.normal(size=(len(shapes), 4))
         quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
         a, b = one.detect(positions, quaternions), two.detect(positions, quaternions)
@@ -127,13 +127,13 @@ def test_two_threads_give_the_same_bytes(scene) -> None:
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_more_contacts_than_there_was_room_for(threads: int) -> None:
-    n = 1200
+    n = 3200
     detector = Detector([Sphere(1.0)] * n, threads=threads)
     positions = np.zeros((n, 3))
     positions[:, 0] = 3.0 * np.arange(n)
     quaternions = np.tile([0.0, 0, 0, 1], (n, 1))
     assert len(detector.detect(positions, quaternions)) == 0
-    assert len(detector.detect(positions * 0.01, quaternions)) == sum(n - k for k in range(1, 67))
+    assert len(detector.detect(positions * 0.02, quaternions)) == sum(n - k for k in range(1, 34))
     assert len(detector.detect(positions, quaternions)) == 0
 
 

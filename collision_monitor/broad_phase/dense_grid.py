@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor._jit import device, inlined, kernel
+from collision_monitor.broad_phase.lanes import LANES, boxes_overlap, lowest_bit, spheres_overlap
 from collision_monitor.errors import InputError
 from collision_monitor.tolerances import EPSILON
 
@@ -39,7 +40,7 @@ FARTHEST_CELL: Final = 2.0**52
 LARGEST: Final = 2.0**200
 """Half extents and positions (m) beyond this are compared with everything: the products of cells stay finite."""
 
-PAD: Final = 16
+PAD: Final = LANES
 """Places behind the last sorted body that a vector may read."""
 
 STARTING: Final = MAX_CLASSES + 1
@@ -87,7 +88,8 @@ def make_grid(capacity: int) -> Grid:
 def classify(size: Any, starts: Any, octave: Any, cubes: Any, grid: Any) -> None:
     """Put bodies with half extent `size` (N,) m into classes; NaN: absent, beyond LARGEST: unbounded.
 
-    octave (_OCTAVES, 2) and cubes (_OCTAVES,) are scratch: counts and class, sum of cubes relative to the octave's.
+    octave (_OCTAVES, 2): scratch for counts and classes; cubes (_OCTAVES, 2): of sums and of the greatest of the cubes
+    of the sizes, relative to the octave's.
     """
     octave[:] = 0
     cubes[:] = 0.0
@@ -96,7 +98,8 @@ def classify(size: Any, starts: Any, octave: Any, cubes: Any, grid: Any) -> None
             mantissa, exponent = frexp(size[i])
             k = min(max(exponent + _OCTAVES // 2, 0), _OCTAVES - 1)
             octave[k, 0] += 1
-            cubes[k] += mantissa * mantissa * mantissa
+            cubes[k, 0] += mantissa * mantissa * mantissa
+            cubes[k, 1] = max(cubes[k, 1], mantissa * mantissa * mantissa)
     number = 0
     count, cube = 0, 0.0
     top = -1
@@ -104,13 +107,13 @@ def classify(size: Any, starts: Any, octave: Any, cubes: Any, grid: Any) -> None
         if octave[k, 0] == 0:
             continue
         shrink = 0.5 ** (3 * min(max(top - k, 0), 100))
-        merged = count + octave[k, 0]
-        if top < 0 or (number < MAX_CLASSES and merged > CROWDING * (cube + shrink * cubes[k])):
+        fitted = cube + shrink * cubes[k, 0]
+        if top < 0 or (number < MAX_CLASSES and (count + octave[k, 0]) * cubes[top, 1] > CROWDING * fitted):
             number += 1
             top, count, cube = k, 0, 0.0
             shrink = 1.0
         count += octave[k, 0]
-        cube += shrink * cubes[k]
+        cube += shrink * cubes[k, 0]
         octave[k, 1] = number
     for i in range(size.size):
         rest = 0 if starts[i] else STARTING
@@ -261,24 +264,21 @@ def places(grid: Any, a: int) -> Any:
 def keep_overlapping(grid: Any, extent: Any, balls: bool, p: int, low: int, high: int, found: Any, n: int) -> int:
     """Append the places low ... high - 1 whose bounds overlap those of place p to found[n:]; returns the new n.
 
-    extent (3, N): half extents of boxes, or with `balls` radii of spheres in row 0. No branch depends on the outcome.
+    extent (3, N + PAD): half extents of boxes, or with `balls` radii of spheres in row 0.
     """
     cx, cy, cz = grid.centre[0, p], grid.centre[1, p], grid.centre[2, p]
-    if balls:
-        for q in range(low, high):
-            x, y, z = grid.centre[0, q] - cx, grid.centre[1, q] - cy, grid.centre[2, q] - cz
-            r = extent[0, p] + extent[0, q]
-            found[n] = q
-            n += x * x + y * y + z * z <= r * r
-    else:
-        hx, hy, hz = extent[0, p], extent[1, p], extent[2, p]
-        for q in range(low, high):
-            found[n] = q
-            n += (
-                (abs(grid.centre[0, q] - cx) <= hx + extent[0, q])
-                & (abs(grid.centre[1, q] - cy) <= hy + extent[1, q])
-                & (abs(grid.centre[2, q] - cz) <= hz + extent[2, q])
-            )
+    hx, hy, hz = extent[0, p], extent[1, p], extent[2, p]
+    for q in range(low, high, LANES):
+        if balls:
+            bits = spheres_overlap(grid.centre, extent, q, cx, cy, cz, hx)
+        else:
+            bits = boxes_overlap(grid.centre, extent, q, cx, cy, cz, hx, hy, hz)
+        if high - q < LANES:
+            bits &= (1 << (high - q)) - 1
+        while bits != 0:
+            found[n] = q + lowest_bit(bits)
+            n += 1
+            bits &= bits - 1
     return n
 
 
@@ -385,7 +385,7 @@ def sort_pairs(pairs: Any, count: int, other: Any, begins: Any) -> None:
 @kernel
 def classify_bodies(size: Any, starts: Any, grid: Any) -> None:
     """Put bodies with half extents `size` (N,) into classes once, for many frames."""
-    classify(size, starts, np.empty((_OCTAVES, 2), np.int64), np.empty(_OCTAVES), grid)
+    classify(size, starts, np.empty((_OCTAVES, 2), np.int64), np.empty((_OCTAVES, 2)), grid)
     measure_classes(size, grid)
 
 
@@ -407,7 +407,7 @@ def _box_pairs(centre: Any, half: Any, starts: Any, grid: Any, pairs: Any) -> in
         if size[i] <= LARGEST:
             lx, ly, lz = min(lx, x), min(ly, y), min(lz, z)
             hx, hy, hz = max(hx, x), max(hy, y), max(hz, z)
-    classify(size, starts, np.empty((_OCTAVES, 2), np.int64), np.empty(_OCTAVES), grid)
+    classify(size, starts, np.empty((_OCTAVES, 2), np.int64), np.empty((_OCTAVES, 2)), grid)
     measure_classes(size, grid)
     cells = plan_cells(lx, ly, lz, hx, hy, hz, grid)
     find_buckets(centre, grid, 0, n)

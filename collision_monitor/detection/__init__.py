@@ -24,7 +24,7 @@ from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 
 Array = NDArray[np.float64]
 
-WORTH_THREADS: Final = 1000
+WORTH_THREADS: Final = 3000
 """Objects below which a frame is done before a second thread has woken up."""
 
 

@@ -1,7 +1,7 @@
 """One frame of full detection: every pose is new, every pair that touches is found, nothing is carried over.
 
-The frame is cut into blocks of bodies, and each stage runs block by block, on one thread or on several: poses, cells,
-sort by cell (one thread), gather, search with the narrow phase, sort of the hits (one thread), output.
+The frame is cut into blocks of bodies, and each stage runs block by block: bounds, cells, sort by cell, and on one
+thread or on several gather, search with the narrow phase, and after the sort of the hits output.
 Each pair is computed from its two poses alone and the hits are sorted: the answer's bytes do not depend on the blocks.
 """
 
@@ -100,14 +100,14 @@ def make_hits(blocks: int, capacity: int) -> Hits:
 
 
 @inlined
-def _block(b: int, frame: Any, n: int) -> Any:
+def _block(b: Any, frame: Any, n: int) -> Any:
     """Begin and end of block b of n things."""
     blocks = frame.bounds.shape[0]
     return b * n // blocks, (b + 1) * n // blocks
 
 
 @device
-def _bounds(positions: Any, frame: Any, b: int) -> None:
+def _bounds(positions: Any, frame: Any, b: Any) -> None:
     """Corners of the positions, and whether all are finite and within LARGEST_INPUT."""
     begin, end = _block(b, frame, positions.shape[0])
     lx = ly = lz = np.inf
@@ -135,13 +135,13 @@ def _cells(grid: Any, frame: Any) -> Any:
 
 
 @device
-def _buckets(positions: Any, grid: Any, frame: Any, b: int) -> None:
+def _buckets(positions: Any, grid: Any, frame: Any, b: Any) -> None:
     begin, end = _block(b, frame, positions.shape[0])
     find_buckets(positions, grid, begin, end)
 
 
 @device
-def _gather(table: Any, path: int, positions: Any, quaternions: Any, grid: Any, frame: Any, b: int) -> None:
+def _gather(table: Any, path: int, positions: Any, quaternions: Any, grid: Any, frame: Any, b: Any) -> None:
     """What the search reads, in the order of the cells, and whether all quaternions are of unit length."""
     begin, end = _block(b, frame, positions.shape[0])
     gather_centres(positions, grid, begin, end)
@@ -212,7 +212,7 @@ def _narrow(
 
 
 @device
-def _search(table: Any, path: int, limit: float, grid: Any, frame: Any, hits: Any, b: int) -> None:
+def _search(table: Any, path: int, limit: float, grid: Any, frame: Any, hits: Any, b: Any) -> None:
     """Contacts of a block of places with all that they look for, and how many there are."""
     begin, end = _block(b, frame, grid.order.size)
     found, owner, work = frame.found[b], frame.owner[b], frame.work[b]
@@ -265,7 +265,7 @@ def _sort_hits(frame: Any, hits: Any) -> int:
 
 
 @device
-def _write(positions: Any, frame: Any, hits: Any, total: int, pairs: Any, contacts: Any, part: int) -> None:
+def _write(positions: Any, frame: Any, hits: Any, total: int, pairs: Any, contacts: Any, part: Any) -> None:
     """A block of the sorted hits into the arrays of the answer, witness points in the world."""
     begin, end = _block(part, frame, total)
     stride = hits.pair.shape[1]
@@ -336,17 +336,20 @@ def detect(path: int, limit: float, positions: Any, quaternions: Any, pairs: Any
 def detect_parallel(
     path: int, limit: float, positions: Any, quaternions: Any, pairs: Any, contacts: Any, *memory: Any
 ) -> int:
-    """The same on as many threads as there are blocks. b is cast, so that both share their compiled stages."""
+    """The same, with the stages that are worth waking a thread for on as many threads as there are blocks.
+
+    A parallel loop's b is cast to what it is in `detect`, so that both share their compiled stages.
+    """
     table, grid = ShapeTable(*memory[:10]), Grid(*memory[10:18])
     frame, hits = Frame(*memory[18:29]), Hits(*memory[29:32])
     blocks = frame.bounds.shape[0]
-    for b in prange(blocks):
-        _bounds(positions, frame, np.int64(b))
+    for b in range(blocks):
+        _bounds(positions, frame, b)
     if not frame.good.all():
         return BAD_POSITION
     cells = _cells(grid, frame)
-    for b in prange(blocks):
-        _buckets(positions, grid, frame, np.int64(b))
+    for b in range(blocks):
+        _buckets(positions, grid, frame, b)
     sort_by_cell(positions.shape[0], cells, grid)
     for b in prange(blocks):
         _gather(table, path, positions, quaternions, grid, frame, np.int64(b))
