@@ -59,15 +59,15 @@ def demo(args: argparse.Namespace) -> int:
     stay_on_this_machine()
     os.environ.setdefault("ROS_DOMAIN_ID", str(free_domain()))
 
-    _watch(args, session, stop)
+    recorded = _watch(args, session, stop)
     if stop.received:
-        print(f"interrupted; the session is finished: {session}")
+        print(f"interrupted; the session is finished: {session}" if recorded else "interrupted before the scene began")
         return EXIT_INTERRUPTED
     return _replay(session)
 
 
-def _watch(args: argparse.Namespace, session: Path, stop: StopRequest) -> None:
-    """From the start of both processes to the finished session file."""
+def _watch(args: argparse.Namespace, session: Path, stop: StopRequest) -> bool:
+    """From the start of both processes to the finished session file. False: interrupted before there was one."""
     scene = ["world", args.scene, "--duration", str(args.duration), "--seed", str(args.seed)]
     if args.path:
         scene += ["--path", args.path]
@@ -78,13 +78,17 @@ def _watch(args: argparse.Namespace, session: Path, stop: StopRequest) -> None:
 
         viewer = Viewer()
         _wait_for_answer(viewer, monitor, stop)
+        if stop.received:
+            return False
         with Child(*scene) as world:
             picture = _show(viewer, args.scene, [monitor, world], stop)
-            world.finish()
+            if not stop.received:  # else it may be starting still, and has nothing to finish
+                world.finish()
         monitor.finish()
         viewer.close()
     if args.capture is not None and not stop.received:
         _capture(picture, args.capture)
+    return True
 
 
 def _wait_for_answer(viewer: Viewer, monitor: Child, stop: StopRequest) -> None:

@@ -52,9 +52,9 @@ def make_parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line (default: the process's own) and return the exit code."""
-    args = make_parser().parse_args(arguments)
-    command: Callable[[argparse.Namespace], int] = args.command
     try:
+        args = make_parser().parse_args(arguments)
+        command: Callable[[argparse.Namespace], int] = args.command
         code = command(args)
         sys.stdout.flush()
         return code
