@@ -12,6 +12,10 @@ from collision_monitor.session.replay import replay
 SESSIONS = sorted(Path(__file__).parent.glob("*.mcap"))
 
 
+def test_there_are_golden_sessions() -> None:
+    assert {path.stem for path in SESSIONS} == {"balanced", "exact"}
+
+
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("path", SESSIONS, ids=lambda path: path.stem)
 def test_a_golden_session_replays_to_the_same_bytes(path: Path, threads: int) -> None:
