@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collision_monitor.cli.live_table import Picture
     from collision_monitor.ros.viewer import Viewer
 
-START_PATIENCE = 60.0
+START_PATIENCE = 180.0
 """s for the monitor to answer; the first start on a machine may have to compile its kernels."""
 FRAME = 0.25
 """s between two pictures."""
