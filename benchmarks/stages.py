@@ -35,9 +35,9 @@ def sort(n, number, grid):
 
 
 @kernel
-def gather(table, path, positions, quaternions, grid, frame):
+def gather(path, positions, quaternions, grid, frame):
     """Centres, sizes and rotation matrices in the order of the cells."""
-    kernels._gather(table, path, positions, quaternions, grid, frame, np.int64(0))
+    kernels._gather(path, positions, quaternions, grid, frame, np.int64(0))
 
 
 @kernel
@@ -95,7 +95,7 @@ def main(name: str = "boxes", n: str = "10000") -> None:
         ("poses: bounds and check", best(lambda: bounds(positions, frame))),
         ("cells", best(lambda: cells(positions, grid, frame))),
         ("sort by cell", best(lambda: sort(len(positions), number, grid))),
-        ("gather, rotation matrices", best(lambda: gather(table, path, positions, quaternions, grid, frame))),
+        ("gather, rotation matrices", best(lambda: gather(path, positions, quaternions, grid, frame))),
         (f"candidates ({found})", time_candidates),
         (f"narrow phase ({len(contacts)} contacts)", time_search - time_candidates),
         ("sort of contacts, output", best(lambda: finish(positions, frame, hits, pairs, rows))),

@@ -34,6 +34,9 @@ DENSE: Final = 4
 FEWEST_CELLS: Final = 64
 """Cells that any class may have, however few its bodies."""
 
+STRIP: Final = 2
+"""log2 of the rows that a strip of cells is wide."""
+
 FARTHEST_CELL: Final = 2.0**52
 """Hashed cell coordinates end here, where float64 still counts them one by one; beyond, bodies share cells."""
 
@@ -52,7 +55,7 @@ CLASSES: Final = 2 * STARTING
 _OCTAVES: Final = 512
 _HASHED, _DENSE, _WHOLE = 0, 1, 2
 _ABSENT: Final = CLASSES
-_FIRST, _COUNT, _BASE, _MODE, _NX, _NY, _NZ = range(7)
+_FIRST, _COUNT, _BASE, _MODE, _NX, _NY, _NZ, _STRIP = range(8)
 _INVERSE, _REACH, _LARGEST = range(3)
 
 
@@ -63,7 +66,7 @@ class Grid(NamedTuple):
     bucket: Any  # (N,) int32: the body's cell, over all classes
     start: Any  # (T + 2,) int32: where each cell's bodies start in `order`
     order: Any  # (N,) int32: the bodies by cell
-    layout: Any  # (_ABSENT + 1, 7) int64: by class first place, count, first cell, mode, cells along x (or mask), y, z
+    layout: Any  # (_ABSENT + 1, 8) int64: class by class: first place, count, first cell, mode, cells along x, y, z, …
     scale: Any  # (_ABSENT + 1, 3) float64: 1 / cell width (1/m), largest half extent (m) with round-off, and without
     origin: Any  # (3,) float64: lower corner of the dense cells (m)
     centre: Any  # (3, N + PAD) float64, sorted by cell
@@ -77,7 +80,7 @@ def make_grid(capacity: int) -> Grid:
         bucket=np.zeros(capacity, np.int32),
         start=np.zeros(cells + 2, np.int32),
         order=np.zeros(capacity, np.int32),
-        layout=np.zeros((_ABSENT + 1, 7), np.int64),
+        layout=np.zeros((_ABSENT + 1, 8), np.int64),
         scale=np.zeros((_ABSENT + 1, 3)),
         origin=np.zeros(3),
         centre=np.zeros((3, capacity + PAD)),
@@ -140,6 +143,12 @@ def _dense(x: float, origin: float, inverse: float) -> Any:
 
 
 @inlined
+def _row(y: Any, z: Any, nz: Any, strip: Any) -> Any:
+    """Where the row of cells (y, z) stands among the rows."""
+    return (((y >> strip) * nz + z) << strip) + (y & ((1 << strip) - 1))
+
+
+@inlined
 def _hashed(x: float, inverse: float) -> Any:
     return np.int64(min(max(np.floor(x * inverse), -FARTHEST_CELL), FARTHEST_CELL))
 
@@ -164,7 +173,7 @@ def plan_cells(lx: float, ly: float, lz: float, hx: float, hy: float, hz: float,
     layout, scale = grid.layout, grid.scale
     grid.origin[0], grid.origin[1], grid.origin[2] = lx, ly, lz
     # round-off of a difference of two coordinates, and of the multiplication by 1 / cell width
-    slack = 8.0 * EPSILON * max(abs(lx), abs(ly), abs(lz), abs(hx), abs(hy), abs(hz))
+    slack = 32.0 * EPSILON * max(abs(lx), abs(ly), abs(lz), abs(hx), abs(hy), abs(hz))
     first = cells = np.int64(0)
     for k in range(_ABSENT + 1):
         count = layout[k, _COUNT]
@@ -185,12 +194,16 @@ def plan_cells(lx: float, ly: float, lz: float, hx: float, hy: float, hz: float,
         nx = np.floor((hx - lx) * inverse) + 1.0
         ny = np.floor((hy - ly) * inverse) + 1.0
         nz = np.floor((hz - lz) * inverse) + 1.0
-        if nx * ny * nz <= max(DENSE * count, FEWEST_CELLS):
+        # rows in strips, as in a bank of pigeonholes: a row's neighbours are in the nearest cache also in large scenes
+        strip = STRIP if ny >= 4.0 * 2.0**STRIP else 0
+        rows = np.ceil(ny * 0.5**strip) * 2.0**strip * nz
+        if nx * rows <= max(DENSE * count, FEWEST_CELLS):
             layout[k, _MODE] = _DENSE
+            layout[k, _STRIP] = strip
             layout[k, _NX] = np.int64(nx)
             layout[k, _NY] = np.int64(ny)
             layout[k, _NZ] = np.int64(nz)
-            cells += np.int64(nx * ny * nz)
+            cells += np.int64(nx * rows)
         else:
             buckets = np.int64(FEWEST_CELLS)
             while buckets < 2 * count:
@@ -214,7 +227,7 @@ def find_buckets(centre: Any, grid: Any, begin: int, end: int) -> None:
             x = _dense(centre[i, 0], ox, inverse)
             y = _dense(centre[i, 1], oy, inverse)
             z = _dense(centre[i, 2], oz, inverse)
-            bucket += (z * grid.layout[k, _NY] + y) * grid.layout[k, _NX] + x
+            bucket += _row(y, z, grid.layout[k, _NZ], grid.layout[k, _STRIP]) * grid.layout[k, _NX] + x
         elif mode == _HASHED:
             row = _hash(_hashed(centre[i, 1], inverse), _hashed(centre[i, 2], inverse))
             bucket += (_hashed(centre[i, 0], inverse) + row) & grid.layout[k, _NX]
@@ -268,13 +281,12 @@ def keep_overlapping(grid: Any, extent: Any, balls: bool, p: int, low: int, high
     """
     cx, cy, cz = grid.centre[0, p], grid.centre[1, p], grid.centre[2, p]
     hx, hy, hz = extent[0, p], extent[1, p], extent[2, p]
-    for q in range(low, high, LANES):
+    for q in range(low, max(high, low + 1), LANES):  # an empty range too is looked at: cheaper than to ask
         if balls:
             bits = spheres_overlap(grid.centre, extent, q, cx, cy, cz, hx)
         else:
             bits = boxes_overlap(grid.centre, extent, q, cx, cy, cz, hx, hy, hz)
-        if high - q < LANES:
-            bits &= (1 << (high - q)) - 1
+        bits &= (1 << max(min(high - q, LANES), 0)) - 1
         while bits != 0:
             found[n] = q + lowest_bit(bits)
             n += 1
@@ -308,7 +320,7 @@ def partners(grid: Any, extent: Any, balls: bool, a: int, b: int, p: int, found:
     first, count = grid.layout[b, _FIRST], grid.layout[b, _COUNT]
     mode = grid.layout[b, _MODE]
     base = grid.layout[b, _BASE]
-    nx, ny, nz = grid.layout[b, _NX], grid.layout[b, _NY], grid.layout[b, _NZ]
+    nx, ny, nz, strip = grid.layout[b, _NX], grid.layout[b, _NY], grid.layout[b, _NZ], grid.layout[b, _STRIP]
     inverse, reach = grid.scale[b, _INVERSE], grid.scale[b, _REACH]
     cx, cy, cz = grid.centre[0, p], grid.centre[1, p], grid.centre[2, p]
     rx = extent[0, p] * (1.0 + 16.0 * EPSILON) + reach
@@ -323,18 +335,19 @@ def partners(grid: Any, extent: Any, balls: bool, a: int, b: int, p: int, found:
         z0 = _clamped(cz - rz, oz, inverse, nz - 1)
         z1 = _clamped(cz + rz, oz, inverse, nz - 1)
         if a == b:
-            # the rows behind this one look back from there
+            # the rows before look this way; of those around, all are taken: a loop that ends by chance costs more
             z0 = _dense(cz, oz, inverse)
             own = _dense(cy, oy, inverse)
-            row = base + (z0 * ny + own) * nx
+            y0, y1, z1 = max(own - 1, 0), min(own + 1, ny - 1), min(z0 + 1, nz - 1)
+            row = base + _row(own, z0, nz, strip) * nx
             n = keep_overlapping(grid, extent, balls, p, p + 1, grid.start[row + x1 + 1], found, n)
-            for y in range(own + 1, y1 + 1):
-                row = base + (z0 * ny + y) * nx
+            if own < y1:
+                row = base + _row(y1, z0, nz, strip) * nx
                 n = keep_overlapping(grid, extent, balls, p, grid.start[row + x0], grid.start[row + x1 + 1], found, n)
             z0 += 1
         for z in range(z0, z1 + 1):
             for y in range(y0, y1 + 1):
-                row = base + (z * ny + y) * nx
+                row = base + _row(y, z, nz, strip) * nx
                 n = keep_overlapping(grid, extent, balls, p, grid.start[row + x0], grid.start[row + x1 + 1], found, n)
         return n
     rows = (2.0 * ry * inverse + 2.0) * (2.0 * rz * inverse + 2.0)

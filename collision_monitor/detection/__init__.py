@@ -104,7 +104,10 @@ class Detector:
         self._threads = threads if n >= WORTH_THREADS else 1
         # half of the margin on each; rounded up, so that no pair at the margin is lost
         radius = (self._table.radius[:n] + 0.5 * margin) * (1.0 + 1e-15)
-        self._frame = kernels.make_frame(radius, self._threads)
+        body = np.column_stack([self._table.size[:n, :3], radius])
+        if self._path == kernels.SPHERES:
+            body[:, 0] += self._table.margin[:n]
+        self._frame = kernels.make_frame(body, self._threads)
         self._grid = make_grid(n)
         classify_bodies(radius, ~resting, self._grid)
         self._hits = kernels.make_hits(self._threads, max(n, 16))

@@ -47,7 +47,7 @@ COLUMNS: Final = 14
 class Frame(NamedTuple):
     """Memory of one detector for N bodies in B blocks; sorted: by cell, in the order of the grid's places."""
 
-    radius: Any  # (N,) float64: bounding radius with half the contact margin
+    body: Any  # (N, 4) float64: half extents of boxes or the radius of spheres; bounding radius with half the margin
     bounds: Any  # (B, 6) float64: lower and upper corner of each block's positions
     extent: Any  # (3, N + PAD) float64: sorted bounding radii in row 0
     size: Any  # (N, 3) float64: sorted, half extents of boxes or the radius of spheres
@@ -68,11 +68,11 @@ class Hits(NamedTuple):
     order: Any  # (2, B * H) int32
 
 
-def make_frame(radius: Any, blocks: int) -> Frame:
-    """Memory for bodies with bounding radii (N,)."""
-    n = len(radius)
+def make_frame(body: Any, blocks: int) -> Frame:
+    """Memory for bodies (N, 4)."""
+    n = len(body)
     return Frame(
-        radius=radius,
+        body=body,
         bounds=np.zeros((blocks, 6)),
         extent=np.zeros((3, n + PAD)),
         size=np.zeros((n, 3)),
@@ -141,22 +141,20 @@ def _buckets(positions: Any, grid: Any, frame: Any, b: Any) -> None:
 
 
 @device
-def _gather(table: Any, path: int, positions: Any, quaternions: Any, grid: Any, frame: Any, b: Any) -> None:
+def _gather(path: int, positions: Any, quaternions: Any, grid: Any, frame: Any, b: Any) -> None:
     """What the search reads, in the order of the cells, and whether all quaternions are of unit length."""
     begin, end = _block(b, frame, positions.shape[0])
     gather_centres(positions, grid, begin, end)
     good = True
     for p in range(begin, end):
         i = grid.order[p]
-        frame.extent[0, p] = frame.radius[i]
+        frame.extent[0, p] = frame.body[i, 3]
         x, y, z, w = quaternions[i, 0], quaternions[i, 1], quaternions[i, 2], quaternions[i, 3]
         squared = x * x + y * y + z * z + w * w
         good &= abs(sqrt(squared) - 1.0) <= UNIT_QUATERNION
+        frame.size[p, 0], frame.size[p, 1], frame.size[p, 2] = frame.body[i, 0], frame.body[i, 1], frame.body[i, 2]
         if path == SPHERES:
-            frame.size[p, 0] = table.size[i, 0] + table.margin[i]
             continue
-        if path == BOXES:
-            frame.size[p, 0], frame.size[p, 1], frame.size[p, 2] = table.size[i, 0], table.size[i, 1], table.size[i, 2]
         s = 2.0 / squared
         R = frame.rotation[p]
         R[0, 0] = 1.0 - s * (y * y + z * z)
@@ -321,7 +319,7 @@ def detect(path: int, limit: float, positions: Any, quaternions: Any, pairs: Any
         _buckets(positions, grid, frame, b)
     sort_by_cell(positions.shape[0], cells, grid)
     for b in range(blocks):
-        _gather(table, path, positions, quaternions, grid, frame, b)
+        _gather(path, positions, quaternions, grid, frame, b)
     if not frame.good.all():
         return BAD_QUATERNION
     for b in range(blocks):
@@ -352,7 +350,7 @@ def detect_parallel(
         _buckets(positions, grid, frame, b)
     sort_by_cell(positions.shape[0], cells, grid)
     for b in prange(blocks):
-        _gather(table, path, positions, quaternions, grid, frame, np.int64(b))
+        _gather(path, positions, quaternions, grid, frame, np.int64(b))
     if not frame.good.all():
         return BAD_QUATERNION
     for b in prange(blocks):
