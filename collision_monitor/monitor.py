@@ -44,7 +44,10 @@ _VERDICTS = {
         "object {id}: expected finite numbers up to 1e18 in pose and twist and standard deviations >= 0, got {row}",
     ),
     tracking.QUATERNION: (Refusal.QUATERNION, "object {id}: expected a unit quaternion within 1e-3, got {quaternion}"),
-    tracking.OLD: (Refusal.OLD, "object {id}: expected a state newer than its last one, or the object is static"),
+    tracking.OLD: (
+        Refusal.OLD,
+        "object {id}: expected one state a message, newer than its last one, and none of a static object",
+    ),
 }
 
 
@@ -303,6 +306,8 @@ class Monitor:
         Single rows that cannot be used are refused and counted (`refused`), never raised. Raises InputError for
         arrays of another shape.
         """
+        if not isinstance(stamp_ns, int | np.integer) or isinstance(stamp_ns, bool):
+            raise InputError(f"stamp_ns: expected an integer number of nanoseconds, got {stamp_ns!r}")
         states = self._states(ids, poses, twists)
         if not self._accept_time(int(stamp_ns)):
             return self._repeat()
@@ -324,7 +329,12 @@ class Monitor:
         return self._last
 
     def _states(self, ids: ArrayLike, poses: Any, twists: Any) -> NDArray[np.void]:
-        given = np.asarray(ids)
+        try:
+            given = np.asarray(ids)
+        except ValueError:
+            raise InputError(f"ids: expected one dimension of integers, got {ids!r}") from None
+        if given.size == 0:
+            return np.zeros(0, records.STATE)
         if given.dtype == records.STATE:
             if given.ndim != 1:
                 raise InputError(f"states: expected one dimension, got shape {given.shape}")
@@ -333,19 +343,21 @@ class Monitor:
             states = self._buffer[: len(given)]
             states[:] = given  # message bytes need not be aligned
             return states
+        if given.ndim != 1 or not np.issubdtype(given.dtype, np.integer):
+            raise InputError(f"ids: expected one dimension of integers, got {given.dtype} of shape {given.shape}")
         try:
             pose = np.asarray(poses, dtype=np.float64)
             twist = np.zeros((len(given), 6)) if twists is None else np.asarray(twists, dtype=np.float64)
         except (TypeError, ValueError):
             raise InputError("poses and twists: expected arrays of numbers") from None
-        n = len(given) if given.ndim == 1 else -1
-        if n < 0 or pose.shape != (n, 7) or twist.shape != (n, 6):
+        n = len(given)
+        if pose.shape != (n, 7) or twist.shape != (n, 6):
             raise InputError(
                 "expected ids (N,), poses (N, 7) and twists (N, 6), "
                 f"got shapes {given.shape}, {pose.shape} and {twist.shape}"
             )
-        if n and not (np.issubdtype(given.dtype, np.integer) and given.min() >= 0 and given.max() < 2**32):
-            raise InputError(f"ids: expected integers from 0 to 4294967295, got {given.dtype}")
+        if given.min() < 0 or given.max() >= 2**32:
+            raise InputError(f"ids: expected integers from 0 to 4294967295, got {given.min()} to {given.max()}")
         states = np.zeros(n, records.STATE)
         states["id"] = given
         states["position"], states["quaternion"] = pose[:, :3], pose[:, 3:]
@@ -522,7 +534,8 @@ class Monitor:
             row["model_a"] = row["model_b"] = Model.EXACT
         self._orphans.clear()
         both = np.concatenate([contacts, ended])
-        return both[np.lexsort((both["phase"], both["id_b"], both["id_a"]))]
+        begins = both["phase"] != records.Phase.END  # the END of what was comes before the BEGIN of what is
+        return both[np.lexsort((begins, both["id_b"], both["id_a"]))]
 
     def _predictions(self, now: float) -> tuple[NDArray[np.void], int]:
         p = self.profile

@@ -173,6 +173,8 @@ class Pipeline:
             self._removed.add(object_id)
 
     def _count_lost(self, sequence: int) -> None:
+        if sequence == 0 and self._sequence != 0xFFFFFFFF:  # of one who does not count
+            return
         last, self._sequence = self._sequence, sequence
         if last is None or sequence == last:
             return

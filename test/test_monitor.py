@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from collision_monitor import records
-from collision_monitor.errors import InputError, Refusal, ShapeError, UnsupportedError
+from collision_monitor.errors import InputError, PoseError, Refusal, ShapeError, UnsupportedError
 from collision_monitor.geometry.pose import Pose, from_rotation_vector, multiply, rotation_matrix
 from collision_monitor.geometry.shapes import Box, Capsule, Circle, HalfSpace, Sphere
 from collision_monitor.monitor import Monitor, StepResult
@@ -289,6 +289,29 @@ class TestRefusals:
             monitor.step(1, [-1], still(0))
         with pytest.raises(InputError, match="described"):
             monitor.remove(99)
+
+    @pytest.mark.parametrize("stamp", [0.1, "0", None, float("nan"), True])
+    def test_a_stamp_is_an_integer(self, monitor: Monitor, stamp: object) -> None:
+        with pytest.raises(InputError, match="nanoseconds"):
+            monitor.step(stamp, [1], still(0))  # type: ignore[arg-type]
+
+    def test_a_step_without_states_is_a_step(self, monitor: Monitor) -> None:
+        assert touching(monitor.step(SECOND // 100, [])) == {(1, 2)}
+        assert touching(monitor.step(SECOND // 50, [], [], [])) == {(1, 2)}
+
+    def test_the_end_of_a_contact_comes_before_its_new_beginning(self, monitor: Monitor) -> None:
+        monitor.remove(1)
+        monitor.add(1, Sphere(0.5))
+        result = monitor.step(SECOND // 100, [1, 2], still(0, 0.9))
+        assert [int(c["phase"]) for c in result.contacts] == [records.Phase.END, records.Phase.BEGIN]
+
+    @pytest.mark.parametrize("big", [1e200, np.inf])
+    def test_what_is_too_large_to_compute_with_is_refused(self, monitor: Monitor, big: float) -> None:
+        for make in (lambda: Sphere(big), lambda: Box((big, 1, 1)), lambda: Capsule(1, big)):
+            with pytest.raises(ShapeError, match=r"1e\+18"):
+                make()
+        with pytest.raises(PoseError, match=r"1e\+18"):
+            Pose((big, 0, 0))
 
     def test_bad_descriptions_change_nothing(self, monitor: Monitor) -> None:
         with pytest.raises(ShapeError):

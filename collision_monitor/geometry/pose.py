@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import PoseError
-from collision_monitor.tolerances import UNIT_QUATERNION
+from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 
 Array = NDArray[np.float64]
 
@@ -26,8 +26,8 @@ def vector(value: ArrayLike, name: str, length: int = 3) -> Array:
         raise PoseError(f"{name}: expected {length} numbers, got {value!r}") from None
     if result.shape != (length,):
         raise PoseError(f"{name}: expected {length} numbers, got an array of shape {result.shape}")
-    if not np.isfinite(result).all():
-        raise PoseError(f"{name}: expected finite numbers, got {result.tolist()}")
+    if not (np.abs(result) <= LARGEST_INPUT).all():
+        raise PoseError(f"{name}: expected finite numbers up to {LARGEST_INPUT:g}, got {result.tolist()}")
     result.setflags(write=False)
     return result
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import ShapeError
+from collision_monitor.tolerances import LARGEST_INPUT
 
 Array = NDArray[np.float64]
 
@@ -18,8 +19,8 @@ def _positive(value: float, what: str) -> float:
         number = float(value)
     except (TypeError, ValueError):
         raise ShapeError(f"{what}: expected a positive number of metres, got {value!r}") from None
-    if not (number > 0.0 and np.isfinite(number)):
-        raise ShapeError(f"{what}: expected a positive, finite number of metres, got {number!r}")
+    if not 0.0 < number <= LARGEST_INPUT:
+        raise ShapeError(f"{what}: expected a positive number of metres up to {LARGEST_INPUT:g}, got {number!r}")
     return number
 
 
@@ -30,8 +31,8 @@ def _points(value: ArrayLike, what: str, width: int, least: int) -> Array:
         raise ShapeError(f"{what}: expected an array of shape (n, {width}), got {type(value).__name__}") from None
     if points.ndim != 2 or points.shape[1] != width or len(points) < least:
         raise ShapeError(f"{what}: expected at least {least} points, shape (n, {width}), got shape {points.shape}")
-    if not np.isfinite(points).all():
-        raise ShapeError(f"{what}: expected finite coordinates, got NaN or infinity")
+    if not (np.abs(points) <= LARGEST_INPUT).all():
+        raise ShapeError(f"{what}: expected finite coordinates up to {LARGEST_INPUT:g}, got NaN, infinity or larger")
     points.setflags(write=False)
     return points
 
@@ -62,8 +63,8 @@ class Box(Shape):
             size = tuple(float(s) for s in self.size)
         except (TypeError, ValueError):
             raise ShapeError(f"Box size: expected 3 full extents in metres, got {self.size!r}") from None
-        if len(size) != 3 or not all(np.isfinite(s) and s >= 0.0 for s in size) or max(size) == 0.0:
-            raise ShapeError(f"Box size: expected 3 finite extents >= 0, not all zero, got {size}")
+        if len(size) != 3 or not all(0.0 <= s <= LARGEST_INPUT for s in size) or max(size) == 0.0:
+            raise ShapeError(f"Box size: expected 3 extents from 0 to {LARGEST_INPUT:g}, not all zero, got {size}")
         object.__setattr__(self, "size", size)
 
 
