@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import time
 from pathlib import Path
 from typing import Any, Final
@@ -49,13 +48,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def bench(args: argparse.Namespace) -> int:
     """Run the benchmark. Raises InputError."""
+    from collision_monitor.detection import default_threads
     from collision_monitor.world.moving_bodies import FRAMES, load_bodies, make_bodies
 
     if args.scene_file is None:
         scene = make_bodies(args.scene, args.n, args.seed, args.frames or FRAMES)
     else:
         scene = load_bodies(args.scene_file)
-    result = measure(scene, args.threads or min(2, os.cpu_count() or 1), args.frames)
+    result = measure(scene, default_threads() if args.threads is None else args.threads, args.frames)
     if args.json:
         print(json.dumps(result))
     else:

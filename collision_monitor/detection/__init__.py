@@ -28,6 +28,11 @@ WORTH_THREADS: Final = 3000
 """Objects below which a frame is done before a second thread has woken up."""
 
 
+def default_threads() -> int:
+    """Two, or one where there is one core."""
+    return min(2, int(numba.config.NUMBA_NUM_THREADS))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Contacts:
     """M contacts, sorted by pair. `table` holds a row for each; the fields are views of it."""

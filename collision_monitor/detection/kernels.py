@@ -171,7 +171,7 @@ def _gather(path: int, positions: Any, quaternions: Any, grid: Any, frame: Any, 
 
 @inlined
 def _boxes(a: Any, b: Any, RA: Any, RB: Any, px: float, py: float, pz: float, out: Any, work: Any) -> bool:
-    gap, axis, sign = sat(a[0], a[1], a[2], b[0], b[1], b[2], RA, RB, px, py, pz)
+    gap, axis, sign = sat(a[0], a[1], a[2], b[0], b[1], b[2], RA, RB, px, py, pz, 0.0)
     if gap > 0.0:
         return False
     nx, ny, nz = axis_direction(axis, sign, RA, RB)

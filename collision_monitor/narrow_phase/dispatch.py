@@ -203,8 +203,9 @@ def _boxes(
     """SAT, and GJK for the distance of boxes whose nearest features no SAT axis is at a right angle to."""
     ha, hb = table.size[a], table.size[b]
     ma, mb = table.margin[a], table.margin[b]
-    gap, axis, sign = sat(ha[0], ha[1], ha[2], hb[0], hb[1], hb[2], RA, RB, px, py, pz)
-    if gap - ma - mb > limit:
+    reach = limit + ma + mb
+    gap, axis, sign = sat(ha[0], ha[1], ha[2], hb[0], hb[1], hb[2], RA, RB, px, py, pz, reach)
+    if gap > reach:
         return False
     size = max(max(ha[0], ha[1], ha[2]), max(hb[0], hb[1], hb[2]))
     if gap > 0.0:

@@ -69,6 +69,7 @@ def test_bad_arguments_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixtur
         (["--seed", "-1"], "seed: expected a whole number from 0, got -1"),
         (["--frames", "-2"], "frames: expected a whole number from 1, got -2"),
         (["--n", "5", "--threads", "1000"], "threads: expected 1 to"),
+        (["--n", "5", "--threads", "0"], "threads: expected 1 to"),
         (["--scene-file", str(tmp_path / "none.npz")], "none.npz: expected a scene"),
         (["--scene-file", str(text)], "text.npz: expected a scene"),
         (["--scene-file", str(other)], "3 bodies do not go with size"),
