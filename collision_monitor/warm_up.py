@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from collision_monitor.detection import WORTH_THREADS, Detector, default_threads
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.monitor import Monitor
@@ -33,16 +32,5 @@ def main() -> None:
     monitor.step(3_000_000_000, np.arange(2, OBJECTS), poses[2:], twists[2:])
 
 
-def full_detection() -> None:
-    """Compile what `Detector` and the benchmark use; the node does without."""
-    shapes = [Sphere(0.5)] * WORTH_THREADS
-    positions = np.zeros((len(shapes), 3))
-    positions[:, 0] = np.arange(len(shapes))
-    quaternions = np.tile([0.0, 0.0, 0.0, 1.0], (len(shapes), 1))
-    for threads in sorted({1, default_threads()}):
-        Detector(shapes, threads=threads).detect(positions, quaternions)
-
-
 if __name__ == "__main__":
     main()
-    full_detection()
