@@ -40,7 +40,10 @@ def install(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def sourced(install: Path, *command: str | Path) -> list[str]:
     """The command in a shell that has sourced the workspace, as a ROS user has."""
-    return ["bash", "-c", f"source {shlex.quote(str(install))}/setup.bash && exec {shlex.join(map(str, command))}"]
+    # colcon's scripts do not quote the interpreter that they run, so it must not stand below a folder with a space
+    interpreter = f"COLCON_PYTHON_EXECUTABLE={shlex.quote(os.path.realpath(sys.executable))}"
+    source = f"{interpreter} source {shlex.quote(str(install))}/setup.bash"
+    return ["bash", "-c", f"{source} && exec {shlex.join(map(str, command))}"]
 
 
 def run(install: Path, *command: str | Path) -> subprocess.CompletedProcess[str]:
