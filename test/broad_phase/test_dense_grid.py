@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -116,27 +114,6 @@ def test_any_boxes(boxes: list[tuple[float, ...]]) -> None:
     numbers = np.array(boxes, dtype=float)
     centre, half, starts = numbers[:, :3], numbers[:, 3:6], numbers[:, 6] > 0
     assert np.array_equal(box_pairs(centre, half, starts), brute_force(centre, half, starts))
-
-
-@pytest.mark.parametrize("scene", [centimetres_to_hundreds_of_metres, far_apart, a_long_thin_wall, sparse])
-def test_no_scene_is_quadratic(scene) -> None:
-    """Ten times the bodies at the same density: far from a hundred times the time."""
-    rng = np.random.default_rng(2)
-    seconds = []
-    for n in (2_000, 20_000):
-        centre, half = scene(rng, n)
-        if scene is far_apart:
-            centre = 1e6 * rng.integers(-n // 50, n // 50, (n, 3)) + rng.normal(0, 1, (n, 3))
-        else:
-            centre *= (n / 2_000) ** (1 / 3)
-        half = half * 0.2
-        times = []
-        for _ in range(4):
-            begin = time.perf_counter()
-            box_pairs(centre, half)
-            times.append(time.perf_counter() - begin)
-        seconds.append(min(times))
-    assert seconds[1] < 30 * seconds[0]
 
 
 def test_resting_pairs_are_never_visited() -> None:
