@@ -1,0 +1,45 @@
+"""A kernel's cache folder is named by the content of its module and of everything below it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from collision_monitor import _cache
+
+TOP = "from collision_monitor.middle import (\n    sum_of,\n)\n"
+MIDDLE = "from collision_monitor import bottom\n"
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    folder = tmp_path / "collision_monitor"
+    folder.mkdir()
+    for name, text in (("top", TOP), ("middle", MIDDLE), ("bottom", "ONE = 1\n"), ("beside", "TWO = 2\n")):
+        (folder / f"{name}.py").write_text(text)
+    monkeypatch.setattr(_cache, "_PACKAGE", folder)
+    _forget()
+    yield folder
+    _forget()
+
+
+def _forget() -> None:
+    for cached in (_cache.folder, _cache._imports, _cache._file_digest):
+        cached.cache_clear()
+
+
+def test_a_change_below_a_module_renames_its_folder_and_no_other(package: Path) -> None:
+    names = ("top", "middle", "bottom", "beside")
+    before = {name: _cache.folder(f"collision_monitor.{name}") for name in names}
+    (package / "bottom.py").write_text("ONE = 3\n")
+    _forget()
+    changed = {name for name in names if _cache.folder(f"collision_monitor.{name}") != before[name]}
+    assert changed == {"top", "middle", "bottom"}
+
+
+def test_the_same_content_gives_the_same_folder(package: Path) -> None:
+    before = _cache.folder("collision_monitor.top")
+    _forget()
+    assert _cache.folder("collision_monitor.top") == before
