@@ -17,7 +17,9 @@ from pathlib import Path
 import numba
 
 _PACKAGE = Path(__file__).parent
-_IMPORT = re.compile(rb"^\s*(?:from (collision_monitor[\w.]*) import (\([^)]*\)|[^\n]*)|import (collision_monitor[\w.]*))", re.M)
+_IMPORT = re.compile(
+    rb"^\s*(?:from (collision_monitor[\w.]*) import (\([^)]*\)|[^\n]*)|import (collision_monitor[\w.]*))", re.MULTILINE
+)
 
 
 def _path(module: str) -> Path | None:
