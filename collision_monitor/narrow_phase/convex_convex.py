@@ -14,6 +14,7 @@ from collision_monitor.geometry.shape_table import CONE, CYLINDER
 from collision_monitor.narrow_phase.answer import MAX_VERTICES, SIMPLEX, write
 from collision_monitor.narrow_phase.epa import epa
 from collision_monitor.narrow_phase.gjk import WEIGHTS, gjk
+from collision_monitor.narrow_phase.parallel_axes import axes_are_parallel, parallel_axes_depth
 from collision_monitor.narrow_phase.support import core_radius
 from collision_monitor.tolerances import EPA_CURVED, EPA_CURVED_POINTS, EPA_POLYTOPE, SAT_ROUND_OFF, TOUCHING
 
@@ -89,6 +90,12 @@ def convex_contact(
             qz += w * work[at + 5]
         distance = max(sqrt(wx * wx + wy * wy + wz * wz), lower)
         bound = distance - lower
+    elif axes_are_parallel(ka, kb, work):
+        depth, x, y, z, qx, qy, qz = parallel_axes_depth(
+            ka, table.size[a, 0], table.size[a, 1], kb, table.size[b, 0], table.size[b, 1], work, size
+        )
+        distance = -depth
+        bound = TOUCHING * size
     else:
         curved = ka == CYLINDER or ka == CONE or kb == CYLINDER or kb == CONE
         upper, lower, x, y, z, qx, qy, qz = epa(

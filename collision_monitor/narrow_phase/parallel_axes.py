@@ -1,0 +1,108 @@
+"""Depth of two overlapping solids of revolution with parallel axes: a problem of two polygons in (radius, height).
+
+Their difference is a solid of revolution too, its profile the difference of their profiles: so the depth is the least
+over the few edge directions of the two profiles. EPA would approach whole circles of tied directions point by point.
+"""
+
+from __future__ import annotations
+
+from math import copysign, inf, sqrt
+from typing import Any
+
+from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.shape_table import CAPSULE, CONE, CYLINDER, SPHERE
+from collision_monitor.tolerances import FEATURE_TIE, SEGMENT_PARALLEL_SIN2
+
+
+@inlined
+def axes_are_parallel(ka: int, kb: int, work: Any) -> bool:
+    """Whether both are solids of revolution and B's axis, the last column of R_AB in work, lies along A's."""
+    if kb != CONE and kb != CYLINDER and kb != CAPSULE and kb != SPHERE:
+        return False
+    if ka != CONE and ka != CYLINDER and ka != CAPSULE and ka != SPHERE:
+        return False
+    return ka == SPHERE or kb == SPHERE or work[2] * work[2] + work[5] * work[5] <= SEGMENT_PARALLEL_SIN2
+
+
+@inlined
+def _corners(kind: int, s0: float, s1: float) -> Any:
+    """The profile's upper and lower half width and half height (m): (top, bottom, half height)."""
+    if kind == CYLINDER:
+        return s0, s0, s1
+    if kind == CONE:
+        return 0.0, s0, s1
+    return 0.0, 0.0, s1 if kind == CAPSULE else 0.0
+
+
+@device
+def _reach(top: float, bottom: float, half: float, r: float, z: float) -> float:
+    """How far a profile reaches along (r, z)."""
+    return max(abs(r) * top + z * half, abs(r) * bottom - z * half)
+
+
+@device
+def _touching(top: float, bottom: float, half: float, r: float, z: float, tie: float) -> Any:
+    """From where to where along (-z, r) the profile touches its supporting line across (r, z)."""
+    reach = _reach(top, bottom, half, r, z) - tie
+    least, most = inf, -inf
+    for k in range(4):
+        y = half if k < 2 else -half
+        x = top if k < 2 else bottom
+        if k % 2:
+            x = -x
+        if r * x + z * y >= reach:
+            along = r * y - z * x
+            least = min(least, along)
+            most = max(most, along)
+    return least, most
+
+
+@device
+def parallel_axes_depth(ka: int, a0: float, a1: float, kb: int, b0: float, b1: float, work: Any, size: float) -> Any:
+    """Depth of two overlapping cores for which `axes_are_parallel`, in A's frame; work[0:12] is the pose of B in it.
+
+    Returns (depth, nx, ny, nz, ax, ay, az): depth (m), the unit direction from A to B, the witness on A: in the middle
+    of what two faces share.
+    """
+    top_a, bottom_a, half_a = _corners(ka, a0, a1)
+    top_b, bottom_b, half_b = _corners(kb, b0, b1)
+    x, y, height = work[9], work[10], work[11]
+    reach = sqrt(x * x + y * y)
+    if reach > 0.0:
+        x, y = x / reach, y / reach
+    else:
+        x, y = 1.0, 0.0
+    if work[8] < 0.0:
+        top_b, bottom_b = bottom_b, top_b
+    depth = inf
+    r = z = 0.0
+    for k in range(5):
+        # across the caps, the nearer one first; across the axes; across A's slope; across B's, seen from A
+        cr, cz = 0.0, copysign(1.0, height)
+        if k == 1:
+            cz = -cz
+        elif k == 2:
+            cr, cz = 1.0, 0.0
+        elif k == 3:
+            cr, cz = 2.0 * half_a, bottom_a - top_a
+        elif k == 4:
+            cr, cz = 2.0 * half_b, top_b - bottom_b
+        length = sqrt(cr * cr + cz * cz)
+        if length > 0.0:
+            cr, cz = cr / length, cz / length
+            d = (
+                _reach(top_a, bottom_a, half_a, cr, cz)
+                + _reach(top_b, bottom_b, half_b, -cr, -cz)
+                - (cr * reach + cz * height)
+            )
+            if d < depth:
+                depth, r, z = d, cr, cz
+    tie = FEATURE_TIE * size
+    least_a, most_a = _touching(top_a, bottom_a, half_a, r, z, tie)
+    least_b, most_b = _touching(top_b, bottom_b, half_b, -r, -z, tie)
+    at = r * height - z * reach
+    along = 0.5 * (max(least_a, at - most_b) + min(most_a, at - least_b))
+    along = min(max(along, least_a), most_a)
+    out = _reach(top_a, bottom_a, half_a, r, z)
+    ar, az = out * r - along * z, out * z + along * r
+    return depth, r * x, r * y, z, ar * x, ar * y, az

@@ -1,0 +1,45 @@
+"""Cones, cylinders, capsules and spheres that overlap with parallel axes: whole circles of directions tie."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from pairs import contact
+
+from collision_monitor.geometry.shapes import Capsule, Cone, Cylinder, Sphere
+
+SHAPES = (Cone(0.25, 0.5), Cone(0.5, 1.0), Capsule(0.25, 0.5), Sphere(0.3), Cylinder(0.25, 0.5), Cylinder(0.5, 1.0))
+UPRIGHT, UPSIDE_DOWN = np.eye(3), np.diag([1.0, -1.0, -1.0])
+
+
+def reach(shape, d):
+    """Support distances of a shape along unit directions d (N, 3), written out from its definition."""
+    across, along = np.hypot(d[:, 0], d[:, 1]), d[:, 2]
+    if isinstance(shape, Sphere):
+        return np.full(len(d), shape.radius)
+    half = 0.5 * shape.length
+    if isinstance(shape, Capsule):
+        return shape.radius + half * np.abs(along)
+    if isinstance(shape, Cylinder):
+        return shape.radius * across + half * np.abs(along)
+    return np.maximum(shape.radius * across - half * along, half * along)
+
+
+@pytest.mark.parametrize(("a", "b"), list(product(SHAPES, SHAPES)), ids=repr)
+@pytest.mark.parametrize("R", [UPRIGHT, UPSIDE_DOWN], ids=["same way up", "upside down"])
+def test_depth_is_the_least_over_all_directions(a, b, R):
+    rng = np.random.default_rng(7)
+    d = rng.normal(size=(5000, 3))
+    d /= np.linalg.norm(d, axis=1)[:, None]
+    for p in (np.zeros(3), np.array([0.0, 0.0, 0.1]), np.array([0.05, 0.0, -0.1]), *rng.uniform(-0.3, 0.3, (5, 3))):
+        c = contact(a, b, p, UPRIGHT, R)
+        if c.distance > 0.0:
+            continue
+        assert c.bound < 1e-8
+        assert np.all(reach(a, d) + reach(b, -d @ R) - d @ p >= -c.distance - 1e-9)
+        n = np.asarray(c.normal)[None]
+        assert (reach(a, n) + reach(b, -n @ R) - n @ p)[0] == pytest.approx(-c.distance, abs=1e-9)
+        assert n[0] @ c.point_a == pytest.approx(reach(a, n)[0], abs=1e-9)
+        assert n[0] @ (c.point_b - p) == pytest.approx(-reach(b, -n @ R)[0], abs=1e-9)
