@@ -19,6 +19,13 @@ def _setting(default: float | int, minimum: float | int, maximum: float | int, u
     return field(default=default, metadata=metadata)
 
 
+_KINDS: dict[type, str] = {int: "a whole number", float: "a number"}
+
+
+def _in(unit: str) -> str:
+    return "" if unit == "1" else f" {unit}"
+
+
 @dataclass(frozen=True)
 class Setting:
     """One field of a profile, as parameter declarations and help texts need it."""
@@ -63,11 +70,10 @@ class Profile:
             value = getattr(self, setting.name)
             wanted = (int,) if setting.type is int else (int, float)
             if isinstance(value, bool) or not isinstance(value, wanted):
-                raise ProfileError(f"{setting.name}: expected {setting.type.__name__} in {setting.unit}, got {value!r}")
+                raise ProfileError(f"{setting.name}: expected {_KINDS[setting.type]}{_in(setting.unit)}, got {value!r}")
             if not setting.minimum <= value <= setting.maximum:
-                raise ProfileError(
-                    f"{setting.name}: expected {setting.minimum:g} to {setting.maximum:g} {setting.unit}, got {value:g}"
-                )
+                wanted_range = f"{setting.minimum:g} to {setting.maximum:g}{_in(setting.unit)}"
+                raise ProfileError(f"{setting.name}: expected {wanted_range}, got {value:g}")
             object.__setattr__(self, setting.name, setting.type(value))
 
     @classmethod

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from collision_monitor._version import VERSION
+from collision_monitor.cli.quantities import whole
 
 WARM_UP: Final = 2
 """Frames at the start that are not counted."""
@@ -37,11 +38,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--scene", default="boxes", metavar="NAME", help="boxes (default), spheres, mixed or hulls")
-    parser.add_argument("--n", type=int, default=10_000, metavar="N", help="how many objects (default: 10000)")
-    parser.add_argument("--seed", type=int, default=1, metavar="S", help="of the random scene (default: 1)")
+    parser.add_argument("--n", type=whole(1), default=10_000, metavar="N", help="how many objects (default: 10000)")
+    parser.add_argument("--seed", type=whole(0), default=1, metavar="S", help="of the random scene (default: 1)")
     parser.add_argument("--scene-file", type=Path, metavar="FILE", help="a saved scene (.npz) instead")
-    parser.add_argument("--frames", type=int, metavar="F", help=f"frames, the first {WARM_UP} uncounted (default: 12)")
-    parser.add_argument("--threads", type=int, metavar="T", help="default: 2, or 1 where there is one core")
+    parser.add_argument("--frames", type=whole(1), metavar="F", help=f"frames, {WARM_UP} uncounted (default: 12)")
+    parser.add_argument("--threads", type=whole(1), metavar="T", help="default: 2, or 1 where there is one core")
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
     parser.set_defaults(command=bench)
 

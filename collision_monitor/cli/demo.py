@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from collision_monitor.cli.child import Child, ProcessError
+from collision_monitor.cli.quantities import positive, whole
 from collision_monitor.errors import InputError
 from collision_monitor.ros.domain import free_domain
 from collision_monitor.ros.process import StopRequest, ros_context, stay_on_this_machine
@@ -38,9 +39,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "record it, then replay the recording without ROS and compare every answer.",
     )
     parser.add_argument("--scene", default="fleet", metavar="NAME", help="see `world --list` (default: fleet)")
-    parser.add_argument("--objects", type=int, metavar="N", help="how many move (default: the scene's own number)")
-    parser.add_argument("--duration", type=float, default=10.0, metavar="S", help="seconds (default: 10)")
-    parser.add_argument("--seed", type=int, default=1, metavar="K", help="of the scene's random numbers (default: 1)")
+    parser.add_argument("--objects", type=whole(1), metavar="N", help="how many move (default: the scene's own number)")
+    parser.add_argument("--duration", type=positive, default=10.0, metavar="S", help="seconds (default: 10)")
+    parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="of the random numbers (default: 1)")
     parser.add_argument("--path", metavar="FILE", help="recorded tracks, for the scene `trajectory`")
     parser.add_argument("--output", type=Path, metavar="PATH", help="session file (default: sessions/SCENE-DATE.mcap)")
     parser.add_argument("--capture", type=Path, metavar="FILE", help="save the last picture of the table as SVG")
@@ -53,8 +54,6 @@ def demo(args: argparse.Namespace) -> int:
     from collision_monitor.world import describe
 
     describe(args.scene)
-    if not args.duration > 0.0:
-        raise InputError(f"--duration: expected a positive number of seconds, got {args.duration}")
     session = _new_file(args.output, args.scene)
     stay_on_this_machine()
     os.environ.setdefault("ROS_DOMAIN_ID", str(free_domain()))

@@ -61,6 +61,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except CollisionMonitorError as error:
         print(f"collision-monitor: error: {error}", file=sys.stderr)
         return EXIT_ERROR
+    except MemoryError as error:
+        print(f"collision-monitor: error: there is not enough memory for that: {error}", file=sys.stderr)
+        return EXIT_ERROR
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED
     except BrokenPipeError:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from collision_monitor.cli.parameter_file import check_parameter_file
 from collision_monitor.cli.ros_arguments import parameters
-from collision_monitor.errors import InputError, SessionError
+from collision_monitor.errors import SessionError
 from collision_monitor.ros.main import monitor
 
 DESCRIPTION = """\
@@ -36,11 +37,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the node until SIGINT or SIGTERM. Raises SessionError for a recording that is there already."""
+    """Run the node until SIGINT or SIGTERM. Raises InputError, SessionError for a recording that is there already."""
     if args.record is not None and args.record.exists():
         raise SessionError(f"--record: expected the name of a new file, {args.record} is there already")
-    if args.params is not None and not args.params.is_file():
-        raise InputError(f"--params: expected a YAML file, there is none at {args.params}")
+    if args.params is not None:
+        check_parameter_file(args.params)
     found = [] if args.params is None else ["--params-file", str(args.params)]
     found += parameters(profile=args.profile, record=args.record)
     return monitor(["collision-monitor", "--ros-args", *found, *args.ros_args])

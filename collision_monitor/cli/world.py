@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from collision_monitor.cli.quantities import positive, whole
 from collision_monitor.cli.ros_arguments import parameters
 from collision_monitor.errors import InputError
 from collision_monitor.ros.main import world
@@ -19,10 +20,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("scene", nargs="?", metavar="SCENE", help="which scene; --list shows them")
     parser.add_argument("--list", action="store_true", help="list the scenes and stop")
-    parser.add_argument("--objects", type=int, metavar="N", help="how many move (default: the scene's own number)")
-    parser.add_argument("--rate", type=float, metavar="HZ", help="messages per second (default: the scene's own)")
-    parser.add_argument("--duration", type=float, metavar="S", help="stop after so many seconds (default: endless)")
-    parser.add_argument("--seed", type=int, default=1, metavar="K", help="of the scene's random numbers (default: 1)")
+    parser.add_argument("--objects", type=whole(1), metavar="N", help="how many move (default: the scene's own number)")
+    parser.add_argument("--rate", type=positive, metavar="HZ", help="messages per second (default: the scene's own)")
+    parser.add_argument("--duration", type=positive, metavar="S", help="stop after so many seconds (default: endless)")
+    parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="of the random numbers (default: 1)")
     parser.add_argument("--path", type=Path, metavar="FILE", help="recorded tracks, for the scene that plays them")
     parser.add_argument("--monitor", default="object_monitor", metavar="NAME", help="the monitor node's name")
     parser.add_argument("--ros-args", nargs=argparse.REMAINDER, default=[], metavar="…", help="passed on to ROS")
@@ -41,8 +42,6 @@ def play(args: argparse.Namespace) -> int:
     if args.scene is None:
         raise InputError(f"world: expected the name of a scene, one of {', '.join(scene_names())}")
     describe(args.scene)
-    if args.duration is not None and not args.duration > 0.0:
-        raise InputError(f"--duration: expected a positive number of seconds, got {args.duration}")
     found = parameters(
         scene=args.scene,
         objects=args.objects,

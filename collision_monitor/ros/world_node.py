@@ -8,8 +8,10 @@ from __future__ import annotations
 import math
 import time
 
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from collision_monitor import codec
 from collision_monitor.errors import CollisionMonitorError, InputError
@@ -39,6 +41,12 @@ class WorldNode(Node):
             self.destroy_node()
             raise
         topics = f"/{self._monitor}/objects"
+        try:
+            validate_full_topic_name(topics)
+        except InvalidTopicNameException:
+            raise InputError(
+                f"monitor: expected a node's name of letters, digits and underscores, got {self._monitor!r}"
+            ) from None
         self._shapes_out = self.create_publisher(ObjectDescriptionArray, f"{topics}/shapes", qos.SHAPES)
         self._states_out = self.create_publisher(ObjectStateArray, f"{topics}/states", qos.STATES)
 

@@ -65,9 +65,6 @@ def test_bad_arguments_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixtur
     np.savez(partial, kind=np.zeros(3, np.uint8))
     for arguments, expected in (
         (["--scene", "rabbits"], "scene: expected one of boxes, spheres, mixed, hulls, got 'rabbits'"),
-        (["--n", "0"], "n: expected a whole number from 1, got 0"),
-        (["--seed", "-1"], "seed: expected a whole number from 0, got -1"),
-        (["--frames", "-2"], "frames: expected a whole number from 1, got -2"),
         (["--n", "5", "--threads", "1000"], "threads: expected 1 to"),
         (["--n", "5", "--threads", "0"], "threads: expected 1 to"),
         (["--scene-file", str(tmp_path / "none.npz")], "none.npz: expected a scene"),

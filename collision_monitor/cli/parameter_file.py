@@ -1,0 +1,34 @@
+"""A look at a parameter file before ROS reads it: ROS says nothing of a file that is for nobody."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import yaml
+
+from collision_monitor.errors import InputError
+
+NODE = "object_monitor"
+
+
+def check_parameter_file(path: Path) -> None:
+    """Raises InputError where the file is not there, is no YAML, or holds nothing for the monitor."""
+    try:
+        content = yaml.safe_load(path.read_text())
+    except OSError as error:
+        raise InputError(f"--params: expected a YAML file, cannot read {path}: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        where = getattr(error, "problem_mark", None)
+        line = f" (line {where.line + 1})" if where else ""
+        raise InputError(f"--params: expected YAML, {path} is none{line}") from None
+    nodes = [name for name, value in content.items() if _holds_parameters(value)] if isinstance(content, dict) else []
+    if not any(str(name).rstrip("*").rstrip("/") == "" or str(name).rsplit("/", 1)[-1] == NODE for name in nodes):
+        found = f"there are settings for {', '.join(map(str, nodes))}" if nodes else "there are none"
+        raise InputError(
+            f"--params: expected settings under `/**/{NODE}: ros__parameters:` in {path}, {found}; "
+            "config/monitor.yaml is an example"
+        )
+
+
+def _holds_parameters(value: object) -> bool:
+    return isinstance(value, dict) and isinstance(value.get("ros__parameters"), dict)

@@ -1,0 +1,82 @@
+"""What a person may mistype: one line that says what was expected, no traceback, an exit code that tells it apart."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from collision_monitor.cli.main import make_parser
+from collision_monitor.cli.parameter_file import check_parameter_file
+from collision_monitor.errors import InputError
+
+PROGRAM = Path(sys.executable).with_name("collision-monitor")
+EXAMPLE = Path(__file__).parents[2] / "config" / "monitor.yaml"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("world", "fleet", "--objects", "0"),
+        ("world", "fleet", "--rate", "0"),
+        ("world", "fleet", "--rate", "nan"),
+        ("world", "fleet", "--duration", "-1"),
+        ("world", "fleet", "--seed", "-1"),
+        ("demo", "--objects", "many"),
+        ("demo", "--duration", "inf"),
+        ("bench", "--frames", "0"),
+        ("bench", "--n", "0"),
+    ],
+    ids=" ".join,
+)
+def test_numbers_out_of_range_are_wrong_usage(
+    arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        make_parser().parse_args(arguments)
+    assert stopped.value.code == 2
+    assert "expected a" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("world", "fleet", "--monitor", "bad name"), "letters, digits and underscores, got 'bad name'"),
+        (("bench", "--n", "1000000000000"), "not enough memory"),
+    ],
+    ids=["node name", "too many objects"],
+)
+def test_no_traceback(arguments: tuple[str, ...], words: str) -> None:
+    answer = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=60)
+    assert answer.returncode in (1, 2)
+    assert words in answer.stderr
+    assert "Traceback" not in answer.stderr
+
+
+def test_the_example_is_for_the_monitor() -> None:
+    check_parameter_file(EXAMPLE)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("a: [1", "expected YAML"),
+        ("", "there are none"),
+        ("horizon: 1.0", "there are none"),
+        ("/other_node:\n  ros__parameters:\n    horizon: 1.0\n", "there are settings for /other_node"),
+    ],
+    ids=["broken", "empty", "no node", "another node"],
+)
+def test_parameter_files_for_nobody(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "parameters.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words):
+        check_parameter_file(path)
+
+
+def test_the_wildcard_reaches_the_monitor(tmp_path: Path) -> None:
+    path = tmp_path / "parameters.yaml"
+    path.write_text("/**:\n  ros__parameters:\n    horizon: 1.0\n")
+    check_parameter_file(path)
