@@ -22,6 +22,7 @@ from collision_monitor.errors import CollisionMonitorError, InputError, Refusal,
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shape_table import ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Shape, Sphere
+from collision_monitor.plan import ScenePlan, scene_plan
 from collision_monitor.prediction import active_pairs, answers, candidates, tracking
 from collision_monitor.prediction.event_list import EventList
 from collision_monitor.prediction.motion import Bodies, enlarge, make_bodies, make_parts
@@ -136,6 +137,11 @@ class Monitor:
         """The object's name for people. Raises InputError for an unknown id."""
         self._slot(object_id)
         return self._names[object_id]
+
+    @property
+    def plan(self) -> ScenePlan:
+        """Which tests and grid cells the objects described now require; `print` it."""
+        return scene_plan(self._shapes.table, self._bodies, self._parts.next, self._grid)
 
     def _slot(self, object_id: int) -> int:
         if object_id not in self._slots:

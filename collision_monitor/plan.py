@@ -1,0 +1,126 @@
+"""The scene plan: which tests and which grid cells the objects that are described require, and what nothing requires.
+
+`Monitor.plan` makes it from what is described at that moment, so it follows every change; `print` shows it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.broad_phase.hashed_grid import LEVEL_OFFSET, LEVELS, HashedGrid
+from collision_monitor.geometry.shape_table import BOX, CAPSULE, CONE, CONVEX_HULL, CYLINDER, HALF_SPACE, SPHERE
+from collision_monitor.prediction.motion import Bodies
+
+KIND_NAMES: Final = {
+    SPHERE: "sphere",
+    BOX: "box",
+    CAPSULE: "capsule",
+    CYLINDER: "cylinder",
+    CONE: "cone",
+    CONVEX_HULL: "convex hull",
+    HALF_SPACE: "half-space",
+}
+_TESTS: Final = {
+    (SPHERE, SPHERE): "sphere_sphere",
+    (SPHERE, BOX): "sphere_box",
+    (SPHERE, CAPSULE): "capsule_capsule",
+    (CAPSULE, CAPSULE): "capsule_capsule",
+    (SPHERE, CONE): "sphere_cone",
+    (SPHERE, CYLINDER): "cylinder_cylinder",
+    (BOX, BOX): "box_box",
+}
+_METHODS: Final = {
+    "sphere_sphere": "centres",
+    "sphere_box": "clamping",
+    "capsule_capsule": "closest points of segments",
+    "sphere_cone": "closed form",
+    "cylinder_cylinder": "closed form where the axes are parallel, else GJK and EPA",
+    "box_box": "SAT",
+    "half_space": "support distance",
+    "convex_convex": "GJK and EPA",
+}
+
+
+@dataclass(frozen=True)
+class ScenePlan:
+    """What a step works with."""
+
+    shapes: dict[str, int]
+    """How many of each kind are described; the parts of a compound count one by one."""
+    moving: int
+    static: int
+    turning: int
+    """Moving objects whose rotation matters: all but single spheres at their frame's origin."""
+    tests: dict[tuple[str, str], str]
+    """The narrow phase test, a file of `narrow_phase/`, for each two kinds that can meet."""
+    cells: dict[float, int]
+    """Objects in the grid by cell width (m): swept boxes, so both size and speed count."""
+    groups: int
+    """How many pairs of (group, mask) there are; with one, nothing is told apart by group."""
+
+    def __str__(self) -> str:
+        lines = [f"objects   {self.moving} moving, {self.static} static"]
+        lines.append("shapes    " + (", ".join(f"{count} {name}" for name, count in self.shapes.items()) or "none"))
+        for (a, b), test in self.tests.items():
+            lines.append(f"test      {a} – {b}: {test} ({_METHODS[test]})")
+        for width, count in self.cells.items():
+            lines.append(f"grid      cells of {width:g} m: {count}")
+        unneeded = self.unneeded
+        lines.append("not used  " + ("; ".join(unneeded) if unneeded else "nothing: the scene requires all of it"))
+        return "\n".join(lines)
+
+    @property
+    def unneeded(self) -> list[str]:
+        """What is left out because nothing in the scene requires it."""
+        used = set(self.tests.values())
+        reasons = (
+            ("box_box" not in used, "SAT: no two boxes can meet"),
+            (not used & {"convex_convex", "cylinder_cylinder"}, "GJK and EPA: no pair needs them"),
+            (self.turning == 0, "rotation: a sphere looks the same turned"),
+            (self.static > 1, f"{self.static * (self.static - 1) // 2} pairs of static objects: never visited"),
+            (self.groups <= 1, "groups and masks: all are the same"),
+        )
+        return [reason for applies, reason in reasons if applies]
+
+
+def scene_plan(table: Any, bodies: Bodies, next_part: NDArray[np.int32], grid: HashedGrid) -> ScenePlan:
+    """The plan for what is described now. next_part (S,): the next shape slot of the same object, -1 after the last."""
+    used = np.flatnonzero(bodies.used)
+    static = bodies.static[used]
+    kinds: dict[bool, list[int]] = {False: [], True: []}
+    for i, fixed in zip(used.tolist(), static.tolist(), strict=True):
+        slot = int(bodies.first_shape[i])
+        while slot >= 0:
+            kinds[fixed].append(int(table.kind[slot]))
+            slot = int(next_part[slot])
+    moving, fixed_kinds = set(kinds[False]), set(kinds[True])
+    pairs = [*combinations_with_replacement(sorted(moving), 2)]
+    if int(np.count_nonzero(~static)) == 1:
+        pairs = []  # one object does not meet itself
+    pairs += [(min(a, b), max(a, b)) for a in moving for b in fixed_kinds]
+    counts = {kind: (kinds[False] + kinds[True]).count(kind) for kind in sorted(moving | fixed_kinds)}
+    moving_bodies = used[~static]
+    filters = np.unique(np.stack([bodies.group[used], bodies.mask[used]], axis=1), axis=0)
+    return ScenePlan(
+        shapes={KIND_NAMES[kind]: count for kind, count in counts.items()},
+        moving=len(moving_bodies),
+        static=int(np.count_nonzero(static)),
+        turning=int(np.count_nonzero(bodies.spin_radius[moving_bodies] > 0.0)),
+        tests={(KIND_NAMES[a], KIND_NAMES[b]): pair_test(a, b) for a, b in sorted(set(pairs))},
+        cells={2.0 ** (k - LEVEL_OFFSET): int(grid.level_count[k]) for k in range(LEVELS) if grid.level_count[k]},
+        groups=len(filters),
+    )
+
+
+def pair_test(kind_a: int, kind_b: int) -> str:
+    """The narrow phase test for two kinds, kind_a <= kind_b."""
+    if kind_b == HALF_SPACE:
+        return "half_space"
+    if kind_b == CYLINDER and kind_a in (CAPSULE, CYLINDER):
+        return "cylinder_cylinder"
+    return _TESTS.get((kind_a, kind_b), "convex_convex")
