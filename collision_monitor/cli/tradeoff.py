@@ -1,0 +1,201 @@
+"""`collision-monitor tradeoff`: what each profile costs and how wrong it is, on scenes or on a recorded session."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from collision_monitor.cli.quantities import positive, whole
+from collision_monitor.errors import InputError, MessageError
+
+if TYPE_CHECKING:
+    from collision_monitor.description import ObjectDescription
+    from collision_monitor.tradeoff import Row, Step
+
+SCENES: Final = ("fleet", "clutter", "particles", "crossing")
+"""What is measured where no scene is named."""
+
+DESCRIPTION = """\
+Run scenes, or a recorded session, through the profiles, and compare every answer with exact ones that are computed
+anew at every step: time per step, false alarms, misses, errors of distance and of time to collision.
+"""
+EPILOG = """\
+examples:
+  collision-monitor tradeoff --scene fleet
+  collision-monitor tradeoff --scene fleet --scene clutter --png tradeoff.png
+  collision-monitor tradeoff run.mcap --profile fast --profile exact --json
+
+A pair counts as an alarm at each step at which it is told, as a contact or as a prediction. A false alarm is one that
+the exact answers do not have at that step: mostly a near miss, within the tolerance that the profile declares.
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the `collision-monitor` parser."""
+    parser = subparsers.add_parser(
+        "tradeoff",
+        help="measure what each profile costs and how wrong it is",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("session", nargs="?", type=Path, metavar="SESSION", help="a recording, in place of scenes")
+    parser.add_argument(
+        "--scene", action="append", metavar="NAME", help=f"may be given again (default: {', '.join(SCENES)})"
+    )
+    parser.add_argument("--path", type=Path, metavar="FILE", help="recorded tracks, for the scene `trajectory`")
+    parser.add_argument("--objects", type=whole(1), metavar="N", help="how many move (default: the scene's own number)")
+    parser.add_argument("--seconds", type=positive, default=5.0, metavar="S", help="of each scene (default: 5)")
+    parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="of the random numbers (default: 1)")
+    parser.add_argument("--profile", action="append", metavar="NAME", help="may be given again (default: all)")
+    parser.add_argument("--json", action="store_true", help="print one line of JSON")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="write the rows there too")
+    parser.add_argument("--png", type=Path, metavar="FILE", help="draw time against error, a panel for each scene")
+    parser.set_defaults(command=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and print. Raises InputError, ProfileError, SessionError."""
+    from collision_monitor.profiles import Profile
+    from collision_monitor.tradeoff import tradeoff
+
+    if args.session is not None and args.scene:
+        raise InputError("tradeoff: expected a session or scenes, got both")
+    profiles = [Profile.named(name) for name in args.profile or Profile.names()]
+    if not args.profile:
+        profiles.sort(key=lambda profile: -profile.impact_tolerance)
+    inputs = [_recorded(args.session)] if args.session else [_played(name, args) for name in args.scene or SCENES]
+    rows = []
+    for name, descriptions, steps in inputs:
+        with _progress_bar(name, 2 * len(steps) * len(profiles)) as progress:
+            rows += tradeoff(name, descriptions, steps, profiles, progress)
+    if args.json:
+        print(json.dumps({"rows": [row.to_dict() for row in rows]}))
+    else:
+        _print_table(rows)
+    try:
+        if args.csv:
+            _write_csv(rows, args.csv)
+        if args.png:
+            _draw(rows, args.png)
+    except OSError as error:
+        raise InputError(f"expected a file that can be written, got {error.filename}: {error.strerror}") from None
+    return 0
+
+
+def _played(name: str, args: argparse.Namespace) -> tuple[str, list[ObjectDescription], list[Step]]:
+    from collision_monitor.world import make_scene
+
+    scene = make_scene(name, objects=args.objects, seed=args.seed, path=args.path)
+    steps = [(0, scene.states())]
+    while len(steps) < args.seconds * scene.rate and not scene.finished:
+        states = scene.step()
+        steps.append((round(scene.time * 1e9), states))
+    return name, scene.descriptions, steps
+
+
+def _recorded(path: Path) -> tuple[str, list[ObjectDescription], list[Step]]:
+    """All objects are known from the first step on, as they were described last; what is malformed is left out."""
+    from collision_monitor.codec import decode_descriptions, decode_states
+    from collision_monitor.description import ObjectDescription
+    from collision_monitor.session import Session
+
+    described: dict[int, ObjectDescription] = {}
+    steps = []
+    for message in Session(path).messages():
+        with suppress(MessageError):
+            if message.type == "ObjectDescriptionArray":
+                changes = decode_descriptions(message.data).objects
+                described.update({it.object_id: it for it in changes if isinstance(it, ObjectDescription)})
+            elif message.type == "ObjectStateArray":
+                states = decode_states(message.data)
+                steps.append((states.stamp_ns, states.states.copy()))
+    if not described or not steps:
+        raise InputError(f"{path}: expected object shapes and states, found {len(described)} and {len(steps)} of them")
+    return path.stem, list(described.values()), steps
+
+
+@contextmanager
+def _progress_bar(name: str, total: int) -> Iterator[Callable[[int], None]]:
+    """A bar on stderr, where that is a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda done: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn(name), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=total)
+        yield lambda done: bar.update(task, advance=done)
+
+
+def _number(value: float) -> str:
+    return "–" if value != value else f"{value:.2g}"
+
+
+def _print_table(rows: Sequence[Row]) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for k, heading in enumerate(("scene", "profile", "ms/step", "µs/pair", "alarms", "false", "missed")):
+        table.add_column(heading, justify="left" if k < 2 else "right", no_wrap=True)
+    for heading in ("distance\nerror m", "TTC error s\nmedian", "\np99", "\nworst"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    scene = ""
+    for row in rows:
+        if scene and row.scene != scene:
+            table.add_section()
+        shown = "" if row.scene == scene else row.scene
+        scene = row.scene
+        error = row.ttc_error_s
+        numbers = (row.distance_error_m, error.median, error.p99, error.worst)
+        table.add_row(
+            shown, row.profile, f"{row.step_ms:.3f}", f"{row.pair_us:.2f}", str(row.alarms), str(row.false_alarms),
+            str(row.misses), *map(_number, numbers),
+        )  # fmt: skip
+    Console(width=None if sys.stdout.isatty() else 120).print(table)
+
+
+def _flat(row: Row) -> dict[str, Any]:
+    values = row.to_dict()
+    errors = values.pop("ttc_error_s")
+    return {**values, **{f"ttc_error_{name}_s": value for name, value in errors.items()}}
+
+
+def _write_csv(rows: Sequence[Row], path: Path) -> None:
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, fieldnames=list(_flat(rows[0])))
+        writer.writeheader()
+        writer.writerows(map(_flat, rows))
+
+
+def _draw(rows: Sequence[Row], path: Path) -> None:
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    scenes = list(dict.fromkeys(row.scene for row in rows))
+    figure, panels = plt.subplots(1, len(scenes), figsize=(4.0 * len(scenes), 3.6), squeeze=False, layout="constrained")
+    for panel, scene in zip(panels[0], scenes, strict=True):
+        shown = [row for row in rows if row.scene == scene and row.ttc_error_s.p99 > 0.0]
+        panel.set(title=scene, xlabel="p99 error of the time to collision (s)", ylabel="ms per step")
+        if not shown:
+            panel.text(0.5, 0.5, "nothing predicted", ha="center", transform=panel.transAxes)
+            continue
+        for row in shown:
+            panel.scatter(row.ttc_error_s.p99, row.step_ms, s=60, label=row.profile)
+        panel.set(xscale="log", ylim=(0.0, 1.4 * max(row.step_ms for row in shown)))
+        panel.legend(loc="lower left")
+        panel.grid(alpha=0.3)
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
