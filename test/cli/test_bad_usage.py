@@ -20,6 +20,7 @@ EXAMPLE = Path(__file__).parents[2] / "config" / "monitor.yaml"
     "arguments",
     [
         ("world", "fleet", "--objects", "0"),
+        ("world", "fleet", "--objects", "-3"),
         ("world", "fleet", "--rate", "0"),
         ("world", "fleet", "--rate", "nan"),
         ("world", "fleet", "--duration", "-1"),
@@ -37,7 +38,8 @@ def test_numbers_out_of_range_are_wrong_usage(
     with pytest.raises(SystemExit) as stopped:
         make_parser().parse_args(arguments)
     assert stopped.value.code == 2
-    assert "expected a" in capsys.readouterr().err
+    error = capsys.readouterr().err.splitlines()[-1]  # below the usage
+    assert "expected a" in error and f"got {arguments[-1]!r}" in error
 
 
 @pytest.mark.parametrize(
