@@ -4,6 +4,7 @@
     profiles        Profile                                the settings that trade speed for accuracy
     shapes, poses   Sphere, Box, …, Pose, Motion           what objects are made of and where they are
     description     ObjectDescription                      an object with its shapes, group and bounds
+    contact         contact, Contact                       two shapes at two poses: distance, normal, points, bound
     errors          CollisionMonitorError and its kinds    what can be wrong with an input
 """
 
@@ -32,6 +33,8 @@ _HOME = {
     "HalfSpace": "geometry.shapes",
     "Circle": "geometry.shapes",
     "Polygon": "geometry.shapes",
+    "contact": "narrow_phase.contact",
+    "Contact": "narrow_phase.contact",
     "CollisionMonitorError": "errors",
     "InputError": "errors",
     "ShapeError": "errors",
@@ -70,6 +73,8 @@ if TYPE_CHECKING:
     from collision_monitor.monitor import Monitor as Monitor
     from collision_monitor.monitor import StepResult as StepResult
     from collision_monitor.monitor import StepStatus as StepStatus
+    from collision_monitor.narrow_phase.contact import Contact as Contact
+    from collision_monitor.narrow_phase.contact import contact as contact
     from collision_monitor.profiles import Profile as Profile
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from collision_monitor.errors import InputError, ShapeError
+from collision_monitor.errors import InputError
+from collision_monitor.geometry.pieces import shape_pairs
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Shape
 from collision_monitor.records import Model
 
 ALL_GROUPS = 0xFFFFFFFF
@@ -30,21 +29,6 @@ def _not_negative(value: Any, what: str, unit: str) -> float:
     if not (number >= 0.0 and math.isfinite(number)):
         raise InputError(f"{what}: expected a finite number of {unit}, at least 0, got {number!r}")
     return number
-
-
-def _shape_pairs(value: Any, what: str) -> tuple[tuple[Shape, Pose], ...]:
-    if isinstance(value, Shape):
-        return ((value, Pose()),)
-    if not isinstance(value, Iterable):
-        raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), got {value!r}")
-    pairs = tuple(tuple(item) if isinstance(item, Iterable) else item for item in value)
-    for pair in pairs:
-        is_pair = isinstance(pair, tuple) and len(pair) == 2
-        if not (is_pair and isinstance(pair[0], Shape) and isinstance(pair[1], Pose)):
-            raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), got {pair!r} in the list")
-    if not pairs:
-        raise ShapeError(f"{what}: expected at least one shape, got none")
-    return pairs
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +67,7 @@ class ObjectDescription:
             raise InputError(f"{what}, pose: expected a Pose, got {type(self.pose).__name__}")
         checked = {
             "object_id": object_id,
-            "shapes": _shape_pairs(self.shapes, what),
+            "shapes": shape_pairs(self.shapes, what),
             "name": str(self.name) or f"object_{object_id}",
             "static": bool(self.static),
             "group": _uint32(self.group, f"{what}, group") or 1,

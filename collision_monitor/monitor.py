@@ -19,9 +19,12 @@ from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.broad_phase.hashed_grid import make_hashed_grid, put_boxes, remove_boxes
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import CollisionMonitorError, InputError, Refusal, UnsupportedError
+from collision_monitor.geometry.pieces import is_planar
+from collision_monitor.geometry.plane import flat_pose, flat_states
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shape_table import ShapeTableBuilder
-from collision_monitor.geometry.shapes import HalfSpace, Shape, Sphere
+from collision_monitor.geometry.shape_table import CIRCLE, SPHERE, ShapeTableBuilder
+from collision_monitor.geometry.shapes import HalfSpace, Shape
+from collision_monitor.narrow_phase.models import monitored_model
 from collision_monitor.plan import ScenePlan, scene_plan
 from collision_monitor.prediction import active_pairs, answers, candidates, tracking
 from collision_monitor.prediction.event_list import EventList
@@ -104,6 +107,7 @@ class Monitor:
         self._names: dict[int, str] = {}
         self._free: list[int] = []
         self._top = 0  # slots below have been used
+        self._planar = False  # whether the scene is one in the plane
         self._shapes = ShapeTableBuilder()
         self._parts = make_parts(64)
         self._bodies: Bodies = make_bodies(64)
@@ -162,14 +166,15 @@ class Monitor:
         Raises InputError, ShapeError; UnsupportedError for a shape or model that is not offered.
         """
         d = description
-        if d.model not in (Model.AUTO, Model.EXACT):
-            raise UnsupportedError(f"object {d.object_id}: model {d.model.name}; supported are AUTO, EXACT")
         if not d.static and any(isinstance(shape, HalfSpace) for shape, _ in d.shapes):
             raise UnsupportedError(f"object {d.object_id}: a HalfSpace has no end and can only be static")
+        planar = self._is_planar(d)
+        pose = flat_pose(d.pose) if planar and d.pose is not None else d.pose
+        modelled = monitored_model(d.shapes, d.model)
         slots: list[int] = []
         try:
-            for shape, offset in d.shapes:
-                slots.append(self._shapes.append(shape, offset, d.padding))
+            for shape, offset in modelled.pieces:
+                slots.append(self._shapes.append(shape, flat_pose(offset) if planar else offset, d.padding))
         except CollisionMonitorError:
             for slot in slots:
                 self._shapes.remove(slot)
@@ -179,18 +184,21 @@ class Monitor:
             i = self._slots[d.object_id] = self._new_body()
         else:
             self._drop_shapes(i)
-        self._link_shapes(i, slots)
+        self._link_shapes(i, slots, modelled.shapes)
+        self._planar = planar
         bodies, table = self._bodies, self._shapes.table
         bodies.used[i] = True
         bodies.motion["id"][i] = d.object_id
         bodies.group[i], bodies.mask[i] = d.group, d.mask
         radius = max(float(np.linalg.norm(table.local_position[s]) + table.radius[s]) for s in slots)
         bodies.motion["radius"][i] = radius
-        centred = len(slots) == 1 and isinstance(d.shapes[0][0], Sphere) and not table.local_position[slots[0]].any()
+        bodies.model[i], bodies.excess[i], bodies.concave[i] = modelled.model, modelled.excess, not modelled.convex
+        centred = len(slots) == 1 and table.kind[slots[0]] in (SPHERE, CIRCLE)
+        centred = centred and not table.local_position[slots[0]].any()
         bodies.spin_radius[i] = 0.0 if centred else radius
         if d.static:
-            assert d.pose is not None
-            bodies.position[i], bodies.quaternion[i] = d.pose.position, d.pose.quaternion
+            assert pose is not None
+            bodies.position[i], bodies.quaternion[i] = pose.position, pose.quaternion
             bodies.linear[i] = bodies.angular[i] = 0.0
             bodies.seen[i] = True
         elif bodies.static[i]:
@@ -203,6 +211,18 @@ class Monitor:
         self._end_pairs([k for k in self._pairs_of(i) if not self._is_checked(self._pairs[k])])
         self._renewed.add(i)
         self._ids = np.zeros(0, np.uint32)
+
+    def _is_planar(self, d: ObjectDescription) -> bool:
+        """Whether the object is one of the plane. Raises UnsupportedError where it meets objects of space."""
+        kinds = {is_planar(shape) for shape, _ in d.shapes}
+        if any(known != d.object_id for known in self._slots):
+            kinds.add(self._planar)
+        if len(kinds) > 1:
+            raise UnsupportedError(
+                f"object {d.object_id}: Circle and Polygon meet each other only; expected a scene in the plane or one "
+                "in space, got shapes of both"
+            )
+        return kinds.pop()
 
     def remove(self, object_id: int) -> None:
         """Forget an object; its contacts end. Raises InputError for an unknown id."""
@@ -253,7 +273,8 @@ class Monitor:
         self._top += 1
         return self._top - 1
 
-    def _link_shapes(self, i: int, slots: list[int]) -> None:
+    def _link_shapes(self, i: int, slots: list[int], shapes: list[int]) -> None:
+        """Make the table's slots, each part of one of the description's shapes, those of body i."""
         table = self._shapes.table
         if len(self._parts.next) < len(table.kind):
             parts = make_parts(len(table.kind))
@@ -261,7 +282,7 @@ class Monitor:
             self._parts = parts
         self._bodies.first_shape[i] = slots[0]
         for index, slot in enumerate(slots):
-            self._parts.index[slot] = index
+            self._parts.index[slot] = shapes[index]
             self._parts.next[slot] = slots[index + 1] if index + 1 < len(slots) else -1
             turned = not np.array_equal(table.local_rotation[slot], np.eye(3))
             self._parts.placed[slot] = turned or table.local_position[slot].any()
@@ -405,7 +426,8 @@ class Monitor:
         if len(states) == 0:
             return
         slots = self._slots_of(states["id"])
-        numbers = states.view(np.float64).reshape(len(states), -1)
+        used = flat_states(states) if self._planar else states
+        numbers = used.view(np.float64).reshape(len(states), -1)
         verdicts = np.empty(len(states), np.uint8)
         flags = np.ascontiguousarray(states["flags"])
         if tracking.take_states(self._bodies, slots, numbers, flags, time, verdicts) == len(states):
@@ -519,7 +541,7 @@ class Monitor:
         self._events.add(np.concatenate([new[~is_due], later[:n_later]]), bodies.motion)
         contacts = np.empty(n, records.CONTACT)
         n = answers.write_contacts(
-            self._pairs, results, self._parts.index, now,
+            self._pairs, results, bodies, self._parts.index, now,
             contacts.view(np.float64).reshape(-1, 17),
             contacts.view(np.uint32).reshape(-1, 34),
             contacts.view(np.uint8).reshape(-1, 136),

@@ -13,7 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.hashed_grid import LEVEL_OFFSET, LEVELS, HashedGrid
-from collision_monitor.geometry.shape_table import BOX, CAPSULE, CONE, CONVEX_HULL, CYLINDER, HALF_SPACE, SPHERE
+from collision_monitor.geometry.shape_table import (
+    BOX,
+    CAPSULE,
+    CIRCLE,
+    CONE,
+    CONVEX_HULL,
+    CYLINDER,
+    HALF_SPACE,
+    POLYGON,
+    SPHERE,
+)
 from collision_monitor.prediction.motion import Bodies
 
 KIND_NAMES: Final = {
@@ -24,6 +34,8 @@ KIND_NAMES: Final = {
     CONE: "cone",
     CONVEX_HULL: "convex hull",
     HALF_SPACE: "half-space",
+    CIRCLE: "circle",
+    POLYGON: "polygon",
 }
 _TESTS: Final = {
     (SPHERE, SPHERE): "sphere_sphere",
@@ -43,6 +55,7 @@ _METHODS: Final = {
     "box_box": "SAT",
     "half_space": "support distance",
     "convex_convex": "GJK and EPA",
+    "polygon_polygon": "SAT in the plane",
 }
 
 
@@ -121,6 +134,8 @@ def pair_test(kind_a: int, kind_b: int) -> str:
     """The narrow phase test for two kinds, kind_a <= kind_b."""
     if kind_b == HALF_SPACE:
         return "half_space"
+    if kind_a >= CIRCLE:
+        return "polygon_polygon"
     if kind_b == CYLINDER and kind_a in (CAPSULE, CYLINDER):
         return "cylinder_cylinder"
     return _TESTS.get((kind_a, kind_b), "convex_convex")

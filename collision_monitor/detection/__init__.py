@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.broad_phase.dense_grid import classify_bodies, make_grid
 from collision_monitor.detection import kernels
-from collision_monitor.errors import InputError, PoseError
+from collision_monitor.errors import InputError, PoseError, UnsupportedError
+from collision_monitor.geometry.pieces import is_planar
 from collision_monitor.geometry.shape_table import BOX, SPHERE, ShapeTableBuilder
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
@@ -98,6 +99,8 @@ class Detector:
             raise InputError(f"static: expected {n} flags, one for each shape, got an array of shape {resting.shape}")
         builder = ShapeTableBuilder(slots=n)
         for shape in shapes:
+            if is_planar(shape):
+                raise UnsupportedError(f"{type(shape).__name__}: the detector is for shapes of space; use Monitor")
             builder.append(shape)
         self._n = n
         self._table = builder.table

@@ -16,6 +16,7 @@ from scipy.spatial import QhullError
 from collision_monitor._jit import device
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.geometry import shapes
+from collision_monitor.geometry.polygons import corners, is_convex, is_counter_clockwise
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.records import ShapeType
 from collision_monitor.tolerances import HULL_DROP
@@ -29,18 +30,24 @@ CYLINDER: Final = int(ShapeType.CYLINDER)
 CONE: Final = int(ShapeType.CONE)
 CONVEX_HULL: Final = int(ShapeType.CONVEX_HULL)
 HALF_SPACE: Final = int(ShapeType.HALF_SPACE)
+CIRCLE: Final = int(ShapeType.CIRCLE)
+POLYGON: Final = int(ShapeType.POLYGON)
 
-SUPPORTED: Final = "Sphere, Box, Capsule, Cylinder, Cone, ConvexHull, HalfSpace"
+SUPPORTED: Final = "Sphere, Box, Capsule, Cylinder, Cone, ConvexHull, HalfSpace; Circle, Polygon (convex) in the plane"
 
 LANES: Final = 8
 """Hull vertices come in blocks of this many, the last one repeated, so that the support scan has no tail."""
+
+
+_CORNERS: Final = np.arange(3, dtype=np.int32)
+"""Of a triangle."""
 
 
 class ShapeTable(NamedTuple):
     """K slots of shapes and the hull vertices (m). A slot with kind 0 is free. Kernels take this as one argument.
 
     size holds, by kind: sphere r | box half extents x, y, z | capsule r, half core length | cylinder r, half height |
-    cone r, half height | half-space normal x, y, z, offset | hull nothing.
+    cone r, half height | half-space normal x, y, z, offset | hull nothing | circle r | polygon number of corners.
     """
 
     kind: Any  # (K,) uint8, records.ShapeType
@@ -77,6 +84,12 @@ def _resized(table: ShapeTable, slots: int, vertices: int) -> ShapeTable:
     return new
 
 
+def take(table: ShapeTable, slots: NDArray[np.int_]) -> ShapeTable:
+    """A table of these slots in this order, each as often as it is named; the vertices are shared."""
+    rows = {name: getattr(table, name)[slots] for name in table._fields if name not in ("vertices", "vertex_index")}
+    return table._replace(**rows)
+
+
 def hull_vertices(points: Array) -> NDArray[np.int32]:
     """Indices of the points (n, 3) that span their convex hull, ascending; all distinct points where qhull gives up."""
     _, first = np.unique(points, axis=0, return_index=True)
@@ -95,6 +108,14 @@ def hull_vertices(points: Array) -> NDArray[np.int32]:
     return first[keep].astype(np.int32)
 
 
+def convex_ring(points: Array) -> NDArray[np.int32]:
+    """Indices of the corners (n,) of a polygon (m, 2), counter-clockwise. Raises ShapeError where it is not convex."""
+    if not is_convex(points):
+        raise ShapeError("Polygon points: expected a convex polygon, got a concave one; see triangulation.convex_parts")
+    ring = corners(points)
+    return (ring if is_counter_clockwise(points) else ring[::-1]).astype(np.int32)
+
+
 class ShapeTableBuilder:
     """Grows a ShapeTable; `table` is the current one and must be fetched again after `append`."""
 
@@ -104,8 +125,8 @@ class ShapeTableBuilder:
         self._vertices = 0
         self._free_slots: list[int] = []
         self._free_blocks: dict[int, list[int]] = {}
-        self._hulls: dict[bytes, tuple[int, int]] = {}  # the points' bytes -> start, count
-        self._users: dict[int, tuple[bytes, int]] = {}  # start -> the points' bytes, how many slots share the block
+        self._blocks: dict[bytes, tuple[int, int]] = {}  # the points' bytes -> start, count
+        self._users: dict[int, tuple[bytes, int]] = {}  # start -> its key, how many slots share the block
 
     def __len__(self) -> int:
         """How many shapes the table holds."""
@@ -136,9 +157,16 @@ class ShapeTableBuilder:
                 radius = float(np.hypot(*size))
             case shapes.HalfSpace():
                 kind, size, radius = HALF_SPACE, (*shape.normal, shape.offset), inf
-            case shapes.ConvexHull():
+            case shapes.ConvexHull() | shapes.Triangle():
                 kind, size, radius = CONVEX_HULL, (), float(np.linalg.norm(shape.points, axis=1).max())
-                start, count = self._share_hull(shape.points)
+                flat = isinstance(shape, shapes.Triangle)
+                start, count = self._share(shape.points, _CORNERS if flat else hull_vertices(shape.points))
+            case shapes.Circle():
+                kind, size, radius = CIRCLE, (shape.radius,), shape.radius
+            case shapes.Polygon():
+                ring = convex_ring(shape.points)
+                kind, size, radius = POLYGON, (len(ring),), float(np.linalg.norm(shape.points, axis=1).max())
+                start, count = self._share(np.pad(shape.points, ((0, 0), (0, 1))), ring)
             case _:
                 raise UnsupportedError(f"{type(shape).__name__} has no narrow phase; supported are {SUPPORTED}")
         slot = self._new_slot()
@@ -159,13 +187,13 @@ class ShapeTableBuilder:
         """Free a slot for reuse. Raises InputError where there is no shape."""
         if not (0 <= slot < self._slots and self.table.kind[slot]):
             raise InputError(f"expected the slot of a shape in the table, got {slot!r}")
-        if self.table.kind[slot] == CONVEX_HULL:
+        if self.table.vertex_count[slot]:
             start = int(self.table.vertex_start[slot])
             key, users = self._users[start]
             if users > 1:
                 self._users[start] = key, users - 1
             else:
-                del self._users[start], self._hulls[key]
+                del self._users[start], self._blocks[key]
                 self._free_blocks.setdefault(int(self.table.vertex_count[slot]), []).append(start)
         self.table.kind[slot] = 0
         self.table.vertex_count[slot] = 0
@@ -180,20 +208,19 @@ class ShapeTableBuilder:
         self._slots += 1
         return self._slots - 1
 
-    def _share_hull(self, points: Array) -> tuple[int, int]:
-        """Start and count of the hull's block of vertices; the same points share one block."""
-        key = points.tobytes()
-        if key in self._hulls:
-            start, count = self._hulls[key]
+    def _share(self, points: Array, chosen: NDArray[np.int32]) -> tuple[int, int]:
+        """Start and count of the block of the chosen points; the same ones share one block."""
+        key = chosen.tobytes() + points[chosen].tobytes()
+        if key in self._blocks:
+            start, count = self._blocks[key]
             self._users[start] = key, self._users[start][1] + 1
             return start, count
-        chosen = hull_vertices(points)
         chosen = np.pad(chosen, (0, -len(chosen) % LANES), mode="edge")
         count = len(chosen)
         start = self._new_block(count)
         self.table.vertices[:, start : start + count] = points[chosen].T
         self.table.vertex_index[start : start + count] = chosen
-        self._hulls[key] = start, count
+        self._blocks[key] = start, count
         self._users[start] = key, 1
         return start, count
 
@@ -235,7 +262,10 @@ def bounds(table: Any, slot: int, R: Any, out: Any) -> None:
             rim = s0 * sqrt(x * x + y * y)
             upper = max(z * s1, rim - z * s1)
             lower = min(z * s1, -rim - z * s1)
-        elif kind == CONVEX_HULL:
+        elif kind == CIRCLE:
+            upper = s0 * sqrt(x * x + y * y)
+            lower = -upper
+        elif kind == CONVEX_HULL or kind == POLYGON:
             upper = -inf
             lower = inf
             first = table.vertex_start[slot]

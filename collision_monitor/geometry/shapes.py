@@ -37,9 +37,9 @@ def _points(value: ArrayLike, what: str, width: int, least: int) -> Array:
     return points
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shape:
-    """Base of all shapes."""
+    """Base of all shapes. Those with arrays are equal only to themselves, the others by their sizes."""
 
 
 @dataclass(frozen=True)
@@ -146,6 +146,16 @@ class Mesh(Shape):
         faces.setflags(write=False)
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces)
+
+
+@dataclass(frozen=True, eq=False)
+class Triangle(Shape):
+    """One face of a mesh: points (3, 3) in m, which may lie on one line or coincide. What a `Mesh` is tested as."""
+
+    points: Any
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", _points(self.points, "Triangle points", 3, 3))
 
 
 @dataclass(frozen=True, eq=False)

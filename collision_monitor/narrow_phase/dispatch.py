@@ -13,13 +13,14 @@ from numba import get_num_threads, prange
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel, parallel_kernel
-from collision_monitor.geometry.shape_table import BOX, CAPSULE, CONE, CYLINDER, HALF_SPACE, SPHERE
+from collision_monitor.geometry.shape_table import BOX, CAPSULE, CIRCLE, CONE, CYLINDER, HALF_SPACE, SPHERE
 from collision_monitor.narrow_phase.answer import CONTACT_SIZE, WORK_SIZE
 from collision_monitor.narrow_phase.box_box import axis_direction, box_box_separation, sat, touching_features
 from collision_monitor.narrow_phase.capsule_capsule import capsule_capsule_contact
 from collision_monitor.narrow_phase.convex_convex import convex_contact, convex_separation
 from collision_monitor.narrow_phase.cylinder_cylinder import is_parallel, parallel_cylinders_contact
 from collision_monitor.narrow_phase.half_space import half_space_contact
+from collision_monitor.narrow_phase.polygon_polygon import planar_contact
 from collision_monitor.narrow_phase.sphere_box import sphere_box_contact, sphere_box_separation
 from collision_monitor.narrow_phase.sphere_cone import sphere_cone_contact
 from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact, sphere_sphere_separation
@@ -97,6 +98,9 @@ def _closed_form(
     ka, kb = table.kind[a], table.kind[b]
     if kb == HALF_SPACE:
         half_space_contact(table, a, b, RA, RB, px, py, pz, out)
+        return True
+    if ka >= CIRCLE:
+        planar_contact(table, a, b, RA, RB, px, py, out)
         return True
     if kb == CAPSULE and (ka == CAPSULE or ka == SPHERE):
         capsule_capsule_contact(

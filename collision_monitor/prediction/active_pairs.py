@@ -95,8 +95,9 @@ def _rotation_now(bodies, i, now, q, R):
 def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, scratch, q, result):
     """Do bodies i and j touch at `now`, from their last states? The deepest contact of their shapes into result.
 
-    Not heard of for a time, a body may be off by what it could have accelerated: the bound says so, and a pair that
-    may touch within it counts as touching, UNRESOLVED. Returns (touching, narrow-phase tests made).
+    Not heard of for a time, a body may be off by what it could have accelerated, and a coarse model by its excess: the
+    bound says so, and a pair that may touch within it counts as touching, UNRESOLVED.
+    Returns (touching, narrow-phase tests made).
     """
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
@@ -141,8 +142,13 @@ def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, sc
     wa = (bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2])
     wb = (bodies.angular[j, 0], bodies.angular[j, 1], bodies.angular[j, 2])
     result[CLOSING] = closing_speed(v, wa, wb, px, py, pz, result)
-    result[BOUND] += widen
-    result[STATUS] = TOUCHING if best <= margin else UNRESOLVED
+    excess = bodies.excess[i] + bodies.excess[j]
+    result[BOUND] += widen + excess
+    certain = best + excess <= margin
+    if excess > 0.0 and best <= 0.0 and (bodies.concave[i] or bodies.concave[j]):
+        result[BOUND] -= best
+        certain = excess <= margin
+    result[STATUS] = TOUCHING if certain else UNRESOLVED
     ti = age_i
     for c in range(3):
         at = bodies.position[i, c] + bodies.linear[i, c] * ti

@@ -9,9 +9,9 @@ import numpy as np
 
 from collision_monitor._jit import kernel
 from collision_monitor.prediction.active_pairs import BEGIN, BOUND, CLOSING, END, PERSIST, SHAPE_I, SHAPE_J, STATUS
-from collision_monitor.records import CONTACT, PREDICTION, Model
+from collision_monitor.records import CONTACT, PREDICTION, PredictionStatus
 
-EXACT: Final = int(Model.EXACT)
+UNRESOLVED: Final = int(PredictionStatus.UNRESOLVED)
 
 CONTACT_NUMBERS: Final = 13
 """float64 numbers at the front of a records.CONTACT; the first uint32 behind them has index 26."""
@@ -21,7 +21,7 @@ assert PREDICTION.itemsize == 8 * PREDICTION_NUMBERS + 24
 
 
 @kernel
-def write_contacts(pairs, results, shape_index, now, floats, words, octets):
+def write_contacts(pairs, results, bodies, shape_index, now, floats, words, octets):
     """Contacts of the pairs that touch or have just ended; returns how many.
 
     floats (n, 17), words (n, 34), octets (n, 136): one array of records.CONTACT seen as float64, uint32 and uint8.
@@ -37,7 +37,7 @@ def write_contacts(pairs, results, shape_index, now, floats, words, octets):
         floats[n, 12] = now - pair.since
         words[n, 28:32] = 0
         octets[n, 128:136] = 0
-        octets[n, 130] = octets[n, 131] = EXACT
+        octets[n, 130], octets[n, 131] = bodies.model[pair.i], bodies.model[pair.j]
         octets[n, 135] = 1
         if pair.touching == 1:
             floats[n, 0] = results[k, 0]
@@ -87,14 +87,19 @@ def write_predictions(pairs, active, pending, bodies, shape_index, now, horizon,
         words[n, 27] = event.key & np.uint64(0xFFFFFFFF)
         words[n, 28] = shape_index[event.shape_i]
         words[n, 29] = shape_index[event.shape_j]
-        octets[n, 120] = event.status
+        status = event.status
+        if bodies.excess[i] + bodies.excess[j] > 0.0:
+            # the models meet; whether and when the objects do is not known
+            status = UNRESOLVED
+            floats[n, 1] = inf
+        octets[n, 120] = status
         octets[n, 121] = event.method
-        octets[n, 122] = octets[n, 123] = EXACT
+        octets[n, 122], octets[n, 123] = bodies.model[i], bodies.model[j]
         stale_i = not bodies.static[i] and now - bodies.time[i] > stale_after
         stale_j = not bodies.static[j] and now - bodies.time[j] > stale_after
         octets[n, 124] = 1 if stale_i or stale_j else 0
         octets[n, 125:128] = 0
-        unresolved += event.status
+        unresolved += status
         n += 1
     return n, unresolved
 

@@ -48,6 +48,9 @@ class Bodies(NamedTuple):
     mask: Any  # (N,) uint32
     first_shape: Any  # (N,) int32: slot in the shape table; further shapes follow by Parts.next
     spin_radius: Any  # (N,) float64: the farthest point that turning moves (m)
+    model: Any  # (N,) uint8: records.Model that stands for it
+    excess: Any  # (N,) float64: how far the model lies outside of the object at most (m)
+    concave: Any  # (N,) bool: a concave object has a convex model, which may overlap where the object is not
     slack: Any  # (N,) float64: how far beyond the horizon it is predicted (s)
     motion: Any  # (N,) MOTION
     ref_quaternion: Any  # (N, 4): the reference motion's orientation at its time
@@ -78,6 +81,9 @@ def make_bodies(capacity: int) -> Bodies:
         mask=np.zeros(n, np.uint32),
         first_shape=np.full(n, -1, np.int32),
         spin_radius=np.zeros(n),
+        model=np.zeros(n, np.uint8),
+        excess=np.zeros(n),
+        concave=np.zeros(n, np.bool_),
         slack=np.zeros(n),
         motion=np.zeros(n, MOTION),
         ref_quaternion=np.zeros((n, 4)),

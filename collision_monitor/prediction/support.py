@@ -5,7 +5,16 @@ from __future__ import annotations
 from math import inf, sqrt
 
 from collision_monitor._jit import inlined
-from collision_monitor.geometry.shape_table import BOX, CAPSULE, CONE, CONVEX_HULL, CYLINDER, SPHERE
+from collision_monitor.geometry.shape_table import (
+    BOX,
+    CAPSULE,
+    CIRCLE,
+    CONE,
+    CONVEX_HULL,
+    CYLINDER,
+    POLYGON,
+    SPHERE,
+)
 
 
 @inlined
@@ -29,7 +38,9 @@ def support_value(table, slot, R, mx, my, mz):
         return abs(z) * s1 + s0 * sqrt(x * x + y * y) + grown
     if kind == CONE:
         return max(z * s1, s0 * sqrt(x * x + y * y) - z * s1) + grown
-    if kind == CONVEX_HULL:
+    if kind == CIRCLE:
+        return s0 * sqrt(x * x + y * y) + grown
+    if kind == CONVEX_HULL or kind == POLYGON:
         best = -inf
         first = table.vertex_start[slot]
         for k in range(first, first + table.vertex_count[slot]):

@@ -1,0 +1,82 @@
+"""What a shape is tested as: convex pieces. A convex shape is one piece, a concave one is their union."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.errors import ShapeError
+from collision_monitor.geometry.polygons import is_convex
+from collision_monitor.geometry.polyhedra import is_closed
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import ConvexHull, Mesh, Polygon, Shape, Triangle
+from collision_monitor.geometry.triangulation import convex_parts
+from collision_monitor.tolerances import HULL_DROP
+
+PLANAR = ("Circle", "Polygon")
+
+
+def is_planar(shape: Shape) -> bool:
+    """Whether a shape is one of the x-y plane."""
+    return type(shape).__name__ in PLANAR
+
+
+def shape_pairs(value: Any, what: str) -> tuple[tuple[Shape, Pose], ...]:
+    """An object's shapes, given as one or as (shape, pose in the object's frame). Raises ShapeError, naming `what`."""
+    if isinstance(value, Shape):
+        return ((value, Pose()),)
+    if not isinstance(value, Iterable):
+        raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), got {value!r}")
+    pairs = tuple(tuple(item) if isinstance(item, Iterable) else item for item in value)
+    for pair in pairs:
+        is_pair = isinstance(pair, tuple) and len(pair) == 2
+        if not (is_pair and isinstance(pair[0], Shape) and isinstance(pair[1], Pose)):
+            raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), got {pair!r} in the list")
+    if not pairs:
+        raise ShapeError(f"{what}: expected at least one shape, got none")
+    return pairs
+
+
+@lru_cache(maxsize=64)
+def convex_pieces(shape: Shape) -> tuple[tuple[Shape, Pose], ...]:
+    """The convex pieces of a shape, each with its pose in the shape's frame.
+
+    A concave polygon gives convex parts, a mesh that is closed and convex its hull, any other mesh its triangles: its
+    surface, so that the inside of a closed one is a question of its own (`is_closed`). A shape never changes,
+    so that its pieces are remembered. Raises ShapeError.
+    """
+    match shape:
+        case Polygon() if not is_convex(shape.points):
+            return tuple((Polygon(shape.points[part]), Pose()) for part in convex_parts(shape.points))
+        case Mesh() if is_convex_mesh(shape):
+            return ((ConvexHull(shape.vertices[np.unique(shape.faces)]), Pose()),)
+        case Mesh():
+            corners: NDArray[np.float64] = shape.vertices[shape.faces]
+            # about its own centre a triangle has a small bounding sphere and keeps its digits
+            centres = corners.mean(axis=1)
+            return tuple((Triangle(c - m), Pose(m)) for c, m in zip(corners, centres, strict=True))
+    return ((shape, Pose()),)
+
+
+def is_convex_mesh(mesh: Mesh) -> bool:
+    """Whether a mesh bounds a solid with no vertex outside the plane of any face, to round-off."""
+    if not is_closed(mesh.faces):
+        return False
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal, axis=1)
+    size = float(np.ptp(mesh.vertices, axis=0).max())
+    if not (length > 0.0).all():
+        return False
+    normal /= length[:, None]
+    used = mesh.vertices[np.unique(mesh.faces)]
+    height = used @ normal.T - np.einsum("ij,ij->i", a, normal)
+    flat = HULL_DROP * 16 * size
+    # inward or outward, but all the same way, and not a sheet that is folded onto itself
+    outward = bool((height <= flat).all()) and bool((height.min(axis=0) < -flat).all())
+    inward = bool((height >= -flat).all()) and bool((height.max(axis=0) > flat).all())
+    return outward or inward

@@ -1,0 +1,40 @@
+"""Scenes in the x-y plane: what sticks out of it is dropped before anything is computed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.errors import PoseError
+from collision_monitor.geometry.pose import Pose
+
+PLANAR_VECTORS = {"position": slice(2, 3), "linear": slice(2, 3), "angular": slice(0, 2)}
+"""Fields of records.STATE and which of their components are none of the plane's business."""
+
+
+def flat_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The turns about z (n, 4) next to orientations (n, 4); all 0, which is no orientation, where z points down."""
+    x, y, z, w = quaternions.T
+    squared = z * z + w * w
+    upright = squared > x * x + y * y
+    scale = np.where(upright, np.sqrt((squared + x * x + y * y) / np.where(upright, squared, 1.0)), 0.0)
+    flat = np.zeros_like(quaternions)
+    flat[:, 2], flat[:, 3] = z * scale, w * scale
+    return flat
+
+
+def flat_states(states: NDArray[np.void]) -> NDArray[np.void]:
+    """records.STATE (n,) without height, tilt and the motion out of the plane."""
+    flat = states.copy()
+    for field, dropped in PLANAR_VECTORS.items():
+        flat[field][:, dropped] = 0.0
+    flat["quaternion"] = flat_quaternions(states["quaternion"])
+    return flat
+
+
+def flat_pose(pose: Pose) -> Pose:
+    """The pose without height and tilt. Raises PoseError where z points down."""
+    quaternion = flat_quaternions(pose.quaternion[None])[0]
+    if not quaternion.any():
+        raise PoseError(f"expected z to point up for a shape of the plane, got quaternion {pose.quaternion.tolist()}")
+    return Pose((*pose.position[:2], 0.0), quaternion)

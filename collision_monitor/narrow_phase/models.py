@@ -1,0 +1,257 @@
+"""Containing models: a coarser, cheaper shape around an object, and how far it lies outside of the true one at most.
+
+(Slides "Bounding objects": test the bounding objects first. Here a coarse answer is an answer, with its error.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import HalfspaceIntersection, cKDTree
+from scipy.spatial.transform import Rotation
+
+from collision_monitor.errors import InputError, UnsupportedError
+from collision_monitor.geometry.bounding_spheres import minimal_sphere
+from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
+from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
+from collision_monitor.geometry.pieces import convex_pieces, is_planar
+from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.reach import reach
+from collision_monitor.geometry.shape_table import ShapeTableBuilder, take
+from collision_monitor.geometry.shapes import (
+    Box,
+    Capsule,
+    Cone,
+    ConvexHull,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Shape,
+    Sphere,
+    Triangle,
+)
+from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.records import Model
+
+Array = NDArray[np.float64]
+Pieces = list[tuple[Shape, Pose]]
+
+ROUNDED_UP: Final = 1e-12
+"""Models are larger by this part of their size, so that they contain the object whatever was rounded."""
+
+SAMPLES: Final = 24
+"""Cells along each axis in which the excess around a concave object is sought: it is known to their half diagonal.
+Larger: as the cube slower. Smaller: the stated excess is up to 2/SAMPLES of the size too large."""
+
+KDOPS: Final = {Model.KDOP6: 6, Model.KDOP14: 14, Model.KDOP18: 18, Model.KDOP26: 26}
+
+SUPPORTED: Final = tuple(m.name.lower() for m in Model if m is not Model.CONVEX_DECOMPOSITION)
+"""The models that there are, by name."""
+
+
+class Modelled(NamedTuple):
+    """What stands for an object: convex pieces with their poses in its frame, what they are, and their excess (m).
+
+    No point of the model is farther than the excess from the object, and no point of the object is outside the model.
+    """
+
+    pieces: Pieces
+    shapes: list[int]  # for each piece: index of the shape that it is part of
+    model: Model
+    excess: float
+    convex: bool  # the object itself, not its model
+
+
+def parse_model(model: Model | str | int) -> Model:
+    """The model of a name such as "obb". Raises InputError for a name that there is not, UnsupportedError."""
+    if isinstance(model, str):
+        chosen = Model.__members__.get(model.upper())
+    else:
+        chosen = Model(model) if model in list(Model) else None
+    if chosen is None:
+        raise InputError(f"model: expected one of {', '.join(SUPPORTED)}, got {model!r}")
+    if chosen.name.lower() not in SUPPORTED:
+        raise UnsupportedError(f"model {chosen.name.lower()} is not offered; supported are {', '.join(SUPPORTED)}")
+    return chosen
+
+
+def containing_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | int) -> Modelled:
+    """The model of an object of these shapes. AUTO is EXACT.
+
+    Raises InputError for an unknown name, UnsupportedError where an object has no such model.
+    """
+    chosen = parse_model(model)
+    pieces, index = [], []
+    for k, (shape, pose) in enumerate(shapes):
+        for piece, offset in convex_pieces(shape):
+            pieces.append((piece, pose @ offset))
+            index.append(k)
+    convex = len(pieces) == 1
+    if chosen in (Model.AUTO, Model.EXACT):
+        return Modelled(pieces, index, Model.EXACT, 0.0, convex)
+    for shape, _ in shapes:
+        if is_planar(shape) or isinstance(shape, HalfSpace):
+            raise UnsupportedError(
+                f"{type(shape).__name__}: model {chosen.name.lower()} is not offered; supported are auto, exact"
+            )
+    piece, pose = _enclose(pieces, chosen)
+    return Modelled([(piece, pose)], [0], chosen, _excess(shapes, pieces, piece, pose), convex)
+
+
+def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model) -> Modelled:
+    """The model that a monitor works with: AUTO is exact, but where a concave mesh has to be its convex hull.
+
+    Raises UnsupportedError for a concave mesh that is to be EXACT.
+    """
+    concave = [isinstance(shape, Mesh) and len(convex_pieces(shape)) > 1 for shape, _ in shapes]
+    if model is Model.EXACT and any(concave):
+        raise UnsupportedError("a concave Mesh is not tested exactly; supported are auto (its convex hull) and coarser")
+    if model is not Model.AUTO or not any(concave):
+        return containing_model(shapes, model)
+    parts = [
+        containing_model([pair], Model.CONVEX_HULL if bent else Model.EXACT)
+        for pair, bent in zip(shapes, concave, strict=True)
+    ]
+    return Modelled(
+        pieces=[piece for part in parts for piece in part.pieces],
+        shapes=[k for k, part in enumerate(parts) for _ in part.pieces],
+        model=Model.CONVEX_HULL,
+        excess=max(part.excess for part in parts),
+        convex=False,
+    )
+
+
+def _enclose(pieces: Pieces, model: Model) -> tuple[Shape, Pose]:
+    """The model around the pieces, with its pose in the object's frame."""
+    shape, pose = pieces[0]
+    single = len(pieces) == 1
+    match model:
+        case Model.SPHERE:
+            if single and isinstance(shape, Sphere | Box | Capsule | Cylinder):
+                return Sphere(float(reach([(shape, Pose())], _widest(shape))) * (1 + ROUNDED_UP)), pose
+            ball = minimal_sphere(_corners(pieces))
+            return Sphere(float(ball.radius) * (1 + ROUNDED_UP)), Pose(ball.center)
+        case Model.AABB:
+            low, high = -reach(pieces, -np.eye(3)), reach(pieces, np.eye(3))
+            return _box(high - low), Pose((low + high) / 2)
+        case Model.OBB:
+            if single and not isinstance(shape, ConvexHull | Triangle):
+                low, high = -reach([(shape, Pose())], -np.eye(3)), reach([(shape, Pose())], np.eye(3))
+                return _box(high - low), pose @ Pose((low + high) / 2)
+            box = obb_minimum_volume(_corners(pieces))
+            axes = np.array(box.rotation)
+            axes[:, 2] *= np.sign(np.linalg.det(axes))
+            turned = Rotation.from_matrix(axes).as_quat()
+            return _box(2 * box.half_extents), Pose(box.center, turned)
+        case Model.CONVEX_HULL:
+            if any(isinstance(s, Sphere | Capsule | Cylinder | Cone) for s, _ in pieces):
+                if single:
+                    return shape, pose
+                raise UnsupportedError("model convex_hull: the hull of several shapes with round ones is not offered")
+            return ConvexHull(_corners(pieces)), Pose()
+    return _kdop(pieces, KDOPS[model])
+
+
+def _widest(shape: Sphere | Box | Capsule | Cylinder) -> Array:
+    """A direction in which a shape that is symmetric about its origin reaches farthest."""
+    match shape:
+        case Box():
+            d = np.array(shape.size)
+        case Cylinder():
+            d = np.array([shape.radius, 0.0, shape.length / 2])
+        case _:
+            d = np.array([0.0, 0.0, 1.0])
+    return np.asarray(d / np.linalg.norm(d))
+
+
+def _box(size: Array) -> Box:
+    """The box of these extents, rounded up."""
+    return Box(size + ROUNDED_UP * float(size.max()))
+
+
+def _corners(pieces: Pieces) -> Array:
+    """Points whose hull contains the pieces: the vertices of polytopes, the corners of boxes about round ones."""
+    corners = []
+    for shape, pose in pieces:
+        if isinstance(shape, ConvexHull | Triangle):
+            points = shape.points
+        else:
+            low, high = -reach([(shape, Pose())], -np.eye(3)), reach([(shape, Pose())], np.eye(3))
+            points = np.array(list(product(*zip(low, high, strict=True))))
+        corners.append(points @ pose.rotation.T + pose.position)
+    return np.concatenate(corners)
+
+
+def _kdop(pieces: Pieces, k: int) -> tuple[Shape, Pose]:
+    """The slabs around the pieces as the polytope that they cut out."""
+    normals = np.array(KDOP_DIRECTIONS[k], float)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.concatenate([normals, -normals])
+    far = reach(pieces, normals)
+    centre = (far[:3] - far[k // 2 : k // 2 + 3]) / 2  # of the slabs along x, y and z
+    distance = far - normals @ centre
+    size = float(distance.max())
+    # Qhull needs a little room about the centre, which a flat object does not leave; and the outcome is rounded
+    distance = np.maximum(distance, 1e-9 * size) + 1e-9 * size
+    points = HalfspaceIntersection(np.column_stack([normals, -distance / size]), np.zeros(3)).intersections * size
+    return ConvexHull(points), Pose(centre)
+
+
+def _excess(shapes: Sequence[tuple[Shape, Pose]], pieces: Pieces, model: Shape, pose: Pose) -> float:
+    """Largest distance (m) of a point of the model from the object, rounded up."""
+    if len(pieces) == 1 and model is pieces[0][0]:
+        return 0.0
+    if len(pieces) > 1:
+        return _excess_around_concave(shapes, pieces, model, pose)
+    # to a convex object, the distance is greatest at a corner of the model
+    if isinstance(model, Sphere):
+        return max(float(_distances(pose.position[None], pieces)[0]) + model.radius, 0.0)
+    return max(float(_distances(_corners([(model, pose)]), pieces).max()), 0.0)
+
+
+def _excess_around_concave(shapes: Sequence[tuple[Shape, Pose]], pieces: Pieces, model: Shape, pose: Pose) -> float:
+    """Sampled in cells: a distance changes by no more than one moves, half a cell's diagonal at most."""
+    low, high = -reach([(model, pose)], -np.eye(3)), reach([(model, pose)], np.eye(3))
+    cell = (high - low) / SAMPLES
+    slack = float(np.linalg.norm(cell)) / 2
+    centres = np.stack(np.meshgrid(*[np.arange(SAMPLES) + 0.5] * 3, indexing="ij"), -1).reshape(-1, 3) * cell + low
+    if not isinstance(model, Box):
+        centres = centres[_distances(centres, [(model, pose)]) <= slack]
+    inside = np.zeros(len(centres), bool)
+    for shape, offset in shapes:
+        if isinstance(shape, Mesh) and is_closed(shape.faces):
+            own = (centres - offset.position) @ offset.rotation
+            inside |= locate_in_polyhedron(own, shape.vertices, shape.faces) >= 0
+    centres = centres[~inside]
+    if not len(centres):
+        return slack
+    if all(isinstance(s, Triangle) for s, _ in pieces):
+        # no nearer than the nearest face is the nearest vertex, which is found at once
+        return float(cKDTree(_corners(pieces)).query(centres)[0].max()) + slack
+    return float(_distances(centres, pieces).max()) + slack
+
+
+def _distances(points: Array, pieces: Pieces) -> Array:
+    """Signed distances (n,) (m) of points (n, 3) from the nearest piece, rounded up."""
+    builder = ShapeTableBuilder(slots=1 + len(pieces))
+    size = float(max(np.abs(reach(pieces, np.concatenate([np.eye(3), -np.eye(3)])))))
+    probe = Sphere(max(1e-9 * size, 1e-300))
+    builder.append(probe)
+    for shape, _ in pieces:
+        builder.append(shape)
+    best = np.full(len(points), np.inf)
+    count = len(points)
+    pairs = np.stack([np.zeros(count), np.arange(1, count + 1)], axis=1).astype(np.int32)
+    rotation = np.tile(np.eye(3), (1 + count, 1, 1))
+    for k, (_, pose) in enumerate(pieces, start=1):
+        # the piece in slot 0, and the probe at each point about it
+        table = take(builder.table, np.r_[k, np.zeros(count, int)])
+        rotation[0] = pose.rotation
+        rows = contact_batch(table, np.concatenate([np.zeros((1, 3)), points - pose.position]), rotation, pairs)
+        best = np.minimum(best, rows[:, 0] + rows[:, 10] + probe.radius)
+    return best

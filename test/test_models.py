@@ -1,0 +1,142 @@
+"""What stands for an object in the monitor: coarse models never hide a collision, plane scenes have no height."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial import ConvexHull as Qhull
+
+import collision_monitor as cm
+from collision_monitor import Monitor, Pose, records
+from collision_monitor.records import ContactStatus, Model, PredictionStatus
+
+SECOND = 1_000_000_000
+TORUS = trimesh.creation.torus(0.5, 0.15, major_sections=12, minor_sections=6)
+COARSE = [Model.SPHERE, Model.AABB, Model.OBB, Model.KDOP14, Model.KDOP26, Model.CONVEX_HULL]
+
+
+def crowd(rng, count, flat=False):
+    """Poses (n, 7) and twists (n, 6) of objects that mill about."""
+    quaternions = rng.normal(size=(count, 4))
+    poses = np.column_stack([rng.uniform(-2, 2, (count, 3)), quaternions])
+    twists = np.column_stack([rng.normal(size=(count, 3)), rng.normal(size=(count, 3))])
+    if flat:
+        poses[:, 2:5] = 0.0
+        twists[:, 2:5] = 0.0
+    poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+    return poses, twists
+
+
+def pairs(rows):
+    return {(int(r["id_a"]), int(r["id_b"])): r for r in rows}
+
+
+@pytest.mark.parametrize("model", COARSE, ids=lambda m: m.name.lower())
+def test_a_coarse_model_hides_nothing_and_states_its_error(model):
+    rng = np.random.default_rng(5)
+    shapes = [cm.Box((0.8, 0.4, 0.2)), cm.Capsule(0.2, 0.6), cm.ConvexHull(rng.normal(size=(12, 3)) * 0.4)] * 4
+    exact, coarse = Monitor("exact"), Monitor("exact")
+    for k, shape in enumerate(shapes):
+        exact.add(k, shape)
+        coarse.add(k, shape, model=model)
+    ids = np.arange(len(shapes))
+    wider = 0
+    for step in range(30):
+        poses, twists = crowd(rng, len(shapes))
+        told, true = (m.step(step * SECOND // 10, ids, poses, twists) for m in (coarse, exact))
+        contacts, events = pairs(told.contacts), pairs(told.predictions)
+        for pair, contact in pairs(true.contacts).items():
+            if contact["phase"] != records.Phase.END:
+                row = contacts[pair]
+                wrong = abs(row["signed_distance"] - contact["signed_distance"])
+                assert wrong <= row["error_bound"] + contact["error_bound"]
+        for pair, event in pairs(true.predictions).items():
+            assert pair in contacts or events[pair]["lower"] <= event["upper"]
+        assert (told.predictions["model_a"] == model).all()
+        for row in told.contacts[told.contacts["phase"] != records.Phase.END]:
+            assert row["model_a"] == row["model_b"] == model
+            if row["status"] == ContactStatus.TOUCHING:
+                assert (row["id_a"], row["id_b"]) in pairs(true.contacts)
+            wider += row["status"] == ContactStatus.UNRESOLVED
+        sure = told.predictions["status"] == PredictionStatus.HIT
+        if model is not Model.CONVEX_HULL:
+            assert not sure.any()
+            assert np.isinf(told.predictions["upper"]).all()
+    assert wider > 0 or model is Model.CONVEX_HULL  # which is exact for these
+
+
+def test_a_concave_mesh_counts_as_its_hull_and_says_so():
+    monitor = Monitor()
+    monitor.add(1, cm.Mesh(TORUS.vertices, TORUS.faces))
+    monitor.add(2, cm.Sphere(0.1))
+    result = monitor.step(SECOND, [1, 2], [(0, 0, 0, 0, 0, 0, 1)] * 2)
+    (row,) = result.contacts
+    assert row["status"] == ContactStatus.UNRESOLVED  # in the hole of the ring: the hull cannot know
+    assert (row["model_a"], row["model_b"]) == (Model.CONVEX_HULL, Model.EXACT)
+    assert row["signed_distance"] + row["error_bound"] >= 0.25
+    with pytest.raises(cm.UnsupportedError, match="auto"):
+        monitor.add(3, cm.Mesh(TORUS.vertices, TORUS.faces), model=Model.EXACT)
+
+
+def test_a_convex_mesh_is_exact():
+    cube = trimesh.creation.box((1, 1, 1))
+    monitor = Monitor()
+    monitor.add(1, cm.Mesh(cube.vertices, cube.faces), model=Model.EXACT)
+    monitor.add(2, cm.Sphere(0.5))
+    (row,) = monitor.step(SECOND, [1, 2], [(0, 0, 0, 0, 0, 0, 1), (0.9, 0, 0, 0, 0, 0, 1)]).contacts
+    assert row["signed_distance"] == pytest.approx(-0.1)
+    assert row["model_a"] == Model.EXACT
+
+
+def test_the_plane_answers_as_tall_prisms_in_space_do():
+    rng = np.random.default_rng(9)
+    outlines = [rng.normal(size=(n, 2)) * 0.5 for n in (5, 6, 8)] * 3
+    plane, space = Monitor("exact"), Monitor("exact")
+    for k, points in enumerate(outlines):
+        hull = points[Qhull(points).vertices]
+        plane.add(k, cm.Polygon(hull))
+        space.add(k, cm.ConvexHull(np.concatenate([np.c_[hull, np.full(len(hull), z)] for z in (-9.0, 9.0)])))
+    for k in range(3):
+        plane.add(20 + k, cm.Circle(0.2))
+        space.add(20 + k, cm.Sphere(0.2))
+    ids = np.array(plane.ids)
+    seen = 0
+    for step in range(20):
+        poses, twists = crowd(rng, len(ids), flat=True)
+        # heights, a little tilt and what moves out of the plane change nothing
+        tilted = poses.copy()
+        tilted[:, 2] = rng.uniform(-50, 50, len(ids))
+        dizzy = twists.copy()
+        dizzy[:, 2:5] = rng.normal(size=(len(ids), 3))
+        mine = plane.step(step * SECOND // 10, ids, tilted, dizzy)
+        theirs = space.step(step * SECOND // 10, ids, poses, twists)
+        a, b = pairs(mine.contacts), pairs(theirs.contacts)
+        assert a.keys() == b.keys()
+        for pair, row in a.items():
+            if row["phase"] != records.Phase.END:
+                assert row["signed_distance"] == pytest.approx(b[pair]["signed_distance"], abs=1e-9)
+        a, b = pairs(mine.predictions), pairs(theirs.predictions)
+        assert a.keys() == b.keys()
+        for pair, row in a.items():
+            seen += 1
+            assert row["lower"] <= b[pair]["upper"] and b[pair]["lower"] <= row["upper"]
+    assert seen > 50
+
+
+def test_concave_polygons_and_walls_of_the_plane():
+    monitor = Monitor()
+    monitor.add(1, cm.Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]), static=True, pose=Pose((0, 0, 3)))
+    monitor.add(2, cm.Circle(0.3))
+    result = monitor.step(SECOND, [2], [(1.5, 2.0, 0, 0, 0, 0, 1)], [(0, -1, 0, 0, 0, 0)])
+    (row,) = result.predictions
+    assert row["lower"] <= 0.7 <= row["upper"]
+    assert row["shape_a"] == 0
+    assert "polygon_polygon" in set(monitor.plan.tests.values())
+    down = monitor.step(SECOND + 1, [2], [(1.5, 2.0, 0, 1, 0, 0, 0)])
+    assert monitor.refused[cm.Refusal.QUATERNION] == 1 and down.status.predictions == 1
+    with pytest.raises(cm.PoseError, match="z to point up"):
+        monitor.add(3, cm.Circle(1), static=True, pose=Pose((0, 0, 0), (1, 0, 0, 0)))
+    monitor.remove(1)
+    monitor.remove(2)
+    monitor.add(1, cm.Sphere(1))  # an empty monitor takes a scene of either kind
