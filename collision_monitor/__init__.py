@@ -5,6 +5,7 @@
     shapes, poses   Sphere, Box, …, Pose, Motion           what objects are made of and where they are
     description     ObjectDescription                      an object with its shapes, group and bounds
     contact         contact, Contact                       two shapes at two poses: distance, normal, points, bound
+    impact          time_of_impact, Impact                 two shapes in motion: when they meet, as an interval
     errors          CollisionMonitorError and its kinds    what can be wrong with an input
 """
 
@@ -35,6 +36,8 @@ _HOME = {
     "Polygon": "geometry.shapes",
     "contact": "narrow_phase.contact",
     "Contact": "narrow_phase.contact",
+    "time_of_impact": "prediction.impact",
+    "Impact": "prediction.impact",
     "CollisionMonitorError": "errors",
     "InputError": "errors",
     "ShapeError": "errors",
@@ -75,6 +78,8 @@ if TYPE_CHECKING:
     from collision_monitor.monitor import StepStatus as StepStatus
     from collision_monitor.narrow_phase.contact import Contact as Contact
     from collision_monitor.narrow_phase.contact import contact as contact
+    from collision_monitor.prediction.impact import Impact as Impact
+    from collision_monitor.prediction.impact import time_of_impact as time_of_impact
     from collision_monitor.profiles import Profile as Profile
 
 

@@ -159,10 +159,10 @@ def _spin(table, s, rate2):
 
 
 @inlined
-def shape_impact(table, parts, A, B, a, b, begin, end, tube_0, tube_1, tolerance, budget, scratch):
+def shape_impact(table, parts, A, B, a, b, begin, end, margin, tube_0, tube_1, tolerance, budget, scratch):
     """When the gap between shape a in motion A and shape b in motion B (MOTION) first is within the wanted one.
 
-    begin, end: seconds after the monitor's origin; the wanted gap is tube_0 + tube_1 (t - begin) (m).
+    begin, end: seconds after the monitor's origin; the wanted gap is margin + tube_0 + tube_1 (t - begin) (m).
     Returns (status, t, queries, guess): no time in [begin, t) is within the wanted gap; at t it is within tolerance of
     it (HIT), t is end (CLEAR), or the budget of distance queries ran out (UNRESOLVED). guess: how long after t they
     overlap by as much as they should, from how fast the gap closed last; 0 where nothing tells.
@@ -185,7 +185,7 @@ def shape_impact(table, parts, A, B, a, b, begin, end, tube_0, tube_1, tolerance
         gap = separation(
             table, a, b, R_a, R_b, px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2], out, scratch.work
         )
-        gap -= tube_0 + tube_1 * (t - begin)
+        gap -= margin + tube_0 + tube_1 * (t - begin)
         if gap <= tolerance:
             if t > t_before:
                 wanted = gap + tolerance + 2.0 * (tube_0 + tube_1 * (t - begin))
@@ -312,7 +312,7 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
         while b >= 0:
             status, t, n, soon = shape_impact(
                 table, parts, A, B, a, b, begin + first, stop,
-                tube_0 + tube_1 * first + margin, tube_1, tolerance, budget, scratch,
+                margin, tube_0 + tube_1 * first, tube_1, tolerance, budget, scratch,
             )  # fmt: skip
             queries += n
             if status != CLEAR and t < lower:
