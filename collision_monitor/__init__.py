@@ -6,6 +6,7 @@
     description     ObjectDescription                      an object with its shapes, group and bounds
     contact         contact, Contact                       two shapes at two poses: distance, normal, points, bound
     impact          time_of_impact, Impact                 two shapes in motion: when they meet, as an interval
+    feature_impact  vertex_face_impact, edge_edge_impact   the same for vertices, faces and edges in linear motion
     errors          CollisionMonitorError and its kinds    what can be wrong with an input
 """
 
@@ -38,6 +39,9 @@ _HOME = {
     "Contact": "narrow_phase.contact",
     "time_of_impact": "prediction.impact",
     "Impact": "prediction.impact",
+    "vertex_face_impact": "prediction.feature_impact",
+    "edge_edge_impact": "prediction.feature_impact",
+    "FeatureImpact": "prediction.feature_impact",
     "CollisionMonitorError": "errors",
     "InputError": "errors",
     "ShapeError": "errors",
@@ -78,6 +82,9 @@ if TYPE_CHECKING:
     from collision_monitor.monitor import StepStatus as StepStatus
     from collision_monitor.narrow_phase.contact import Contact as Contact
     from collision_monitor.narrow_phase.contact import contact as contact
+    from collision_monitor.prediction.feature_impact import FeatureImpact as FeatureImpact
+    from collision_monitor.prediction.feature_impact import edge_edge_impact as edge_edge_impact
+    from collision_monitor.prediction.feature_impact import vertex_face_impact as vertex_face_impact
     from collision_monitor.prediction.impact import Impact as Impact
     from collision_monitor.prediction.impact import time_of_impact as time_of_impact
     from collision_monitor.profiles import Profile as Profile
