@@ -23,6 +23,7 @@ _HOME = {
     "StepStatus": "monitor",
     "Profile": "profiles",
     "ObjectDescription": "description",
+    "Model": "records",
     "Pose": "geometry.pose",
     "Motion": "geometry.pose",
     "Sphere": "geometry.shapes",
@@ -88,6 +89,7 @@ if TYPE_CHECKING:
     from collision_monitor.prediction.impact import Impact as Impact
     from collision_monitor.prediction.impact import time_of_impact as time_of_impact
     from collision_monitor.profiles import Profile as Profile
+    from collision_monitor.records import Model as Model
 
 
 def __getattr__(name: str) -> Any:

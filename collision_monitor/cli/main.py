@@ -12,7 +12,7 @@ from typing import Final
 from collision_monitor._version import VERSION
 from collision_monitor.errors import CollisionMonitorError
 
-COMMANDS: Final = ("demo", "run", "world", "replay", "tradeoff", "bench")
+COMMANDS: Final = ("demo", "run", "world", "replay", "check", "tradeoff", "bench")
 """In the order of `--help`. Each is a module of this package with `add_parser(subparsers)`."""
 
 EXIT_ERROR: Final = 1
@@ -28,10 +28,12 @@ examples:
   collision-monitor world --list                          the scenes that can be played to it
   collision-monitor world crossing                        play one of them
   collision-monitor replay run.mcap                       the same answers again, without ROS; differences are shown
+  collision-monitor check run.mcap --expect expected.yaml recorded sessions as regression tests
   collision-monitor tradeoff --scene fleet                what each profile costs and how wrong it is
   collision-monitor bench --scene boxes --n 10000         how long it takes to find all contacts
 
-exit codes: 0 done, 1 error, 2 wrong usage, 130 interrupted; replay: 3 the answers differ, 4 they cannot be compared
+exit codes: 0 done, 1 error, 2 wrong usage, 130 interrupted; 3 not as expected: replay, the answers differ; check, an
+expectation does not hold; replay: 4 the answers cannot be compared
 `collision-monitor COMMAND --help` says more about each command.
 """
 

@@ -6,11 +6,12 @@ import argparse
 import csv
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from collision_monitor.cli.progress import progress_bar
 from collision_monitor.cli.quantities import positive, whole
 from collision_monitor.errors import InputError, MessageError
 
@@ -73,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     inputs = [_recorded(args.session)] if args.session else [_played(name, args) for name in args.scene or SCENES]
     rows = []
     for name, descriptions, steps in inputs:
-        with _progress_bar(name, 2 * len(steps) * len(profiles)) as progress:
+        with progress_bar(name, 2 * len(steps) * len(profiles)) as progress:
             rows += tradeoff(name, descriptions, steps, profiles, progress)
     if args.json:
         print(json.dumps({"rows": [row.to_dict() for row in rows]}))
@@ -119,21 +120,6 @@ def _recorded(path: Path) -> tuple[str, list[ObjectDescription], list[Step]]:
     if not described or not steps:
         raise InputError(f"{path}: expected object shapes and states, found {len(described)} and {len(steps)} of them")
     return path.stem, list(described.values()), steps
-
-
-@contextmanager
-def _progress_bar(name: str, total: int) -> Iterator[Callable[[int], None]]:
-    """A bar on stderr, where that is a terminal."""
-    if not sys.stderr.isatty():
-        yield lambda done: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn(name), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=total)
-        yield lambda done: bar.update(task, advance=done)
 
 
 def _number(value: float) -> str:

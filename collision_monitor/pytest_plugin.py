@@ -1,0 +1,71 @@
+"""A pytest plugin: recorded sessions as fixtures, so that a team keeps them as tests.
+
+    @pytest.mark.session("yard.mcap")
+    def test_yard(session):
+        assert session.contacts("cart", "wall_*") == []
+        session.check("expectations.yaml")
+
+The path is relative to the test's file. `replay=True` or `replay="fast"`: what this program answers to the inputs, with
+the recorded profile or that one, in place of what was recorded.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collision_monitor.session.history import Collision, History
+
+MARKER = "session(path, replay=False): the recorded session that the fixture `session` reads"
+
+
+class RecordedSession:
+    """A session under test."""
+
+    def __init__(self, path: Path, replay: bool | str = False) -> None:
+        from collision_monitor.profiles import Profile
+        from collision_monitor.session import Session
+        from collision_monitor.session.history import read_history
+
+        self.path = path
+        recorded = Session(path)
+        profile = Profile.named(replay) if isinstance(replay, str) else recorded.profile if replay else None
+        self.history: History = read_history(recorded, profile)
+
+    def contacts(self, a: str = "*", b: str = "*") -> list[Collision]:
+        """The collisions between objects of these names, with wildcards. Raises InputError for an unknown name."""
+        return self.history.collisions_of([a, b])
+
+    def replay(self) -> str:
+        """`identical`, `not comparable` or `diverged`, and in which way: today's answers against the recorded ones."""
+        from collision_monitor.session.check import replay_verdict
+
+        return replay_verdict(self.path)
+
+    def check(self, expectations: str | Path | dict[str, Any]) -> None:
+        """Assert what a YAML file, or a mapping like one, expects. A path is relative to the session's file."""
+        from collision_monitor.session.expectations import evaluate, load_expectations, parse_expectations
+
+        if isinstance(expectations, dict):
+            expected = parse_expectations(expectations)
+        else:
+            expected = load_expectations(self.path.parent / expectations)
+        failed = [each for each in evaluate(expected, self.history, self.replay) if not each.holds]
+        assert not failed, "\n".join([str(self.path), *(f"  {each.expectation}: {each.found}" for each in failed)])
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Make the marker known."""
+    config.addinivalue_line("markers", MARKER)
+
+
+@pytest.fixture
+def session(request: pytest.FixtureRequest) -> RecordedSession:
+    """The recorded session that the test's marker names."""
+    marker = request.node.get_closest_marker("session")
+    if marker is None or len(marker.args) != 1:
+        pytest.fail(f'expected a marker such as @pytest.mark.session("yard.mcap"): {MARKER}', pytrace=False)
+    return RecordedSession(request.path.parent / marker.args[0], **marker.kwargs)

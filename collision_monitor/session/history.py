@@ -1,0 +1,276 @@
+"""What happened in a session, gathered: who touched whom and when, what was predicted before, how long it took.
+
+The one view of a session that checks, reports and comparisons are made from.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor import records
+from collision_monitor.codec import (
+    Removal,
+    Status,
+    decode_contacts,
+    decode_descriptions,
+    decode_predictions,
+    decode_states,
+    decode_status,
+)
+from collision_monitor.description import ObjectDescription
+from collision_monitor.errors import InputError, MessageError, SessionError
+from collision_monitor.pipeline import Outputs, Pipeline
+from collision_monitor.profiles import Profile
+from collision_monitor.records import ContactStatus, Phase
+from collision_monitor.session.reader import Recorded, Session
+
+Floats = NDArray[np.float64]
+Records = NDArray[np.void]
+Pair = tuple[int, int]
+
+NANOSECOND: Final = 1e-9
+
+ANY: Final = "any"
+"""In place of names: every pair."""
+
+
+@dataclass(frozen=True)
+class Collision:
+    """Two objects in contact without a break. Times in s from the session's first step; step: index of the begin.
+
+    end: None where it went on to the end of the session. deepest: least signed distance (m). certain: they were known
+    to touch at some time, not only not known to be apart. warned: how long before the begin (s) the predictions of it
+    began that were not interrupted any more; 0 where there was none, NaN where the session begins with the contact.
+    """
+
+    pair: Pair
+    begin: float
+    end: float | None
+    step: int
+    deepest: float
+    certain: bool
+    warned: float
+
+
+@dataclass
+class History:
+    """A session, from its first step to its last.
+
+    times (n,): s of each step from the first. contacts, predictions: of all steps, records.CONTACT and
+    records.PREDICTION, and the step (index) of each row. states: of all messages, records.STATE, and the time (s).
+    durations: s that steps took, as far as they were reported or measured. problems: why some of it may be unknown.
+    """
+
+    name: str
+    profile: Profile
+    metadata: dict[str, str]
+    replayed: bool
+    begin_ns: int = 0
+    times: Floats = field(default_factory=lambda: np.zeros(0))
+    contacts: Records = field(default_factory=lambda: np.zeros(0, records.CONTACT))
+    contact_step: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    predictions: Records = field(default_factory=lambda: np.zeros(0, records.PREDICTION))
+    prediction_step: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    states: Records = field(default_factory=lambda: np.zeros(0, records.STATE))
+    state_time: Floats = field(default_factory=lambda: np.zeros(0))
+    durations: Floats = field(default_factory=lambda: np.zeros(0))
+    objects: dict[int, ObjectDescription] = field(default_factory=dict)
+    status: Status | None = None
+    problems: list[str] = field(default_factory=list)
+    collisions: list[Collision] = field(default_factory=list)
+
+    @property
+    def duration(self) -> float:
+        """s from the first step to the last."""
+        return float(self.times[-1]) if len(self.times) else 0.0
+
+    def name_of(self, object_id: int) -> str:
+        """The name of an object, or what stands for one that was never described."""
+        return self.objects[object_id].name if object_id in self.objects else f"object_{object_id}"
+
+    def ids_of(self, name: str) -> set[int]:
+        """The ids of the objects of that name, with wildcards: `person_*`. Raises InputError where there is none."""
+        names = {each.name: each.object_id for each in self.objects.values()}
+        found = {i for each, i in names.items() if fnmatchcase(each, name)}
+        if not found:
+            known = ", ".join(sorted(names)) or "none"
+            raise InputError(f"expected the name of an object of the session, one of {known}; got {name!r}")
+        return found
+
+    def pairs_of(self, names: str | Iterable[str]) -> Callable[[Pair], bool]:
+        """Whether a pair is one of those named: ANY, or two names, with wildcards. Raises InputError."""
+        if names == ANY:
+            return lambda pair: True
+        a, b = (self.ids_of(name) for name in names)
+        return lambda pair: (pair[0] in a and pair[1] in b) or (pair[0] in b and pair[1] in a)
+
+    def collisions_of(self, names: str | Iterable[str] = ANY) -> list[Collision]:
+        """The collisions of the named pairs, by their begin. Raises InputError."""
+        wanted = self.pairs_of(names)
+        return [each for each in self.collisions if wanted(each.pair)]
+
+
+def read_history(
+    session: Session, replay_with: Profile | None = None, progress: Callable[[], None] = lambda: None
+) -> History:
+    """Read a session whole; with a profile: not what was answered then, but what this program answers to the inputs.
+
+    progress: called after every message. Raises SessionError for a session without inputs.
+    """
+    gathered = _Gathered(session, replay_with)
+    for message in session.messages():
+        gathered.take(message)
+        progress()
+    return gathered.history()
+
+
+class _Gathered:
+    """Lists that grow with the messages."""
+
+    def __init__(self, session: Session, replay_with: Profile | None) -> None:
+        profile = session.profile if replay_with is None else replay_with
+        self._session = session
+        self._history = History(session.path.name, profile, session.metadata, replay_with is not None)
+        self._pipeline = None if replay_with is None else Pipeline(replay_with, frame_id=session.frame_id)
+        self._count = 0
+        self._steps: list[int] = []  # stamps in ns
+        self._step_of: dict[int, int] = {}
+        self._contacts: list[tuple[int, Records]] = []
+        self._predictions: list[tuple[int, Records]] = []
+        self._states: list[tuple[int, Records]] = []
+        self._durations: list[float] = []
+
+    def take(self, message: Recorded) -> None:
+        missing = (message.sequence - self._count) & 0xFFFFFFFF
+        if missing:
+            self._history.problems.append(f"{missing} messages are missing before message {message.sequence}")
+            self._count = message.sequence
+        self._count += 1
+        try:
+            self._read(message)
+        except MessageError as error:
+            if message.type not in ("ObjectStateArray", "ObjectDescriptionArray"):  # those are the monitor's to refuse
+                self._history.problems.append(f"message {message.sequence} on {message.topic}: {error}")
+
+    def _read(self, message: Recorded) -> None:
+        answers = self._pipeline is None
+        match message.type:
+            case "ObjectDescriptionArray":
+                if self._pipeline is not None:
+                    self._pipeline.on_shapes(message.data)
+                for each in decode_descriptions(message.data).objects:
+                    if not isinstance(each, Removal):
+                        self._history.objects[each.object_id] = each
+            case "ObjectStateArray":
+                if self._pipeline is not None:
+                    begin = time.perf_counter()
+                    outputs = self._pipeline.on_states(message.data)
+                    if outputs is not None:
+                        self._durations.append(time.perf_counter() - begin)
+                        self._answer(outputs)
+                states = decode_states(message.data)
+                self._states.append((states.stamp_ns, states.states))
+            case "ContactArray" if answers:
+                contacts = decode_contacts(message.data)
+                self._contacts.append((self._step(contacts.stamp_ns, contacts.step), contacts.contacts))
+            case "PredictedCollisionArray" if answers:
+                predictions = decode_predictions(message.data)
+                self._predictions.append((self._step(predictions.stamp_ns, predictions.step), predictions.predictions))
+            case "MonitorStatus":
+                status = self._history.status = decode_status(message.data)
+                if answers and np.isfinite(status.step_duration):
+                    self._durations.append(status.step_duration)
+
+    def _answer(self, outputs: Outputs) -> None:
+        result = outputs.result
+        step = self._step(result.stamp_ns, result.step)
+        self._contacts.append((step, result.contacts))
+        self._predictions.append((step, result.predictions))
+
+    def _step(self, stamp_ns: int, number: int) -> int:
+        """Index of the step with this number; contacts and predictions of one step share it."""
+        if number not in self._step_of:
+            self._step_of[number] = len(self._steps)
+            self._steps.append(stamp_ns)
+        return self._step_of[number]
+
+    def history(self) -> History:
+        h = self._history
+        h.problems += self._session.damage
+        if not self._states:
+            raise SessionError(f"{self._session.path}: expected object states, found none")
+        stamps = np.array(self._steps, np.int64)
+        h.begin_ns = int(stamps[0]) if len(stamps) else self._states[0][0]
+        h.times = np.asarray((stamps - h.begin_ns) * NANOSECOND, np.float64)
+        h.contacts, h.contact_step = _joined(self._contacts, records.CONTACT)
+        h.predictions, h.prediction_step = _joined(self._predictions, records.PREDICTION)
+        h.states, stamps_of = _joined(self._states, records.STATE)
+        h.state_time = np.asarray((stamps_of - h.begin_ns) * NANOSECOND, np.float64)
+        h.durations = np.array(self._durations)
+        if not len(stamps):
+            h.problems.append("the session holds no answers")
+        h.collisions = _collisions(h)
+        return h
+
+
+def _joined(parts: list[tuple[int, Records]], dtype: np.dtype[np.void]) -> tuple[Records, NDArray[np.int64]]:
+    if not parts:
+        return np.zeros(0, dtype), np.zeros(0, np.int64)
+    counts = [len(rows) for _, rows in parts]
+    return np.concatenate([rows for _, rows in parts]), np.repeat([key for key, _ in parts], counts)
+
+
+def _keys(rows: Records) -> NDArray[np.uint64]:
+    """One number for the pair of each row."""
+    return (rows["id_a"].astype(np.uint64) << np.uint64(32)) | rows["id_b"].astype(np.uint64)
+
+
+def _collisions(h: History) -> list[Collision]:
+    """Unbroken runs of contacts, by begin and pair."""
+    touching = h.contacts["phase"] != Phase.END
+    rows, steps = h.contacts[touching], h.contact_step[touching]
+    keys = _keys(rows)
+    order = np.lexsort((steps, keys))
+    predicted = _steps_by_pair(_keys(h.predictions), h.prediction_step)
+    found = []
+    breaks = np.flatnonzero((np.diff(keys[order]) != 0) | (np.diff(steps[order]) != 1)) + 1
+    for run in np.split(order, breaks) if len(order) else ():
+        first, last = int(steps[run[0]]), int(steps[run[-1]])
+        pair = (int(rows["id_a"][run[0]]), int(rows["id_b"][run[0]]))
+        found.append(
+            Collision(
+                pair=pair,
+                begin=float(h.times[first]),
+                end=float(h.times[last + 1]) if last + 1 < len(h.times) else None,
+                step=first,
+                deepest=float(rows["signed_distance"][run].min()),
+                certain=bool((rows["status"][run] == ContactStatus.TOUCHING).any()),
+                warned=_warned(h.times, first, predicted.get(int(keys[run[0]]), np.zeros(0, np.int64))),
+            )
+        )
+    return sorted(found, key=lambda c: (c.begin, c.pair))
+
+
+def _steps_by_pair(keys: NDArray[np.uint64], steps: NDArray[np.int64]) -> dict[int, NDArray[np.int64]]:
+    """The steps of each pair, ascending."""
+    order = np.lexsort((steps, keys))
+    breaks = np.flatnonzero(np.diff(keys[order]) != 0) + 1
+    return {int(keys[run[0]]): steps[run] for run in np.split(order, breaks) if len(run)}
+
+
+def _warned(times: Floats, begin: int, steps: NDArray[np.int64]) -> float:
+    """s by which the unbroken run of predictions right before step `begin` came before it."""
+    if begin == 0:
+        return float("nan")
+    before = steps[steps < begin]
+    run = 0
+    while run < len(before) and before[-1 - run] == begin - 1 - run:
+        run += 1
+    return float(times[begin] - times[begin - run])
