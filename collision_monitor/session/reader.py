@@ -23,6 +23,9 @@ from collision_monitor.profiles import Profile
 from collision_monitor.session.recorder import METADATA
 from collision_monitor.session.rosbag2 import TYPES, full_name
 
+SALVAGE: Final = "collision_monitor_salvage"
+"""Name of the metadata record that says what is missing in a file that was salvaged."""
+
 _MAGIC: Final = b"\x89MCAP0\r\n"
 _HEAD: Final = struct.Struct("<BQ")
 _LARGEST_CHUNK: Final = 1 << 30
@@ -77,6 +80,9 @@ class Session:
                 elif isinstance(record, Channel):
                     self._check_encoding(record, schemas)
                     channels[record.id] = record
+                elif isinstance(record, Metadata) and record.name == SALVAGE:
+                    losses = record.metadata.get("losses", "").splitlines()
+                    self.damage += [f"lost before it was salvaged: {loss}" for loss in losses]
                 elif isinstance(record, Message) and record.channel_id in channels:
                     channel = channels[record.channel_id]
                     name = schemas.get(channel.schema_id, "")
