@@ -31,8 +31,6 @@ def _run(body: Callable[[StopRequest], None], args: Sequence[str] | None) -> int
     except CollisionMonitorError as error:
         print(f"collision-monitor: error: {error}", file=sys.stderr)
         return BAD_INPUT
-    except KeyboardInterrupt:  # see StopRequest.interrupting
-        return 0
     return 0
 
 

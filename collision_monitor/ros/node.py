@@ -93,7 +93,7 @@ class MonitorNode(Node):
         patience = threading.Timer(COMPILER_PATIENCE, self.get_logger().info, [text])
         patience.start()
         try:
-            with stop.interrupting():
+            with stop.ending():
                 warm_up.main()
         finally:
             patience.cancel()

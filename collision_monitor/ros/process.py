@@ -29,7 +29,7 @@ class StopRequest:
 
     def __init__(self) -> None:
         self.received = False
-        self._interrupts = False
+        self._ends = False
 
     def install(self) -> StopRequest:
         """Take over both signals; call it before the slow imports so that an early Ctrl-C is clean as well."""
@@ -39,19 +39,28 @@ class StopRequest:
 
     def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
         self.received = True
-        if self._interrupts:
-            raise KeyboardInterrupt
+        if self._ends:
+            _end()
 
     @contextmanager
-    def interrupting(self) -> Iterator[None]:
-        """For long work with nothing to be finished: a signal raises KeyboardInterrupt instead of waiting."""
-        self._interrupts = True
+    def ending(self) -> Iterator[None]:
+        """For long work with nothing to be finished: a signal ends the process, exit code 0.
+
+        A KeyboardInterrupt would not do: raised within a callback of the compiler it is printed and forgotten.
+        """
+        self._ends = True
+        if self.received:
+            _end()
         try:
-            if self.received:
-                raise KeyboardInterrupt
             yield
         finally:
-            self._interrupts = False
+            self._ends = False
+
+
+def _end() -> None:
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0)
 
 
 PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")

@@ -16,13 +16,26 @@ README = (ROOT / "README.md").read_text()
 
 
 def test_the_python_example_predicts_the_impact() -> None:
-    (example,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    example = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[0]
     answer = subprocess.run([sys.executable, "-c", example], capture_output=True, text=True, timeout=300)
     assert answer.returncode == 0, answer.stderr
     times = re.fullmatch(r"cart meets ball in (\S+) to (\S+) s\n", answer.stdout)
     assert times, answer.stdout
     # The cart's front is at 0.5 m, the ball's near side at 3.5 m: 3 m at 2 m/s.
     assert float(times[1]) <= 1.5 <= float(times[2]) + 1e-3
+
+
+def test_the_examples_of_two_shapes_run() -> None:
+    example = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[1]
+    stand_ins = (
+        "import collision_monitor as cm; mesh_a = mesh_b = cm.Box((1, 1, 1)); pose_a = cm.Pose(); "
+        "pose_b = cm.Pose((3, 0, 0)); x = [[0.0, 0.0, 0.0]] * 8\n"
+    )
+    checks = "assert i.status == 'hit' and i.lower <= 2.81 <= i.upper + 0.01\n"
+    answer = subprocess.run(
+        [sys.executable, "-c", stand_ins + example + checks], capture_output=True, text=True, timeout=300
+    )
+    assert answer.returncode == 0, answer.stderr
 
 
 @pytest.mark.parametrize("setting", Profile.fields(), ids=lambda setting: setting.name)
