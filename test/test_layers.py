@@ -24,6 +24,7 @@ LAYERS = (
     {"monitor"},
     {"pipeline"},
     {"session"},
+    {"report"},
     {"ros", "cli"},
 )
 """From the bottom up. A module imports its own layer and those below; the rest is free (errors, records …)."""

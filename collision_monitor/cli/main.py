@@ -12,7 +12,7 @@ from typing import Final
 from collision_monitor._version import VERSION
 from collision_monitor.errors import CollisionMonitorError
 
-COMMANDS: Final = ("demo", "run", "world", "replay", "check", "salvage", "tradeoff", "bench")
+COMMANDS: Final = ("demo", "run", "world", "replay", "report", "check", "salvage", "tradeoff", "bench")
 """In the order of `--help`. Each is a module of this package with `add_parser(subparsers)`."""
 
 EXIT_ERROR: Final = 1
@@ -28,6 +28,7 @@ examples:
   collision-monitor world --list                          the scenes that can be played to it
   collision-monitor world crossing                        play one of them
   collision-monitor replay run.mcap                       the same answers again, without ROS; differences are shown
+  collision-monitor report run.mcap                       what happened, as one HTML page
   collision-monitor check run.mcap --expect expected.yaml recorded sessions as regression tests
   collision-monitor salvage cut.mcap -o whole.mcap        what is whole in a damaged recording
   collision-monitor tradeoff --scene fleet                what each profile costs and how wrong it is

@@ -1,0 +1,51 @@
+"""`collision-monitor report`: a session as one HTML file that people look at."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from collision_monitor.cli.progress import progress_bar
+
+
+def add_parser(subparsers: Any) -> None:
+    """Register the command."""
+    parser = subparsers.add_parser(
+        "report",
+        help="a session as one HTML page: collisions, how early they were predicted, tracks",
+        description="Write one HTML file that needs nothing else: verdict, timeline, predicted against actual, tracks.",
+    )
+    parser.add_argument("session", type=Path, metavar="SESSION", help="a .mcap file, or a folder that holds one")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: SESSION.html, where you are")
+    parser.add_argument("--png", type=Path, metavar="FOLDER", help="write the pictures there too")
+    parser.add_argument(
+        "--replay", nargs="?", const="", metavar="PROFILE",
+        help="report what this program answers to the inputs, with the recorded profile or this one",
+    )  # fmt: skip
+    parser.add_argument("--force", action="store_true", help="overwrite what is there")
+    parser.set_defaults(command=report_command)
+
+
+def report_command(args: argparse.Namespace) -> int:
+    """Return the exit code. Raises SessionError, ProfileError."""
+    from collision_monitor.profiles import Profile
+    from collision_monitor.report import write_report
+    from collision_monitor.session import Session
+    from collision_monitor.session.history import read_history
+
+    session = Session(args.session)
+    profile = None if args.replay is None else Profile.named(args.replay) if args.replay else session.profile
+    with progress_bar("report", session.size) as done:
+        last = 0
+
+        def show() -> None:
+            nonlocal last
+            done(session.position - last)
+            last = session.position
+
+        history = read_history(session, profile, show)
+    output = args.output or Path(f"{args.session.stem}.html")
+    for file in write_report(history, output, pictures=args.png, overwrite=args.force):
+        print(file)
+    return 0

@@ -1,0 +1,78 @@
+"""Sessions of the demo scenes, recorded as the node records them, with step times that are the same in every run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+
+from collision_monitor.codec import encode_descriptions, encode_states
+from collision_monitor.description import ObjectDescription
+from collision_monitor.pipeline import Pipeline
+from collision_monitor.session import Recorder
+from collision_monitor.world import make_scene
+from collision_monitor.world.scene import Scene, States
+
+NODE = "/object_monitor"
+TYPES = {
+    f"{NODE}/objects/shapes": "ObjectDescriptionArray",
+    f"{NODE}/objects/states": "ObjectStateArray",
+    f"{NODE}/contacts": "ContactArray",
+    f"{NODE}/predictions": "PredictedCollisionArray",
+    f"{NODE}/status": "MonitorStatus",
+}
+SHAPES, STATES, CONTACTS, PREDICTIONS, STATUS = TYPES
+START = 1_700_000_000_000_000_000
+
+
+def record_states(
+    path: Path,
+    descriptions: list[ObjectDescription],
+    states: Iterable[tuple[float, States]],
+    *,
+    profile: str = "balanced",
+    answers: bool = True,
+    close: bool = True,
+) -> Path:
+    """A session of these states (s, records.STATE); without answers: the inputs alone, as a recorder of bags has."""
+    pipeline = Pipeline(profile)
+    recorder = Recorder(path, TYPES, pipeline.metadata(node=NODE))
+    shapes = encode_descriptions(START, "world", descriptions, snapshot=True)
+    pipeline.on_shapes(shapes)
+    recorder.write(SHAPES, shapes, START, START)
+    for k, (seconds, rows) in enumerate(states):
+        now = START + round(seconds * 1e9)
+        data = encode_states(now, "world", k + 1, rows)
+        outputs = pipeline.on_states(data)
+        recorder.write(STATES, data, now, now)
+        if answers and outputs is not None:
+            recorder.write(CONTACTS, outputs.contacts, now, now)
+            recorder.write(PREDICTIONS, outputs.predictions, now, now)
+            status = pipeline.status(step_duration=0.001 + 0.0001 * (k % 7), recording=1)
+            recorder.write(STATUS, status, now, now)
+    if close:
+        recorder.close()
+    return path
+
+
+def played(scene: Scene, seconds: float) -> Iterable[tuple[float, States]]:
+    """The states of a scene, step by step."""
+    yield scene.time, scene.states()
+    while scene.time < seconds and not scene.finished:
+        states = scene.step()
+        yield scene.time, states
+
+
+def record_scene(
+    path: Path,
+    name: str,
+    seconds: float,
+    *,
+    objects: int | None = None,
+    profile: str = "balanced",
+    rename: Callable[[str], str] = str,
+) -> Path:
+    """A session of the named scene; rename: what its objects are called."""
+    scene = make_scene(name, objects=objects)
+    descriptions = [replace(each, name=rename(each.name)) for each in scene.descriptions]
+    return record_states(path, descriptions, played(scene, seconds), profile=profile)
