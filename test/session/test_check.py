@@ -57,7 +57,7 @@ def record_yard(path: Path, *, unseen: bool = False, close: bool = True) -> Path
     recorder.close()
     if not close:
         data = path.read_bytes()
-        path.write_bytes(data[: len(data) // 2])
+        path.write_bytes(data[: data.rindex(b"\x0f\x04\0\0\0\0\0\0\0") + 5])  # within the end of the data
     return path
 
 
