@@ -14,7 +14,7 @@ import numpy
 from collision_monitor._version import VERSION
 
 _PACKAGE = Path(__file__).parent
-_NO_PART_OF_THE_ANSWERS = ("cli", "ros", "session", "world")
+_NO_PART_OF_THE_ANSWERS = ("cli", "report", "ros", "session", "world")
 
 
 @cache

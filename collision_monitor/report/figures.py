@@ -1,229 +1,206 @@
-"""The pictures of a report, drawn with matplotlib."""
+"""The pictures of a report, drawn with matplotlib from its facts."""
 
 from __future__ import annotations
 
-from io import BytesIO
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable
+from typing import Final
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
-from collision_monitor.geometry.reach import reach
-from collision_monitor.report.facts import Facts, pair_distance, track
-from collision_monitor.session.history import Collision, History, Pair
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-CONTACT, WARNING, POSSIBLE, INK = "#c0392b", "#e69f00", "#8a8a8a", "#1f4e79"
-PALETTE: Final = ("#1f4e79", "#c0392b", "#2a8c4a", "#8e44ad", "#e69f00", "#555555")
+from collision_monitor.report.alerts import stated_error
+from collision_monitor.report.facts import Facts
+from collision_monitor.report.from_above import from_above
+from collision_monitor.report.picture import CONTACT, INK, PALETTE, POSSIBLE, STYLE, WARNING, Size
+from collision_monitor.session.history import Collision, Floats, History, Pair
 
 PAIRS: Final = 16
 """Rows of the timeline."""
 CLOSEST: Final = 4
 """Pairs whose distance is drawn."""
-EVENTS: Final = 6
-"""Collisions that are drawn from above."""
-AROUND: Final = 2.0
-"""s of the tracks that are drawn before and after a collision."""
-OUTLINE: Final = 48
-"""Directions from which a footprint is looked at."""
-
-STYLE: Final[Any] = {
-    "font.size": 11,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.titlesize": 12,
-    "axes.titlelocation": "left",
-    "legend.frameon": False,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "collision_monitor",
-    "text.parse_math": False,  # a name may hold a dollar sign
-}
+CURVES: Final = 6
+"""Collisions whose predictions are drawn."""
+DOTS: Final = 2000
+"""Predictions of one pair that are drawn, at most."""
+FINEST: Final = 1000
+"""Parts of the timeline's length: what is closer together is drawn as one."""
+BINS: Final = 40
+TAIL: Final = 0.995
+"""Of the step times are drawn each for itself; what took longer stands in the last bar."""
 
 
-def figures(history: History, facts: Facts) -> dict[str, Figure]:
+def figures(history: History, facts: Facts, size: Size) -> dict[str, Figure]:
     """All pictures for which there is something to draw, by name, in their order on the page."""
+    draw: dict[str, Callable[[History, Facts, Size], Figure | None]] = {
+        "timeline": _timeline,
+        "predicted": _predicted,
+        "distances": _distances,
+        "events": from_above,
+        "steps": _steps,
+    }
     with mpl.rc_context(STYLE):
-        drawn = {
-            "timeline": _timeline(history, facts),
-            "predicted": _predicted(history, facts),
-            "distances": _distances(history, facts),
-            "events": _events(history, facts),
-            "steps": _steps(history),
-        }
+        drawn = {name: function(history, facts, size) for name, function in draw.items()}
     return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
-def as_svg(figure: Figure) -> str:
-    """The picture as an SVG element; the same bytes for the same picture."""
-    buffer = BytesIO()
-    with mpl.rc_context(STYLE):
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    text = buffer.getvalue().decode()
-    return text[text.index("<svg") :]
-
-
-def as_png(figure: Figure) -> bytes:
-    """The picture as PNG."""
-    buffer = BytesIO()
-    with mpl.rc_context(STYLE):
-        figure.savefig(buffer, format="png", dpi=130, metadata={"Software": None})
-    return buffer.getvalue()
-
-
-def pair_name(history: History, pair: Pair) -> str:
+def pair_name(history: History, pair: Pair, longest: int = 18) -> str:
     """Both names, shortened to what fits on a picture."""
-    return " – ".join(name if len(name) <= 16 else f"{name[:15]}…" for name in map(history.name_of, pair))
+    return " – ".join(shortened(history.name_of(object_id), longest) for object_id in pair)
 
 
-def _runs(times: NDArray[np.float64], period: float) -> list[tuple[float, float]]:
-    """Begin and length of the stretches of times without a gap of over 1.5 periods."""
-    breaks = np.flatnonzero(np.diff(times) > 1.5 * period) + 1
+def shortened(name: str, longest: int = 18) -> str:
+    """The name; of a long one the beginning and the end, for names often differ there."""
+    if len(name) <= longest:
+        return name
+    return f"{name[: longest // 2]}…{name[len(name) - longest // 2 + 1 :]}"
+
+
+def drawn_collisions(facts: Facts) -> list[Collision]:
+    """Those whose predictions are drawn: the earliest."""
+    return [each for each in facts.collisions if each in facts.answered][:CURVES]
+
+
+def _runs(times: Floats, longest: float, period: float) -> list[tuple[float, float]]:
+    """Begin and length of the stretches of times without a gap of over `longest`."""
+    breaks = np.flatnonzero(np.diff(times) > longest) + 1
     return [(float(part[0]), float(part[-1] - part[0]) + period) for part in np.split(times, breaks) if len(part)]
 
 
-def _timeline(history: History, facts: Facts) -> Figure | None:
+def _timeline(history: History, facts: Facts, size: Size) -> Figure | None:
     pairs = facts.risky[:PAIRS]
     if not pairs:
         return None
-    figure = Figure(figsize=(9, 0.9 + 0.34 * len(pairs)), layout="constrained")
+    of_pair: dict[Pair, list[Collision]] = {pair: [] for pair in pairs}
+    for each in history.collisions:
+        if each.pair in of_pair:
+            of_pair[each.pair].append(each)
+    pairs.sort(key=lambda pair: (min([c.begin for c in of_pair[pair]], default=np.inf), pair))
+    figure = Figure(figsize=(size.width, 0.9 + (0.46 if size.narrow else 0.3) * len(pairs)), layout="constrained")
     axes = figure.subplots()
-    period = float(np.median(np.diff(history.times))) if len(history.times) > 1 else 0.1
+    for begin, end in facts.gaps:
+        axes.axvspan(begin, end, facecolor="none", edgecolor=POSSIBLE, hatch="////", linewidth=0, alpha=0.6)
+    shortest = max(facts.period, history.duration / FINEST)
     for row, pair in enumerate(pairs):
-        warning = facts.warnings.get(pair)
-        if warning is not None:
-            sure = warning.certain
-            axes.broken_barh(_runs(warning.time[~sure], period), (row - 0.16, 0.32), color=POSSIBLE, alpha=0.5)
-            axes.broken_barh(_runs(warning.time[sure], period), (row - 0.16, 0.32), color=WARNING)
-        for each in (c for c in history.collisions if c.pair == pair):
+        for certain, color in ((False, POSSIBLE), (True, WARNING)):
+            times = [alert.time for alert in facts.alerts.get(pair, ()) if alert.certain == certain]
+            if times:
+                runs = _runs(np.concatenate(times), 1.5 * shortest, shortest)
+                axes.broken_barh(runs, (row - 0.14, 0.28), color=color, linewidth=0)
+        for each in of_pair[pair]:
             end = history.duration if each.end is None else each.end
             color = CONTACT if each.certain else POSSIBLE
-            axes.broken_barh([(each.begin, max(end - each.begin, period))], (row - 0.32, 0.64), color=color)
-    axes.set_yticks(range(len(pairs)), [pair_name(history, pair) for pair in pairs])
-    axes.set_ylim(len(pairs) - 0.5, -0.5)
-    axes.set_xlim(0.0, max(history.duration, period))
+            bar = (each.begin, max(end - each.begin, shortest))
+            axes.broken_barh([bar], (row - 0.3, 0.6), color=color, linewidth=0)
+            if each in facts.answered:
+                low, high = facts.answered[each].first_stated
+                stated = [low, high] if np.isfinite(high) else [low]
+                axes.vlines(stated, row - 0.42, row + 0.42, color=INK, linewidth=0.9)
+    if size.narrow:  # the names over the bars: beside them there is no room
+        axes.set_yticks([])
+        axes.spines["left"].set_visible(False)
+        for row, pair in enumerate(pairs):
+            axes.text(0.0, row - 0.44, pair_name(history, pair), fontsize=8, va="center", ha="left")
+        axes.set_ylim(len(pairs) - 0.4, -0.8)
+    else:
+        axes.set_yticks(range(len(pairs)), [pair_name(history, pair) for pair in pairs], fontsize=9)
+        axes.set_ylim(len(pairs) - 0.5, -0.5)
+    axes.set_xlim(0.0, max(history.duration, shortest))
     axes.set_xlabel("s from the first step")
-    marks = [(CONTACT, "in contact"), (WARNING, "predicted to touch"), (POSSIBLE, "possible, not certain")]
-    handles = [mpl.patches.Patch(color=color, label=label) for color, label in marks]
-    figure.legend(handles=handles, loc="outside upper right", ncols=3)
+    handles: list[Patch | Line2D] = [Patch(color=CONTACT, label="in contact"), Patch(color=WARNING, label="predicted")]
+    if facts.answered:
+        handles.append(Line2D([], [], color=INK, marker="|", linestyle="", label="when, as first stated"))
+    if facts.possible or any(not alert.certain for pair in pairs for alert in facts.alerts.get(pair, ())):
+        handles.append(Patch(color=POSSIBLE, label="possible"))
+    if facts.gaps:
+        handles.append(Patch(facecolor="none", edgecolor=POSSIBLE, hatch="////", label="no steps"))
+    _legend(figure, handles, 2 if size.narrow else len(handles))
     return figure
 
 
-def _predicted(history: History, facts: Facts) -> Figure | None:
-    """Predicted against actual: how wrong each prediction of a collision was, by how long before it was made."""
-    figure = Figure(figsize=(9, 3.4), layout="constrained")
-    axes = figure.subplots()
-    drawn = False
-    for color, each in zip(PALETTE * len(facts.warned), facts.warned[: len(PALETTE)], strict=False):
-        warning = facts.warnings[each.pair]
-        inside = (warning.time >= each.begin - each.warned - 1e-9) & (warning.time < each.begin)
-        lead = each.begin - warning.time[inside]
-        low, high = warning.lower[inside] - lead, warning.upper[inside] - lead
-        high = np.where(np.isfinite(high), high, low)
-        axes.fill_between(lead, low, high, color=color, alpha=0.3, linewidth=0)
-        axes.plot(lead, low, color=color, linewidth=1.5, label=f"{pair_name(history, each.pair)}, {each.begin:.2f} s")
-        drawn = True
-    if not drawn:
-        return None
-    axes.axhline(0.0, color="black", linewidth=0.8)
-    axes.invert_xaxis()
-    axes.set_xlabel("s before the contact was first reported")
-    axes.set_ylabel("predicted − actual (s)")
-    axes.legend(fontsize=9, ncols=2)
-    return figure
+def _legend(figure: Figure, handles: list[Patch | Line2D], columns: int) -> None:
+    figure.legend(handles=handles, loc="outside upper left", ncols=columns, columnspacing=1.2)
 
 
-def _distances(history: History, facts: Facts) -> Figure | None:
-    pairs = [pair for pair in facts.risky if len(pair_distance(history, pair)[0])][:CLOSEST]
-    if not pairs:
-        return None
-    figure = Figure(figsize=(9, 5.2), layout="constrained")
-    above, below = figure.subplots(2, 1, sharex=True)
-    for color, pair in zip(PALETTE, pairs, strict=False):
-        times, distance = pair_distance(history, pair)
-        above.plot(times, distance, color=color, label=pair_name(history, pair))
-        warning = facts.warnings.get(pair)
-        if warning is not None:
-            below.plot(warning.time, warning.lower, ".", color=color, markersize=3)
-    above.axhline(0.0, color="black", linewidth=0.8)
-    above.set_ylabel("distance (m)")
-    above.legend(fontsize=9, ncols=2)
-    below.set_ylabel("time to collision (s)")
-    below.set_ylim(bottom=0.0)
-    below.set_xlabel("s from the first step")
-    return figure
-
-
-def _events(history: History, facts: Facts) -> Figure | None:
-    chosen = sorted(facts.collisions, key=lambda c: (c.deepest, c.begin))[:EVENTS]
-    chosen.sort(key=lambda c: (c.begin, c.pair))
+def _predicted(history: History, facts: Facts, size: Size) -> Figure | None:
+    """How wrong each prediction of a collision was, by how long before it was made."""
+    chosen = drawn_collisions(facts)
     if not chosen:
         return None
-    columns = min(len(chosen), 3)
-    rows = -(-len(chosen) // columns)
-    figure = Figure(figsize=(9, 0.3 + 3.2 * rows), layout="constrained")
-    for axes, each in zip(figure.subplots(rows, columns, squeeze=False).ravel(), [*chosen, *[None] * 3], strict=False):
-        if each is None:
-            axes.axis("off")
-        else:
-            _from_above(axes, history, each)
+    figure = Figure(figsize=(size.width, 3.4 if size.narrow else 3.0), layout="constrained")
+    axes = figure.subplots()
+    axes.axhspan(-1e3 * facts.period, 0.0, color=POSSIBLE, alpha=0.25, linewidth=0)
+    handles: list[Patch | Line2D] = []
+    for color, each in zip(PALETTE, chosen, strict=False):
+        alert = facts.answered[each]
+        before = alert.time < each.begin
+        lead = each.begin - alert.time[before]
+        low, high = 1e3 * (alert.lower[before] - lead), 1e3 * (alert.upper[before] - lead)
+        every = slice(None, None, -(-len(lead) // DOTS))
+        lead, low, high = lead[every], low[every], np.where(np.isfinite(high), high, low)[every]
+        axes.fill_between(lead, low, high, color=color, alpha=0.2, linewidth=0)
+        axes.plot(lead, low, color=color, linewidth=1.5)
+        name = f"{pair_name(history, each.pair, 14 if size.narrow else 18)}, {each.begin:.2f} s"
+        handles.append(Line2D([], [], color=color, label=name))
+    axes.invert_xaxis()
+    axes.set_xlabel("s before the contact was first reported")
+    axes.set_ylabel("predicted − actual (ms)")
+    handles.append(Patch(color=POSSIBLE, alpha=0.4, label="within the step in which it began"))
+    _legend(figure, handles, 1 if size.narrow else 2)
     return figure
 
 
-def _from_above(axes: Axes, history: History, collision: Collision) -> None:
-    for color, object_id in zip(PALETTE, collision.pair, strict=False):
-        path = track(history, object_id)
-        if path is None:
-            continue
-        near = (path.time >= collision.begin - AROUND) & (path.time <= collision.begin + AROUND)
-        axes.plot(path.position[near, 0], path.position[near, 1], color=color, linewidth=1, alpha=0.7)
-        name = history.name_of(object_id)
-        axes.plot([], [], color=color, label=name if len(name) <= 14 else f"{name[:13]}…")
-        described = history.objects.get(object_id)
-        if described is not None:
-            position, quaternion = path.at(np.array([collision.begin]))
-            outline = _footprint(described.shapes, position[0], quaternion[0])
-            if outline is not None:
-                axes.fill(outline[:, 0], outline[:, 1], color=color, alpha=0.35, linewidth=0)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set_title(f"{collision.begin:.2f} s", fontsize=10)
-    axes.legend(fontsize=8, loc="upper left", handlelength=1)
-    axes.tick_params(labelsize=8)
+def largest_error(facts: Facts) -> float:
+    """Of all predictions of collisions, how far the stated interval was off at most, s; NaN without any."""
+    errors = [np.abs(stated_error(alert, each, facts.period)).max() for each, alert in facts.answered.items()]
+    return float(max(errors, default=np.nan))
 
 
-def _footprint(
-    shapes: Any, position: NDArray[np.float64], quaternion: NDArray[np.float64]
-) -> NDArray[np.float64] | None:
-    """The convex outline (n, 2) of an object seen from above; None for one without an end."""
-    from collision_monitor.geometry.pose import Pose
-
-    pose = Pose((0.0, 0.0, 0.0), quaternion)
-    angle = np.linspace(0.0, 2.0 * np.pi, OUTLINE, endpoint=False)
-    normal = np.stack([np.cos(angle), np.sin(angle), np.zeros(OUTLINE)], axis=1)
-    far = reach([(shape, pose @ offset) for shape, offset in shapes], normal)
-    if not np.isfinite(far).all():
+def _distances(history: History, facts: Facts, size: Size) -> Figure | None:
+    curves: list[tuple[Pair, tuple[Floats, Floats]]] = []
+    for pair in facts.risky:
+        if len(curves) == CLOSEST:
+            break
+        curve = facts.tracks.distance(pair)
+        if curve is not None and np.isfinite(curve[1]).any():
+            curves.append((pair, curve))
+    if not curves:
         return None
-    # corners: where neighbouring lines of sight meet
-    after_normal, after = np.roll(normal, -1, axis=0), np.roll(far, -1)
-    area = normal[:, 0] * after_normal[:, 1] - normal[:, 1] * after_normal[:, 0]
-    x = (far * after_normal[:, 1] - after * normal[:, 1]) / area
-    y = (after * normal[:, 0] - far * after_normal[:, 0]) / area
-    return np.stack([x, y], axis=1) + position[:2]
+    figure = Figure(figsize=(size.width, 4.8 if size.narrow else 4.4), layout="constrained")
+    above, below = figure.subplots(2, 1, sharex=True)
+    handles: list[Patch | Line2D] = []
+    for color, (pair, (times, distance)) in zip(PALETTE, curves, strict=False):
+        above.plot(times, distance, color=color, linewidth=1.5)
+        for alert in facts.alerts.get(pair, ()):
+            every = slice(None, None, -(-len(alert.time) // DOTS))
+            below.plot(alert.time[every], alert.lower[every], color=color, linewidth=1.5, marker=".", markersize=2)
+        handles.append(Line2D([], [], color=color, label=pair_name(history, pair, 14 if size.narrow else 18)))
+    low = min(0.0, *(float(np.nanmin(distance)) for _, (_, distance) in curves))
+    above.axhspan(1.1 * low, 0.0, color=CONTACT, alpha=0.12, linewidth=0)
+    above.axhline(0.0, color=INK, linewidth=0.8)
+    above.set_ylabel("distance (m)")
+    below.set_ylabel("time to\ncollision (s)")
+    below.set_ylim(0.0, 1.05 * history.profile.horizon)
+    below.set_xlim(0.0, max(history.duration, facts.period) or 1.0)
+    below.set_xlabel("s from the first step")
+    _legend(figure, handles, 1 if size.narrow else 2)
+    return figure
 
 
-def _steps(history: History) -> Figure | None:
+def _steps(history: History, facts: Facts, size: Size) -> Figure | None:
     if not len(history.durations):
         return None
     milliseconds = history.durations * 1e3
-    figure = Figure(figsize=(9, 2.6), layout="constrained")
+    middle, p99, longest = np.quantile(milliseconds, [0.5, 0.99, 1.0])
+    last = max(float(np.quantile(milliseconds, TAIL)), 1e-6)
+    figure = Figure(figsize=(size.width, 2.4), layout="constrained")
     axes = figure.subplots()
-    axes.hist(milliseconds, bins=min(40, max(5, len(milliseconds) // 3)), color=INK)
-    p99 = float(np.quantile(milliseconds, 0.99))
+    axes.hist(np.minimum(milliseconds, last), bins=BINS, range=(0.0, last * 1.001), color=PALETTE[0])
     axes.axvline(p99, color=CONTACT, linewidth=1.5)
-    axes.set_title(f"99 % within {p99:.3g} ms", color=CONTACT, fontsize=10)
+    text = [f"median {middle:.3g} ms", f"99 % within {p99:.3g} ms", f"longest {longest:.3g} ms"]
+    axes.set_title((",\n" if size.narrow else ", ").join([", ".join(text[:2]), text[2]]))
     axes.set_xlabel("ms from a message to its answers")
     axes.set_ylabel("steps")
     return figure

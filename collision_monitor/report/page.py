@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from html import escape
 from pathlib import Path
 from typing import Final
@@ -9,169 +11,226 @@ from typing import Final
 from collision_monitor._version import VERSION
 from collision_monitor.errors import SessionError
 from collision_monitor.report.facts import Facts, gather
-from collision_monitor.report.figures import EVENTS, PAIRS, as_png, as_svg, figures, pair_name
-from collision_monitor.session.history import History
+from collision_monitor.report.figures import PAIRS, drawn_collisions, figures, largest_error
+from collision_monitor.report.from_above import AROUND, EVENTS
+from collision_monitor.report.picture import BROAD, NARROW, as_png, as_svg
+from collision_monitor.report.verdict import verdict
+from collision_monitor.session.history import Collision, History
 
 ROWS: Final = 200
 """Collisions in the table."""
 
-CAPTIONS: Final = {
-    "timeline": (
-        "Timeline",
-        "When pairs touched, and when they were predicted to: the riskiest pairs first.",
-    ),
-    "predicted": (
-        "Predicted against actual",
-        "For each collision that was predicted, how far off the predicted time was. The band is the interval that was "
-        "stated; above zero it came too late.",
-    ),
-    "distances": (
-        "The riskiest pairs",
-        "Distance of the shapes, from the recorded states, and the time to collision that was predicted.",
-    ),
-    "events": (
-        "From above",
-        "The tracks from 2 s before to 2 s after the deepest collisions; footprints where the contact began.",
-    ),
-    "steps": ("Step times", "How long the monitor took, as its status said."),
-}
+NOTHING_ELSE: Final = "default-src 'none'; style-src 'unsafe-inline'"
+"""Content security policy: whatever a name may hold, the page runs no script and asks for nothing."""
 
 STYLE: Final = """\
-:root { color-scheme: light dark; --line: #8884; --card: #fff; --bad: #c0392b; --good: #2a8c4a; --warn: #b07800; }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 0 auto; padding: 1rem; }
-h1 { font-size: 1.5rem; margin: 0 0 .25rem; overflow-wrap: anywhere; }
-h2 { font-size: 1.15rem; margin: 2rem 0 .25rem; }
+:root { color-scheme: light dark; --ink: #1b1f24; --paper: #fff; --soft: #f3f4f6; --line: #d5d9de;
+  --bad: #c0392b; --good: #2a8c4a; --unknown: #b07800; }
+@media screen and (prefers-color-scheme: dark) { :root { --ink: #e4e7eb; --paper: #14171a; --soft: #1f2429;
+  --line: #3a4149; --bad: #ff7b6b; --good: #5fc980; --unknown: #e5b04b; } }
+body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper); max-width: 50rem;
+  margin: 0 auto; padding: 1rem; }
+h1 { font-size: 1.4rem; margin: 0 0 .75rem; overflow-wrap: anywhere; }
+h2 { font-size: 1.15rem; margin: 2.25rem 0 .25rem; }
 p { margin: .25rem 0 .75rem; }
-.verdict { border-left: .5rem solid var(--good); padding: .5rem 1rem; background: #8881; }
-.verdict.bad { border-color: var(--bad); }
-.verdict.unknown { border-color: var(--warn); }
-.verdict strong { font-size: 1.25rem; }
-.problem { color: var(--bad); }
-figure { margin: 0; background: var(--card); border: 1px solid var(--line); border-radius: .4rem; padding: .5rem; }
-figure { overflow-x: auto; }
-figure svg { width: 100%; min-width: 36rem; height: auto; display: block; }
+ul { margin: .5rem 0 0; padding-left: 1.25rem; }
+.verdict { border-left: .5rem solid var(--bad); padding: .75rem 1rem; background: var(--soft);
+  overflow-wrap: anywhere; }
+.verdict.clear { border-color: var(--good); }
+.verdict.unknown { border-color: var(--unknown); }
+.verdict strong { display: block; font-size: 1.5rem; line-height: 1.25; }
+.doubts { color: var(--unknown); }
+.bad { color: var(--bad); font-weight: 600; }
+figure { margin: 0; }
+figure svg { width: 100%; height: auto; display: block; }
+.narrow { display: none; }
+@media screen and (max-width: 36rem) { .narrow { display: block; } .broad { display: none; } }
 .scroll { overflow-x: auto; }
-table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
-th, td { text-align: left; padding: .2rem .8rem .2rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }
-td.number, th.number { text-align: right; }
-td { overflow-wrap: anywhere; }
-@media print { figure, table { break-inside: avoid; } }
+table { border-collapse: collapse; width: 100%; font-size: .9rem; font-variant-numeric: tabular-nums; }
+th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }
+.number { text-align: right; white-space: nowrap; }
+.number:last-child { padding-right: 0; }
+.facts td { overflow-wrap: anywhere; }
+@media print { body { max-width: none; } figure, tr, .verdict { break-inside: avoid; } h2, p { break-after: avoid; } }
 """
 
 
 def write_report(
-    history: History, path: str | Path, *, pictures: str | Path | None = None, overwrite: bool = False
+    history: History,
+    path: str | Path,
+    *,
+    pictures: str | Path | None = None,
+    overwrite: bool = False,
 ) -> list[Path]:
     """Write the report, and with `pictures` its figures as PNG into that folder; returns what was written.
 
     Raises SessionError where a file is there already and not to be overwritten, or cannot be written.
     """
+    check_outputs([Path(path)], overwrite)
     facts = gather(history)
-    drawn = figures(history, facts)
-    files = {Path(path): page(history, facts, {name: as_svg(figure) for name, figure in drawn.items()}).encode()}
+    broad, narrow = figures(history, facts, BROAD), figures(history, facts, NARROW)
+    drawn = {
+        name: "".join(
+            f'<div class="{size.name}">{as_svg(figure, f"{name}-{size.name}")}</div>'
+            for size, figure in ((BROAD, broad[name]), (NARROW, narrow[name]))
+        )
+        for name in broad
+    }
+    files = {Path(path): page(history, facts, drawn).encode("utf-8", errors="replace")}
     if pictures is not None:
-        files |= {Path(pictures) / f"{name}.png": as_png(figure) for name, figure in drawn.items()}
-    there = [file for file in files if file.exists()]
-    if there and not overwrite:
-        raise SessionError(f"{there[0]}: expected a new file, got one that exists; choose another name or --force")
+        files |= {Path(pictures) / f"{name}.png": as_png(figure) for name, figure in broad.items()}
+    check_outputs(list(files), overwrite)
     try:
-        if pictures is not None:
-            Path(pictures).mkdir(parents=True, exist_ok=True)
         for file, content in files.items():
+            file.parent.mkdir(parents=True, exist_ok=True)
             file.write_bytes(content)
     except OSError as error:
         raise SessionError(f"{error.filename}: expected to be able to write there, got: {error.strerror}") from None
     return list(files)
 
 
+def check_outputs(files: list[Path], overwrite: bool) -> None:
+    """Raises SessionError for the first that is there already and may not be overwritten."""
+    for file in files:
+        if file.is_dir():
+            raise SessionError(f"{file}: expected a file to write to, got a folder")
+        if file.exists() and not overwrite:
+            raise SessionError(f"{file}: expected a new file, got one that exists; choose another name or --force")
+
+
 def page(history: History, facts: Facts, pictures: dict[str, str]) -> str:
-    """The whole page; pictures: SVG elements by the names of CAPTIONS."""
-    sections = [_verdict(history, facts)]
-    for name, (title, caption) in CAPTIONS.items():
-        if name in pictures:
-            note = _left_out(name, facts)
-            sections.append(f"<h2>{title}</h2>\n<p>{caption}{note}</p>\n<figure>{pictures[name]}</figure>")
-        if name == "timeline":
-            sections.append(_table(history, facts))
+    """The whole page; pictures: HTML by the names that `figures` gives."""
+    sections = [_verdict(history, facts), _section("Timeline", _timeline_caption(facts), pictures.get("timeline"))]
+    sections.append(_collisions(history, facts))
+    for name, title, caption in (
+        ("predicted", "Predicted against actual", _predicted_caption),
+        ("distances", "The riskiest pairs", _distances_caption),
+        ("events", "From above", _events_caption),
+    ):
+        sections.append(_section(title, caption(facts), pictures.get(name)))
+    sections.append(_section("Step times", _steps_caption(history), pictures.get("steps")))
     sections.append(_provenance(history))
     title = escape(history.name)
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{title}</title>\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{NOTHING_ELSE}">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<style>\n{STYLE}</style>\n</head>\n'
-        f"<body>\n<h1>{title}</h1>\n" + "\n".join(sections) + "\n</body>\n</html>\n"
+        f"<body>\n<h1>{title}</h1>\n" + "\n".join(filter(None, sections)) + "\n</body>\n</html>\n"
     )
 
 
-def _plural(count: int, what: str) -> str:
-    return f"{count or 'no'} {what}{'' if count == 1 else 's'}"
+def _section(title: str, caption: str, picture: str | None) -> str:
+    return f"<h2>{title}</h2>\n<p>{caption}</p>\n<figure>{picture}</figure>" if picture else ""
 
 
 def _verdict(history: History, facts: Facts) -> str:
     """First what a reader has to know, and whether it can be relied on."""
-    count = len(facts.collisions)
-    lines = []
-    if facts.warned:
-        lines.append(
-            f"{len(facts.warned)} of them {'was' if len(facts.warned) == 1 else 'were'} predicted, "
-            f"{facts.quickest:.2f} s ahead or more"
-        )
-    if facts.surprises:
-        lines.append(f"{len(facts.surprises)} came without a prediction right before")
-    there = count - len(facts.warned) - len(facts.surprises)
-    if there:
-        lines.append(f"{there} {'was' if there == 1 else 'were'} there from the first step on")
-    if facts.false:
-        lines.append(f"{_plural(len(facts.false), 'pair')} predicted to touch did not: the objects moved otherwise")
-    if facts.possible:
-        lines.append(f"{_plural(len(facts.possible), 'further contact')} could not be excluded")
-    if history.status is not None:
-        status = history.status
-        refused = sum(getattr(status, name) for name in vars(status) if name.startswith("refused_"))
-        if refused:
-            lines.append(f"{_plural(refused, 'input')} refused; the last for: {status.last_refusal}")
-        if status.messages_lost:
-            lines.append(f"{_plural(status.messages_lost, 'message')} lost on the way to the monitor")
-        if status.recording_dropped:
-            lines.append(f"{_plural(status.recording_dropped, 'message')} could not be recorded")
-    unknown = bool(history.problems or facts.possible)
-    kind = "bad" if count else "unknown" if unknown else "good"
-    answer = _plural(count, "collision").capitalize() if count or not unknown else "No collision is known of"
+    found = verdict(history, facts)
     moving = sum(not each.static for each in history.objects.values())
-    extent = f"{history.duration:.1f} s, {_plural(len(history.times), 'step')}, {_plural(moving, 'moving object')}"
     source = "today's answers to the recorded inputs" if history.replayed else "as recorded"
-    problems = "".join(f'<p class="problem">Not all is known: {escape(each)}</p>\n' for each in history.problems[:5])
-    if len(history.problems) > 5:
-        problems += f'<p class="problem">and {len(history.problems) - 5} more</p>\n'
-    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
+    extent = (
+        f"in {history.duration:.1f} s, {_plural(len(history.times), 'step')}, {_plural(moving, 'moving object')}, "
+        f"profile {escape(history.profile.name)}, {source}"
+    )
+    doubts = ""
+    if found.doubts:
+        doubts = f'<p class="doubts">There may be more than is known:</p>\n{_list(found.doubts, "doubts")}\n'
     return (
-        f'<div class="verdict {kind}"><strong>{answer}</strong> in {extent}, {source}, profile '
-        f"{escape(history.profile.name)}.\n{problems}<ul>{items}</ul></div>"
+        f'<div class="verdict {found.kind}"><strong>{found.answer}</strong> {extent}\n'
+        f"{_list(found.findings, 'findings')}\n{doubts}</div>"
     )
 
 
-def _left_out(name: str, facts: Facts) -> str:
-    if name == "timeline" and len(facts.risky) > PAIRS:
-        return f" {len(facts.risky) - PAIRS} more are left out."
-    if name == "events" and len(facts.collisions) > EVENTS:
-        return f" {len(facts.collisions) - EVENTS} more are left out."
-    return ""
+def _list(sentences: list[str], name: str) -> str:
+    items = "".join(f"<li>{escape(each)}</li>" for each in sentences)
+    return f'<ul class="{name}">{items}</ul>' if items else ""
 
 
-def _table(history: History, facts: Facts) -> str:
+def _plural(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+# -- what the pictures show, and what they leave out
+
+
+def _timeline_caption(facts: Facts) -> str:
+    left = len(facts.risky) - PAIRS
+    out = f" The {PAIRS} riskiest pairs; {_plural(left, 'more pair')} left out." if left > 0 else ""
+    return f"When pairs touched, and when they were predicted to.{out}"
+
+
+def _predicted_caption(facts: Facts) -> str:
+    left = len(facts.answered) - len(drawn_collisions(facts))
+    worst = largest_error(facts)
+    return (
+        "For each collision that was predicted: how far off the stated time was, from the first prediction to the "
+        "contact. The band is the stated interval; below the grey it was too early, above too late. The largest error "
+        f"of all predictions is {worst * 1e3:.3g} ms beyond the stated interval."
+        + (f" The first ones; {left} more left out." if left else "")
+    )
+
+
+def _distances_caption(facts: Facts) -> str:
+    return (
+        "Distance of the shapes, computed from the recorded states, and the time to collision that was predicted. "
+        "Gaps: no state was known, or the object was moved."
+    )
+
+
+def _events_caption(facts: Facts) -> str:
+    left = len(facts.collisions) - EVENTS
+    out = f" Unpredicted and deepest first; {left} more left out." if left > 0 else ""
+    return (
+        f"Tracks from {AROUND:g} s before to {AROUND:g} s after the contact began (m). Filled: then; dotted: "
+        f"{AROUND / 2:g} s before; cross: the point of contact.{out}"
+    )
+
+
+def _steps_caption(history: History) -> str:
+    if history.replayed:
+        return f"How long the steps of this replay took ({len(history.durations)} steps)."
+    return f"How long the monitor took, as its status said ({_plural(len(history.durations), 'status message')})."
+
+
+# -- tables
+
+_COLUMNS: Final[tuple[tuple[str, Callable[[Collision, Facts], str]], ...]] = (
+    ("began<br>(s)", lambda each, facts: f"{each.begin:.3f}"),
+    ("ended<br>(s)", lambda each, facts: "goes on" if each.end is None else f"{each.end:.3f}"),
+    ("depth<br>(m)", lambda each, facts: f"{max(-each.deepest, 0.0):.3g}"),
+    ("warned<br>(s before)", lambda each, facts: _warned(each)),
+    ("first stated<br>(s)", lambda each, facts: _stated(each, facts)),
+)
+
+
+def _warned(collision: Collision) -> str:
+    if math.isnan(collision.warned):
+        return "there from the start"
+    return f"{collision.warned:.3f}" if collision.warned else '<span class="bad">not</span>'
+
+
+def _stated(collision: Collision, facts: Facts) -> str:
+    if collision not in facts.answered:
+        return "–"
+    low, high = facts.answered[collision].first_stated
+    return f"{low:.3f} … {high:.3f}" if math.isfinite(high) else f"{low:.3f} or later"
+
+
+def _collisions(history: History, facts: Facts) -> str:
     if not facts.collisions:
         return ""
     rows = []
     for each in facts.collisions[:ROWS]:
-        end = "goes on" if each.end is None else f"{each.end:.3f}"
-        warned = "from the start" if each.warned != each.warned else f"{each.warned:.3f}" if each.warned else "no"
-        cells = [f"{each.begin:.3f}", end, f"{max(-each.deepest, 0.0):.4g}", warned]
-        numbers = "".join(f'<td class="number">{cell}</td>' for cell in cells)
-        rows.append(f"<tr><td>{escape(pair_name(history, each.pair))}</td>{numbers}</tr>")
-    heads = "".join(f'<th class="number">{head}</th>' for head in ("begin (s)", "end (s)", "depth (m)", "warned (s)"))
-    more = f"<p>{len(facts.collisions) - ROWS} more are left out.</p>" if len(facts.collisions) > ROWS else ""
+        names = " – ".join(escape(history.name_of(object_id)) for object_id in each.pair)
+        cells = "".join(f'<td class="number">{text(each, facts)}</td>' for _, text in _COLUMNS)
+        rows.append(f"<tr><td>{names}</td>{cells}</tr>")
+    heads = "".join(f'<th class="number">{head}</th>' for head, _ in _COLUMNS)
+    left = len(facts.collisions) - ROWS
+    out = f"<p>The first {ROWS}; {left} more left out.</p>" if left > 0 else ""
     return (
-        '<h2>Collisions</h2>\n<div class="scroll"><table>\n<tr><th>pair</th>'
-        f"{heads}</tr>\n" + "\n".join(rows) + f"\n</table></div>{more}"
+        "<h2>Collisions</h2>\n<p>Times from the first step. First stated: when they would touch, by the first "
+        'prediction.</p>\n<div class="scroll"><table>\n<tr><th>pair</th>'
+        f"{heads}</tr>\n" + "\n".join(rows) + f"\n</table></div>{out}"
     )
 
 
@@ -180,8 +239,11 @@ def _provenance(history: History) -> str:
     facts = {key: value for key, value in sorted(history.metadata.items()) if key != "profile"}
     facts["profile"] = f"{history.profile.name}: " + ", ".join(f"{key} {value:g}" for key, value in settings.items())
     if history.status is not None:
-        facts["digest at the last status"] = f"{history.status.digest:016x}"
-    facts["first step (ns)"] = str(history.begin_ns)
+        facts["digest at the last status"] = f"{history.status.digest:016x}, step {history.status.step}"
+    facts["first step"] = f"{history.begin_ns} ns"
     facts["report by"] = f"collision_monitor {VERSION}"
-    rows = "\n".join(f"<tr><th>{escape(key)}</th><td>{escape(str(value))}</td></tr>" for key, value in facts.items())
-    return f'<h2>Provenance</h2>\n<div class="scroll"><table>\n{rows}\n</table></div>'
+    rows = "\n".join(
+        f"<tr><th>{escape(key.replace('_', ' '))}</th><td>{escape(str(value))}</td></tr>"
+        for key, value in facts.items()
+    )
+    return f'<h2>Provenance</h2>\n<table class="facts">\n{rows}\n</table>'

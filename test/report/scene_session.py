@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from collision_monitor.codec import encode_descriptions, encode_states
 from collision_monitor.description import ObjectDescription
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.pipeline import Pipeline
 from collision_monitor.session import Recorder
 from collision_monitor.world import make_scene
-from collision_monitor.world.scene import Scene, States
+from collision_monitor.world.scene import Scene, States, state_array
 
 NODE = "/object_monitor"
 TYPES = {
@@ -76,3 +81,28 @@ def record_scene(
     scene = make_scene(name, objects=objects)
     descriptions = [replace(each, name=rename(each.name)) for each in scene.descriptions]
     return record_states(path, descriptions, played(scene, seconds), profile=profile)
+
+
+NASTY = "<script>alert('$x$ & y')</script>"
+"""A name that must do no harm."""
+
+
+def record_drive(path: Path, seconds: float = 3.0, **options: Any) -> Path:
+    """A compound cart (1) named NASTY drives into a post (2) at 1.5 s; a ball (3) comes towards it until 0.5 s, then
+    turns back before it would have hit.
+    """
+    objects = [
+        ObjectDescription(1, [(Box((1, 0.6, 0.4)), Pose()), (Sphere(0.2), Pose((0.5, 0, 0)))], name=NASTY),
+        ObjectDescription(2, Sphere(0.5), name="post", static=True, pose=Pose((2.7, 0, 0))),
+        ObjectDescription(3, Sphere(0.3), name="ball"),
+    ]
+
+    def states() -> Iterable[tuple[float, States]]:
+        for t in np.arange(0.0, seconds, 0.02):
+            rows = state_array(np.array([1, 3], np.uint32))
+            rows["position"][0], rows["linear"][0] = (t, 0, 0), (1, 0, 0)
+            rows["position"][1] = (1.5, 2.2 - min(t, 0.5) + max(t - 0.5, 0.0), 0)
+            rows["linear"][1] = (0, 1 if t > 0.5 else -1, 0)
+            yield float(t), rows
+
+    return record_states(path, objects, states(), profile="exact", **options)

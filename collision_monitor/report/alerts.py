@@ -1,0 +1,94 @@
+"""Alerts: the predictions of a pair without a break, and what became of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.records import PredictionStatus
+from collision_monitor.session.history import Collision, Floats, History, Pair
+
+
+class Outcome(Enum):
+    """What became of an alert."""
+
+    CONTACT = "the pair touched when it was due"
+    NOTHING = "it was withdrawn"
+    OPEN = "the session ends before"
+
+
+@dataclass(frozen=True, eq=False)
+class Alert:
+    """Predictions of one pair in steps that follow each other.
+
+    time (n,): s, when they were made. lower, upper (n,): s from then on, the stated interval of the first contact;
+    upper is infinite where none was stated. certain: at least one was a HIT.
+    """
+
+    pair: Pair
+    time: Floats
+    lower: Floats
+    upper: Floats
+    certain: bool
+    outcome: Outcome
+
+    @property
+    def begin(self) -> float:
+        """When it was raised, s."""
+        return float(self.time[0])
+
+    @property
+    def first_stated(self) -> tuple[float, float]:
+        """When they would touch, as it was stated first: from, to (s)."""
+        return float(self.time[0] + self.lower[0]), float(self.time[0] + self.upper[0])
+
+
+def alerts_of(history: History, period: float) -> list[Alert]:
+    """All alerts, by begin and pair; period: s from one step to the next, within which a contact is seen."""
+    rows, steps = history.predictions, history.prediction_step
+    keys = (rows["id_a"].astype(np.uint64) << np.uint64(32)) | rows["id_b"].astype(np.uint64)
+    order = np.lexsort((steps, keys))
+    breaks = np.flatnonzero((np.diff(keys[order]) != 0) | (np.diff(steps[order]) != 1)) + 1
+    begins: dict[Pair, list[float]] = {}
+    for collision in history.collisions:
+        begins.setdefault(collision.pair, []).append(collision.begin)
+    found = []
+    for run in np.split(order, breaks) if len(order) else ():
+        pair = (int(rows["id_a"][run[0]]), int(rows["id_b"][run[0]]))
+        time, lower, upper = history.times[steps[run]], rows["lower"][run], rows["upper"][run]
+        due = float((time + np.where(np.isfinite(upper), upper, history.profile.horizon)).max()) + 2.0 * period
+        touched = any(time[0] < begin <= due for begin in begins.get(pair, ()))
+        last = int(steps[run[-1]]) + 1 == len(history.times)
+        found.append(
+            Alert(
+                pair=pair,
+                time=time,
+                lower=lower,
+                upper=upper,
+                certain=bool((rows["status"][run] == PredictionStatus.HIT).any()),
+                outcome=Outcome.CONTACT if touched else Outcome.OPEN if last else Outcome.NOTHING,
+            )
+        )
+    return sorted(found, key=lambda alert: (alert.begin, alert.pair))
+
+
+def alert_before(alerts: list[Alert], collision: Collision) -> Alert | None:
+    """The alert, of those of its pair, that went on until the collision began."""
+    if not collision.warned > 0.0:
+        return None
+    before = [alert for alert in alerts if alert.begin < collision.begin and alert.outcome is Outcome.CONTACT]
+    return before[-1] if before else None
+
+
+def stated_error(alert: Alert, collision: Collision, period: float) -> NDArray[np.float64]:
+    """How far each stated interval is from the step in which the contact began, (n,) s; negative: too early.
+
+    0 where they overlap: when within that step it began, nobody saw.
+    """
+    low, high = alert.time + alert.lower, alert.time + alert.upper
+    early = np.minimum(high - (collision.begin - period), 0.0)
+    late = np.maximum(low - collision.begin, 0.0)
+    return np.asarray(early + late, np.float64)

@@ -1,0 +1,81 @@
+"""Objects seen from above: outlines in the x-y plane."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from scipy.spatial import ConvexHull as Qhull
+from scipy.spatial import QhullError
+
+from collision_monitor.description import ObjectDescription
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.reach import reach
+from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, Polygon, Shape, Triangle
+from collision_monitor.session.history import Floats
+
+DIRECTIONS: Final = 64
+"""From which round shapes are looked at."""
+
+FAR: Final = 1e4
+"""m: how much is drawn of a half-space, more than any picture shows."""
+
+_CORNERS: Final = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+_ANGLE: Final = np.linspace(0.0, 2.0 * np.pi, DIRECTIONS, endpoint=False)
+_NORMAL: Final = np.stack([np.cos(_ANGLE), np.sin(_ANGLE), np.zeros(DIRECTIONS)], axis=1)
+
+
+def footprint(described: ObjectDescription, position: Floats, quaternion: Floats) -> list[Floats]:
+    """The outline (n, 2) in m of each of an object's shapes, convex but for polygons; a ground plane has none."""
+    pose = Pose(position, quaternion)
+    outlines = [_outline(shape, pose @ offset) for shape, offset in described.shapes]
+    return [outline for outline in outlines if outline is not None]
+
+
+def _outline(shape: Shape, pose: Pose) -> Floats | None:
+    match shape:
+        case HalfSpace():
+            return _half_plane(shape, pose)
+        case Polygon():
+            return _from_above(np.pad(shape.points, ((0, 0), (0, 1))), pose)
+        case Box():
+            return _hull(_CORNERS * np.asarray(shape.size), pose)
+        case ConvexHull() | Triangle():
+            return _hull(shape.points, pose)
+        case Mesh():
+            return _hull(shape.vertices, pose)
+    return _round(shape, pose)
+
+
+def _from_above(points: Floats, pose: Pose) -> Floats:
+    return np.asarray((points @ pose.rotation.T + pose.position)[:, :2], np.float64)
+
+
+def _hull(points: Floats, pose: Pose) -> Floats:
+    seen = _from_above(points, pose)
+    try:
+        return np.asarray(seen[Qhull(seen).vertices], np.float64)
+    except QhullError:  # it is seen from its edge
+        return seen
+
+
+def _round(shape: Shape, pose: Pose) -> Floats:
+    """Where neighbouring lines of sight meet."""
+    far = reach([(shape, Pose((0.0, 0.0, 0.0), pose.quaternion))], _NORMAL)
+    after_normal, after = np.roll(_NORMAL, -1, axis=0), np.roll(far, -1)
+    area = _NORMAL[:, 0] * after_normal[:, 1] - _NORMAL[:, 1] * after_normal[:, 0]
+    x = (far * after_normal[:, 1] - after * _NORMAL[:, 1]) / area
+    y = (after * _NORMAL[:, 0] - far * after_normal[:, 0]) / area
+    return np.asarray(np.stack([x, y], axis=1) + pose.position[:2], np.float64)
+
+
+def _half_plane(shape: HalfSpace, pose: Pose) -> Floats | None:
+    """What of a half-space lies in its own height: {x : n.x <= offset}."""
+    normal = pose.rotation @ shape.normal
+    level = float(np.linalg.norm(normal[:2]))
+    if level < 0.1:
+        return None
+    n = normal[:2] / level
+    edge = pose.position[:2] + n * shape.offset / level
+    along = np.array([-n[1], n[0]])
+    return np.array([edge + FAR * along, edge - FAR * along, edge - FAR * (along + n), edge + FAR * (along - n)])

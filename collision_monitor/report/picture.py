@@ -1,0 +1,80 @@
+"""How pictures look, and how they become SVG and PNG: for light and dark pages, broad and narrow."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from dataclasses import dataclass
+from io import BytesIO
+from typing import Any, Final
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+CONTACT, WARNING, POSSIBLE = "#d1493f", "#e0912a", "#8a8a8a"
+PALETTE: Final = ("#3b82c4", "#d1493f", "#2e9e5b", "#9b5fc0", "#e0912a", "#8a8a8a")
+
+INK: Final = "#010101"
+"""Of all text and lines that are no data. In SVG it becomes the page's text colour, which is light on dark pages."""
+
+STYLE: Final[Any] = {
+    "font.size": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "legend.handlelength": 1.2,
+    "svg.fonttype": "none",  # the reader's own fonts know the letters of every name
+    "svg.hashsalt": "collision_monitor",
+    "text.parse_math": False,  # a name may hold a dollar sign
+    **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), INK),
+}
+
+
+@dataclass(frozen=True)
+class Size:
+    """For which page: its name, the width of a picture (inches), and how many small pictures stand side by side."""
+
+    name: str
+    width: float
+    columns: int
+
+    @property
+    def narrow(self) -> bool:
+        """A phone."""
+        return self.columns == 1
+
+
+BROAD: Final = Size("broad", 7.6, 3)
+NARROW: Final = Size("narrow", 3.9, 1)
+
+_WITHOUT_METADATA: Final[Any] = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+
+
+def as_svg(figure: Figure, name: str) -> str:
+    """The picture as an SVG element to stand in HTML; the same bytes for the same picture.
+
+    name: of the picture, unique on the page, in front of all ids: a reference finds its own picture's parts.
+    """
+    text = _saved(figure, format="svg", metadata=_WITHOUT_METADATA, transparent=True).decode()
+    text = text[text.index("<svg") :]
+    text = re.sub(r'(\sid="|xlink:href="#|url\(#)', rf"\g<1>{name}-", text)
+    text = re.sub(r'\sxmlns(:xlink)?="[^"]*"', "", text)  # HTML knows what an SVG element is
+    text = re.sub(r"(font: [^'\";]*?)'DejaVu Sans'[^\";]*", r"\1system-ui, sans-serif", text)
+    text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.DOTALL)
+    return text.replace("xlink:href=", "href=").replace(INK, "currentColor")
+
+
+def as_png(figure: Figure) -> bytes:
+    """The picture as PNG on white."""
+    return _saved(figure, format="png", dpi=150, metadata={"Software": None})
+
+
+def _saved(figure: Figure, **options: Any) -> bytes:
+    buffer = BytesIO()
+    with mpl.rc_context(STYLE), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")  # of a name in other letters
+        figure.savefig(buffer, **options)
+    return buffer.getvalue()

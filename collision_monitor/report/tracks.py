@@ -1,0 +1,119 @@
+"""Where objects were, and how far apart, from the recorded states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.geometry.pose import from_rotation_vector, multiply, rotation_matrix
+from collision_monitor.geometry.shape_table import ShapeTableBuilder, take
+from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.narrow_phase.models import Modelled, containing_model
+from collision_monitor.records import StateFlag
+from collision_monitor.session.history import Floats, History, Pair
+
+PIECES: Final = 64
+"""Most pairs of convex pieces that a distance is taken of; beyond, the objects' convex hulls stand for them."""
+
+SAMPLES: Final = 800
+"""Times at which the distance of a pair is drawn, at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """States of one object: time (n,) s, position (n, 3) m, quaternion (n, 4), linear (n, 3) m/s, angular (n, 3) rad/s.
+
+    jump (n,): it was moved there, and not on a way from the state before. A static object has one state, from always.
+    """
+
+    time: Floats
+    position: Floats
+    quaternion: Floats
+    linear: Floats
+    angular: Floats
+    jump: NDArray[np.bool_]
+
+    def at(self, times: Floats) -> tuple[Floats, Floats, Floats]:
+        """Positions (k, 3), quaternions (k, 4), each carried on from the last state before, and its age (k,) s.
+
+        Before the first state the age is NaN.
+        """
+        i = np.searchsorted(self.time, times, side="right") - 1
+        with np.errstate(invalid="ignore"):
+            age = np.where(i >= 0, times - self.time[np.maximum(i, 0)], np.nan)
+        i, dt = np.maximum(i, 0), np.nan_to_num(age, posinf=0.0)[:, None]
+        turned = multiply(from_rotation_vector(self.angular[i] * dt), self.quaternion[i])
+        return self.position[i] + self.linear[i] * dt, turned, np.where(np.isposinf(age), 0.0, age)
+
+
+class Tracks:
+    """The tracks of a history's objects, by id."""
+
+    def __init__(self, history: History) -> None:
+        self._history = history
+        self._order = np.argsort(history.states["id"], kind="stable")
+        self._ids = history.states["id"][self._order]
+        self._found: dict[int, Track | None] = {}
+
+    def __getitem__(self, object_id: int) -> Track | None:
+        """None where nothing usable is known."""
+        if object_id not in self._found:
+            self._found[object_id] = self._read(object_id)
+        return self._found[object_id]
+
+    def _read(self, object_id: int) -> Track | None:
+        described = self._history.objects.get(object_id)
+        if described is not None and described.static and described.pose is not None:
+            pose, none = described.pose, np.zeros((1, 3))
+            always = np.array([-np.inf])
+            return Track(always, pose.position[None], pose.quaternion[None], none, none, np.zeros(1, np.bool_))
+        low, high = np.searchsorted(self._ids, [object_id, object_id + 1])
+        mine = self._order[low:high]
+        rows, time = self._history.states[mine], self._history.state_time[mine]
+        good = np.isfinite(rows["position"]).all(axis=1)
+        good &= np.abs(np.linalg.norm(rows["quaternion"], axis=1) - 1.0) < 1e-3
+        good[1:] &= time[1:] > np.maximum.accumulate(time)[:-1]
+        if not good.any():
+            return None
+        rows, time = rows[good], time[good]
+        linear, angular = (np.where(np.isfinite(rows[name]), rows[name], 0.0) for name in ("linear", "angular"))
+        jump = (rows["flags"] & StateFlag.DISCONTINUITY) != 0
+        return Track(time, rows["position"].copy(), rows["quaternion"].copy(), linear, angular, jump)
+
+    def distance(self, pair: Pair) -> tuple[Floats, Floats] | None:
+        """Times (n,) and signed distances (n,), NaN where a state is missing; None where nothing is known."""
+        history, (a, b) = self._history, (self[object_id] for object_id in pair)
+        if a is None or b is None or any(i not in history.objects for i in pair) or not len(history.times):
+            return None
+        times = history.times[:: -(-len(history.times) // SAMPLES)]
+        at_a, at_b = a.at(times), b.at(times)
+        models = [containing_model(history.objects[i].shapes, "exact") for i in pair]
+        if len(models[0].pieces) * len(models[1].pieces) > PIECES:
+            models = [containing_model(history.objects[i].shapes, "convex_hull") for i in pair]
+        distance = _distances(models[0], models[1], at_a[:2], at_b[:2])
+        distance -= sum(history.objects[i].padding for i in pair)
+        oldest = history.profile.stale_after
+        distance[~((at_a[2] <= oldest) & (at_b[2] <= oldest))] = np.nan
+        jumps = np.searchsorted(times, np.concatenate([each.time[each.jump] for each in (a, b)]))
+        jumps = np.unique(jumps[(jumps > 0) & (jumps < len(times))])
+        return np.insert(times, jumps, times[jumps]), np.insert(distance, jumps, np.nan)  # no line across a jump
+
+
+def _distances(a: Modelled, b: Modelled, at_a: tuple[Floats, Floats], at_b: tuple[Floats, Floats]) -> Floats:
+    """Least signed distances (n,) over the pieces of two objects at these positions and quaternions."""
+    count = len(at_a[0])
+    R_WA, R_WB = rotation_matrix(at_a[1]), rotation_matrix(at_b[1])
+    builder = ShapeTableBuilder()
+    slots = [[builder.append(piece) for piece, _ in model.pieces] for model in (a, b)]
+    pairs = np.stack([np.arange(count), np.arange(count, 2 * count)], axis=1).astype(np.int32)
+    best = np.full(count, np.inf)
+    for slot_a, (_, pose_a) in zip(slots[0], a.pieces, strict=True):
+        for slot_b, (_, pose_b) in zip(slots[1], b.pieces, strict=True):
+            table = take(builder.table, np.repeat([slot_a, slot_b], count))
+            position = np.concatenate([at_a[0] + R_WA @ pose_a.position, at_b[0] + R_WB @ pose_b.position])
+            rotation = np.concatenate([R_WA @ pose_a.rotation, R_WB @ pose_b.rotation])
+            best = np.minimum(best, contact_batch(table, position, rotation, pairs)[:, 0])
+    return best

@@ -1,0 +1,128 @@
+"""The verdict in words: what happened, and why it may not be all. Nothing is called clear that was not seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from collision_monitor.errors import Refusal
+from collision_monitor.report.alerts import Outcome
+from collision_monitor.report.facts import Facts
+from collision_monitor.session.history import History
+
+NAMED: Final = 3
+"""Objects, gaps and problems that are named; of more than that the number is said."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """answer: the first words. findings: sentences about what happened. doubts: why there may be more.
+
+    kind: `collisions`, `clear` or, where nothing is known of and not all is known, `unknown`.
+    """
+
+    kind: str
+    answer: str
+    findings: list[str]
+    doubts: list[str]
+
+
+def verdict(history: History, facts: Facts) -> Verdict:
+    """The verdict on a session."""
+    doubts = _doubts(history, facts)
+    count = len(facts.collisions)
+    if count:
+        kind, answer = "collisions", ("At least " if doubts else "") + _count(count, "collision")
+    elif doubts:
+        kind, answer = "unknown", "No collision is known of, but not all is known"
+    else:
+        kind, answer = "clear", "No collisions"
+    return Verdict(kind, answer, _findings(facts), doubts)
+
+
+def _count(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def _were(count: int) -> str:
+    return f"{count} {'was' if count == 1 else 'were'}"
+
+
+def _findings(facts: Facts) -> list[str]:
+    lines = []
+    leads = np.array([each.warned for each in facts.collisions if each.warned > 0.0])
+    if len(leads):
+        lines.append(
+            f"{_were(len(leads))} predicted: {leads.min():.2f} s ahead at the least, {np.median(leads):.2f} s in the "
+            "median"
+        )
+    if facts.surprises:
+        lines.append(f"{len(facts.surprises)} came without a prediction right before")
+    there = len(facts.collisions) - len(leads) - len(facts.surprises)
+    if there:
+        lines.append(f"{_were(there)} there from the first step on")
+    if facts.nothing:
+        pairs = len({alert.pair for alert in facts.nothing})
+        lines.append(
+            f"{_count(len(facts.nothing), 'warning')} of {_count(pairs, 'pair')} came to nothing: the objects moved "
+            "otherwise, or passed within the tolerance"
+        )
+    due = sum(each[-1].certain and each[-1].outcome is Outcome.OPEN for each in facts.alerts.values())
+    if due:
+        lines.append(f"{_count(due, 'pair')} still predicted to touch when the session ended")
+    if not facts.collisions and not facts.alerts:
+        lines.append("none was predicted either")
+    return lines
+
+
+def _doubts(history: History, facts: Facts) -> list[str]:
+    lines = _some(history.problems, "problems with the recording")
+    if not len(history.times):
+        return [*lines, "no step was answered"]
+    if not history.objects:
+        lines.append("no object was described: nothing could be monitored")
+    seen = set(history.states["id"].tolist())
+    unseen = [each.name for i, each in sorted(history.objects.items()) if not each.static and i not in seen]
+    if unseen:
+        lines.append(f"no state of {_names(unseen)} was ever received")
+    if (np.diff(history.times) < 0.0).any():
+        lines.append("the clock of the states was set back within the session")
+    lines += _some([f"no step from {a:.2f} s to {b:.2f} s" for a, b in facts.gaps], "gaps between the steps")
+    if facts.possible:
+        lines.append(f"{_count(len(facts.possible), 'further contact')} could not be excluded (UNRESOLVED)")
+    stale = len(np.unique(history.prediction_step[history.predictions["stale"] != 0]))
+    if stale:
+        lines.append(f"in {_count(stale, 'step')} predictions rested on states that were too old")
+    return lines + _counted(history)
+
+
+def _counted(history: History) -> list[str]:
+    """What the last status counted."""
+    status = history.status
+    if status is None:
+        return ["the session holds no status: what was refused or lost is not known"]
+    lines = []
+    refused = {reason.value: int(getattr(status, f"refused_{reason.value}")) for reason in Refusal}
+    if any(refused.values()):
+        reasons = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in refused.items() if count)
+        count = _count(sum(refused.values()), "refusal")
+        lines.append(f"{count} of messages, states or shapes ({reasons}); the last: {status.last_refusal}")
+    if status.messages_lost:
+        lines.append(f"{_count(status.messages_lost, 'message')} of states were lost on the way to the monitor")
+    if status.recording_dropped:
+        lines.append(f"{_count(status.recording_dropped, 'message')} could not be recorded")
+    if status.recording_error:
+        lines.append(f"the recorder failed: {status.recording_error}")
+    return lines
+
+
+def _some(sentences: list[str], what: str) -> list[str]:
+    more = len(sentences) - NAMED
+    return [*sentences[:NAMED], f"and {more} more {what}"] if more > 0 else sentences
+
+
+def _names(names: list[str]) -> str:
+    more = len(names) - NAMED
+    return ", ".join(names[:NAMED]) + (f" and {more} more" if more > 0 else "")
