@@ -14,10 +14,15 @@ from hypothesis import strategies as st
 
 import collision_monitor as cm
 from collision_monitor import Motion, Pose, contact, time_of_impact
+from collision_monitor.prediction.candidates import predict_pairs
 
 ROCK = cm.ConvexHull(np.random.default_rng(3).normal(size=(16, 3)) * 0.4)
 SOLIDS = [cm.Sphere(0.4), cm.Box((0.7, 0.9, 0.5)), cm.Capsule(0.2, 0.8), cm.Cylinder(0.4, 0.7), cm.Cone(0.5, 0.9), ROCK]
 BOX = cm.Box((1, 1, 1))
+FLOOR = cm.HalfSpace((0, 0, 1), 0)
+BOARD = [(cm.Box((9, 9, 1)), Pose((0, 0, -0.5)))]
+HALVES = [(cm.Box((1, 0.5, 1)), Pose((0, 0.25, 0))), (cm.Box((1, 0.5, 1)), Pose((0, -0.25, 0)))]
+LYING = (0, np.sqrt(0.5), 0, np.sqrt(0.5))
 
 
 def name(value):
@@ -159,6 +164,63 @@ def test_what_touches_parts_and_comes_back_is_found():
     )
 
 
+@pytest.mark.parametrize(
+    ("shape", "motion", "below"),
+    [
+        (cm.Sphere(0.5), Motion(Pose((0, 0, 0.5)), (1, 0, 0), (0, 2, 0)), FLOOR),
+        (cm.Sphere(0.5), Motion(Pose((0, 0, 0.5)), (1, 0, 0), (0, 2, 0)), BOARD),
+        (cm.Cylinder(0.5, 1), Motion(Pose((0, 0, 0.5), LYING), (0, 1, 0), (-2, 0, 0)), FLOOR),
+        (cm.Capsule(0.3, 1), Motion(Pose((0, 0, 0.3), LYING), (0, 1, 0), (-1 / 0.3, 0, 0)), FLOOR),
+        (cm.Cylinder(0.5, 1), Motion(Pose((0, 0, 0.5)), (0, 0, 0), (0, 0, 5)), BOARD),
+        (BOX, Motion(Pose((0, 0, 0.5)), (1, 0, 0), (0, 0, 3)), FLOOR),
+        (HALVES, Motion(Pose((0, 0, 0.5)), (1, 0, 0), (0, 0, 3)), FLOOR),
+        (HALVES, Motion(Pose((0, 0, 0.5)), (0, 1, 0)), BOARD),
+        (HALVES, Motion(Pose((0, 0, 0.5)), (0, 0, 1)), BOARD),
+        (BOX, Motion(Pose((0, 0.5, 0.5)), (0, 1, 0)), [(s, p @ Pose((0, 0, -0.5))) for s, p in HALVES]),  # over a seam
+    ],
+)
+def test_rolling_spinning_and_sliding_are_no_impact(shape, motion, below):
+    for horizon in (1e-3, 2, 1000):
+        assert time_of_impact(shape, motion, below, still(0, 0, 0), horizon).status == "clear"
+
+
+def test_a_part_that_touches_does_not_hide_one_that_comes():
+    wall = [(cm.Box((9, 9, 1)), Pose((0, 0, -0.5))), (cm.Box((1, 9, 9)), Pose((3, 0, 0)))]
+    ball = Motion(Pose((0, 0, 0.5)), (1, 0, 0), (0, 2, 0))
+    answer = time_of_impact(cm.Sphere(0.5), ball, wall, still(0, 0, 0), 9)
+    assert answer.status == "hit"
+    assert answer.lower <= 2.0 <= answer.upper
+
+
+def test_touching_at_random_against_dense_samples():
+    rng = np.random.default_rng(5)
+    times = np.concatenate([np.geomspace(1e-6, 2, 25), np.linspace(0, 2, 26)])
+    seen = {"hit": 0, "clear": 0, "unresolved": 0}
+    for k in range(75):
+        a, b = rng.choice(len(SOLIDS), 2)
+        A, B = random_motion(rng), random_motion(rng, 2.5)
+        gap = contact(SOLIDS[a], A.pose, SOLIDS[b], B.pose)
+        B = Motion(Pose(B.pose.position - gap.signed_distance * gap.normal, B.pose.quaternion), B.linear, B.angular)
+        if k % 3:  # apart, so that more of them part, or without turning
+            B = Motion(B.pose, B.linear + 2 * gap.normal, B.angular * (k % 3 - 1))
+        answer = time_of_impact(SOLIDS[a], A, SOLIDS[b], B)
+        seen[answer.status] += 1
+        distance = np.array([contact(SOLIDS[a], A.at(t), SOLIDS[b], B.at(t)).signed_distance for t in times])
+        assert (distance[times < answer.lower] > -1e-8).all()
+        if answer.status == "hit":
+            assert answer.contact.signed_distance < 0.0
+        if answer.status == "clear":
+            assert (distance > -1e-8).all()
+    assert seen["hit"] > 20 and seen["clear"] > 20
+
+
+def test_whole_numbers_are_numbers():
+    """Numba would compile the kernels anew for them: for a quarter of a minute, once."""
+    answer = time_of_impact(cm.Sphere(1), Motion(Pose(), (1, 0, 0)), BOX, still(4, 0, 0), 9, 1, 0, np.int32(50))
+    assert answer.status == "hit"
+    assert len(predict_pairs.signatures) == 1
+
+
 def test_separation_is_kept():
     answer = time_of_impact(cm.Sphere(1), Motion(Pose(), (1, 0, 0)), BOX, still(4, 0, 0), 9.0, separation=0.25)
     assert answer.lower <= 2.25 <= answer.upper
@@ -211,9 +273,12 @@ def test_scale_costs_nothing(scale):
     [
         ({"horizon": -1.0}, cm.InputError, "horizon: expected a finite number, at least 0, got -1.0"),
         ({"horizon": inf}, cm.InputError, "horizon"),
-        ({"tolerance": 0.0}, cm.InputError, "tolerance: expected a finite number of metres above 0, got 0.0"),
+        ({"tolerance": 0.0}, cm.InputError, "tolerance: expected a finite number, above 0, got 0.0"),
         ({"separation": float("nan")}, cm.InputError, "separation"),
         ({"iterations": 0}, cm.InputError, "iterations"),
+        ({"iterations": 2.5}, cm.InputError, "iterations: expected a whole number from 1, got 2.5"),
+        ({"horizon": "soon"}, cm.InputError, "horizon: expected a finite number, at least 0, got 'soon'"),
+        ({"shape_a": FLOOR, "shape_b": FLOOR}, cm.UnsupportedError, "two HalfSpaces"),
         ({"motion_a": Pose()}, cm.PoseError, "motion A: expected a Motion, got Pose"),
         ({"shape_b": 7}, cm.ShapeError, "shape B"),
         ({"shape_b": cm.Circle(1)}, cm.UnsupportedError, "meet each other only"),

@@ -1,0 +1,163 @@
+"""What becomes of two bodies that touch at the start: they part, slide, roll or rest, or they go deeper.
+
+Along a fixed direction in which two convex pieces do not overlap, the gap after a time t is at least a concave function
+of t (see time_of_impact.py), so that between two times it is above its values at both. Where that bound holds until
+they are apart, or for the whole horizon, touching was no impact.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import chain
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.reach import reach
+from collision_monitor.geometry.shapes import Capsule, Circle, Cone, Cylinder, Sphere
+from collision_monitor.narrow_phase.contact import contact
+from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.prediction.time_of_impact import HIT
+from collision_monitor.prediction.two_bodies import Body, Query, Scene, first_impacts, make_scene
+
+Array = NDArray[np.float64]
+
+HALVINGS: Final = 80
+"""Times that are tried for the parting of shapes that touch: the horizon, half of it, …: down to 1e-24 of it."""
+
+PROBES: Final = 40
+"""The same for their going deeper, which costs a distance query each: down to 1e-12 of the horizon."""
+
+ALIGNED: Final = 1e-12
+"""Sine of an angle that counts as none: it moves a support value by that part of the size, below what touching is.
+Larger: comes near that. Smaller: a wheel whose axis is rounded no longer rolls."""
+
+
+class Outcome(NamedTuple):
+    """The first impact of bodies that touch at the start; no impact: lower is infinite, a doubtful one: upper is."""
+
+    lower: float
+    upper: float
+
+
+def _outcome(event: np.void) -> Outcome:
+    return Outcome(float(event["lower"]), float(event["upper"]) if event["status"] == HIT else math.inf)
+
+
+def follow(a: Body, b: Body, query: Query, round_off: float) -> Outcome:
+    """When two bodies that touch at the start, no deeper than `round_off` (m), come nearer to each other than that."""
+    scene = make_scene(a, b, query.horizon, apart=True)
+    touching, later = _pairs(a, b, scene, query)
+    directions = [row[1:4] for _, _, row in touching]
+    for i, j, row in touching:
+        parted = -math.inf
+        for n in chain([row[1:4]], directions):
+            parted = max(parted, _parting(_Piece(a, i), _Piece(b, j), n, query, round_off))
+            if parted > 0.0:
+                break
+        if parted <= 0.0:
+            pairs = np.array([(i, len(a.pieces) + j) for i, j, _ in touching], np.int32)
+            return Outcome(0.0, _deep_by(a, b, scene, pairs, query, round_off))
+        if parted < query.horizon:
+            again = first_impacts(scene, np.array([[i, len(a.pieces) + j]], np.int32), parted, query)
+            later += [_outcome(event) for event in again]
+    if not later:
+        return Outcome(math.inf, math.inf)
+    return Outcome(min(e.lower for e in later), min(e.upper for e in later))
+
+
+def _pairs(a: Body, b: Body, scene: Scene, query: Query) -> tuple[list[tuple[int, int, Array]], list[Outcome]]:
+    """The pairs of pieces that touch, as (i, j, contact), and the impacts of the others."""
+    n, m = len(a.pieces), len(b.pieces)
+    rotation = np.stack([body.motion.pose.rotation @ pose.rotation for body in (a, b) for _, pose in body.pieces])
+    offset = b.motion.pose.position - a.motion.pose.position
+    position = np.stack([body.motion.pose.rotation @ pose.position for body in (a, b) for _, pose in body.pieces])
+    position[n:] += offset
+    touching: list[tuple[int, int, Array]] = []
+    later: list[Outcome] = []
+    for i in range(n):
+        events = first_impacts(scene, np.array([(i, n + j) for j in range(m)], np.int32), 0.0, query)
+        later += [_outcome(event) for event in events if event["lower"] > 0.0]
+        at_once = np.array([(e["i"], e["j"]) for e in events if e["lower"] <= 0.0], np.int32).reshape(-1, 2)
+        rows = contact_batch(scene.table, position, rotation, at_once)
+        touching += [(i, int(j) - n, row) for (_, j), row in zip(at_once, rows, strict=True)]
+    return touching, later
+
+
+class _Piece:
+    """A convex piece of a moving body, in world axes at the start, about the body's origin."""
+
+    def __init__(self, body: Body, index: int) -> None:
+        self.shape, pose = body.pieces[index]
+        self.origin, self.velocity, self.angular = body.motion.pose.position, body.motion.linear, body.motion.angular
+        self.rotation = body.motion.pose.rotation @ pose.rotation
+        self.offset = body.motion.pose.rotation @ pose.position
+        self.rate = float(np.linalg.norm(self.angular))
+        axes = np.concatenate([np.eye(3), -np.eye(3)])
+        unbounded = self.rate == 0.0
+        self.radius = (
+            0.0 if unbounded else float(np.linalg.norm(reach([(self.shape, Pose())], axes).reshape(2, 3).max(0)))
+        )
+
+    def support(self, directions: Array) -> Array:
+        """max of d . x (n,) over the points x about the piece's own origin, for directions (n, 3) of any length."""
+        length = np.linalg.norm(directions, axis=1)
+        unit = directions / length[:, None]
+        return np.asarray(length * reach([(self.shape, Pose())], unit @ self.rotation))
+
+    def advance(self, n: Array, times: Array) -> Array:
+        """Upper bounds (T,) on how much farther it reaches along n (3,) after the times (T,), by its turning."""
+        if self.rate == 0.0:
+            return np.zeros(len(times))
+        axis = self.angular / self.rate
+        across = float(np.linalg.norm(np.cross(n, axis)))
+        if across <= ALIGNED:
+            return np.zeros(len(times))
+        turn = np.cross(n, self.angular)
+        bend = 0.5 * (self.rate * times) ** 2 * across
+        farther = times * float(turn @ self.offset) + bend * float(np.linalg.norm(self.offset))
+        if not self._is_round_about(axis):
+            turned = n + times[:, None] * turn
+            farther = farther + self.support(turned) - self.support(n[None]) + bend * self.radius
+        return np.asarray(farther)
+
+    def _is_round_about(self, axis: Array) -> bool:
+        """Whether a turn about the axis (3,) through its own origin changes nothing."""
+        own = isinstance(self.shape, Capsule | Cylinder | Cone)
+        return isinstance(self.shape, Sphere | Circle) or (
+            own and float(np.linalg.norm(np.cross(self.rotation[:, 2], axis))) <= ALIGNED
+        )
+
+
+def _parting(a: _Piece, b: _Piece, n: Array, query: Query, round_off: float) -> float:
+    """A time until which they certainly go no deeper; they are apart then, or it is the horizon; 0 where none is."""
+    between = b.origin - a.origin + (b.offset - a.offset)
+    gap = float(n @ between) - float(a.support(n[None])[0]) - float(b.support(-n[None])[0]) - query.separation
+    if not gap >= -round_off:
+        return 0.0
+    times: Array = query.horizon * np.exp2(-np.arange(HALVINGS, dtype=np.float64))
+    least = gap + times * float(n @ (b.velocity - a.velocity)) - a.advance(n, times) - b.advance(-n, times)
+    # seen along the axes of SAT, boxes are half as far apart as they are at least: enough for a new start
+    clear = np.flatnonzero(least > 2.0 * query.tolerance)
+    if len(clear):
+        return float(times[clear[0]])
+    return query.horizon if least[0] >= -round_off else 0.0
+
+
+def _deep_by(a: Body, b: Body, scene: Scene, pairs: NDArray[np.int32], query: Query, round_off: float) -> float:
+    """A time at which they are deeper than `round_off` for certain, early where that is easy; infinite: none found."""
+    wanted = query.separation - 2.0 * round_off
+    events = first_impacts(scene, pairs, 0.0, query, wanted)
+    sure = [float(e["upper"]) for e in events if e["status"] == HIT and e["upper"] <= query.horizon]
+    if sure:
+        return min(sure)
+    found = math.inf
+    for t in query.horizon * 0.5 ** np.arange(PROBES):
+        distance = contact(a.shapes, a.motion.at(t), b.shapes, b.motion.at(t)).signed_distance
+        if distance < wanted:
+            found = float(t)
+        elif found < math.inf:
+            break
+    return found
