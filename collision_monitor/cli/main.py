@@ -7,13 +7,14 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from keyword import iskeyword
 from typing import Final
 
 from collision_monitor._version import VERSION
 from collision_monitor.errors import CollisionMonitorError
 
-COMMANDS: Final = ("demo", "run", "world", "replay", "report", "check", "salvage", "tradeoff", "bench")
-"""In the order of `--help`. Each is a module of this package with `add_parser(subparsers)`."""
+COMMANDS: Final = ("demo", "run", "world", "replay", "report", "check", "salvage", "import", "tradeoff", "bench")
+"""In the order of `--help`. Each is a module of this package (`import_` for import) with `add_parser(subparsers)`."""
 
 EXIT_ERROR: Final = 1
 EXIT_INTERRUPTED: Final = 128 + 2  # what a shell reports for SIGINT
@@ -31,6 +32,7 @@ examples:
   collision-monitor report run.mcap                       what happened, as one HTML page
   collision-monitor check run.mcap --expect expected.yaml recorded sessions as regression tests
   collision-monitor salvage cut.mcap -o whole.mcap        what is whole in a damaged recording
+  collision-monitor import bag --map map.yaml -o run.mcap odometry, poses, tf or markers as a session
   collision-monitor tradeoff --scene fleet                what each profile costs and how wrong it is
   collision-monitor bench --scene boxes --n 10000         how long it takes to find all contacts
 
@@ -51,7 +53,8 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"%(prog)s {VERSION}")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in COMMANDS:
-        import_module(f"collision_monitor.cli.{name}").add_parser(subparsers)
+        module = f"{name}_" if iskeyword(name) else name
+        import_module(f"collision_monitor.cli.{module}").add_parser(subparsers)
     return parser
 
 

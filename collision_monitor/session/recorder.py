@@ -57,6 +57,7 @@ class Recorder:
 
     path: a new `.mcap` file, or a new folder of any other name (then with a metadata.yaml, as `ros2 bag record` does).
     types: topic -> message name, such as `ContactArray`. metadata: what `Pipeline.metadata` says.
+    patient: `write` waits for the disk where the queue is full, instead of dropping: for a caller who has the time.
     Raises SessionError where the file cannot be made or is there already (unless overwrite).
     """
 
@@ -68,6 +69,7 @@ class Recorder:
         *,
         overwrite: bool = False,
         queue_bytes: int = QUEUE_BYTES,
+        patient: bool = False,
     ) -> None:
         unknown = [name for name in types.values() if name not in TYPES]
         if unknown:
@@ -75,6 +77,7 @@ class Recorder:
         self.path = Path(path)
         self._types = dict(types)
         self._queue_bytes = queue_bytes
+        self._patient = patient
         self._folder = None if self.path.suffix == ".mcap" else self.path
         definitions = {name: definition(full_name(name)).encode() for name in self._types.values()}
         self._stream = _create(self.path, overwrite)
@@ -114,6 +117,9 @@ class Recorder:
         channel = self._channels[topic]
         size = len(data) + _OVERHEAD
         with self._wake:
+            while self._patient and self._state is Recording.ON and self._waiting + size > self._queue_bytes:
+                self._wake.notify()
+                self._wake.wait(FLUSH_PERIOD)
             sequence = self._next_sequence & 0xFFFFFFFF
             self._next_sequence += 1
             if self._closing or self._state is Recording.FAILED or self._waiting + size > self._queue_bytes:

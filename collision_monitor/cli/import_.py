@@ -1,0 +1,104 @@
+"""`collision-monitor import`: a bag of another program as a session."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collision_monitor.session.foreign import Imported
+
+EXIT_LEFT_OUT = 3
+
+DESCRIPTION = """\
+Make a session of a bag that holds nav_msgs/Odometry, geometry_msgs/PoseStamped (or WithCovariance), tf2_msgs/TFMessage
+or visualization_msgs/Marker and MarkerArray. A mapping file says which topic tells where which object is:
+
+  frame: map                       # of the session; poses in other frames are brought there by the bag's tf
+  stamps: header                   # or `received`: when the bag got the message
+  objects:
+    cart:     {topic: /cart/odom, shape: {box: [1.2, 0.8, 0.5], at: [0, 0, 0.25]}}
+    person_1: {topic: /tf, frame: person_1, shape: {capsule: [0.3, 1.1]}}
+    crate:    {topic: /markers, marker: {ns: crates, id: 7}}         # the marker's own shape
+    walls:    {topic: /markers, marker: {ns: walls}, static: true}   # all markers of the namespace
+    floor:    {static: true, shape: {half_space: [0, 0, 1, 0]}}
+
+Without --map the bag must hold a monitor's own inputs, as `ros2 bag record` takes them.
+"""
+EPILOG = """\
+exit codes: 0 all of it was imported, 1 it cannot be imported, 3 something was left out (it is said what)
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Register the command."""
+    parser = subparsers.add_parser(
+        "import",
+        help="make a session of a bag with odometry, poses, transforms or markers",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("bag", type=Path, metavar="BAG", help="an .mcap or .db3 file, or the folder of a bag")
+    parser.add_argument("--map", type=Path, metavar="FILE", help="the mapping file (YAML)")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help="the new session (.mcap)")
+    parser.add_argument("--profile", default="balanced", metavar="NAME", help="fast, balanced (default) or exact")
+    parser.add_argument("--node", metavar="NAME", help="without --map: the monitor whose inputs are taken")
+    parser.add_argument("--force", action="store_true", help="overwrite OUT")
+    parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
+    parser.set_defaults(command=import_command)
+
+
+def import_command(args: argparse.Namespace) -> int:
+    """Return the exit code. Raises SessionError, InputError."""
+    from collision_monitor.session.foreign import import_bag, load_mapping
+
+    mapping = None if args.map is None else load_mapping(args.map)
+    with _progress() as progress:
+        result = import_bag(
+            args.bag,
+            args.output,
+            mapping,
+            profile=args.profile,
+            node=args.node,
+            overwrite=args.force,
+            progress=progress,
+        )
+    if args.json:
+        print(json.dumps({"bag": str(args.bag), "output": str(args.output), **asdict(result)}, indent=2))
+    else:
+        print(_as_text(result, args.output))
+    return 0 if result.whole else EXIT_LEFT_OUT
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[Imported], None] | None]:
+    """The number of messages on stderr, where that is a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status("import") as status:
+
+        def show(result: Imported) -> None:
+            if result.messages % 256 == 0:
+                status.update(f"import: {result.messages} messages, {result.steps} steps")
+
+        yield show
+
+
+def _as_text(result: Imported, output: Path) -> str:
+    lines = [f"states     {count:8d}  {name}" for name, count in result.states.items()]
+    lines += [f"skipped    {count:8d}  {reason}" for reason, count in result.skipped.items()]
+    lines += [f"refused    {count:8d}  {reason.replace('_', ' ')}" for reason, count in result.refused.items()]
+    if result.refused:
+        lines.append(f"last       {result.last_refusal}")
+    lines += [f"unseen     {name}: the bag tells nothing of it that could be used" for name in result.unseen]
+    return "\n".join([*lines, f"written    {result.messages} messages, {result.steps} steps to {output}"])

@@ -1,0 +1,114 @@
+"""A rosbag2 recording of any program: an MCAP or SQLite file, or the folder that `ros2 bag record` makes.
+
+rosbags reads it: it knows every storage, compression and age of the format, and decodes by the definitions in the bag.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple
+
+from collision_monitor.errors import MessageError, SessionError
+
+
+class Raw(NamedTuple):
+    """A message as it lies in the bag; time in ns."""
+
+    topic: str
+    type: str
+    log_time: int
+    data: bytes
+
+
+class Bag:
+    """An open bag. topics: topic -> type, `nav_msgs/msg/Odometry`. Raises SessionError for what is none."""
+
+    def __init__(self, path: Path) -> None:
+        try:
+            from rosbags.rosbag2 import Reader
+        except ImportError:
+            raise SessionError("reading other programs' bags needs rosbags, got none: pip install rosbags") from None
+        self.path = path
+        if not path.exists():
+            raise SessionError(f"{path}: expected a bag, got nothing there")
+        if path.is_dir() and not (path / "metadata.yaml").exists():
+            raise SessionError(
+                f"{path}: expected the folder of a bag, got one without metadata.yaml; "
+                "name the .mcap file in it, or make it with `ros2 bag reindex`"
+            )
+        try:
+            self._reader = Reader(path)
+            self._reader.open()
+        except Exception as error:  # the library has one for each kind of damage, and lets others through
+            raise self._broken(error) from None
+        self.topics: dict[str, str] = {}
+        for connection in self._reader.connections:
+            other = self.topics.setdefault(connection.topic, connection.msgtype)
+            if other != connection.msgtype:
+                self.close()
+                raise SessionError(f"{path}: topic {connection.topic} has messages of {other} and {connection.msgtype}")
+        self._types: Any = None
+
+    def messages(self, topics: Iterable[str]) -> Iterator[Raw]:
+        """The messages of these topics by the time of their receipt. Raises SessionError where the bag is damaged."""
+        wanted = set(topics)
+        connections = [c for c in self._reader.connections if c.topic in wanted]
+        if not connections:  # for rosbags, none is all
+            return
+        try:
+            for connection, log_time, data in self._reader.messages(connections):
+                yield Raw(connection.topic, connection.msgtype, log_time, data)
+        except GeneratorExit:
+            raise
+        except SessionError:
+            raise
+        except Exception as error:
+            raise self._broken(error) from None
+
+    def decode(self, message: Raw) -> Any:
+        """The message with its fields as attributes. Raises MessageError."""
+        if self._types is None:
+            self._types = self._typestore()
+        try:
+            return self._types.deserialize_cdr(message.data, message.type)
+        except Exception as error:
+            reason = str(error) or type(error).__name__
+            raise MessageError(f"{message.topic}: expected a {message.type}, cannot be decoded: {reason}") from None
+
+    def _typestore(self) -> Any:
+        """The types of ROS 2 Jazzy, and in their place what the bag itself says of the types that it holds."""
+        from rosbags.interfaces import MessageDefinitionFormat
+        from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+
+        found: dict[Any, Any] = {}
+        for connection in self._reader.connections:
+            definition = connection.msgdef
+            with suppress(Exception):  # a bag may hold types that nobody can read; those we need are standard ones
+                if definition.format == MessageDefinitionFormat.MSG:
+                    found |= get_types_from_msg(definition.data, connection.msgtype)
+                elif definition.format == MessageDefinitionFormat.IDL:
+                    found |= get_types_from_idl(definition.data)
+        store = get_typestore(Stores.EMPTY)
+        store.register({**get_typestore(Stores.ROS2_JAZZY).fielddefs, **found})
+        return store
+
+    def close(self) -> None:
+        """Close its files."""
+        with suppress(Exception):
+            self._reader.close()
+
+    def __enter__(self) -> Bag:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _broken(self, error: Exception) -> SessionError:
+        reason = str(error) or type(error).__name__
+        hint = "" if self.path.suffix != ".mcap" else "; `collision-monitor salvage` recovers what is whole in it"
+        return SessionError(f"{self.path}: expected a bag of rosbag2, cannot be read: {reason}{hint}")

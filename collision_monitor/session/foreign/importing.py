@@ -1,0 +1,224 @@
+"""Makes a session of a bag: its messages become the monitor's inputs, and the monitor answers them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from collision_monitor.codec import decode_states
+from collision_monitor.errors import CollisionMonitorError, InputError, MessageError, Refusal, SessionError
+from collision_monitor.pipeline import Pipeline
+from collision_monitor.profiles import Profile
+from collision_monitor.session.foreign.bag import Bag
+from collision_monitor.session.foreign.convert import TRANSFORMS, Converter, Input, put_transform
+from collision_monitor.session.foreign.mapping import Mapping
+from collision_monitor.session.foreign.transforms import TransformTree
+from collision_monitor.session.recorder import Recorder, Recording
+from collision_monitor.session.rosbag2 import full_name
+
+NODE: Final = "/object_monitor"
+STATUS_PERIOD: Final = 50_000_000
+"""ns between two statuses, as the node has them."""
+
+_STATIC: Final = "tf_static"
+_INPUTS: Final = ("ObjectStateArray", "ObjectDescriptionArray")
+
+
+@dataclass
+class Imported:
+    """What came of a bag. states: of each object, how many were told; skipped, refused: what was left out, and why."""
+
+    messages: int = 0
+    steps: int = 0
+    states: dict[str, int] = field(default_factory=dict)
+    skipped: dict[str, int] = field(default_factory=dict)
+    refused: dict[str, int] = field(default_factory=dict)
+    last_refusal: str = ""
+
+    @property
+    def unseen(self) -> list[str]:
+        """Moving objects of the mapping of which the bag tells nothing that could be used."""
+        return sorted(name for name, count in self.states.items() if not count)
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing was left out."""
+        return not (self.skipped or self.refused or self.unseen)
+
+
+def import_bag(
+    source: Path,
+    target: Path,
+    mapping: Mapping | None = None,
+    *,
+    profile: Profile | str = "balanced",
+    node: str | None = None,
+    overwrite: bool = False,
+    progress: Callable[[Imported], None] | None = None,
+) -> Imported:
+    """Write the session `target` from the bag `source`.
+
+    Without a mapping the bag must hold a monitor's inputs; node: whose, where there are several.
+    Raises SessionError, InputError; then there is no target.
+    """
+    result = Imported()
+    if target.exists() and source.exists() and target.samefile(source):
+        raise SessionError(f"{target}: expected another file than the bag that is imported")
+    with Bag(source) as bag:
+        if mapping is None:
+            frame_id, inputs = _recorded_inputs(bag, node)
+        else:
+            converter = _converter(bag, mapping)
+            frame_id, inputs = mapping.frame, _mapped_inputs(bag, mapping, converter, result)
+        pipeline = Pipeline(profile, frame_id=frame_id)
+        _write(inputs, target, pipeline, result, overwrite, progress)
+    if mapping is not None:
+        result.states, result.skipped = dict(converter.states), result.skipped | dict(converter.skipped)
+    return result
+
+
+def _write(
+    inputs: Iterator[Input],
+    target: Path,
+    pipeline: Pipeline,
+    result: Imported,
+    overwrite: bool,
+    progress: Callable[[Imported], None] | None,
+) -> None:
+    """Feed the inputs and record them with the answers."""
+    names = ("objects/shapes", "objects/states", "contacts", "predictions", "status")
+    shapes, states, contacts, predictions, status = (f"{NODE}/{name}" for name in names)
+    topics = dict(zip(("ObjectDescriptionArray", "ObjectStateArray"), (shapes, states), strict=True))
+    types = {
+        **{topic: kind for kind, topic in topics.items()},
+        contacts: "ContactArray",
+        predictions: "PredictedCollisionArray",
+        status: "MonitorStatus",
+    }
+    first = next(inputs, None)  # what is wrong with the bag shows before there is a file
+    if first is None:
+        raise SessionError("expected messages of the mapped topics in the bag, got none")
+    recorder = Recorder(target, types, pipeline.metadata(node=NODE), overwrite=overwrite, patient=True)
+    last_status = now = first.log_time
+    try:
+        recorder.write(status, pipeline.status(), now, now)
+        each: Input | None = first
+        while each is not None:
+            now = each.log_time
+            outputs = None
+            if each.kind == "ObjectDescriptionArray":
+                pipeline.on_shapes(each.data)
+                if each is first and pipeline.monitor.refused[Refusal.SHAPE]:
+                    raise InputError(pipeline.monitor.last_refusal)
+            else:
+                outputs = pipeline.on_states(each.data)
+            recorder.write(topics[each.kind], each.data, now, each.publish_time)
+            result.messages += 1
+            if outputs is not None:
+                result.steps = outputs.result.step
+                recorder.write(contacts, outputs.contacts, now, outputs.result.stamp_ns)
+                recorder.write(predictions, outputs.predictions, now, outputs.result.stamp_ns)
+                if now - last_status >= STATUS_PERIOD:
+                    last_status = now
+                    recorder.write(status, pipeline.status(), now, now)
+            if progress is not None:
+                progress(result)
+            each = next(inputs, None)
+        recorder.write(status, pipeline.status(), now, now)
+    except BaseException:
+        recorder.close()
+        _remove(target)
+        raise
+    recorder.close()
+    told = recorder.status()
+    if told["recording"] == Recording.FAILED:
+        _remove(target)
+        raise SessionError(str(told["recording_error"]))
+    result.refused = {reason.value: count for reason, count in pipeline.monitor.refused.items() if count}
+    result.last_refusal = pipeline.monitor.last_refusal
+
+
+def _remove(target: Path) -> None:
+    with suppress(OSError):
+        if target.is_dir():
+            for path in [*target.glob(f"{target.name}_*.mcap"), target / "metadata.yaml"]:
+                path.unlink(missing_ok=True)
+            target.rmdir()
+        else:
+            target.unlink()
+
+
+# -- bags with other topics
+
+
+def _converter(bag: Bag, mapping: Mapping) -> Converter:
+    """With the static transforms of the whole bag: they hold from its start, whenever they were recorded."""
+    tree = TransformTree()
+    for raw in bag.messages(topic for topic in _transform_topics(bag) if topic.endswith(_STATIC)):
+        with suppress(MessageError):  # counted when its turn comes
+            for each in bag.decode(raw).transforms:
+                put_transform(tree, each, static=True)
+    return Converter(mapping, bag.topics, tree)
+
+
+def _mapped_inputs(bag: Bag, mapping: Mapping, converter: Converter, result: Imported) -> Iterator[Input]:
+    begun = False
+    for raw in bag.messages({*mapping.topics, *_transform_topics(bag)}):
+        if raw.topic.endswith(_STATIC) and raw.type == TRANSFORMS and raw.topic not in mapping.topics:
+            continue
+        if not begun:
+            begun = True
+            yield converter.begin(raw.log_time)
+        try:
+            message = bag.decode(raw)
+        except MessageError as error:
+            result.skipped[str(error)] = result.skipped.get(str(error), 0) + 1
+            continue
+        yield from converter.take(raw.topic, raw.type, message, raw.log_time)
+
+
+def _transform_topics(bag: Bag) -> list[str]:
+    return [topic for topic, kind in bag.topics.items() if kind == TRANSFORMS]
+
+
+# -- bags with a monitor's topics
+
+
+def _recorded_inputs(bag: Bag, node: str | None) -> tuple[str, Iterator[Input]]:
+    """The frame of the states and the inputs, as they were recorded."""
+    chosen: dict[str, str] = {}
+    for name in _INPUTS:
+        found = [topic for topic, kind in bag.topics.items() if kind == full_name(name)]
+        if node is not None:
+            found = [topic for topic in found if topic.startswith(f"{node.rstrip('/')}/")]
+        if len(found) > 1:
+            raise SessionError(
+                f"{bag.path}: expected the inputs of one monitor, got {', '.join(sorted(found))}; "
+                "choose with --node, such as --node " + found[0].removesuffix("/objects/states")
+            )
+        if found:
+            chosen[found[0]] = name
+    if "ObjectStateArray" not in chosen.values():
+        there = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(bag.topics.items())) or "no topics"
+        raise SessionError(
+            f"{bag.path}: expected {full_name('ObjectStateArray')}{f' of {node}' if node else ''}, got {there}; "
+            "for other topics give a mapping file (--map)"
+        )
+    frame_id = ""
+    for raw in bag.messages([topic for topic, name in chosen.items() if name == "ObjectStateArray"]):
+        with suppress(CollisionMonitorError):
+            frame_id = decode_states(raw.data).frame_id
+            break
+    return frame_id or "world", _inputs(bag, chosen)
+
+
+def _inputs(bag: Bag, chosen: dict[str, str]) -> Iterator[Input]:
+    for raw in bag.messages(chosen):
+        stamp = raw.log_time
+        if chosen[raw.topic] == "ObjectStateArray":
+            with suppress(MessageError):
+                stamp = decode_states(raw.data).stamp_ns
+        yield Input(chosen[raw.topic], bytes(raw.data), raw.log_time, stamp)
