@@ -59,8 +59,18 @@ def shortened(name: str, longest: int = 18) -> str:
 
 
 def drawn_collisions(facts: Facts) -> list[Collision]:
-    """Those whose predictions are drawn: the earliest."""
-    return [each for each in facts.collisions if each in facts.answered][:CURVES]
+    """Those whose predictions are drawn: the ones that were most wrong, then the ones that were made longest before."""
+    chosen = sorted(facts.answered, key=lambda c: (-_worst(facts, c), -c.warned, c.begin, c.pair))[:CURVES]
+    return sorted(chosen, key=lambda c: (c.begin, c.pair))
+
+
+def largest_error(facts: Facts) -> float:
+    """Of all predictions of collisions, how far the stated interval was off at most, s; 0 without any."""
+    return max((_worst(facts, each) for each in facts.answered), default=0.0)
+
+
+def _worst(facts: Facts, collision: Collision) -> float:
+    return float(np.abs(stated_error(facts.answered[collision], collision, facts.period)).max())
 
 
 def _runs(times: Floats, longest: float, period: float) -> list[tuple[float, float]]:
@@ -83,26 +93,27 @@ def _timeline(history: History, facts: Facts, size: Size) -> Figure | None:
     for begin, end in facts.gaps:
         axes.axvspan(begin, end, facecolor="none", edgecolor=POSSIBLE, hatch="////", linewidth=0, alpha=0.6)
     shortest = max(facts.period, history.duration / FINEST)
+    reach = 0.26 if size.narrow else 0.42
     for row, pair in enumerate(pairs):
         for certain, color in ((False, POSSIBLE), (True, WARNING)):
             times = [alert.time for alert in facts.alerts.get(pair, ()) if alert.certain == certain]
             if times:
                 runs = _runs(np.concatenate(times), 1.5 * shortest, shortest)
-                axes.broken_barh(runs, (row - 0.14, 0.28), color=color, linewidth=0)
+                axes.broken_barh(runs, (row - 0.3 * reach, 0.6 * reach), color=color, linewidth=0)
         for each in of_pair[pair]:
             end = history.duration if each.end is None else each.end
             color = CONTACT if each.certain else POSSIBLE
             bar = (each.begin, max(end - each.begin, shortest))
-            axes.broken_barh([bar], (row - 0.3, 0.6), color=color, linewidth=0)
+            axes.broken_barh([bar], (row - 0.7 * reach, 1.4 * reach), color=color, linewidth=0)
             if each in facts.answered:
                 low, high = facts.answered[each].first_stated
                 stated = [low, high] if np.isfinite(high) else [low]
-                axes.vlines(stated, row - 0.42, row + 0.42, color=INK, linewidth=0.9)
+                axes.vlines(stated, row - reach, row + reach, color=INK, linewidth=0.9)
     if size.narrow:  # the names over the bars: beside them there is no room
         axes.set_yticks([])
         axes.spines["left"].set_visible(False)
         for row, pair in enumerate(pairs):
-            axes.text(0.0, row - 0.44, pair_name(history, pair), fontsize=8, va="center", ha="left")
+            axes.text(0.0, row - 0.46, pair_name(history, pair), fontsize=8, va="center", ha="left")
         axes.set_ylim(len(pairs) - 0.4, -0.8)
     else:
         axes.set_yticks(range(len(pairs)), [pair_name(history, pair) for pair in pairs], fontsize=9)
@@ -111,7 +122,8 @@ def _timeline(history: History, facts: Facts, size: Size) -> Figure | None:
     axes.set_xlabel("s from the first step")
     handles: list[Patch | Line2D] = [Patch(color=CONTACT, label="in contact"), Patch(color=WARNING, label="predicted")]
     if facts.answered:
-        handles.append(Line2D([], [], color=INK, marker="|", linestyle="", label="when, as first stated"))
+        mark = Line2D([], [], color=INK, marker="|", markersize=10, linestyle="", label="when, as first stated")
+        handles.append(mark)
     if facts.possible or any(not alert.certain for pair in pairs for alert in facts.alerts.get(pair, ())):
         handles.append(Patch(color=POSSIBLE, label="possible"))
     if facts.gaps:
@@ -129,7 +141,7 @@ def _predicted(history: History, facts: Facts, size: Size) -> Figure | None:
     chosen = drawn_collisions(facts)
     if not chosen:
         return None
-    figure = Figure(figsize=(size.width, 3.4 if size.narrow else 3.0), layout="constrained")
+    figure = Figure(figsize=(size.width, 4.0 if size.narrow else 3.0), layout="constrained")
     axes = figure.subplots()
     axes.axhspan(-1e3 * facts.period, 0.0, color=POSSIBLE, alpha=0.25, linewidth=0)
     handles: list[Patch | Line2D] = []
@@ -150,12 +162,6 @@ def _predicted(history: History, facts: Facts, size: Size) -> Figure | None:
     handles.append(Patch(color=POSSIBLE, alpha=0.4, label="within the step in which it began"))
     _legend(figure, handles, 1 if size.narrow else 2)
     return figure
-
-
-def largest_error(facts: Facts) -> float:
-    """Of all predictions of collisions, how far the stated interval was off at most, s; NaN without any."""
-    errors = [np.abs(stated_error(alert, each, facts.period)).max() for each, alert in facts.answered.items()]
-    return float(max(errors, default=np.nan))
 
 
 def _distances(history: History, facts: Facts, size: Size) -> Figure | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isnan
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -25,8 +26,9 @@ POINTS: Final = 400
 
 
 def chosen_events(facts: Facts) -> list[Collision]:
-    """The collisions that are drawn: first those that nobody predicted, then the deepest; in order of time."""
-    worst = sorted(facts.collisions, key=lambda c: (c.warned > 0.0, c.deepest, c.begin, c.pair))[:EVENTS]
+    """The collisions that are drawn: not predicted ones first, those there from the start last; in order of time."""
+    worst = sorted(facts.collisions, key=lambda c: (isnan(c.warned), c.warned > 0.0, c.deepest, c.begin, c.pair))
+    worst = worst[:EVENTS]
     return sorted(worst, key=lambda c: (c.begin, c.pair))
 
 
@@ -67,8 +69,8 @@ def _panel(axes: Axes, history: History, facts: Facts, collision: Collision) -> 
         for outline in outlines:
             axes.fill(*outline.T, facecolor=color, edgecolor=color, alpha=0.4, linewidth=1.2)
         extents += [outline for outline in outlines if np.ptp(outline, axis=0).max() < FAR]
-        if np.any(path.linear):
-            earlier = path.at(np.maximum(now - 0.5 * AROUND, path.time[:1]))
+        if np.any(path.linear) and collision.begin - 0.5 * AROUND >= path.time[0]:
+            earlier = path.at(now - 0.5 * AROUND)
             for outline in footprint(described, earlier[0][0], earlier[1][0]):
                 axes.fill(*outline.T, facecolor="none", edgecolor=color, linestyle=":", linewidth=1)
     rows = history.contacts[(history.contact_step == collision.step) & _of_pair(history, collision)]

@@ -11,7 +11,7 @@ from typing import Final
 from collision_monitor._version import VERSION
 from collision_monitor.errors import SessionError
 from collision_monitor.report.facts import Facts, gather
-from collision_monitor.report.figures import PAIRS, drawn_collisions, figures, largest_error
+from collision_monitor.report.figures import CURVES, PAIRS, drawn_collisions, figures, largest_error
 from collision_monitor.report.from_above import AROUND, EVENTS
 from collision_monitor.report.picture import BROAD, NARROW, as_png, as_svg
 from collision_monitor.report.verdict import verdict
@@ -45,13 +45,15 @@ figure { margin: 0; }
 figure svg { width: 100%; height: auto; display: block; }
 .narrow { display: none; }
 @media screen and (max-width: 36rem) { .narrow { display: block; } .broad { display: none; } }
-.scroll { overflow-x: auto; }
+.scroll { overflow: auto; max-height: 28rem; }
+.scroll tr:first-child th { position: sticky; top: 0; background: var(--paper); }
 table { border-collapse: collapse; width: 100%; font-size: .9rem; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }
 .number { text-align: right; white-space: nowrap; }
 .number:last-child { padding-right: 0; }
 .facts td { overflow-wrap: anywhere; }
-@media print { body { max-width: none; } figure, tr, .verdict { break-inside: avoid; } h2, p { break-after: avoid; } }
+@media print { body { max-width: none; } .scroll { max-height: none; } h2, p { break-after: avoid; }
+  figure, tr, .verdict { break-inside: avoid; } }
 """
 
 
@@ -162,11 +164,12 @@ def _timeline_caption(facts: Facts) -> str:
 def _predicted_caption(facts: Facts) -> str:
     left = len(facts.answered) - len(drawn_collisions(facts))
     worst = largest_error(facts)
+    held = f"at worst the interval was off by {worst:.2g} s" if worst > 0.0005 else "here every interval was right"
     return (
         "For each collision that was predicted: how far off the stated time was, from the first prediction to the "
-        "contact. The band is the stated interval; below the grey it was too early, above too late. The largest error "
-        f"of all predictions is {worst * 1e3:.3g} ms beyond the stated interval."
-        + (f" The first ones; {left} more left out." if left else "")
+        "contact. The band is the stated interval; below the grey it was too early, above too late. "
+        f"A prediction says what happens if both go on as they move: {held}."
+        + (f" The {CURVES} that were furthest off; {left} more left out." if left else "")
     )
 
 
@@ -205,7 +208,7 @@ _COLUMNS: Final[tuple[tuple[str, Callable[[Collision, Facts], str]], ...]] = (
 
 def _warned(collision: Collision) -> str:
     if math.isnan(collision.warned):
-        return "there from the start"
+        return "at start"
     return f"{collision.warned:.3f}" if collision.warned else '<span class="bad">not</span>'
 
 

@@ -12,7 +12,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 CONTACT, WARNING, POSSIBLE = "#d1493f", "#e0912a", "#8a8a8a"
-PALETTE: Final = ("#3b82c4", "#d1493f", "#2e9e5b", "#9b5fc0", "#e0912a", "#8a8a8a")
+PALETTE: Final = ("#3b82c4", "#d1493f", "#2e9e5b", "#9b5fc0", "#e0912a", "#1a9fa8")
 
 INK: Final = "#010101"
 """Of all text and lines that are no data. In SVG it becomes the page's text colour, which is light on dark pages."""
