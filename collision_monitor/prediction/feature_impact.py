@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.errors import InputError
+from collision_monitor.prediction.arguments import count, number
 from collision_monitor.tolerances import EPSILON, LARGEST_INPUT
 
 BUDGET: Final = 8192
@@ -42,7 +43,14 @@ _STEPS: Final = 1000
 """Most steps of conservative advancement, some 100 µs; what is not settled then is left to the boxes."""
 
 _DISTANCE_ERROR: Final = 1e-9
-"""Part of the query's size that a computed distance may be too long by; nearly parallel edges are the worst."""
+"""Part of the query's size that a computed distance may be too long by; it is 1e-11 where edges are nearly parallel."""
+
+_PARALLEL_SIN2: Final = 1e-22
+"""sin^2 between two edges below which the points nearest to each other are sought at their ends only: these are at most
+1e-11 of the size farther."""
+
+_BORDER: Final = 1e-6
+"""Part of an edge by which a nearest point may lie beyond its end and still count: the distance is hardly too short."""
 
 _ROUND_OFF: Final = 16 * EPSILON
 """Error of one evaluation of F's component, as a part of the sum of its terms: a dozen roundings of half a unit."""
@@ -90,15 +98,11 @@ def _impacts(x: ArrayLike, face: bool, separation: float, tolerance: float | Non
         raise InputError(f"x: expected four points at the start and at the end, (..., 8, 3), got shape {points.shape}")
     if not (np.abs(points) <= LARGEST_INPUT).all():
         raise InputError(f"x: expected finite coordinates up to {LARGEST_INPUT:g}, got NaN, infinity or larger")
-    if not (math.isfinite(separation) and separation >= 0.0):
-        raise InputError(f"separation: expected a finite number of metres, at least 0, got {separation!r}")
-    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
-        raise InputError(f"tolerance: expected a finite number of metres above 0, got {tolerance!r}")
-    if budget < 1:
-        raise InputError(f"budget: expected a whole number from 1, got {budget!r}")
+    wanted, most = number("separation", separation), count("budget", budget)
+    near = 0.0 if tolerance is None else number("tolerance", tolerance, positive=True)
     flat = points.reshape(-1, 8, 3)
     status, lower, upper = np.empty(len(flat), np.uint8), np.empty(len(flat)), np.empty(len(flat))
-    _solve(flat, face, separation, 0.0 if tolerance is None else tolerance, budget, status, lower, upper)
+    _solve(flat, face, wanted, near, most, status, lower, upper)
     leading = points.shape[:-2]
     if leading == ():
         return FeatureImpact(str(_NAMES[status[0]]), float(lower[0]), float(upper[0]))
@@ -307,22 +311,38 @@ def _distance(terms: Any, face: bool, t: float) -> float:
          terms[2, 1] + t * (terms[2, 4] - terms[2, 1]))  # fmt: skip
     c = (terms[0, 2] + t * (terms[0, 5] - terms[0, 2]), terms[1, 2] + t * (terms[1, 5] - terms[1, 2]),
          terms[2, 2] + t * (terms[2, 5] - terms[2, 2]))  # fmt: skip
-    best = min(_on_edge(a, b, 0.0, c), _on_edge(a, c, 0.0, b))
+    best, u = _on_edge(a, b, 0.0, c)
+    w = 0.0
+    squared, s = _on_edge(a, c, 0.0, b)
+    if squared < best:
+        best, u, w = squared, 0.0, s
     if face:
-        best = min(best, _on_edge(a, (c[0] - b[0], c[1] - b[1], c[2] - b[2]), 1.0, b))
+        squared, s = _on_edge(a, (c[0] - b[0], c[1] - b[1], c[2] - b[2]), 1.0, b)
+        if squared < best:
+            best, u, w = squared, 1.0 - s, s
     else:
-        best = min(best, _on_edge(a, b, 1.0, c), _on_edge(a, c, 1.0, b))
-    bb, cc, bc = _dot(b, b), _dot(c, c), _dot(b, c)
-    ab, ac = _dot(a, b), _dot(a, c)
-    determinant = bb * cc - bc * bc
-    if determinant > 0.0:
-        u, w = (bc * ac - cc * ab) / determinant, (bc * ab - bb * ac) / determinant
-        if u >= 0.0 and w >= 0.0 and ((u + w <= 1.0) if face else max(u, w) <= 1.0):
-            squared = 0.0
-            for k in range(3):
-                squared += (a[k] + u * b[k] + w * c[k]) ** 2
-            best = min(best, squared)
+        squared, s = _on_edge(a, b, 1.0, c)
+        if squared < best:
+            best, u, w = squared, s, 1.0
+        squared, s = _on_edge(a, c, 1.0, b)
+        if squared < best:
+            best, u, w = squared, 1.0, s
+    n = _cross(b, c)
+    nn = _dot(n, n)
+    if nn > _PARALLEL_SIN2 * _dot(b, b) * _dot(c, c):
+        # from the border's point, not from a: what is left to go is small, and so is what the round-off of n does to it
+        f = (a[0] + u * b[0] + w * c[0], a[1] + u * b[1] + w * c[1], a[2] + u * b[2] + w * c[2])
+        u -= _dot(_cross(f, c), n) / nn
+        w += _dot(_cross(f, b), n) / nn
+        outside = max(-u, -w, u + w - 1.0) if face else max(-u, -w, u - 1.0, w - 1.0)
+        if outside <= _BORDER:
+            best = min(best, _dot(f, n) ** 2 / nn)
     return math.sqrt(best)
+
+
+@inlined
+def _cross(a: Any, b: Any) -> Any:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @inlined
@@ -331,14 +351,14 @@ def _dot(a: Any, b: Any) -> float:
 
 
 @inlined
-def _on_edge(a: Any, along: Any, fixed: float, across: Any) -> float:
-    """Least squared distance of 0 from a + fixed across + s along for s in 0 … 1."""
+def _on_edge(a: Any, along: Any, fixed: float, across: Any) -> Any:
+    """Least squared distance of 0 from a + fixed across + s along for s in 0 … 1, and s."""
     x, y, z = a[0] + fixed * across[0], a[1] + fixed * across[1], a[2] + fixed * across[2]
     squared = _dot(along, along)
     s = -(x * along[0] + y * along[1] + z * along[2]) / squared if squared > 0.0 else 0.0
     s = min(max(s, 0.0), 1.0)
     x, y, z = x + s * along[0], y + s * along[1], z + s * along[2]
-    return x * x + y * y + z * z
+    return x * x + y * y + z * z, s
 
 
 @device

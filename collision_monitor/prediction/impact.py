@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-import operator
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 
-from collision_monitor.errors import InputError, UnsupportedError
+from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.pose import Motion
 from collision_monitor.geometry.shapes import HalfSpace
 from collision_monitor.narrow_phase.contact import Compound, Contact, contact
+from collision_monitor.prediction.arguments import count, number
 from collision_monitor.prediction.time_of_impact import HIT
 from collision_monitor.prediction.touching import follow
 from collision_monitor.prediction.two_bodies import Body, Query, first_impacts, make_body, make_scene
@@ -84,30 +84,13 @@ def time_of_impact(
 
 
 def check_query(horizon: float, tolerance: float, separation: float, iterations: int) -> Query:
-    """The question in the types that the kernels are compiled for. Raises InputError."""
-    try:
-        budget = operator.index(iterations)
-    except TypeError:
-        budget = 0
-    if budget < 1:
-        raise InputError(f"iterations: expected a whole number from 1, got {iterations!r}")
+    """What is asked for, checked. Raises InputError."""
     return Query(
-        horizon=_number("horizon", horizon, 0.0),
-        tolerance=_number("tolerance", tolerance, math.ulp(0.0)),
-        separation=_number("separation", separation, 0.0),
-        budget=min(budget, 2**31),
+        horizon=number("horizon", horizon),
+        tolerance=number("tolerance", tolerance, positive=True),
+        separation=number("separation", separation),
+        budget=count("iterations", iterations),
     )
-
-
-def _number(name: str, value: Any, least: float) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if not (math.isfinite(number) and number >= least):
-        bounds = "at least 0" if least == 0.0 else "above 0"
-        raise InputError(f"{name}: expected a finite number, {bounds}, got {value!r}")
-    return number
 
 
 def check_bounded(a: Body, b: Body) -> None:

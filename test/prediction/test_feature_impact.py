@@ -155,6 +155,21 @@ def test_degenerate_features_are_found_within_the_budget(kind, x, t, scale, turn
     assert answer.upper - answer.lower < 1e-5
 
 
+@pytest.mark.parametrize("gap", [0.0, 1e-12, 1e-6, 0.5])
+def test_edges_that_are_nearly_parallel_come_as_near_as_they_do(gap):
+    """They cross in the middle, `gap` apart: their ends are farther, by less than the round-off of many formulas."""
+    rng = np.random.default_rng(6)
+    for angle in np.geomspace(1e-12, 1e-2, 60):
+        along, across = np.array([1.0, 0, 0]), np.array([np.cos(angle), np.sin(angle), 0])
+        over = np.array([0, 0, gap])
+        x = np.array([-along, along, over - across, over + across]) * rng.uniform(0.1, 1)
+        reached = x[2, 2]
+        x = np.concatenate([x, x])
+        assert edge_edge_impact(x, separation=reached + 1e-9, tolerance=1e-12).status != "clear"
+        if gap > 1e-6:
+            assert edge_edge_impact(x, separation=reached - 2e-9, tolerance=1e-12).status == "clear"
+
+
 def test_a_small_budget_is_unresolved_and_its_lower_bound_holds():
     x = np.array(VERTEX, float)
     for budget in range(1, 120):
@@ -189,6 +204,8 @@ def test_shapes_of_queries():
         ({"x": np.zeros((8, 3)), "separation": -1.0}, "separation"),
         ({"x": np.zeros((8, 3)), "tolerance": 0.0}, "tolerance"),
         ({"x": np.zeros((8, 3)), "budget": 0}, "budget"),
+        ({"x": np.zeros((8, 3)), "budget": 1e3}, "budget: expected a whole number from 1, got 1000.0"),
+        ({"x": np.zeros((8, 3)), "separation": "near"}, "separation: expected a finite number, at least 0, got 'near'"),
     ],
 )
 def test_what_is_refused(arguments, words):
