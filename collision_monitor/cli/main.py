@@ -13,7 +13,10 @@ from typing import Final
 from collision_monitor._version import VERSION
 from collision_monitor.errors import CollisionMonitorError
 
-COMMANDS: Final = ("demo", "run", "world", "replay", "report", "check", "salvage", "import", "tradeoff", "bench")
+COMMANDS: Final = (
+    "demo", "run", "world", "replay", "report", "compare",
+    "check", "salvage", "import", "tradeoff", "bench",
+)  # fmt: skip
 """In the order of `--help`. Each is a module of this package (`import_` for import) with `add_parser(subparsers)`."""
 
 EXIT_ERROR: Final = 1
@@ -30,14 +33,15 @@ examples:
   collision-monitor world crossing                        play one of them
   collision-monitor replay run.mcap                       the same answers again, without ROS; differences are shown
   collision-monitor report run.mcap                       what happened, as one HTML page
+  collision-monitor compare before.mcap after.mcap        what changed between two sessions, or two profiles on one
   collision-monitor check run.mcap --expect expected.yaml recorded sessions as regression tests
   collision-monitor salvage cut.mcap -o whole.mcap        what is whole in a damaged recording
   collision-monitor import bag --map map.yaml -o run.mcap odometry, poses, tf or markers as a session
   collision-monitor tradeoff --scene fleet                what each profile costs and how wrong it is
   collision-monitor bench --scene boxes --n 10000         how long it takes to find all contacts
 
-exit codes: 0 done, 1 error, 2 wrong usage, 130 interrupted; 3 not as expected: replay, the answers differ; check, an
-expectation does not hold; replay: 4 the answers cannot be compared
+exit codes: 0 done, 1 error, 2 wrong usage, 130 interrupted; 3 not as expected: replay and compare, the answers differ;
+check, an expectation does not hold; 4 cannot be told: replay, the answers cannot be compared; compare, not all is known
 `collision-monitor COMMAND --help` says more about each command.
 """
 

@@ -5,6 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collision_monitor.session import Session
 
 
 @contextmanager
@@ -20,3 +24,18 @@ def progress_bar(name: str, total: int) -> Iterator[Callable[[int], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=total)
         yield lambda done: bar.update(task, advance=done)
+
+
+@contextmanager
+def session_bar(name: str, session: Session) -> Iterator[Callable[[], None]]:
+    """Gives a function that shows how far the session was read."""
+    with progress_bar(name, session.size) as done:
+        last = 0
+
+        def show() -> None:
+            nonlocal last
+            if session.position != last:
+                done(session.position - last)
+                last = session.position
+
+        yield show

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from collision_monitor.cli.progress import progress_bar
+from collision_monitor.cli.progress import session_bar
 
 
 def add_parser(subparsers: Any) -> None:
@@ -36,16 +36,9 @@ def report_command(args: argparse.Namespace) -> int:
 
     session = Session(args.session)
     profile = None if args.replay is None else Profile.named(args.replay) if args.replay else session.profile
-    with progress_bar("report", session.size) as done:
-        last = 0
-
-        def show() -> None:
-            nonlocal last
-            done(session.position - last)
-            last = session.position
-
+    with session_bar("report", session) as show:
         history = read_history(session, profile, show)
-    output = args.output or Path(f"{args.session.stem}.html")
+    output = args.output or Path(f"{args.session.resolve().stem}.html")
     for file in write_report(history, output, pictures=args.png, overwrite=args.force):
         print(file)
     return 0

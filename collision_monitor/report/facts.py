@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from collision_monitor.report.alerts import Alert, Outcome, alert_before, alerts_of
 from collision_monitor.report.tracks import Tracks
+from collision_monitor.session.alerts import Alert, Outcome, alert_before, alerts_of
 from collision_monitor.session.history import Collision, Floats, History, Pair
 
 ANSWER_GAP: Final = 5.0
@@ -39,9 +39,8 @@ class Facts:
 
 def gather(history: History) -> Facts:
     """The facts of a history."""
-    apart = np.diff(history.times)
-    period = float(np.median(apart[apart > 0.0])) if (apart > 0.0).any() else 0.0
-    found = alerts_of(history, period)
+    period = history.period
+    found = alerts_of(history)
     alerts: dict[Pair, list[Alert]] = {}
     for alert in found:
         alerts.setdefault(alert.pair, []).append(alert)

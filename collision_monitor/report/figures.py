@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from collision_monitor.report.alerts import stated_error
 from collision_monitor.report.facts import Facts
 from collision_monitor.report.from_above import from_above
 from collision_monitor.report.picture import CONTACT, INK, PALETTE, POSSIBLE, STYLE, WARNING, Size
+from collision_monitor.session.alerts import stated_error
 from collision_monitor.session.history import Collision, Floats, History, Pair
 
 PAIRS: Final = 16

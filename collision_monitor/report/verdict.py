@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from collision_monitor.errors import Refusal
-from collision_monitor.report.alerts import Outcome
 from collision_monitor.report.facts import Facts
+from collision_monitor.session.alerts import Outcome
 from collision_monitor.session.history import History
 
 NAMED: Final = 3

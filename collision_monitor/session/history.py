@@ -91,6 +91,12 @@ class History:
         """s from the first step to the last."""
         return float(self.times[-1]) if len(self.times) else 0.0
 
+    @property
+    def period(self) -> float:
+        """s from one step to the next, the median; 0 where there are less than two."""
+        apart = np.diff(self.times)
+        return float(np.median(apart[apart > 0.0])) if (apart > 0.0).any() else 0.0
+
     def name_of(self, object_id: int) -> str:
         """The name of an object, or what stands for one that was never described."""
         return self.objects[object_id].name if object_id in self.objects else f"object_{object_id}"
@@ -176,7 +182,8 @@ class _Gathered:
                         self._durations.append(time.perf_counter() - begin)
                         self._answer(outputs)
                 states = decode_states(message.data)
-                self._states.append((states.stamp_ns, states.states))
+                if states.frame_id in ("", self._session.frame_id):
+                    self._states.append((states.stamp_ns, states.states))
             case "ContactArray" if answers:
                 contacts = decode_contacts(message.data)
                 self._contacts.append((self._step(contacts.stamp_ns, contacts.step), contacts.contacts))
@@ -240,7 +247,8 @@ def _collisions(h: History) -> list[Collision]:
     order = np.lexsort((steps, keys))
     predicted = _steps_by_pair(_keys(h.predictions), h.prediction_step)
     found = []
-    breaks = np.flatnonzero((np.diff(keys[order]) != 0) | (np.diff(steps[order]) != 1)) + 1
+    begins = rows["phase"][order] == Phase.BEGIN  # also where one ends in the step in which the next begins
+    breaks = np.flatnonzero((np.diff(keys[order]) != 0) | (np.diff(steps[order]) != 1) | begins[1:]) + 1
     for run in np.split(order, breaks) if len(order) else ():
         first, last = int(steps[run[0]]), int(steps[run[-1]])
         pair = (int(rows["id_a"][run[0]]), int(rows["id_b"][run[0]]))

@@ -1,4 +1,4 @@
-"""Sessions for all tests of this folder; not to be changed. Their helpers are imported from beside them."""
+"""Sessions for all tests of this folder, not to be changed; the helpers of the sessions' own tests record them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-from scene_session import record_drive, record_scene
+sys.path.insert(0, str(Path(__file__).parents[1] / "session"))
+from played_session import record_drive, record_scene
 
 
 @pytest.fixture(scope="session")

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scene_session import record_drive, record_scene
+from played_session import record_drive, record_scene
 
 from collision_monitor import Pose, Sphere, contact
 from collision_monitor.description import ObjectDescription
 from collision_monitor.geometry.shapes import Box, HalfSpace, Polygon
-from collision_monitor.report.alerts import Outcome, stated_error
 from collision_monitor.report.facts import gather
 from collision_monitor.report.footprint import footprint
 from collision_monitor.report.verdict import verdict
 from collision_monitor.session import Session
+from collision_monitor.session.alerts import Outcome, stated_error
 from collision_monitor.session.history import read_history
 from collision_monitor.world.crossing import Crossing
 

@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from scene_session import NASTY, played, record_drive, record_scene, record_states
+from played_session import NASTY, played, record_drive, record_scene, record_states
 
 from collision_monitor.cli.main import main
 from collision_monitor.errors import SessionError

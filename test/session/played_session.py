@@ -37,16 +37,16 @@ def record_states(
     *,
     profile: str = "balanced",
     answers: bool = True,
-    close: bool = True,
+    start: int = START,
 ) -> Path:
-    """A session of these states (s, records.STATE); without answers: the inputs alone, as a recorder of bags has."""
+    """A session of these states (s, records.STATE), from `start` (ns) on; without answers: the inputs alone."""
     pipeline = Pipeline(profile)
     recorder = Recorder(path, TYPES, pipeline.metadata(node=NODE))
-    shapes = encode_descriptions(START, "world", descriptions, snapshot=True)
+    shapes = encode_descriptions(start, "world", descriptions, snapshot=True)
     pipeline.on_shapes(shapes)
-    recorder.write(SHAPES, shapes, START, START)
+    recorder.write(SHAPES, shapes, start, start)
     for k, (seconds, rows) in enumerate(states):
-        now = START + round(seconds * 1e9)
+        now = start + round(seconds * 1e9)
         data = encode_states(now, "world", k + 1, rows)
         outputs = pipeline.on_states(data)
         recorder.write(STATES, data, now, now)
@@ -55,8 +55,7 @@ def record_states(
             recorder.write(PREDICTIONS, outputs.predictions, now, now)
             status = pipeline.status(step_duration=0.001 + 0.0001 * (k % 7), recording=1)
             recorder.write(STATUS, status, now, now)
-    if close:
-        recorder.close()
+    recorder.close()
     return path
 
 
@@ -87,9 +86,10 @@ NASTY = "<script>alert('$x$ & y')</script>"
 """A name that must do no harm."""
 
 
-def record_drive(path: Path, seconds: float = 3.0, **options: Any) -> Path:
-    """A compound cart (1) named NASTY drives into a post (2) at 1.5 s; a ball (3) comes towards it until 0.5 s, then
-    turns back before it would have hit.
+def record_drive(path: Path, seconds: float = 3.0, *, speed: float = 1.0, **options: Any) -> Path:
+    """A compound cart (1), named NASTY, drives into a post (2), which is 1.5 m ahead.
+
+    A ball (3) comes towards it until 0.5 s, then turns back before it would have hit. speed: of the cart, m/s.
     """
     objects = [
         ObjectDescription(1, [(Box((1, 0.6, 0.4)), Pose()), (Sphere(0.2), Pose((0.5, 0, 0)))], name=NASTY),
@@ -100,7 +100,7 @@ def record_drive(path: Path, seconds: float = 3.0, **options: Any) -> Path:
     def states() -> Iterable[tuple[float, States]]:
         for t in np.arange(0.0, seconds, 0.02):
             rows = state_array(np.array([1, 3], np.uint32))
-            rows["position"][0], rows["linear"][0] = (t, 0, 0), (1, 0, 0)
+            rows["position"][0], rows["linear"][0] = (speed * t, 0, 0), (speed, 0, 0)
             rows["position"][1] = (1.5, 2.2 - min(t, 0.5) + max(t - 0.5, 0.0), 0)
             rows["linear"][1] = (0, 1 if t > 0.5 else -1, 0)
             yield float(t), rows

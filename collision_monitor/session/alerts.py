@@ -46,8 +46,9 @@ class Alert:
         return float(self.time[0] + self.lower[0]), float(self.time[0] + self.upper[0])
 
 
-def alerts_of(history: History, period: float) -> list[Alert]:
-    """All alerts, by begin and pair; period: s from one step to the next, within which a contact is seen."""
+def alerts_of(history: History) -> list[Alert]:
+    """All alerts of a history, by begin and pair."""
+    period = history.period
     rows, steps = history.predictions, history.prediction_step
     keys = (rows["id_a"].astype(np.uint64) << np.uint64(32)) | rows["id_b"].astype(np.uint64)
     order = np.lexsort((steps, keys))

@@ -1,0 +1,186 @@
+"""`collision-monitor compare`: what changed between two sessions, or between two profiles on one session."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections import Counter
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from collision_monitor.cli.progress import session_bar
+from collision_monitor.cli.quantities import positive, whole
+from collision_monitor.errors import InputError
+
+if TYPE_CHECKING:
+    from collision_monitor.session.changes import Change, Changes, Event
+    from collision_monitor.session.history import History
+
+EXIT_DIFFERENT: Final = 3
+EXIT_NOT_KNOWN: Final = 4
+
+EPILOG = """\
+examples:
+  collision-monitor compare yesterday.mcap today.mcap
+  collision-monitor compare run.mcap --profile fast --profile exact     one session, replayed with each
+  collision-monitor compare run.mcap --profile fast                     what was recorded, and a replay
+  collision-monitor compare before.mcap after.mcap --replay             both replayed with today's program
+
+Objects are the same where their names are. Times count from A's first step; B's too where the stamps of both overlap,
+else from its own. Step times are shown and never count as a difference.
+
+exit codes: 0 the same collisions and warnings, 1 a session cannot be read, 3 they differ (it is said in what),
+4 no difference was found, but something is missing in a session
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Register the command."""
+    parser = subparsers.add_parser(
+        "compare",
+        help="what changed between two sessions, or two profiles on one session",
+        description="Compare collisions, how early they were predicted, warnings that came to nothing, and the cost.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION", help="one with profiles, or two: A and B")
+    parser.add_argument("--profile", action="append", default=[], metavar="NAME", help="may be given again")
+    parser.add_argument("--replay", action="store_true", help="of two sessions: today's answers, not the recorded ones")
+    parser.add_argument(
+        "--tolerance", type=positive, default=0.0, metavar="S", help="times that differ less are the same (default: 0)"
+    )
+    parser.add_argument("--limit", type=whole(1), default=20, metavar="N", help="changes that are listed (default: 20)")
+    parser.add_argument("--json", action="store_true", help="print everything as one JSON object")
+    parser.set_defaults(command=compare_command)
+
+
+def compare_command(args: argparse.Namespace) -> int:
+    """Return the exit code. Raises InputError, ProfileError, SessionError."""
+    from collision_monitor.session.changes import changes
+
+    a, b = (_history(path, profile) for path, profile in _sides(args))
+    found = changes(a, b, args.tolerance)
+    print(json.dumps(_as_json(found), indent=2) if args.json else _as_text(found, args.limit))
+    return EXIT_DIFFERENT if found.changes else 0 if found.known else EXIT_NOT_KNOWN
+
+
+def _sides(args: argparse.Namespace) -> list[tuple[Path, str | None]]:
+    """The session and the profile of each side; None: as recorded, an empty name: replayed with the recorded one."""
+    paths, profiles = args.sessions, args.profile
+    match len(paths), len(profiles):
+        case 2, 0:
+            return [(path, "" if args.replay else None) for path in paths]
+        case 1, 1:
+            return [(paths[0], "" if args.replay else None), (paths[0], profiles[0])]
+        case 1, 2:
+            return [(paths[0], profile) for profile in profiles]
+    raise InputError(
+        f"compare: expected two sessions, or one session and one or two --profile; got {len(paths)} and {len(profiles)}"
+    )
+
+
+def _history(path: Path, with_profile: str | None) -> History:
+    from collision_monitor.profiles import Profile
+    from collision_monitor.session import Session
+    from collision_monitor.session.history import read_history
+
+    session = Session(path)
+    profile = None
+    if with_profile is not None:
+        profile = Profile.named(with_profile) if with_profile else session.profile
+    with session_bar(path.name, session) as show:
+        return read_history(session, profile, show)
+
+
+# -- text
+
+
+def _as_text(found: Changes, limit: int) -> str:
+    lines = [_row("", "A", "B")]
+    sides = (found.a, found.b)
+    lines.append(_row("session", *(side.session for side in sides)))
+    lines.append(_row("answers", *(f"{side.profile}, {'replayed' if side.replayed else 'recorded'}" for side in sides)))
+    lines.append(_row("recorded by", *(f"version {side.version}" for side in sides)))
+    lines.append(_row("duration", *(f"{side.duration:.3f} s, {side.steps} steps" for side in sides)))
+    for title, name in (
+        ("objects", "objects"),
+        ("collisions", "collisions"),
+        ("  not predicted", "not_predicted"),
+        ("warnings in vain", "in_vain"),
+        ("contacts × steps", "contacts"),
+        ("predictions × steps", "predictions"),
+    ):
+        lines.append(_row(title, *(str(getattr(side, name)) for side in sides)))
+    lines.append(_row("step time, median", *(_milliseconds(side.step_median) for side in sides)))
+    lines.append(_row("step time, 99 %", *(_milliseconds(side.step_p99) for side in sides)))
+    for letter, side in zip("AB", sides, strict=True):
+        lines += [f"missing in {letter}: {problem}" for problem in side.problems[:3]]
+        lines += [f"missing in {letter}: and {len(side.problems) - 3} more"] if len(side.problems) > 3 else []
+    if found.changes:
+        lines += ["", *(_change(each) for each in found.changes[:limit])]
+        if len(found.changes) > limit:
+            lines.append(f"and {len(found.changes) - limit} more (--limit, --json)")
+    return "\n".join([*lines, "", _verdict(found)])
+
+
+def _row(title: str, a: str, b: str) -> str:
+    return f"{title:<20} {a:<28} {b}".rstrip()
+
+
+def _milliseconds(seconds: float) -> str:
+    return "not known" if math.isnan(seconds) else f"{seconds * 1e3:.3f} ms"
+
+
+def _change(change: Change) -> str:
+    event = change.event
+    if change.a is None or change.b is None:
+        where = "only in A" if change.b is None else "only in B"
+        return f"{event.begin:9.3f} s  {event.what:<9}  {where:<9}  {' – '.join(event.pair)}{_details(event)}"
+    a, b = change.a, change.b
+    differences = ", ".join(f"{name} {_value(a, name)} → {_value(b, name)}" for name in change.fields)
+    return f"{event.begin:9.3f} s  {event.what:<9}  {'changed':<9}  {' – '.join(event.pair)}: {differences}"
+
+
+def _details(event: Event) -> str:
+    words = ["goes on" if event.end is None else f"until {event.end:.3f} s"]
+    if event.what == "collision":
+        words.append(f"warned {_value(event, 'warned')}")
+        words += [] if event.certain else ["UNRESOLVED"]
+    return f": {', '.join(words)}"
+
+
+def _value(event: Event, name: str) -> str:
+    value = getattr(event, name)
+    if value is None:
+        return "at the start" if name == "warned" else "goes on"
+    if isinstance(value, bool):
+        return "certain" if value else "UNRESOLVED"
+    return f"{value:.3f} s" if name != "warned" or value else "not at all"
+
+
+def _verdict(found: Changes) -> str:
+    if not found.changes:
+        return "the same" if found.known else "no difference was found, but not all is known"
+    counts = Counter(
+        (each.event.what, "only in A" if each.b is None else "only in B" if each.a is None else "changed")
+        for each in found.changes
+    )
+    return "different: " + ", ".join(
+        f"{count} {what}{'' if count == 1 else 's'} {kind}" for (what, kind), count in sorted(counts.items())
+    )
+
+
+def _as_json(found: Changes) -> dict[str, Any]:
+    def plain(side: Any) -> dict[str, Any]:
+        return {key: None if isinstance(v, float) and math.isnan(v) else v for key, v in asdict(side).items()}
+
+    return {
+        "same": not found.changes and found.known,
+        "known": found.known,
+        "by_stamps": found.by_stamps,
+        "a": plain(found.a),
+        "b": plain(found.b),
+        "changes": [asdict(each) for each in found.changes],
+    }

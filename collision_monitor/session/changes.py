@@ -1,0 +1,204 @@
+"""What changed between two histories: collisions, how early they were predicted, warnings in vain, and the cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, TypeVar
+
+import numpy as np
+
+from collision_monitor.records import Phase
+from collision_monitor.session.alerts import Outcome, alerts_of
+from collision_monitor.session.history import NANOSECOND, History, Pair
+
+WITHIN: Final = 0.5
+"""s: two collisions of a pair whose begins are further apart are two events, not one that was shifted."""
+
+EXACT: Final = 1e-9
+"""s: times are differences of whole nanoseconds."""
+
+Names = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Event:
+    """A collision, or a warning that no collision followed. Times in s from A's first step.
+
+    end: None where it went on to the end. warned: s before the begin; None where the session begins with it, and for
+    warnings. certain: not only that it could not be excluded.
+    """
+
+    what: str
+    pair: Names
+    begin: float
+    end: float | None
+    warned: float | None
+    certain: bool
+
+
+@dataclass(frozen=True)
+class Change:
+    """An event of A, of B, or of both with what is not the same in it: fields of Event."""
+
+    a: Event | None
+    b: Event | None
+    fields: tuple[str, ...] = ()
+
+    @property
+    def event(self) -> Event:
+        """The event, A's where both have it."""
+        event = self.a or self.b
+        assert event is not None
+        return event
+
+
+@dataclass(frozen=True)
+class Side:
+    """One of the two, in numbers. contacts, predictions: pairs, counted at each step. Step times in s, NaN: unknown."""
+
+    session: str
+    profile: str
+    version: str
+    replayed: bool
+    steps: int
+    duration: float
+    objects: int
+    collisions: int
+    not_predicted: int
+    in_vain: int
+    contacts: int
+    predictions: int
+    step_median: float
+    step_p99: float
+    problems: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Changes:
+    """The two sides and what changed, collisions first; by_stamps: else B's times count from its own first step."""
+
+    a: Side
+    b: Side
+    changes: list[Change]
+    by_stamps: bool
+
+    @property
+    def known(self) -> bool:
+        """Whether all is known of both, so that no change means that there is none."""
+        return not (self.a.problems or self.b.problems)
+
+
+def changes(a: History, b: History, tolerance: float = 0.0) -> Changes:
+    """What changed from a to b; times that differ by at most the tolerance (s) count as the same."""
+    shift = (b.begin_ns - a.begin_ns) * NANOSECOND
+    by_stamps = -b.duration <= shift <= a.duration  # else they are of different times: compared from the start of each
+    names = _naming(a, b)
+    found: list[Change] = []
+    events_a, warnings_a = _events(a, 0.0, names)
+    events_b, warnings_b = _events(b, shift if by_stamps else 0.0, names)
+    for ours, theirs in ((events_a, events_b), (warnings_a, warnings_b)):
+        for pair in sorted({each.pair for each in (*ours, *theirs)}):
+            mine, other = ([each for each in events if each.pair == pair] for events in (ours, theirs))
+            for one, two in _matched(mine, other, lambda event: event.begin):
+                fields = _differing(one, two, tolerance + EXACT) if one and two else ()
+                if fields or one is None or two is None:
+                    found.append(Change(one, two, fields))
+    found.sort(key=lambda change: (change.event.what, change.event.begin, change.event.pair))
+    return Changes(_side(a), _side(b), found, by_stamps)
+
+
+def _naming(a: History, b: History) -> Callable[[History, Pair], Names]:
+    """How objects are called in both: by their names where they are unique, else with their ids."""
+    unique = all(len({o.name for o in h.objects.values()}) == len(h.objects) for h in (a, b))
+
+    def names(history: History, pair: Pair) -> Names:
+        first, second = (
+            history.name_of(i) if unique and i in history.objects else f"{history.name_of(i)} ({i})" for i in pair
+        )
+        return (first, second) if first <= second else (second, first)
+
+    return names
+
+
+def _events(
+    history: History, shift: float, names: Callable[[History, Pair], Names]
+) -> tuple[list[Event], list[Event]]:
+    """Collisions, and warnings that no collision followed, by begin."""
+    collisions = [
+        Event(
+            what="collision",
+            pair=names(history, each.pair),
+            begin=each.begin + shift,
+            end=None if each.end is None else each.end + shift,
+            warned=None if math.isnan(each.warned) else each.warned,
+            certain=each.certain,
+        )
+        for each in history.collisions
+    ]
+    warnings = [
+        Event(
+            what="warning",
+            pair=names(history, each.pair),
+            begin=each.begin + shift,
+            end=None if each.outcome is Outcome.OPEN else float(each.time[-1]) + shift,
+            warned=None,
+            certain=True,
+        )
+        for each in alerts_of(history)
+        if each.certain and each.outcome is not Outcome.CONTACT
+    ]
+    return collisions, warnings
+
+
+_T = TypeVar("_T")
+
+
+def _matched(
+    a: Sequence[_T], b: Sequence[_T], begin: Callable[[_T], float]
+) -> Iterable[tuple[_T | None, _T | None]]:
+    """Events of one pair, by begin, side by side where they begin within WITHIN of each other."""
+    i = j = 0
+    while i < len(a) or j < len(b):
+        if i == len(a) or (j < len(b) and begin(b[j]) < begin(a[i]) - WITHIN):
+            yield None, b[j]
+            j += 1
+        elif j == len(b) or begin(a[i]) < begin(b[j]) - WITHIN:
+            yield a[i], None
+            i += 1
+        else:
+            yield a[i], b[j]
+            i, j = i + 1, j + 1
+
+
+def _differing(a: Event, b: Event, tolerance: float) -> tuple[str, ...]:
+    def same(x: Any, y: Any) -> bool:
+        return x == y or (isinstance(x, float) and isinstance(y, float) and abs(x - y) <= tolerance)
+
+    return tuple(name for name in ("begin", "end", "warned", "certain") if not same(getattr(a, name), getattr(b, name)))
+
+
+def _side(history: History) -> Side:
+    problems = list(history.problems)
+    if history.status is not None and history.status.recording_dropped:
+        problems.append(f"{history.status.recording_dropped} messages could not be recorded")
+    # The first step of a replay compiles, or loads what was compiled.
+    durations = history.durations[1:] if history.replayed else history.durations
+    return Side(
+        session=history.name,
+        profile=history.profile.name,
+        version=history.metadata.get("version", ""),
+        replayed=history.replayed,
+        steps=len(history.times),
+        duration=history.duration,
+        objects=len(history.objects),
+        collisions=len(history.collisions),
+        not_predicted=sum(each.warned == 0.0 for each in history.collisions),
+        in_vain=sum(each.certain and each.outcome is Outcome.NOTHING for each in alerts_of(history)),
+        contacts=int(np.count_nonzero(history.contacts["phase"] != Phase.END)),
+        predictions=len(history.predictions),
+        step_median=float(np.median(durations)) if len(durations) else math.nan,
+        step_p99=float(np.quantile(durations, 0.99)) if len(durations) else math.nan,
+        problems=problems,
+    )
