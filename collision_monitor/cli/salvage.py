@@ -11,7 +11,10 @@ from typing import Any
 EXIT_LOSSY = 3
 
 EPILOG = """\
-exit codes: 0 the file was whole, 1 nothing could be recovered, 3 something is missing (it is said what)
+A chunk of messages counts where its checksum is right. What is complete in a chunk whose checksum is wrong is left out,
+or kept with --unverified; what is complete and has no checksum is kept, and said to be unverified.
+
+exit codes: 0 everything is there, 1 nothing could be recovered, 3 something is missing (it is said what)
 """
 
 
@@ -42,6 +45,8 @@ def salvage_command(args: argparse.Namespace) -> int:
     else:
         for topic, count in sorted(result.topics.items()):
             print(f"recovered  {count:8d}  {topic}")
+        for note in result.notes:
+            print(f"note       {note}")
         for loss in result.losses:
             print(f"lost       {loss}")
         trusted = f", {result.unverified} of them unverified" if result.unverified else ""

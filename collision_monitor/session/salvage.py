@@ -1,4 +1,4 @@
-"""Recovers what is whole in an MCAP file that was cut off, overwritten or has flipped bits.
+"""Recovers what is whole in an MCAP file that was cut off, overwritten or has flipped bits, and says what is not there.
 
 Nothing of the file is believed that cannot be checked: a chunk counts where its checksum is right. Of a chunk that the
 end of the file cuts, all complete messages count: what is there of it is as it was written.
@@ -7,76 +7,62 @@ end of the file cuts, all complete messages count: what is there of it is as it 
 from __future__ import annotations
 
 import mmap
-import re
-import struct
-import zlib
-from collections.abc import Iterator
-from contextlib import suppress
+import os
+from collections import Counter
 from dataclasses import dataclass, field
-from enum import IntEnum
 from io import BytesIO
 from pathlib import Path
 from typing import Any, Final
 
-import lz4.frame  # type: ignore[import-untyped]
-import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Metadata, Schema, Statistics
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    Header,
+    MessageIndex,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
 from mcap.writer import Writer
 
 from collision_monitor._version import VERSION
 from collision_monitor.errors import SessionError
+from collision_monitor.session.damaged_mcap import MESSAGE, Damage, Part, Place, Trust, walk
 from collision_monitor.session.reader import SALVAGE
 
-MAGIC: Final = b"\x89MCAP0\r\n"
-LARGEST: Final = 1 << 30
-"""Bytes of an unpacked chunk; what claims more is damaged."""
+LIBRARY: Final = "collision_monitor"
+"""In the header of what this package writes."""
 
-_HEAD: Final = struct.Struct("<BQ")
-_CHUNK: Final = struct.Struct("<QQQI")  # start time, end time, unpacked size, checksum
-_MESSAGE: Final = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
-_LENGTH: Final = struct.Struct("<I")
-_LONG: Final = struct.Struct("<Q")
-_CANDIDATE: Final = re.compile(rb"[\x01-\x0f].{5}\x00\x00\x00", re.DOTALL)
-"""Where a record may begin: a known opcode, and a length below 2^40."""
-
-_PIECE: Final = 1 << 12
-"""Bytes that a damaged chunk is unpacked by: what comes before the damage is had to this."""
-
-
-_DECLARING: Final = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS)
-"""What counts behind the end of the data too."""
+_KINDS: Final[dict[int, Any]] = {
+    Opcode.HEADER: Header,
+    Opcode.SCHEMA: Schema,
+    Opcode.CHANNEL: Channel,
+    Opcode.METADATA: Metadata,
+    Opcode.ATTACHMENT: Attachment,
+    Opcode.MESSAGE_INDEX: MessageIndex,
+    Opcode.STATISTICS: Statistics,
+    Opcode.METADATA_INDEX: MetadataIndex,
+    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
+}
 
 
 @dataclass
 class Salvaged:
-    """What came of it. losses: one sentence for each, in the order of the file; empty: it was whole and is copied.
+    """What came of it.
 
-    unverified: how many of the messages have no right checksum to show that they are as they were written.
+    losses: one sentence for each, in the order of the file; empty: everything is there. notes: the same for what cost
+    nothing. unverified: how many of the messages have no right checksum to show that they are as they were written.
     """
 
     messages: int = 0
     unverified: int = 0
     topics: dict[str, int] = field(default_factory=dict)
     losses: list[str] = field(default_factory=list)
-
-
-class Trust(IntEnum):
-    """How far a record can be believed."""
-
-    NONE = 0  # in a chunk whose checksum is wrong
-    WHOLE = 1  # complete, and without a checksum: outside of chunks, or in one that is cut off
-    CHECKED = 2  # in a chunk whose checksum is right
-
-
-@dataclass(frozen=True)
-class _Part:
-    """A record of the file, from a chunk or by itself."""
-
-    opcode: int
-    payload: bytes
-    trust: Trust
+    notes: list[str] = field(default_factory=list)
 
 
 def salvage(source: str | Path, target: str | Path, *, unverified: bool = False, overwrite: bool = False) -> Salvaged:
@@ -86,277 +72,231 @@ def salvage(source: str | Path, target: str | Path, *, unverified: bool = False,
     nothing can be recovered, or where `target` exists and is not to be overwritten.
     """
     source, target = Path(source), Path(target)
-    try:
-        if source.exists() and target.exists() and source.samefile(target):
+    if not source.is_file():
+        found = "no regular file" if source.exists() else "nothing there"
+        raise SessionError(f"{source}: expected an MCAP file, got {found}")
+    if target.exists():
+        if source.samefile(target):
             raise SessionError(f"{target}: expected another file than the one that is salvaged")
+        if not overwrite:
+            raise SessionError(f"{target}: expected a new file, got one that exists; choose another name or --force")
+    try:
         with source.open("rb") as file:
             if source.stat().st_size == 0:
                 raise SessionError(f"{source}: expected an MCAP file, but the file is empty")
             with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-                return _copy(data, source, target, unverified, overwrite)
+                return _write(data, source, target, unverified)
     except OSError as error:
-        raise SessionError(f"{error.filename or source}: expected a file, got: {error.strerror}") from None
+        raise SessionError(f"{error.filename or target}: expected to read and write, got: {error.strerror}") from None
 
 
-def _copy(data: mmap.mmap, source: Path, target: Path, unverified: bool, overwrite: bool) -> Salvaged:
-    result = Salvaged()
-    schemas, channels, expected, count = _declarations(data, result)
-    if not count:
-        raise SessionError(
-            f"{source}: expected the messages of an MCAP file, found none that is whole; {'; '.join(result.losses[:3])}"
-        )
-    with target.open("wb" if overwrite else "xb") as stream:
-        writer = Writer(stream)
-        writer.start(profile="ros2", library=f"collision_monitor {VERSION} salvage")
-        schema_ids = {i: writer.register_schema(s.name, s.encoding, s.data) for i, s in sorted(schemas.items())}
-        channel_ids: dict[int, int] = {}
-        for i, c in sorted(channels.items()):
-            channel_ids[i] = writer.register_channel(
-                c.topic, c.message_encoding, schema_ids.get(c.schema_id, 0), c.metadata
-            )
-        nameless = 0
-        next_sequence: int | None = None
-        for part in _parts(data, Salvaged()):
-            if part.opcode == Opcode.METADATA:
-                metadata = _read(Metadata, part.payload)
-                if metadata is not None:
-                    writer.add_metadata(metadata.name, metadata.metadata)
-            if part.opcode != Opcode.MESSAGE or (part.trust is Trust.NONE and not unverified):
-                continue
-            channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(part.payload)
-            if channel not in channel_ids:
-                nameless += 1
-                continue
-            if next_sequence is not None and 0 < sequence - next_sequence < 1 << 31:
-                result.losses.append(f"messages {next_sequence} to {sequence - 1} are not there")
-            next_sequence = sequence + 1
-            writer.add_message(channel_ids[channel], log_time, part.payload[_MESSAGE.size :], publish_time, sequence)
-            topic = channels[channel].topic
-            result.messages += 1
-            result.unverified += part.trust is not Trust.CHECKED
-            result.topics[topic] = result.topics.get(topic, 0) + 1
-        if nameless:
-            result.losses.append(f"{nameless} messages whose topic is not known any more")
-        for i, number in sorted(expected.items()):
-            topic = channels[i].topic if i in channels else f"channel {i}"
-            missing = number - result.topics.get(topic, 0)
-            if missing > 0:
-                result.losses.append(f"{missing} of the {number} messages of {topic}, as the file's summary has them")
-        if result.losses:
-            writer.add_metadata(SALVAGE, {"source": source.name, "losses": "\n".join(result.losses)})
-        writer.finish()  # type: ignore[no-untyped-call]
+def _write(data: mmap.mmap, source: Path, target: Path, unverified: bool) -> Salvaged:
+    """Into a file beside the target, which takes its place when it is finished."""
+    contents = _Contents(data)
+    unfinished = target.with_name(f"{target.name}.part")
+    try:
+        with unfinished.open("wb") as stream:
+            copy = _Copy(contents, Writer(stream), unverified)
+            result = copy.run(data)
+            if not result.messages:
+                found = "; ".join(result.losses[:2]) or "no damage"
+                raise SessionError(f"{source}: expected messages of an MCAP file, found none that is whole; {found}")
+            copy.finish(source.name)
+        os.replace(unfinished, target)
+    finally:
+        unfinished.unlink(missing_ok=True)
     return result
 
 
-def _declarations(
-    data: mmap.mmap, result: Salvaged
-) -> tuple[dict[int, Schema], dict[int, Channel], dict[int, int], int]:
-    """Schemas and channels from wherever they are, the summary's counts of messages, and how many there are."""
-    schemas: dict[int, Schema] = {}
-    channels: dict[int, Channel] = {}
-    trust: dict[tuple[int, int], Trust] = {}  # by opcode and id: the best copy counts
-    expected: dict[int, int] = {}
-    count = 0
-    for part in _parts(data, result):
-        match part.opcode:
-            case Opcode.SCHEMA | Opcode.CHANNEL:
-                record = _read(Schema if part.opcode == Opcode.SCHEMA else Channel, part.payload)
-                key = (part.opcode, 0 if record is None else record.id)
-                if record is None or part.trust <= trust.get(key, -1):
-                    continue
-                if isinstance(record, Schema) and record.name:
-                    schemas[record.id] = record
-                    trust[key] = part.trust
-                elif isinstance(record, Channel) and record.topic and record.message_encoding:
-                    channels[record.id] = record
-                    trust[key] = part.trust
-            case Opcode.STATISTICS:
-                statistics = _read(Statistics, part.payload)
-                if statistics is not None:
-                    expected = statistics.channel_message_counts
-            case Opcode.MESSAGE:
-                count += 1
-    return schemas, channels, expected, count
-
-
-def _read(kind: Any, payload: bytes) -> Any:
-    """The record of that kind, or None where the bytes are not one."""
+def _read(part: Part) -> Any:
+    """The record, or None where the bytes are not one."""
     try:
-        return kind.read(ReadDataStream(BytesIO(payload)))
+        return _KINDS[part.opcode].read(ReadDataStream(BytesIO(part.payload)))
     except Exception:  # whatever the library raises for bytes that are not as they should be
         return None
 
 
-# -- the file, record by record
+class _Contents:
+    """What the messages need, wherever in the file it is, and what its summary says of it."""
+
+    def __init__(self, data: mmap.mmap) -> None:
+        self.profile = "ros2"
+        self.chunked = False
+        self.library = ""
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        self.statistics: Statistics | None = None
+        self.names: list[str] = []  # of metadata and attachments, as the summary has them
+        trust: dict[tuple[int, int], Trust] = {}  # by opcode and id: the best copy counts
+        for part in walk(data):
+            if isinstance(part, Damage) or part.opcode not in _KINDS or part.opcode == Opcode.MESSAGE_INDEX:
+                continue
+            self.chunked |= part.place is Place.CHUNK
+            match _read(part):
+                case Header() as header:
+                    self.profile = header.profile
+                    self.library = header.library
+                case (Schema() | Channel()) as record if part.trust > trust.get((part.opcode, record.id), -1):
+                    if isinstance(record, Schema) and record.name and record.id:
+                        self.schemas[record.id] = record
+                    elif isinstance(record, Channel) and record.topic and record.message_encoding:
+                        self.channels[record.id] = record
+                    else:
+                        continue
+                    trust[part.opcode, record.id] = part.trust
+                case Statistics() as statistics if part.place is Place.SUMMARY:
+                    self.statistics = statistics
+                case (MetadataIndex() | AttachmentIndex()) as index if part.place is Place.SUMMARY:
+                    self.names.append(index.name)
 
 
-def _parts(data: mmap.mmap, result: Salvaged) -> Iterator[_Part]:
-    """All records that are whole, those of chunks one by one; losses are noted in the result."""
-    at = len(MAGIC)
-    if data[:at] != MAGIC:
-        result.losses.append(f"the file begins with {data[:at]!r}, not as an MCAP file does")
-        at = 0
-    closed = False
-    while at < len(data):
-        if closed and data[at:] == MAGIC:
+class _Copy:
+    """The new file, and the account of what did not get into it."""
+
+    def __init__(self, contents: _Contents, writer: Writer, unverified: bool) -> None:
+        self._contents = contents
+        self._writer = writer
+        self._unverified = unverified
+        self._result = Salvaged()
+        self._counts: Counter[int] = Counter()  # of messages, by channel
+        self._names: list[str] = []  # of metadata and attachments
+        self._nameless = 0
+        self._begin: int | None = None
+        self._last: tuple[int, int] | None = None  # sequence and log time of the last message that was kept
+        self._indexed: Counter[int] = Counter()  # what the indexes of a damaged chunk say was in it, by channel
+        self._kept: Counter[int] = Counter()  # what was kept of it
+        self._damaged = False
+        self._stray = 0  # messages found among the damage
+        self._doubt: list[tuple[int, int]] = []  # the first and the last of a run of messages without a checksum
+        writer.start(profile=contents.profile, library=contents.library or f"{LIBRARY} {VERSION} salvage")
+        ids = {
+            i: writer.register_schema(s.name, s.encoding, s.data) if s else 0
+            for i, s in sorted(contents.schemas.items())
+        }
+        self._ids = {
+            i: writer.register_channel(c.topic, c.message_encoding, ids.get(c.schema_id, 0), c.metadata)
+            for i, c in sorted(contents.channels.items())
+        }
+
+    def run(self, data: mmap.mmap) -> Salvaged:
+        """Copy everything and settle the account."""
+        for part in walk(data):
+            if isinstance(part, Damage):
+                self._settle_chunk()
+                self._damaged = True
+                self._result.losses.append(part.text)
+            elif part.opcode == Opcode.MESSAGE:
+                self._message(part)
+            elif part.opcode == Opcode.MESSAGE_INDEX:
+                if self._damaged and (index := _read(part)) is not None:
+                    self._indexed[index.channel_id] += len(index.records)
+            elif part.opcode in (Opcode.METADATA, Opcode.ATTACHMENT):
+                self._by_name(_read(part))
+        self._settle_chunk()
+        self._settle()
+        return self._result
+
+    def finish(self, source: str) -> None:
+        """Note the losses in the file, for whoever reads it, and close it."""
+        if self._result.losses:
+            self._writer.add_metadata(SALVAGE, {"source": source, "losses": "\n".join(self._result.losses)})
+        self._writer.finish()  # type: ignore[no-untyped-call]
+
+    def _by_name(self, record: Metadata | Attachment | None) -> None:
+        if isinstance(record, Metadata):
+            self._writer.add_metadata(record.name, record.metadata)
+        elif record is not None:
+            self._writer.add_attachment(
+                record.create_time, record.log_time, record.name, record.media_type, record.data
+            )
+        if record is not None:
+            self._names.append(record.name)
+
+    def _message(self, part: Part) -> None:
+        # by itself, among the damage of a file that has its messages in chunks: the rest of a chunk
+        stray = part.place is Place.DATA and self._damaged and self._contents.chunked
+        self._stray += stray
+        if (stray or part.trust is Trust.NONE) and not self._unverified:
             return
-        record = _record(data, at)
-        if record is None:
-            following = _next_record(data, at + 1)
-            if not closed:
-                result.losses.append(f"{following - at} bytes from byte {at} on are damaged or incomplete")
-            yield from _cut_chunk(data, at, following, result)
-            at = following
-            continue
-        opcode, payload, end = record
-        if opcode == Opcode.CHUNK:
-            yield from _chunk(payload, at, result)
-        elif opcode == Opcode.DATA_END:
-            closed = True
-        elif opcode in _DECLARING or (not closed and (opcode != Opcode.MESSAGE or len(payload) >= _MESSAGE.size)):
-            yield _Part(opcode, payload, Trust.WHOLE)
-        at = end
-    if not closed:
-        result.losses.append("the file was not closed: what came after its last byte is not known")
-
-
-def _record(data: mmap.mmap, at: int) -> tuple[int, bytes, int] | None:
-    """Opcode, payload and end of the record at a place, or None where there is none that is whole.
-
-    A chunk's own lengths are believed before that of its record, if its checksum is right.
-    """
-    if at + _HEAD.size > len(data):
-        return None
-    opcode, length = _HEAD.unpack_from(data, at)
-    begin = at + _HEAD.size
-    if opcode == Opcode.CHUNK:
-        end = _chunk_end(data, begin)
-        if end is not None and end != begin + length and _unpacked(data[begin:end])[1]:
-            return opcode, data[begin:end], end
-    if not 1 <= opcode <= Opcode.DATA_END or length > len(data) - begin:
-        return None
-    return opcode, data[begin : begin + length], begin + length
-
-
-def _chunk_end(data: mmap.mmap, begin: int) -> int | None:
-    """Where the chunk ends by its own lengths, if that is in the file."""
-    at = begin + _CHUNK.size
-    if at + _LENGTH.size > len(data):
-        return None
-    (name,) = _LENGTH.unpack_from(data, at)
-    at += _LENGTH.size + name
-    if name > 8 or at + _LONG.size > len(data):
-        return None
-    (size,) = _LONG.unpack_from(data, at)
-    at += _LONG.size
-    return at + int(size) if size <= len(data) - at else None
-
-
-def _next_record(data: mmap.mmap, at: int) -> int:
-    """The next place where a record begins that another one, or the end, follows; the end where there is none."""
-    for match in _CANDIDATE.finditer(data, at):
-        record = _record(data, match.start())
-        if record is None:
-            continue
-        opcode, payload, end = record
-        if opcode == Opcode.CHUNK and _unpacked(payload)[1]:
-            return match.start()
-        if opcode != Opcode.CHUNK and _plausible(opcode, payload) and (end == len(data) or _record(data, end)):
-            return match.start()
-    return len(data)
-
-
-def _plausible(opcode: int, payload: bytes) -> bool:
-    """Whether a record found among other bytes is one: it reads as its kind does, to its last byte."""
-    kinds: dict[int, Any] = {
-        Opcode.SCHEMA: Schema,
-        Opcode.CHANNEL: Channel,
-        Opcode.METADATA: Metadata,
-        Opcode.STATISTICS: Statistics,
-    }
-    if opcode in kinds:
-        stream = ReadDataStream(BytesIO(payload))
-        with suppress(Exception):
-            kinds[opcode].read(stream)
-            return stream.count == len(payload)
-        return False
-    if opcode == Opcode.MESSAGE:
-        # years 2001 to 2100, or a simulation's time
-        return len(payload) > _MESSAGE.size and _MESSAGE.unpack_from(payload)[2] < 1 << 62
-    return opcode in (Opcode.MESSAGE_INDEX, Opcode.DATA_END) and len(payload) < 1 << 24
-
-
-# -- chunks
-
-
-def _chunk(payload: bytes, at: int, result: Salvaged) -> Iterator[_Part]:
-    """The records of a chunk."""
-    records, verified = _unpacked(payload)
-    parts = list(_inner(records, Trust.CHECKED if verified else Trust.NONE))
-    if not verified:
-        messages = sum(part.opcode == Opcode.MESSAGE for part in parts)
-        result.losses.append(
-            f"the chunk of {len(payload)} bytes at byte {at} has a wrong checksum: {messages} messages in it are "
-            "complete and cannot be trusted"
-        )
-    yield from parts
-
-
-def _cut_chunk(data: mmap.mmap, at: int, end: int, result: Salvaged) -> Iterator[_Part]:
-    """The complete records of a chunk that the end of the file cuts off."""
-    begin = at + _HEAD.size
-    if end < len(data) or begin + _CHUNK.size > len(data) or data[at] != Opcode.CHUNK:
-        return
-    parts = list(_inner(_unpacked(data[begin:end])[0], Trust.WHOLE))
-    messages = sum(part.opcode == Opcode.MESSAGE for part in parts)
-    if messages:
-        result.losses.append(f"of the chunk that is cut off at byte {at}, {messages} messages are complete and kept")
-    yield from parts
-
-
-def _unpacked(payload: bytes) -> tuple[bytes, bool]:
-    """A chunk's records, as far as they can be unpacked, and whether they are all there and as they were written."""
-    try:
-        _, _, size, checksum = _CHUNK.unpack_from(payload)
-        (name,) = _LENGTH.unpack_from(payload, _CHUNK.size)
-        at = _CHUNK.size + _LENGTH.size
-        compression = payload[at : at + min(name, 8)]
-        at += name + _LONG.size
-    except struct.error:
-        return b"", False
-    if size > LARGEST or name > 8 or at > len(payload):
-        return b"", False
-    records = _decompressed(compression, payload[at:], size)
-    whole = len(records) == size and (checksum == 0 or zlib.crc32(records) == checksum)
-    return records, whole
-
-
-def _decompressed(compression: bytes, packed: bytes, size: int) -> bytes:
-    """As much as can be unpacked, at most `size` bytes."""
-    if compression == b"":
-        return packed[:size]
-    if compression not in (b"zstd", b"lz4"):
-        return b""
-    unpacker: Any = (
-        zstandard.ZstdDecompressor().decompressobj() if compression == b"zstd" else lz4.frame.LZ4FrameDecompressor()
-    )
-    out = bytearray()
-    with suppress(zstandard.ZstdError, RuntimeError, EOFError):
-        for begin in range(0, len(packed), _PIECE):
-            out += unpacker.decompress(packed[begin : begin + _PIECE])
-            if len(out) > size:
-                break
-    return bytes(out[:size])
-
-
-def _inner(records: bytes, trust: Trust) -> Iterator[_Part]:
-    """The complete records in the bytes of a chunk."""
-    at = 0
-    while at + _HEAD.size <= len(records):
-        opcode, length = _HEAD.unpack_from(records, at)
-        at += _HEAD.size
-        if opcode not in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE) or length > len(records) - at:
+        channel, sequence, log_time, publish_time = MESSAGE.unpack_from(part.payload)
+        if part.trust is Trust.CHECKED:
+            self._settle_chunk()
+        if channel not in self._ids:
+            self._nameless += 1
             return
-        if opcode != Opcode.MESSAGE or length >= _MESSAGE.size:
-            yield _Part(opcode, records[at : at + length], trust)
-        at += length
+        self._begin = log_time if self._begin is None else self._begin
+        self._note_gap(sequence, log_time)
+        self._writer.add_message(self._ids[channel], log_time, part.payload[MESSAGE.size :], publish_time, sequence)
+        topic = self._contents.channels[channel].topic
+        self._result.messages += 1
+        self._result.topics[topic] = self._result.topics.get(topic, 0) + 1
+        self._counts[channel] += 1
+        self._kept[channel] += self._damaged
+        self._last = sequence, log_time
+        if part.trust is Trust.CHECKED:
+            self._settle_doubt()
+        else:
+            self._result.unverified += 1
+            self._doubt = [*self._doubt[:1], self._last]
+
+    # -- the account
+
+    def _seconds(self, log_time: int) -> str:
+        return f"{(log_time - (self._begin or 0)) * 1e-9:.3f} s"
+
+    def _note_gap(self, sequence: int, log_time: int) -> None:
+        """What is not there between the last message and this one. A session numbers its messages through."""
+        first = 0 if self._last is None else self._last[0] + 1
+        if self._contents.library.startswith(LIBRARY) and 0 < sequence - first < 1 << 31:
+            since = "the beginning" if self._last is None else self._seconds(self._last[1])
+            self._result.losses.append(
+                f"messages {first} to {sequence - 1}, from {since} to {self._seconds(log_time)}, are not there"
+            )
+
+    def _settle_chunk(self) -> None:
+        """Say what was in a damaged chunk, from the indexes behind it."""
+        if self._stray:
+            self._result.losses.append(f"{self._stray} messages in it are complete and cannot be trusted")
+        missing = self._indexed - self._kept
+        if missing:
+            parts = ", ".join(f"{count} of {self._topic(i)}" for i, count in sorted(missing.items()))
+            self._result.losses.append(f"in it were, by the index behind it, {parts}")
+        self._indexed.clear()
+        self._kept.clear()
+        self._stray = 0
+        self._damaged = False
+
+    def _settle_doubt(self) -> None:
+        if self._doubt:
+            (first, begin), (last, end) = self._doubt[0], self._doubt[-1]
+            self._result.notes.append(
+                f"messages {first} to {last}, from {self._seconds(begin)} to {self._seconds(end)}, are complete and "
+                "have no checksum that is right"
+            )
+        self._doubt = []
+
+    def _settle(self) -> None:
+        """Hold what was found against the file's summary, which may also show that damage cost nothing."""
+        self._settle_doubt()
+        result, statistics = self._result, self._contents.statistics
+        lost = []
+        if self._nameless:
+            lost.append(f"{self._nameless} messages whose topic is not known any more")
+        if statistics is not None:
+            for i, count in sorted(statistics.channel_message_counts.items()):
+                missing = count - self._counts[i]
+                if missing > 0:
+                    lost.append(f"{missing} of the {count} messages of {self._topic(i)}, as the summary has them")
+        for name, count in sorted((Counter(self._contents.names) - Counter(self._names)).items()):
+            lost.append(f"{count} of the metadata or attachments named {name!r}, as the summary has them")
+        if statistics is not None and not lost and self._all_there(statistics):
+            result.notes = [*result.losses, *result.notes]
+            result.losses = []
+        result.losses += lost
+
+    def _all_there(self, statistics: Statistics) -> bool:
+        expected = statistics.message_count, statistics.metadata_count + statistics.attachment_count
+        return not self._result.unverified and (self._result.messages, len(self._names)) == expected
+
+    def _topic(self, channel: int) -> str:
+        return self._contents.channels[channel].topic if channel in self._contents.channels else f"channel {channel}"

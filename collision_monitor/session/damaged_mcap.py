@@ -1,0 +1,326 @@
+"""Walks an MCAP file that was cut off, overwritten or has flipped bits, from one whole record to the next.
+
+The length of nearly every record follows from its content as well: where both agree, the record is one. A chunk counts
+by its checksum, whatever became of the record's head. All else is damage, and behind it the walk finds its way back.
+Every place is looked at a bounded number of times, and no length is believed before it was compared with the file's.
+"""
+
+from __future__ import annotations
+
+import mmap
+import re
+import struct
+import zlib
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, Final
+
+import lz4.frame  # type: ignore[import-untyped]
+import zstandard
+from mcap.opcode import Opcode
+
+MAGIC: Final = b"\x89MCAP0\r\n"
+LARGEST: Final = 1 << 30
+"""Bytes that a chunk is unpacked to at most, so that no damaged one takes all memory; rosbag2 writes under 1 MiB."""
+
+_EFFORT: Final = 8
+"""How many times the file's size is spent at most on places that might be chunks and are none."""
+
+MESSAGE: Final = struct.Struct("<HIQQ")
+"""Channel, sequence, log time, publish time; the data follows."""
+
+_HEAD: Final = struct.Struct("<BQ")
+_CHUNK: Final = struct.Struct("<QQQI")  # start time, end time, unpacked size, checksum
+_PIECE: Final = 1 << 12
+"""Bytes that a chunk is unpacked by: what comes before damage in it is had to this."""
+
+_CANDIDATE: Final = re.compile(rb"[\x01-\x0f](?=.{5}\x00\x00\x00)", re.DOTALL)
+"""Where a record may begin: a known opcode, and a length below 2^40."""
+
+_LAYOUT: Final[dict[int, tuple[int, ...]]] = {
+    Opcode.HEADER: (-4, -4),
+    Opcode.FOOTER: (20,),
+    Opcode.SCHEMA: (2, -4, -4, -4),
+    Opcode.CHANNEL: (4, -4, -4, -4),
+    Opcode.CHUNK: (_CHUNK.size, -4, -8),
+    Opcode.MESSAGE_INDEX: (2, -4),
+    Opcode.CHUNK_INDEX: (32, -4, 8, -4, 16),
+    Opcode.ATTACHMENT: (16, -4, -4, -8, 4),
+    Opcode.ATTACHMENT_INDEX: (40, -4, -4),
+    Opcode.STATISTICS: (42, -4),
+    Opcode.METADATA: (-4, -4),
+    Opcode.METADATA_INDEX: (16, -4),
+    Opcode.SUMMARY_OFFSET: (17,),
+    Opcode.DATA_END: (4,),
+}
+"""Bytes of each field; negative: a length of so many bytes, then what it counts. A message alone has no own length."""
+
+_KINDS: Final = {*_LAYOUT, Opcode.MESSAGE}
+
+_MISTAKABLE: Final = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA_INDEX)
+"""What one flipped bit of the opcode makes a message of."""
+
+_IN_CHUNKS: Final = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+
+
+class Trust(IntEnum):
+    """How far a record can be believed."""
+
+    NONE = 0  # in a chunk whose checksum is wrong
+    WHOLE = 1  # complete, and without a checksum: outside of chunks, or in one that is cut off or has none
+    CHECKED = 2  # in a chunk whose checksum is right
+
+
+class Place(IntEnum):
+    """Where a record stands."""
+
+    DATA = 0  # by itself
+    CHUNK = 1
+    SUMMARY = 2  # behind the end of the data
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A record of the file."""
+
+    opcode: int
+    payload: bytes
+    trust: Trust
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """Something of the file is not as it was written; in words, without what it cost."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Record:
+    opcode: int
+    begin: int  # of the payload
+    end: int
+
+
+def walk(data: mmap.mmap) -> Iterator[Part | Damage]:
+    """All records that are whole, in the order of the file, those of chunks one by one, and what lies between them."""
+    at = len(MAGIC)
+    if data[:at] != MAGIC:
+        yield Damage(f"the file begins with {data[:at]!r}, not as an MCAP file does")
+        at = 0
+    closed = chunked = False
+    effort = _EFFORT * len(data)
+    while at < len(data):
+        if closed and _is_end(data, at):
+            return
+        record = _record(data, at)
+        if record is None or record.opcode not in _KINDS:
+            chunk, spent = _chunk_at(data, at) if effort > 0 else (None, 0)
+            effort -= spent
+            record = chunk or record
+        following = len(data) if record is None else record.end
+        if record is None or (record.opcode == Opcode.MESSAGE and not _is_message(data, record, chunked)):
+            cut = _is_cut_chunk(data, at)
+            following = len(data) if cut else _next_record(data, at + 1)
+            # a message whose successor is damaged is one; a damaged one ends where the next record begins, or before
+            if record is None or record.end > following or not _only_a_message(data, record, chunked):
+                if not closed:
+                    yield Damage(f"{following - at} bytes from byte {at} on are damaged or incomplete")
+                    if cut:
+                        yield from _cut_chunk(data, at)
+                at = following
+                continue
+            following = record.end
+        if record.opcode == Opcode.CHUNK:
+            chunked = True
+            yield from _chunk(data[record.begin : record.end], at)
+        elif record.opcode not in _KINDS:
+            yield Damage(f"a record of unknown kind {record.opcode}, {record.end - at} bytes at byte {at}, is left out")
+        elif record.opcode in (Opcode.DATA_END, Opcode.FOOTER):
+            closed = True
+        elif record.opcode != Opcode.MESSAGE or not closed:
+            place = Place.SUMMARY if closed else Place.DATA
+            yield Part(record.opcode, data[record.begin : record.end], Trust.WHOLE, place)
+        at = following
+    if not closed:
+        yield Damage("the file was not closed: what came after its last byte is not known")
+
+
+# -- one record
+
+
+def _record(data: mmap.mmap, at: int) -> _Record | None:
+    """The record at a place, if it is whole and its content agrees with its length."""
+    if at + _HEAD.size > len(data):
+        return None
+    opcode, length = _HEAD.unpack_from(data, at)
+    if opcode in _KINDS:
+        return _known(data, at)
+    # of a kind that a newer or private writer knows: to be stepped over, if that leads anywhere
+    end = at + _HEAD.size + int(length)
+    return _Record(opcode, at + _HEAD.size, end) if opcode and end < len(data) and _known(data, end) else None
+
+
+def _known(data: mmap.mmap, at: int) -> _Record | None:
+    """The same for the kinds that are known."""
+    if at + _HEAD.size > len(data):
+        return None
+    opcode, length = _HEAD.unpack_from(data, at)
+    begin = at + _HEAD.size
+    if length > len(data) - begin:
+        return None
+    whole = length >= MESSAGE.size if opcode == Opcode.MESSAGE else _own_length(data, opcode, begin) == length
+    return _Record(opcode, begin, begin + length) if whole else None
+
+
+def _own_length(data: mmap.mmap, opcode: int, begin: int) -> int | None:
+    """Bytes of the record as its content has it; None where that is not in the file."""
+    at = begin
+    for size in _LAYOUT.get(opcode, (len(data),)):
+        if size < 0:
+            length = int.from_bytes(data[at : at - size], "little")
+            at += length - size
+        else:
+            at += size
+        if at > len(data):
+            return None
+    return at - begin
+
+
+def _is_message(data: mmap.mmap, record: _Record, chunked: bool) -> bool:
+    """Whether what says so is a message, and leads to a next record."""
+    return _only_a_message(data, record, chunked) and _leads_on(data, record.end, 0)
+
+
+def _only_a_message(data: mmap.mmap, record: _Record, chunked: bool) -> bool:
+    """Whether it is not another record whose opcode has a flipped bit."""
+    others = (*_MISTAKABLE, Opcode.MESSAGE_INDEX) if chunked else _MISTAKABLE
+    return all(_own_length(data, other, record.begin) != record.end - record.begin for other in others)
+
+
+def _leads_on(data: mmap.mmap, at: int, steps: int) -> bool:
+    """Whether one record and so many more are here, or the end."""
+    record = _known(data, at)
+    if record is None:
+        return at == len(data) or _is_end(data, at)
+    return steps == 0 or _leads_on(data, record.end, steps - 1)
+
+
+def _is_end(data: mmap.mmap, at: int) -> bool:
+    return at == len(data) - len(MAGIC) and data[at:] == MAGIC
+
+
+def _next_record(data: mmap.mmap, at: int) -> int:
+    """The next place where a record begins that leads to others, or to the end; the end where there is none."""
+    for match in _CANDIDATE.finditer(data, at):
+        record = _known(data, match.start())
+        # a message has no length of its own that agrees: two more records have to follow it
+        if record is not None and _leads_on(data, record.end, int(record.opcode == Opcode.MESSAGE)):
+            return match.start()
+    return len(data)
+
+
+# -- chunks
+
+
+def _chunk_at(data: mmap.mmap, at: int) -> tuple[_Record | None, int]:
+    """A chunk whose checksum is right, whatever became of its opcode and one of its lengths; or the bytes spent."""
+    begin = at + _HEAD.size
+    if begin + _CHUNK.size > len(data):
+        return None, 0
+    spent = 0
+    for size in (_own_length(data, Opcode.CHUNK, begin), int(_HEAD.unpack_from(data, at)[1])):
+        if size is not None and size <= len(data) - begin:
+            if _unpacked(data[begin : begin + size])[1] is Trust.CHECKED:
+                return _Record(Opcode.CHUNK, begin, begin + size), 0
+            spent += size
+    return None, spent
+
+
+def _chunk(payload: bytes, at: int) -> Iterator[Part | Damage]:
+    """The records of a chunk."""
+    records, trust = _unpacked(payload)
+    if trust is Trust.NONE:
+        parts = list(_inner(records, trust))
+        messages = sum(part.opcode == Opcode.MESSAGE for part in parts)
+        yield Damage(
+            f"the chunk of {len(payload)} bytes at byte {at} is not as it was written: {messages} messages in it are "
+            "complete and cannot be trusted"
+        )
+        yield from parts
+    else:
+        yield from _inner(records, trust)
+
+
+def _is_cut_chunk(data: mmap.mmap, at: int) -> bool:
+    """Whether here begins a chunk, by both of its lengths, that the end of the file cuts off."""
+    sizes = at + _HEAD.size + _CHUNK.size
+    if sizes + 4 > len(data) or data[at] != Opcode.CHUNK:
+        return False
+    name = int.from_bytes(data[sizes : sizes + 4], "little")
+    if name > 8 or sizes + 12 + name > len(data):
+        return False
+    size = int.from_bytes(data[sizes + 4 + name : sizes + 12 + name], "little")
+    length = int(_HEAD.unpack_from(data, at)[1])
+    return length == _CHUNK.size + 12 + name + size and at + _HEAD.size + length > len(data)
+
+
+def _cut_chunk(data: mmap.mmap, at: int) -> Iterator[Part | Damage]:
+    """Its complete records: what is there is as it was written."""
+    parts = list(_inner(_unpacked(data[at + _HEAD.size :])[0], Trust.WHOLE))
+    messages = sum(part.opcode == Opcode.MESSAGE for part in parts)
+    if messages:
+        yield Damage(f"of the chunk that is cut off at byte {at}, {messages} messages are complete and kept")
+    yield from parts
+
+
+def _unpacked(payload: bytes) -> tuple[bytes, Trust]:
+    """A chunk's records as far as they can be unpacked, and how far they can be believed."""
+    try:
+        _, _, size, checksum = _CHUNK.unpack_from(payload)
+        (name,) = struct.unpack_from("<I", payload, _CHUNK.size)
+    except struct.error:
+        return b"", Trust.NONE
+    begin = _CHUNK.size + 4 + name + 8
+    if name > 8 or begin > len(payload):
+        return b"", Trust.NONE
+    records, whole = _decompressed(payload[begin:])
+    if not whole:
+        return records, Trust.NONE
+    if checksum and zlib.crc32(records) == checksum:
+        return records, Trust.CHECKED
+    return records, Trust.WHOLE if checksum == 0 and len(records) == size else Trust.NONE
+
+
+def _decompressed(packed: bytes) -> tuple[bytes, bool]:
+    """As much as can be unpacked, by what the bytes say they are packed with; whether that was all and nothing else."""
+    unpacker: Any
+    if packed.startswith(b"\x28\xb5\x2f\xfd"):
+        unpacker = zstandard.ZstdDecompressor(max_window_size=LARGEST).decompressobj()
+    elif packed.startswith(b"\x04\x22\x4d\x18"):
+        unpacker = lz4.frame.LZ4FrameDecompressor()
+    else:
+        return packed, True
+    out = bytearray()
+    end = 0
+    with suppress(zstandard.ZstdError, RuntimeError, EOFError):
+        while end < len(packed) and not unpacker.eof and len(out) <= LARGEST:
+            out += unpacker.decompress(packed[end : end + _PIECE])
+            end += _PIECE
+    return bytes(out), bool(unpacker.eof and not unpacker.unused_data and end >= len(packed))
+
+
+def _inner(records: bytes, trust: Trust) -> Iterator[Part]:
+    """The complete records in the bytes of a chunk."""
+    at = 0
+    while at + _HEAD.size <= len(records):
+        opcode, length = _HEAD.unpack_from(records, at)
+        at += _HEAD.size
+        if opcode == 0 or length > len(records) - at:
+            return
+        if opcode in _IN_CHUNKS and (opcode != Opcode.MESSAGE or length >= MESSAGE.size):
+            yield Part(opcode, records[at : at + length], trust, Place.CHUNK)
+        at += length
