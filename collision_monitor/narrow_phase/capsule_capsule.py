@@ -27,6 +27,7 @@ def capsule_capsule_contact(
     wy = py + t * vy - s * uy
     wz = pz + t * vz - s * uz
     distance, nx, ny, nz = direction(wx, wy, wz)
+    bound = SAT_ROUND_OFF * (distance + ra + rb + la + lb + abs(px) + abs(py) + abs(pz))
     if (abs(s) < 1.0 and abs(t) < 1.0) or distance <= TOUCHING * (la + lb):
         cx = uy * vz - uz * vy
         cy = uz * vx - ux * vz
@@ -42,6 +43,9 @@ def capsule_capsule_contact(
             ax, ay, az = (RA[0, 2], RA[1, 2], RA[2, 2]) if la >= lb else (RB[0, 2], RB[1, 2], RB[2, 2])
             nx, ny, nz = across(ax, ay, az, wx, wy, wz)
             distance = nx * wx + ny * wy + nz * wz
+        if length2 <= SEGMENT_PARALLEL_SIN2 * (la * la) * (lb * lb) and length2 > 0.0:
+            # taken for parallel, they were compared in the middle: towards an end they may be this much nearer
+            bound += 2.0 * sqrt(length2) / max(la, lb)
     write(
         out,
         distance - (ra + rb),
@@ -51,7 +55,7 @@ def capsule_capsule_contact(
         s * ux + ra * nx,
         s * uy + ra * ny,
         s * uz + ra * nz,
-        SAT_ROUND_OFF * (distance + ra + rb + la + lb + abs(px) + abs(py) + abs(pz)),
+        bound,
     )
     out[11] = SURFACE
     out[13] = SURFACE

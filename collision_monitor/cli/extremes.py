@@ -1,0 +1,112 @@
+"""`collision-monitor extremes`: how right the numbers are at the ends of the scales, against exact ones."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from collision_monitor.cli.progress import progress_bar
+from collision_monitor.cli.quantities import whole
+from collision_monitor.errors import InputError
+
+if TYPE_CHECKING:
+    from collision_monitor.extremes import Row
+
+EXIT_OUTSIDE = 3
+
+EPILOG = """\
+error: worst distance of a number from the exact one (60 digits), as a part of the sizes involved; of a time, as a part
+of it, with the interval asked to 1e-9 of the size. within: worst error as a part of the bound that the answer states,
+or whether the interval holds the true time. at: where on the scale the error is worst.
+
+exit codes: 0 every truth is within its bound and every number finite, 3 not so
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Register the command."""
+    parser = subparsers.add_parser(
+        "extremes",
+        help="numerical stability from 1e-150 m to 1e18 m, against exact numbers",
+        description="Compare answers with exact ones over sizes, ratios, distances, gaps, speeds, angles and times.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--samples", type=whole(1), default=12, metavar="N", help="at each place (default: 12)")
+    parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="of the random numbers (default: 1)")
+    parser.add_argument("--json", action="store_true", help="print one line of JSON")
+    parser.add_argument("--png", type=Path, metavar="FILE", help="draw the errors, a panel for each scale")
+    parser.set_defaults(command=extremes_command)
+
+
+def extremes_command(args: argparse.Namespace) -> int:
+    """Return the exit code. Raises InputError."""
+    from collision_monitor import extremes
+
+    with progress_bar("extremes", extremes.steps()) as done:
+        rows = extremes.run(args.samples, args.seed, done)
+    if args.json:
+        print(json.dumps({"rows": [_plain(row) for row in rows]}))
+    else:
+        print("\n".join(_as_text(rows)))
+    if args.png is not None:
+        try:
+            _draw(rows, args.png)
+        except OSError as error:
+            raise InputError(f"{args.png}: expected a file that can be written, got: {error.strerror}") from None
+    return 0 if all(row.holds for row in rows) else EXIT_OUTSIDE
+
+
+def _plain(row: Row) -> dict[str, Any]:
+    values = asdict(row) | {"holds": row.holds}
+    values["curve"] = [[x, y] for x, y in row.curve.items()]
+    return values
+
+
+def _as_text(rows: list[Row]) -> list[str]:
+    from collision_monitor.extremes import SWEEPS
+
+    lines = [
+        f"{'scale':<24} {'from':>7} {'to':>7}  {'answer':<16} {'samples':>7} {'error':>8} {'at':>7}  {'within':>8}"
+    ]
+    last = ""
+    for row in rows:
+        unit, values, _ = SWEEPS.get(row.sweep, ("ns", [0.0, 2.0**63], None))
+        name = f"{row.sweep} ({unit})" if unit else row.sweep
+        start = f"{name:<24} {values[0]:7.0e} {values[-1]:7.0e}" if row.sweep != last else " " * 40
+        within = "OUTSIDE" if row.ratio > 1.0 else "NOT FINITE" if row.not_finite else f"{row.ratio:8.2g}"
+        lines.append(f"{start}  {row.quantity:<16} {row.samples:7d} {row.error:8.1e} {row.at:7.0e}  {within:>8}")
+        last = row.sweep
+    bad = sum(not row.holds for row in rows)
+    samples = sum(row.samples for row in rows)
+    verdict = "every truth is within its stated bound" if not bad else f"{bad} of {len(rows)} rows do not hold"
+    return [*lines, f"{samples} answers: {verdict}"]
+
+
+def _draw(rows: list[Row], path: Path) -> None:
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    from collision_monitor.extremes import SWEEPS
+
+    names = list(SWEEPS)
+    with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
+        figure = Figure(figsize=(13, 6.2), layout="constrained")
+        panels = figure.subplots(2, (len(names) + 1) // 2, sharey=True).ravel()
+        for axes, name in zip(panels, names, strict=False):
+            for row in (row for row in rows if row.sweep == name):
+                x = [value or min(v for v in row.curve if v) / 10 for value in row.curve]
+                axes.plot(x, [max(error, 1e-18) for error in row.curve.values()], ".-", label=row.quantity, linewidth=1)
+            unit = SWEEPS[name][0]
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            axes.set_xlabel(f"{name} ({unit})" if unit else name)
+            axes.axhline(2.2e-16, color="black", linewidth=0.6, linestyle=":")
+        for axes in panels[:: len(panels) // 2]:
+            axes.set_ylabel("worst relative error")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=6)
+        figure.savefig(path, dpi=110)
