@@ -48,12 +48,16 @@ class Outputs:
 
 
 class Pipeline:
-    """Feeds a Monitor with message bytes. No method raises for what a message holds: it is refused and counted."""
+    """Feeds a Monitor with message bytes. No method raises for what a message holds: it is refused and counted.
+
+    objects: what is monitored, as it was described last, by id.
+    """
 
     def __init__(self, profile: Profile | str = "balanced", frame_id: str = "world") -> None:
         self.monitor = Monitor(profile)
         self.frame_id = frame_id
         self.messages_lost = 0
+        self.objects: dict[int, ObjectDescription] = {}
         self._sequence: int | None = None
         self._static: set[int] = set()
         self._names: dict[int, str] = {}  # also of what was removed since the last step, whose contacts end in the next
@@ -161,6 +165,7 @@ class Pipeline:
         except CollisionMonitorError as error:
             self.monitor.refuse(Refusal.SHAPE, str(error))
             return
+        self.objects[it.object_id] = it
         (self._static.add if it.static else self._static.discard)(it.object_id)
         self._names[it.object_id] = it.name
         self._removed.discard(it.object_id)
@@ -169,6 +174,7 @@ class Pipeline:
         """Removing what is not there is no error: the sender's wish is met."""
         with suppress(InputError):
             self.monitor.remove(object_id)
+            del self.objects[object_id]
             self._static.discard(object_id)
             self._removed.add(object_id)
 

@@ -31,3 +31,12 @@ def positive(text: str) -> float:
     if not 0.0 < value < math.inf:
         raise argparse.ArgumentTypeError(f"expected a number above 0, got {text!r}")
     return value
+
+
+def size(text: str) -> int:
+    """Bytes above 0: `500M` is 500,000,000."""
+    factor = {"K": 10**3, "M": 10**6, "G": 10**9}.get(text[-1:].upper(), 1)
+    number = text if factor == 1 else text[:-1]
+    if not (number.isdecimal() and int(number)):
+        raise argparse.ArgumentTypeError(f"expected a number of bytes above 0, such as 500M or 2G, got {text!r}")
+    return int(number) * factor

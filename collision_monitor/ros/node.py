@@ -1,6 +1,6 @@
 """The monitor as a ROS 2 node: message bytes in, the pipeline, message bytes out, and all of it on record.
 
-    ros2 run collision_monitor monitor --ros-args -p horizon:=1.0 -p record:=run.mcap
+ros2 run collision_monitor monitor --ros-args -p horizon:=1.0 -p record:=run.mcap
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from visualization_msgs.msg import MarkerArray
 from collision_monitor import codec, warm_up
 from collision_monitor.errors import CollisionMonitorError, Refusal, SessionError
 from collision_monitor.pipeline import Outputs, Pipeline
+from collision_monitor.records import Phase
 from collision_monitor.ros import qos
 from collision_monitor.ros.markers import MarkerView
 from collision_monitor.ros.parameters import read_monitor_parameters
@@ -67,6 +68,8 @@ class MonitorNode(Node):
         self._last_step: int | None = None
         self._said_silent = False
         self._no_recording: dict[str, Any] = {}
+        self._recording: dict[str, Any] = {}  # as it was told last
+        self._is_event_wanted = self.settings.splitting.on_event
 
         self._contacts_out = self.create_publisher(ContactArray, "~/contacts", qos.ANSWERS)
         self._predictions_out = self.create_publisher(PredictedCollisionArray, "~/predictions", qos.ANSWERS)
@@ -111,7 +114,8 @@ class MonitorNode(Node):
             self._status_out.topic_name: "MonitorStatus",
         }
         try:
-            return Recorder(path, types, self._pipeline.metadata(node=self.get_fully_qualified_name()))
+            metadata = self._pipeline.metadata(node=self.get_fully_qualified_name())
+            return Recorder(path, types, metadata, splitting=self.settings.splitting)
         except SessionError as error:
             self.get_logger().error(f"not recording: {error}")
             self._no_recording = {
@@ -126,7 +130,7 @@ class MonitorNode(Node):
     def _on_shapes(self, data: bytes) -> None:
         received = self._now()
         message = self._pipeline.on_shapes(data)
-        self._record(self._shapes_topic, data, received, received)
+        self._record(self._shapes_topic, data, received, received, objects=tuple(self._pipeline.objects.values()))
         if message is not None:
             self._markers.describe(message)
             _keep_from_collector()
@@ -148,13 +152,15 @@ class MonitorNode(Node):
         self._times.add(began, ended, self._now() - stamp)
         self._last_step = ended
         self._record(self._states_topic, data, received, stamp)
-        self._record(self._contacts_out.topic_name, outputs.contacts, received, stamp)
+        begins = self._is_event_wanted and bool((outputs.result.contacts["phase"] == Phase.BEGIN).any())
+        self._record(self._contacts_out.topic_name, outputs.contacts, received, stamp, event=begins)
         self._record(self._predictions_out.topic_name, outputs.predictions, received, stamp)
         if ended - self._last_status >= STATUS_PERIOD:
             self._publish_status()
         self._publish_markers(data, outputs, ended)
 
     def _on_watchdog(self) -> None:
+        self._tell_of_recording()
         now = time.monotonic_ns()
         silent = self._is_silent(now)
         if silent and not self._said_silent:
@@ -191,9 +197,22 @@ class MonitorNode(Node):
         self._last_markers = now
         self._markers_out.publish(self._markers.draw(codec.decode_states(states).states, outputs.result))
 
-    def _record(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
+    def _record(self, topic: str, data: bytes, log_time: int, publish_time: int, **what: Any) -> None:
         if self._recorder is not None:
-            self._recorder.write(topic, data, log_time, publish_time)
+            self._recorder.write(topic, data, log_time, publish_time, **what)
+
+    def _tell_of_recording(self) -> None:
+        """A recording that fails or loses messages is said at once, not only where someone reads the status."""
+        if self._recorder is None:
+            return
+        told, recording = self._recording, self._recorder.status()
+        self._recording = recording
+        if recording["recording"] == Recording.FAILED != told.get("recording"):
+            self.get_logger().error(f"the recording failed, the monitoring goes on: {recording['recording_error']}")
+        elif recording["recording_dropped"] != told.get("recording_dropped", 0):
+            self.get_logger().warning(
+                f"the disk is too slow for the recording: {recording['recording_dropped']} messages dropped so far"
+            )
 
     def _line(self, status: codec.Status) -> str:
         latency = "unknown" if math.isnan(status.latency) else f"{status.latency * 1e3:.1f} ms"
@@ -217,6 +236,7 @@ class MonitorNode(Node):
         self._publish_status()
         if self._recorder is not None:
             self._recorder.close()
+            self._tell_of_recording()
         self.destroy_node()
 
 

@@ -14,8 +14,9 @@ from typing import TypeVar
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
-from collision_monitor.errors import InputError, ProfileError
+from collision_monitor.errors import InputError, ProfileError, SessionError
 from collision_monitor.profiles import Profile, Setting
+from collision_monitor.session import ONE_FILE, Splitting
 
 T = TypeVar("T", str, int, float, str | int | float)
 
@@ -65,6 +66,8 @@ class ParameterReader:
 
 
 EXECUTORS = ("single", "events")
+RECORD_MODES = ("always", "on_event")
+_RECORD = ("record", "record_mode", "record_before", "record_after", "record_split_size", "record_split_duration")
 
 
 @dataclass(frozen=True)
@@ -75,12 +78,13 @@ class MonitorParameters:
     frame_id: str
     record: str
     executor: str
+    splitting: Splitting = ONE_FILE
 
 
 def read_monitor_parameters(node: Node) -> MonitorParameters:
     """Raises InputError, ProfileError for a setting out of range."""
     settings = Profile.fields()
-    reader = ParameterReader(node, ["profile", *(s.name for s in settings), "frame_id", "record", "executor"])
+    reader = ParameterReader(node, ["profile", *(s.name for s in settings), "frame_id", *_RECORD, "executor"])
     profile = Profile.named(
         reader.read("profile", "balanced", f"Where the settings start from: {', '.join(Profile.names())}.")
     )
@@ -89,13 +93,29 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
         reader.declare(setting.name, getattr(profile, setting.name), _descriptor(setting))
 
     frame_id = reader.read("frame_id", "world", "The frame of all poses; messages in another one are refused.")
-    record = reader.read("record", "", "Path of the session file (.mcap) to write; empty: no recording.")
+    record = reader.read("record", "", "Path of the session to write, a .mcap file or a folder; empty: no recording.")
+    splitting = _read_splitting(reader)
     executor = reader.read("executor", "single", f"The rclpy executor: {' or '.join(EXECUTORS)}.")
     if not frame_id:
         raise ProfileError("parameter frame_id: expected the name of a frame, got an empty text")
     if executor not in EXECUTORS:
         raise ProfileError(f"parameter executor: expected {' or '.join(EXECUTORS)}, got {executor!r}")
-    return MonitorParameters(profile, frame_id, record, executor)
+    return MonitorParameters(profile, frame_id, record, executor, splitting)
+
+
+def _read_splitting(reader: ParameterReader) -> Splitting:
+    """Raises InputError."""
+    mode = reader.read("record_mode", RECORD_MODES[0], "always, or on_event: only what is around collisions.")
+    before = reader.read("record_before", ONE_FILE.before, "on_event: how long before each collision is kept [s].")
+    after = reader.read("record_after", ONE_FILE.after, "on_event: how long after each collision begins is kept [s].")
+    size = reader.read("record_split_size", ONE_FILE.size, "Size from which on another file follows [bytes]; 0: never.")
+    duration = reader.read("record_split_duration", ONE_FILE.duration, "The same by time [s]; 0: never.")
+    if mode not in RECORD_MODES:
+        raise InputError(f"parameter record_mode: expected {' or '.join(RECORD_MODES)}, got {mode!r}")
+    try:
+        return Splitting(size, duration, mode == "on_event", before, after)
+    except SessionError as error:
+        raise InputError(f"parameters record_split_* and record_*: {error}") from None
 
 
 def _descriptor(setting: Setting) -> ParameterDescriptor:

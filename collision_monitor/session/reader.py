@@ -6,32 +6,33 @@ Only the order of the file is used, no index: a session that was cut off by a cr
 from __future__ import annotations
 
 import json
-import struct
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Final
 
-from mcap.data_stream import ReadDataStream
-from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Message, Metadata, Schema
-from mcap.stream_reader import breakup_chunk
+import yaml
+from mcap.records import Channel, Header, Message, Metadata, Schema
 
-from collision_monitor.errors import ProfileError, SessionError
+from collision_monitor.codec import Descriptions, States, decode_descriptions, decode_states
+from collision_monitor.errors import MessageError, ProfileError, SessionError
 from collision_monitor.profiles import Profile
-from collision_monitor.session.recorder import METADATA
+from collision_monitor.session.mcap_records import McapRecords
+from collision_monitor.session.parts import NUMBER, RECORDING, REPEATED
 from collision_monitor.session.rosbag2 import TYPES, full_name
+from collision_monitor.session.session_file import METADATA
 
 SALVAGE: Final = "collision_monitor_salvage"
 """Name of the metadata record that says what is missing in a file that was salvaged."""
 
-_MAGIC: Final = b"\x89MCAP0\r\n"
-_HEAD: Final = struct.Struct("<BQ")
-_LARGEST_CHUNK: Final = 1 << 30
-"""Bytes, unpacked. rosbag2 writes less than 1 MiB; what claims more than this is damaged."""
-
 _NAMES: Final = {full_name(name): name for name in TYPES}
+_INPUTS: Final[dict[str, Callable[[bytes], States | Descriptions]]] = {
+    "ObjectStateArray": decode_states,
+    "ObjectDescriptionArray": decode_descriptions,
+}
+_OURS: Final = "collision_monitor"
+"""How the header names the writer of our files."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,77 +48,51 @@ class Recorded:
 
 
 class Session:
-    """A recorded session.
+    """A recorded session: a file, or the folder of all files of one recording.
 
-    metadata, profile, frame_id: of the monitor that was recorded.
+    metadata, profile, frame_id: of the monitor that was recorded. foreign: another program recorded the monitor's
+    topics; then there is no metadata, the profile is `balanced`, and the messages are numbered as they come.
     damage: what is missing or broken, one sentence each; complete when all messages have been read.
-    position, size: bytes of the file that were read, and all.
+    position, size: bytes that were read, and all.
     Raises SessionError for what is no session, naming what it is.
     """
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self.damage: list[str] = []
-        self.position = 0
-        self._file = _find(self.path)
-        try:
-            self.size = self._file.stat().st_size
-            self.metadata = self._read_metadata()
-        except OSError as error:
-            raise SessionError(f"{self.path}: expected a file that can be read, got: {error.strerror}") from None
-        self.profile = self._profile()
+        parts = [_Part(file) for file in _find(self.path)]
+        self._parts = _in_order(self.path, parts)
+        self.size = sum(part.records.size for part in parts)
+        self.foreign = self._parts[0].foreign
+        self.metadata = self._parts[0].metadata
+        self.profile = Profile.named("balanced") if self.foreign else self._profile()
         self.frame_id = self.metadata.get("frame_id", "")
+
+    @property
+    def position(self) -> int:
+        """Bytes that were read."""
+        return sum(part.records.position for part in self._parts)
 
     def messages(self) -> Iterator[Recorded]:
         """All messages whose bytes are whole, in recorded order. Raises SessionError for a foreign encoding."""
-        self.damage = []
-        schemas: dict[int, str] = {}
-        channels: dict[int, Channel] = {}
-        with self._file.open("rb") as file:
-            for record in self._parsed(file):
-                if isinstance(record, Schema):
-                    schemas[record.id] = record.name
-                elif isinstance(record, Channel):
-                    self._check_encoding(record, schemas)
-                    channels[record.id] = record
-                elif isinstance(record, Metadata) and record.name == SALVAGE:
-                    losses = record.metadata.get("losses", "").splitlines()
-                    self.damage += [f"lost before it was salvaged: {loss}" for loss in losses]
-                elif isinstance(record, Message) and record.channel_id in channels:
-                    channel = channels[record.channel_id]
-                    name = schemas.get(channel.schema_id, "")
-                    yield Recorded(
-                        topic=channel.topic,
-                        type=_NAMES.get(name, name),
-                        data=record.data,
-                        sequence=record.sequence,
-                        log_time=record.log_time,
-                        publish_time=record.publish_time,
+        self.damage = [f"{name} is not there" for name in _absent(self.path)]
+        last: int | None = None
+        count = 0
+        for part in self._parts:
+            repeated = part.repeated
+            for message in part.messages():
+                repeats, repeated = repeated > 0, repeated - 1
+                if repeats and message.sequence == last:
+                    continue  # it goes on where the last file ended
+                last = message.sequence
+                if self.foreign:
+                    message = Recorded(
+                        message.topic, message.type, message.data, count, message.log_time, message.publish_time
                     )
-
-    # -- opening
-
-    def _read_metadata(self) -> dict[str, str]:
-        """The record at the file's start. Raises SessionError."""
-        topics: set[str] = set()
-        with self._file.open("rb") as file:
-            magic = file.read(len(_MAGIC))
-            if magic != _MAGIC:
-                what = f"it begins with {magic!r}" if magic else "the file is empty"
-                raise SessionError(f"{self.path}: expected an MCAP file, but {what}")
-            file.seek(0)
-            for record in self._parsed(file):
-                if isinstance(record, Metadata) and record.name == METADATA:
-                    return dict(record.metadata)
-                if isinstance(record, Channel):
-                    topics.add(record.topic)
-        found = f"topics {', '.join(sorted(topics))}" if topics else "no topics"
-        if self.damage:
-            found += f" and damage ({self.damage[0]})"
-        raise SessionError(
-            f"{self.path}: expected a session of collision_monitor, got an MCAP file without its metadata, "
-            f"with {found}; record one with `collision-monitor run --record PATH`"
-        )
+                    count += 1
+                yield message
+            prefix = f"{part.records.path.name}: " if len(self._parts) > 1 else ""
+            self.damage += [prefix + text for text in part.damage]
 
     def _profile(self) -> Profile:
         try:
@@ -130,82 +105,127 @@ class Session:
         except (ValueError, TypeError) as error:
             raise SessionError(f"{self.path}: the profile in the session's metadata cannot be used: {error}") from None
 
-    def _check_encoding(self, channel: Channel, schemas: dict[int, str]) -> None:
-        if schemas.get(channel.schema_id) in _NAMES and channel.message_encoding != "cdr":
+
+class _Part:
+    """One file of a session. Raises SessionError."""
+
+    def __init__(self, path: Path) -> None:
+        self.records = McapRecords(path)
+        self.damage: list[str] = []
+        self.foreign = False
+        self.metadata = self._read_metadata()
+        self.repeated = _number(self.metadata.get(REPEATED))
+        self.number = _number(self.metadata.get(NUMBER))
+
+    def messages(self) -> Iterator[Recorded]:
+        """As `Session.messages`."""
+        self.damage = []
+        schemas: dict[int, str] = {}
+        channels: dict[int, Channel] = {}
+        inputs: dict[str, str] = {}
+        for record in self.records:
+            if isinstance(record, Schema):
+                schemas[record.id] = record.name
+            elif isinstance(record, Channel):
+                self._check(record, schemas, inputs)
+                channels[record.id] = record
+            elif isinstance(record, Metadata) and record.name == SALVAGE:
+                losses = record.metadata.get("losses", "").splitlines()
+                self.damage += [f"lost before it was salvaged: {loss}" for loss in losses]
+            elif isinstance(record, Message) and record.channel_id in channels:
+                channel = channels[record.channel_id]
+                name = schemas.get(channel.schema_id, "")
+                yield Recorded(
+                    topic=channel.topic,
+                    type=_NAMES.get(name, name),
+                    data=record.data,
+                    sequence=record.sequence,
+                    log_time=record.log_time,
+                    publish_time=record.publish_time,
+                )
+        self.damage += self.records.damage
+
+    def _read_metadata(self) -> dict[str, str]:
+        """The record at the file's start; of a foreign file, the frame of its inputs. Raises SessionError."""
+        topics: dict[int, str] = {}
+        schemas: dict[int, str] = {}
+        inputs: dict[int, str] = {}
+        ours = False
+        for record in self.records:
+            if isinstance(record, Metadata) and record.name == METADATA:
+                return dict(record.metadata)
+            if isinstance(record, Header):
+                ours = record.library.startswith(_OURS)  # then what it lacks was lost
+            elif isinstance(record, Schema):
+                schemas[record.id] = record.name
+            elif isinstance(record, Channel):
+                topics[record.id] = record.topic
+                inputs[record.id] = _NAMES.get(schemas.get(record.schema_id, ""), "")
+            elif isinstance(record, Message) and not ours and inputs.get(record.channel_id) in _INPUTS:
+                try:
+                    frame_id = _INPUTS[inputs[record.channel_id]](record.data).frame_id
+                except MessageError:
+                    continue
+                self.foreign = True
+                return {"frame_id": frame_id or "world"}
+        found = f"topics {', '.join(sorted(topics.values()))}" if topics else "no topics"
+        if self.records.damage:
+            found += f" and damage ({self.records.damage[0]})"
+        raise SessionError(
+            f"{self.records.path}: expected a session of collision_monitor, got an MCAP file without its metadata, "
+            f"with {found}; record one with `collision-monitor run --record PATH`, or make one of odometry, poses, "
+            "transforms or markers with `collision-monitor import`"
+        )
+
+    def _check(self, channel: Channel, schemas: dict[int, str], inputs: dict[str, str]) -> None:
+        """Raises SessionError for another encoding, and for the inputs of two monitors in one foreign file."""
+        name = _NAMES.get(schemas.get(channel.schema_id, ""), "")
+        if name and channel.message_encoding != "cdr":
             raise SessionError(
-                f"{self.path}: expected messages of {channel.topic} encoded as cdr, got {channel.message_encoding!r}"
+                f"{self.records.path}: expected messages of {channel.topic} encoded as cdr, "
+                f"got {channel.message_encoding!r}"
+            )
+        if self.foreign and name in _INPUTS and inputs.setdefault(name, channel.topic) != channel.topic:
+            raise SessionError(
+                f"{self.records.path}: expected the inputs of one monitor, got {inputs[name]} and {channel.topic}; "
+                "take one out with `collision-monitor import --node NAME`"
             )
 
-    # -- the file's records
 
-    def _parsed(self, file: BinaryIO) -> Iterator[Any]:
-        """Schemas, channels, messages and metadata, from chunks as well; what is damaged is noted and left out."""
-        for start, opcode, payload in self._records(file):
-            # Whatever the library raises for bytes that are not as they should be: that record is damaged.
-            try:
-                records = _unpack(opcode, payload)
-            except Exception as error:
-                reason = str(error) or repr(error)
-                self.damage.append(f"{_name(opcode)} of {len(payload)} bytes at byte {start} is damaged: {reason}")
-                continue
-            yield from records
-
-    def _records(self, file: BinaryIO) -> Iterator[tuple[int, int, bytes]]:
-        """Where each record starts, its opcode and its payload, up to the end of the data or of what is there."""
-        file.read(len(_MAGIC))
-        while True:
-            self.position = start = file.tell()
-            head = file.read(_HEAD.size)
-            if not head:
-                self.damage.append("the recording was not closed: it ends without a summary")
-                return
-            opcode, length = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, self.size)
-            if length > self.size - start - _HEAD.size:
-                self.damage.append(
-                    f"the recording was cut off: its last {self.size - start} bytes are an incomplete record"
-                )
-                return
-            if opcode == Opcode.DATA_END:
-                self.position = self.size
-                return
-            yield start, opcode, file.read(length)
+def _number(text: str | None) -> int:
+    """Of our own metadata; what is no number was damaged, and 0 says the least."""
+    return int(text) if text and text.isdecimal() else 0
 
 
-def _unpack(opcode: int, payload: bytes) -> list[Any]:
-    """The records in the payload; raises anything where it is damaged."""
-    stream = ReadDataStream(BytesIO(payload))
-    if opcode == Opcode.CHUNK:
-        chunk = Chunk.read(stream)
-        if chunk.uncompressed_size > _LARGEST_CHUNK:
-            raise ValueError(f"it claims {chunk.uncompressed_size} bytes")
-        return list(breakup_chunk(chunk, validate_crc=True))
-    if opcode == Opcode.MESSAGE:
-        return [Message.read(stream, len(payload))]
-    if opcode == Opcode.METADATA:
-        return [Metadata.read(stream)]
-    if opcode == Opcode.SCHEMA:
-        return [Schema.read(stream)]
-    if opcode == Opcode.CHANNEL:
-        return [Channel.read(stream)]
-    return []
-
-
-def _name(opcode: int) -> str:
-    try:
-        return f"the {Opcode(opcode).name.lower()}"
-    except ValueError:
-        return f"a record of unknown kind {opcode}"
-
-
-def _find(path: Path) -> Path:
-    """The file, also of a folder that holds one. Raises SessionError."""
+def _find(path: Path) -> list[Path]:
+    """The file, or the files of a folder in the order of the numbers in their names. Raises SessionError."""
     if path.is_dir():
-        files = sorted(path.glob("*.mcap"))
-        if len(files) != 1:
-            raise SessionError(f"{path}: expected a folder with one .mcap file, got {len(files)}")
-        return files[0]
+        files = [file for file in path.glob("*.mcap") if file.is_file()]
+        if not files:
+            raise SessionError(f"{path}: expected a folder with .mcap files, got none in it")
+        return sorted(files, key=lambda file: [(len(digits), digits) for digits in re.findall(r"\d+|\D+", file.stem)])
     if not path.is_file():
         raise SessionError(
             f"{path}: expected a session file, got {'no regular file' if path.exists() else 'nothing there'}"
         )
-    return path
+    return [path]
+
+
+def _absent(path: Path) -> list[str]:
+    """The files that a folder should hold, by its metadata.yaml, and does not."""
+    try:
+        content = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
+        names = content["rosbag2_bagfile_information"]["relative_file_paths"]
+        return [str(name) for name in names if not (path / str(name)).exists()]
+    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError):  # it is not needed to read the session
+        return []
+
+
+def _in_order(path: Path, parts: list[_Part]) -> list[_Part]:
+    """The files of one recording. Raises SessionError where they are of several."""
+    recordings = {part.metadata.get(RECORDING, "") for part in parts}
+    kinds = {part.foreign for part in parts}
+    if len(parts) > 1 and (len(recordings) > 1 or len(kinds) > 1 or (recordings == {""} and kinds == {False})):
+        names = ", ".join(part.records.path.name for part in parts)
+        raise SessionError(f"{path}: expected the files of one recording, got those of several; name one of {names}")
+    return sorted(parts, key=lambda part: part.number)

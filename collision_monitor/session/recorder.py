@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import Counter
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Final, NamedTuple
+from typing import Final
 
-from mcap.writer import Writer
-
-from collision_monitor._version import VERSION
+from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import SessionError
-from collision_monitor.session.definitions import definition
-from collision_monitor.session.rosbag2 import TYPES, Extent, channel_metadata, file_metadata, full_name
+from collision_monitor.session.entry import Entry
+from collision_monitor.session.parts import ONE_FILE, Parts, Splitting
+from collision_monitor.session.rosbag2 import TYPES
+from collision_monitor.session.session_file import METADATA
 
-METADATA: Final = "collision_monitor"
-"""Name of the metadata record that makes an MCAP file a session."""
+__all__ = ["METADATA", "Recorder", "Recording", "Splitting"]
 
 FLUSH_PERIOD: Final = 0.25
 """s between two flushes: with the time a flush takes, a killed process loses less than the last 0.5 s."""
@@ -31,9 +28,6 @@ QUEUE_BYTES: Final = 256 << 20
 _WAKE_BYTES: Final = 4 << 20
 """Waiting bytes that wake the thread before the next flush is due."""
 
-_OVERHEAD: Final = 128
-"""Bytes that a waiting message costs beside its data, so that empty ones are bounded too."""
-
 
 class Recording(IntEnum):
     """`MonitorStatus.recording`."""
@@ -41,15 +35,6 @@ class Recording(IntEnum):
     OFF = 0
     ON = 1
     FAILED = 2
-
-
-class _Item(NamedTuple):
-    channel: int
-    topic: str
-    data: bytes
-    log_time: int
-    publish_time: int
-    sequence: int
 
 
 class Recorder:
@@ -67,6 +52,7 @@ class Recorder:
         types: Mapping[str, str],
         metadata: Mapping[str, str],
         *,
+        splitting: Splitting = ONE_FILE,
         overwrite: bool = False,
         queue_bytes: int = QUEUE_BYTES,
         patient: bool = False,
@@ -75,15 +61,12 @@ class Recorder:
         if unknown:
             raise SessionError(f"message type: expected one of {', '.join(TYPES)}, got {', '.join(unknown)}")
         self.path = Path(path)
-        self._types = dict(types)
+        self._topics = frozenset(types)
         self._queue_bytes = queue_bytes
         self._patient = patient
-        self._folder = None if self.path.suffix == ".mcap" else self.path
-        definitions = {name: definition(full_name(name)).encode() for name in self._types.values()}
-        self._stream = _create(self.path, overwrite)
 
         self._wake = threading.Condition()
-        self._queue: list[_Item] = []
+        self._queue: list[Entry] = []
         self._waiting = 0
         self._closing = False
         self._next_sequence = 0
@@ -93,42 +76,45 @@ class Recorder:
         self._dropped = 0
         self._recorded = 0
         self._recorded_bytes = 0
-        self._extent = Extent(0, 0, Counter())
-        try:
-            self._writer = Writer(self._stream)
-            self._writer.start(profile="ros2", library=f"collision_monitor {VERSION}")
-            self._writer.add_metadata(METADATA, dict(metadata))
-            self._channels = self._register(definitions)
-            self._writer.flush()  # type: ignore[no-untyped-call]
-        except OSError as error:
-            self._close_stream()
-            raise SessionError(f"{self.path}: expected to be able to write there, got: {error.strerror}") from None
+        self._taken = 0  # by the thread, written or not kept
+        self._parts = _create(self.path, types, metadata, splitting, overwrite)
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 
     # -- the caller's side
 
-    def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
+    def write(
+        self,
+        topic: str,
+        data: bytes,
+        log_time: int,
+        publish_time: int,
+        *,
+        event: bool = False,
+        objects: Sequence[ObjectDescription] | None = None,
+    ) -> None:
         """Put one message on the queue. Messages are recorded in the order of these calls; times in ns.
 
+        event: a collision begins in it. objects: of a message that changes the objects, all that are described then;
+        they are repeated at the start of each further file.
         A log time before the last one is raised to it. A message that finds the queue full is dropped and counted; its
-        sequence number stays unused, so that a replay knows.
+        sequence number stays unused, so that a replay knows. Raises KeyError for a topic that was not named.
         """
-        channel = self._channels[topic]
-        size = len(data) + _OVERHEAD
+        if topic not in self._topics:
+            raise KeyError(topic)
         with self._wake:
-            while self._patient and self._state is Recording.ON and self._waiting + size > self._queue_bytes:
+            sequence = self._next_sequence & 0xFFFFFFFF
+            self._last_log_time = max(self._last_log_time, log_time)
+            entry = Entry(topic, data, self._last_log_time, max(0, publish_time), sequence, event, objects)
+            while self._patient and self._state is Recording.ON and self._waiting + entry.cost > self._queue_bytes:
                 self._wake.notify()
                 self._wake.wait(FLUSH_PERIOD)
-            sequence = self._next_sequence & 0xFFFFFFFF
             self._next_sequence += 1
-            if self._closing or self._state is Recording.FAILED or self._waiting + size > self._queue_bytes:
+            if self._closing or self._state is Recording.FAILED or self._waiting + entry.cost > self._queue_bytes:
                 self._dropped += 1
                 return
-            self._last_log_time = max(self._last_log_time, log_time)
-            item = _Item(channel, topic, data, self._last_log_time, max(0, publish_time), sequence)
-            self._queue.append(item)
-            self._waiting += size
+            self._queue.append(entry)
+            self._waiting += entry.cost
             if self._waiting >= _WAKE_BYTES:
                 self._wake.notify()
 
@@ -165,16 +151,18 @@ class Recorder:
         try:
             while self._write_what_waits():
                 pass
-            self._finish()
+            self._parts.finish()
+            with self._wake:
+                self._recorded_bytes = self._parts.size
         except Exception as error:  # whatever it is: the caller goes on, and the status says it
             reason = error.strerror if isinstance(error, OSError) and error.strerror else repr(error)
             with self._wake:
                 self._state = Recording.FAILED
                 self._error = f"{self.path}: {reason}"
-                self._dropped = self._next_sequence - self._recorded
+                self._dropped = self._next_sequence - self._taken
                 self._queue.clear()
         finally:
-            self._close_stream()
+            self._parts.close()
 
     def _write_what_waits(self) -> bool:
         """Sleep until the next flush is due, then write. False: the session is closed and nothing is left."""
@@ -184,68 +172,34 @@ class Recorder:
             batch, self._queue = self._queue, []
             size, closing = self._waiting, self._closing
         flushed = time.monotonic()
-        unflushed = 0
-        for item in batch:
-            self._writer.add_message(item.channel, item.log_time, item.data, item.publish_time, item.sequence)
-            unflushed += 1
+        taken = written = 0
+        for entry in batch:
+            written += self._parts.write(entry)
+            taken += 1
             if time.monotonic() - flushed >= FLUSH_PERIOD:
-                self._flush(unflushed)
-                flushed, unflushed = time.monotonic(), 0
-        if unflushed:
-            self._flush(unflushed)
-        self._count(batch)
+                self._flush(taken, written)
+                flushed, taken, written = time.monotonic(), 0, 0
+        if taken:
+            self._flush(taken, written)
         with self._wake:
             self._waiting -= size
+            self._wake.notify_all()
         return not closing
 
-    def _flush(self, messages: int) -> None:
-        """Hand everything to the operating system, which keeps it when this process is killed."""
-        self._writer.flush()  # type: ignore[no-untyped-call]
+    def _flush(self, taken: int, written: int) -> None:
+        self._parts.flush()
         with self._wake:
-            self._recorded += messages
-            self._recorded_bytes = self._stream.tell()
-
-    def _count(self, batch: list[_Item]) -> None:
-        if batch:
-            begin = self._extent.begin if self._extent.counts else batch[0].log_time
-            counts = Counter(self._extent.counts) + Counter(item.topic for item in batch)
-            self._extent = Extent(begin, batch[-1].log_time, counts)
-
-    def _finish(self) -> None:
-        """Write the summary, and rosbag2's metadata as a record and, in a folder, as a file."""
-        name = Path(self._stream.name).name
-        text = file_metadata(name, self._types, self._extent)
-        self._writer.add_metadata("rosbag2", {"serialized_metadata": text})
-        self._writer.finish()  # type: ignore[no-untyped-call]
-        self._stream.flush()
-        if self._folder is not None:
-            (self._folder / "metadata.yaml").write_text(text, encoding="utf-8")
-        with self._wake:
-            self._recorded_bytes = self._stream.tell()
-
-    def _register(self, definitions: Mapping[str, bytes]) -> dict[str, int]:
-        """One channel for each topic. They go into the first chunk, before the first message."""
-        schemas = {
-            name: self._writer.register_schema(full_name(name), "ros2msg", text) for name, text in definitions.items()
-        }
-        return {
-            topic: self._writer.register_channel(topic, "cdr", schemas[name], channel_metadata(name))
-            for topic, name in self._types.items()
-        }
-
-    def _close_stream(self) -> None:
-        with suppress(OSError):  # what could not be written has been reported already
-            self._stream.close()
+            self._taken += taken
+            self._recorded += written
+            self._recorded_bytes = self._parts.size
 
 
-def _create(path: Path, overwrite: bool) -> BinaryIO:
+def _create(
+    path: Path, types: Mapping[str, str], metadata: Mapping[str, str], splitting: Splitting, overwrite: bool
+) -> Parts:
     """The new file, in a new folder unless the path ends in `.mcap`. Raises SessionError."""
     try:
-        file = path
-        if path.suffix != ".mcap":
-            path.mkdir(exist_ok=overwrite)
-            file = path / f"{path.name}_0.mcap"
-        return file.open("wb" if overwrite else "xb")
+        return Parts(path, types, metadata, splitting, overwrite=overwrite)
     except FileExistsError:
         raise SessionError(
             f"{path}: expected a new file, got one that exists; choose another name or remove it"

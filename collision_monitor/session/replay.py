@@ -24,7 +24,11 @@ class Verdict(IntEnum):
 
 @dataclass
 class Report:
-    """What a replay did and found. Durations in s; digest: of all answers that the replay gave."""
+    """What a replay did and found. Durations in s; digest: of all answers that the replay gave.
+
+    foreign: another program recorded it. hole: messages are missing, it ends there. late: the session begins after its
+    monitor, whose state then is not in it, so the answers are given anew and not compared.
+    """
 
     steps: int = 0
     messages: int = 0
@@ -37,6 +41,7 @@ class Report:
     notes: list[str] = field(default_factory=list)
     foreign: bool = False
     hole: bool = False
+    late: bool = False
 
     @property
     def verdict(self) -> Verdict:
@@ -60,25 +65,33 @@ def replay(session: Session, *, threads: int | None = None, progress: Callable[[
     run = _Replay(Pipeline(profile, frame_id=session.frame_id))
     report = run.report
     report.foreign = session.metadata.get("determinism_key") != provenance()["determinism_key"]
-    if report.foreign:
+    if session.foreign:
+        report.notes.append(f"the recording has no settings in it: replayed with the profile {profile.name}")
+    elif report.foreign:
         report.notes.append(f"recorded by another program: {_provenance_differences(session)}")
 
     topics: set[str] = set()
     inputs = 0
     begin: int | None = None
+    first = 0
     started = time.perf_counter()
     for count, message in enumerate(session.messages()):
-        missing = (message.sequence - count) & 0xFFFFFFFF
+        if count == 0 and message.sequence:
+            first, report.late = message.sequence, True
+            report.notes.append(
+                f"it begins {first} messages after its recording: what the monitor knew then is not in it, "
+                "so its answers are given anew and not compared"
+            )
+        missing = (message.sequence - first - count) & 0xFFFFFFFF
         if missing:
             report.hole = True
-            report.notes.append(
-                f"{missing} messages are missing after step {report.steps}: replayed and compared up to there"
-            )
+            done = "replayed" if report.late else "replayed and compared"
+            report.notes.append(f"{missing} messages are missing after step {report.steps}: {done} up to there")
             break
         topics.add(message.topic)
         inputs += message.type in ("ObjectStateArray", "ObjectDescriptionArray")
         begin = message.log_time if begin is None else begin
-        run.feed(message)
+        run.feed(message, compare=not report.late)
         report.messages = count + 1
         report.recorded_duration = (message.log_time - begin) * 1e-9
         report.replay_duration = time.perf_counter() - started
@@ -88,9 +101,9 @@ def replay(session: Session, *, threads: int | None = None, progress: Callable[[
         found = ", ".join(sorted(topics)) or "no messages at all"
         raise SessionError(f"{session.path}: expected object states and shapes, found {found}")
     report.notes += session.damage
-    if not (report.hole or session.damage):
+    if not (report.hole or report.late or session.damage):
         run.expect_nothing_more()
-    if not report.compared:
+    if not report.compared and not report.late:
         report.first_difference, report.differing = None, 0
         report.notes.append("the session holds no answers to compare with")
     return report
@@ -105,8 +118,10 @@ class _Replay:
         self._open: dict[str, bytes] = {}
         self._differed_in = -1
 
-    def feed(self, message: Recorded) -> None:
+    def feed(self, message: Recorded, *, compare: bool = True) -> None:
         """One recorded message: an input is processed, an answer is compared."""
+        if not compare:
+            self._open = {}
         match message.type:
             case "ObjectDescriptionArray":
                 self.expect_nothing_more()
@@ -118,9 +133,9 @@ class _Replay:
                     self._open = {"ContactArray": outputs.contacts, "PredictedCollisionArray": outputs.predictions}
                     self.report.steps = outputs.result.step
                     self.report.digest = outputs.digest
-            case "ContactArray" | "PredictedCollisionArray":
+            case "ContactArray" | "PredictedCollisionArray" if compare:
                 self._compare(message)
-            case "MonitorStatus":
+            case "MonitorStatus" if compare:
                 self.report.compared += 1
                 step = self.report.steps
                 self._note(compare_status(message.topic, step, message.data, self.pipeline.status()))

@@ -64,12 +64,17 @@ class Extent:
     end: int
     counts: Mapping[str, int]
 
+    @property
+    def count(self) -> int:
+        """Of all topics."""
+        return sum(self.counts.values())
 
-def file_metadata(file_name: str, types: Mapping[str, str], extent: Extent) -> str:
-    """metadata.yaml; types: topic -> name of its message."""
-    start = {"nanoseconds_since_epoch": extent.begin}
-    duration = {"nanoseconds": extent.end - extent.begin}
-    count = sum(extent.counts.values())
+
+def file_metadata(files: Mapping[str, Extent], types: Mapping[str, str]) -> str:
+    """metadata.yaml; files: by name, in their order; types: topic -> name of its message."""
+    filled = [extent for extent in files.values() if extent.counts]
+    begin = min((extent.begin for extent in filled), default=0)
+    end = max((extent.end for extent in filled), default=0)
     topics = [
         {
             "topic_metadata": {
@@ -79,22 +84,28 @@ def file_metadata(file_name: str, types: Mapping[str, str], extent: Extent) -> s
                 "offered_qos_profiles": qos_profiles(name),
                 "type_description_hash": type_hash(full_name(name)),
             },
-            "message_count": extent.counts.get(topic, 0),
+            "message_count": sum(extent.counts.get(topic, 0) for extent in files.values()),
         }
         for topic, name in types.items()
     ]
     information = {
         "version": VERSION,
         "storage_identifier": "mcap",
-        "duration": dict(duration),
-        "starting_time": dict(start),
-        "message_count": count,
+        "duration": {"nanoseconds": end - begin},
+        "starting_time": {"nanoseconds_since_epoch": begin},
+        "message_count": sum(extent.count for extent in files.values()),
         "topics_with_message_count": topics,
         "compression_format": "",
         "compression_mode": "",
-        "relative_file_paths": [file_name],
+        "relative_file_paths": list(files),
         "files": [
-            {"path": file_name, "starting_time": dict(start), "duration": dict(duration), "message_count": count}
+            {
+                "path": name,
+                "starting_time": {"nanoseconds_since_epoch": extent.begin},
+                "duration": {"nanoseconds": extent.end - extent.begin},
+                "message_count": extent.count,
+            }
+            for name, extent in files.items()
         ],
         "custom_data": None,
         "ros_distro": "jazzy",

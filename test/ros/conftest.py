@@ -56,6 +56,10 @@ class Process:
         return self.wait(15.0)
 
     @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    @property
     def running(self) -> bool:
         return self._process.poll() is None
 

@@ -8,8 +8,10 @@ import rclpy
 import yaml
 from rclpy.node import Node
 
+from collision_monitor.errors import InputError
 from collision_monitor.profiles import Profile
 from collision_monitor.ros.parameters import MonitorParameters, read_monitor_parameters
+from collision_monitor.session import Splitting
 
 CONFIG = Path(__file__).parents[2] / "config" / "monitor.yaml"
 
@@ -37,7 +39,8 @@ def test_the_file_as_it_is_gives_the_defaults(read):
 def test_the_file_with_every_line_in_force_gives_the_defaults(read, tmp_path):
     text = re.sub(r"^( *)# (\w+: )", r"\1\2", CONFIG.read_text(), flags=re.MULTILINE)
     values = next(iter(yaml.safe_load(text).values()))["ros__parameters"]
-    assert set(values) == {"profile", "frame_id", "record", "executor", *(s.name for s in Profile.fields())}
+    recording = {"record", *(f"record_{n}" for n in ("mode", "before", "after", "split_size", "split_duration"))}
+    assert set(values) == {"profile", "frame_id", "executor", *recording, *(s.name for s in Profile.fields())}
     (tmp_path / "all.yaml").write_text(text)
     assert read("--params-file", str(tmp_path / "all.yaml"))[0].profile == Profile()
 
@@ -45,6 +48,25 @@ def test_the_file_with_every_line_in_force_gives_the_defaults(read, tmp_path):
 def test_a_setting_wins_over_the_profile_it_starts_from(read):
     found, _ = read("-p", "profile:=fast", "-p", "horizon:=7")
     assert found.profile == Profile.named("fast").replace(horizon=7.0)
+
+
+def test_the_recording_is_split_as_asked(read):
+    found, _ = read("-p", "record_split_size:=1000", "-p", "record_split_duration:=60", "-p", "record_mode:=on_event")
+    assert found.splitting == Splitting(1000, 60.0, True)
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ("record_mode:=sometimes", "record_mode: expected always or on_event, got 'sometimes'"),
+        ("record_before:=-1.0", "before: expected a finite number, at least 0, got -1.0"),
+        ("record_split_size:=big", "record_split_size: expected a whole number, got 'big'"),
+    ],
+)
+def test_a_recording_that_cannot_be_is_named(read, given, text):
+    with pytest.raises(InputError) as error:
+        read("-p", given)
+    assert text in str(error.value)
 
 
 def test_the_descriptors_say_unit_and_range(read):

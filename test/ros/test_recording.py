@@ -1,9 +1,12 @@
 """What the node records, and that the same answers come out of it without ROS."""
 
+import resource
+
 import numpy as np
 import pytest
 
 from collision_monitor import records
+from collision_monitor.codec import decode_contacts, decode_descriptions
 from collision_monitor.description import ObjectDescription
 from collision_monitor.geometry.shapes import Box
 from collision_monitor.session import Session
@@ -75,3 +78,53 @@ def test_a_recording_that_fails_does_not_stop_the_monitor(start, team, tmp_path,
     assert monitor.stop() == 0
     assert "not recording" in monitor.words
     assert (tmp_path / "there.mcap").read_bytes() == b"precious"
+
+
+def test_only_what_is_around_collisions_is_recorded(start, team, tmp_path):
+    options = ("--on-event", "--before", "0.3", "--after", "0.2")
+    monitor = start("run", "--record", "events", *options)
+    team.meet()
+    team.describe(*(ObjectDescription(i, Box((1, 1, 1))) for i in range(1, 21)))
+    team.status(lambda s: s.objects == 20)
+    for step in (*range(10), *range(30, 60), *range(10)):  # apart, touching from about step 40 on, apart
+        team.say(*states(step))
+        team.listen(0.03)
+    team.listen(0.5)
+    status = team.status(lambda s: s.step == 50)
+    assert status.recording == MonitorStatus.RECORDING_ON
+    assert monitor.stop() == 0
+    (path,) = (tmp_path / "events").glob("*.mcap")
+    messages = list(Session(path).messages())
+    steps = [decode_contacts(m.data) for m in messages if m.type == "ContactArray"]
+    begins = next(k for k, each in enumerate(steps) if len(each.contacts))
+    assert 0 < begins < len(steps) - 1 < 45
+    assert messages[0].type == "ObjectDescriptionArray"
+    assert len(decode_descriptions(messages[0].data).objects) == 20
+    assert start("replay", "events").wait() == 4
+
+
+def test_a_full_disk_is_told_and_does_not_stop_the_monitor(start, team, tmp_path):
+    """RLIMIT_FSIZE makes the kernel refuse to grow the file, as a full disk does."""
+    monitor = start("run", "--record", "run.mcap")
+    team.meet()
+    team.describe(*(ObjectDescription(i, Box((1, 1, 1))) for i in range(1, 21)))
+    team.status(lambda s: s.objects == 20)
+    team.ask(*states(0))
+    limit = 60_000
+    resource.prlimit(monitor.pid, resource.RLIMIT_FSIZE, (limit, limit))
+    for step in range(1, 400):
+        team.say(*states(0.1 * step))
+        team.listen(0.005)
+        if team.statuses[-1].recording == MonitorStatus.RECORDING_FAILED:
+            break
+    status = team.status(lambda s: s.recording == MonitorStatus.RECORDING_FAILED)
+    assert "run.mcap: File too large" in status.recording_error
+    _, predictions = team.ask(*states(0.1 * step + 0.1))
+    assert len(predictions.predictions) == 10
+    dropped = status.recording_dropped
+    status = team.status(lambda s: s.recording_dropped > dropped)
+    assert monitor.running
+    assert monitor.stop() == 0
+    assert "the recording failed, the monitoring goes on: run.mcap: File too large" in monitor.words
+    assert 0 < (tmp_path / "run.mcap").stat().st_size <= limit
+    assert len(list(Session(tmp_path / "run.mcap").messages())) >= status.recorded_messages > 3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -55,23 +56,26 @@ def inputs(steps: int) -> Iterator[tuple[str, bytes]]:
         yield STATES, data
 
 
-def record(path: Path, steps: int = 50, *, close: bool = True, pipeline: Pipeline | None = None) -> Recorder:
-    """The scene, recorded as the node records it."""
+def record(
+    path: Path, steps: int = 50, *, close: bool = True, pipeline: Pipeline | None = None, **options: Any
+) -> Recorder:
+    """The scene, recorded as the node records it; options: of the recorder."""
     pipeline = pipeline or Pipeline("balanced")
-    recorder = Recorder(path, TYPES, pipeline.metadata(node=NODE))
+    recorder = Recorder(path, TYPES, pipeline.metadata(node=NODE), **options)
     now = START
     recorder.write(STATUS, pipeline.status(), now, now)
     for topic, data in inputs(steps):
         now += STEP
         if topic == SHAPES:
             pipeline.on_shapes(data)
-            recorder.write(topic, data, now, now)
+            recorder.write(topic, data, now, now, objects=tuple(pipeline.objects.values()))
             continue
         outputs = pipeline.on_states(data)
         recorder.write(topic, data, now, now)
         if outputs is not None:
             stamp = outputs.result.stamp_ns
-            recorder.write(CONTACTS, outputs.contacts, now, stamp)
+            begins = bool((outputs.result.contacts["phase"] == records.Phase.BEGIN).any())
+            recorder.write(CONTACTS, outputs.contacts, now, stamp, event=begins)
             recorder.write(PREDICTIONS, outputs.predictions, now, stamp)
             if outputs.result.step % 5 == 0:
                 recorder.write(STATUS, pipeline.status(recording=1, rate=100.0), now, now)

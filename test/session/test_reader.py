@@ -32,7 +32,7 @@ def test_a_finished_session_reads_as_it_was_written(recorded: Path) -> None:
 
 
 def test_a_folder_with_one_file_is_read(tmp_path: Path, recorded: Path) -> None:
-    with pytest.raises(SessionError, match=r"a folder with one .mcap file, got 0"):
+    with pytest.raises(SessionError, match=r"expected a folder with .mcap files, got none in it"):
         Session(tmp_path)
     shutil.copy(recorded, tmp_path / "x_0.mcap")
     assert len(list(Session(tmp_path).messages())) == len(list(Session(recorded).messages()))

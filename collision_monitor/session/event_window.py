@@ -1,0 +1,42 @@
+"""Which messages of a recording are kept that is only made around events."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+
+from collision_monitor.session.entry import Entry
+
+
+class EventWindow:
+    """Holds back what came last, to keep it if an event follows.
+
+    before, after: s around each event that are kept. limit: most bytes that are held back, for the oldest go first.
+    """
+
+    def __init__(self, before: float, after: float, limit: int) -> None:
+        self._before = round(before * 1e9)
+        self._after = round(after * 1e9)
+        self._limit = limit
+        self._held: deque[Entry] = deque()
+        self._bytes = 0
+        self._until = -1
+
+    def take(self, entry: Entry) -> Iterator[tuple[Entry, bool]]:
+        """What is decided now, and whether it is kept: each entry comes out once, in order. Times never decrease."""
+        if entry.event:
+            self._until = entry.log_time + self._after
+        self._held.append(entry)
+        self._bytes += entry.cost
+        # All messages of a step have its log time, so steps are kept or not kept as a whole.
+        while self._held[0].log_time < entry.log_time - self._before:
+            yield self._pop(), False
+        while self._held and entry.log_time <= self._until:
+            yield self._pop(), True
+        while self._bytes > self._limit:
+            yield self._pop(), False
+
+    def _pop(self) -> Entry:
+        entry = self._held.popleft()
+        self._bytes -= entry.cost
+        return entry
