@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.description import ObjectDescription
-from collision_monitor.errors import InputError
+from collision_monitor.errors import InputError, MessageError
 from collision_monitor.monitor import Monitor, StepResult
 from collision_monitor.plain import PlainMonitor
 from collision_monitor.profiles import Profile
@@ -52,6 +54,7 @@ class Row:
     steps: int
     step_ms: float
     """Median time of a step."""
+    step_ms_p99: float
     pair_us: float
     """Time of all steps by the pairs that were examined or predicted in them."""
     alarms: int
@@ -81,6 +84,29 @@ def _without_nan(values: dict[str, Any]) -> dict[str, Any]:
         else value
         for name, value in values.items()
     }
+
+
+def recorded(path: Path) -> tuple[str, list[ObjectDescription], list[Step]]:
+    """Name, objects and steps of a session, all objects known from the first step on, as they were described last.
+
+    What is malformed is left out. Raises InputError where there is nothing, SessionError.
+    """
+    from collision_monitor.codec import decode_descriptions, decode_states
+    from collision_monitor.session import Session
+
+    described: dict[int, ObjectDescription] = {}
+    steps = []
+    for message in Session(path).messages():
+        with suppress(MessageError):
+            if message.type == "ObjectDescriptionArray":
+                changes = decode_descriptions(message.data).objects
+                described.update({it.object_id: it for it in changes if isinstance(it, ObjectDescription)})
+            elif message.type == "ObjectStateArray":
+                states = decode_states(message.data)
+                steps.append((states.stamp_ns, states.states.copy()))
+    if not described or not steps:
+        raise InputError(f"{path}: expected object shapes and states, found {len(described)} and {len(steps)} of them")
+    return path.stem, list(described.values()), steps
 
 
 def tradeoff(
@@ -165,6 +191,7 @@ def _compare(
         objects=objects,
         steps=len(answers),
         step_ms=float(np.median(warm)) * 1e3,
+        step_ms_p99=float(np.percentile(warm, 99)) * 1e3,
         pair_us=float(warm.sum()) * 1e6 / pairs if pairs else float("nan"),
         alarms=alarms,
         false_alarms=false_alarms,

@@ -15,7 +15,7 @@ from collision_monitor.errors import CollisionMonitorError
 
 COMMANDS: Final = (
     "demo", "run", "world", "replay", "report", "compare",
-    "check", "salvage", "import", "tradeoff", "extremes", "bench",
+    "check", "salvage", "import", "tradeoff", "tune", "extremes", "bench",
 )  # fmt: skip
 """In the order of `--help`. Each is a module of this package (`import_` for import) with `add_parser(subparsers)`."""
 
@@ -38,6 +38,7 @@ examples:
   collision-monitor salvage cut.mcap -o whole.mcap        what is whole in a damaged recording
   collision-monitor import bag --map map.yaml -o run.mcap odometry, poses, tf or markers as a session
   collision-monitor tradeoff --scene fleet                what each profile costs and how wrong it is
+  collision-monitor tune run.mcap --max-ttc-error 0.05    the cheapest settings that are good enough
   collision-monitor extremes                              how right the numbers are from 1e-150 m to 1e18 m
   collision-monitor bench --scene boxes --n 10000         how long it takes to find all contacts
 

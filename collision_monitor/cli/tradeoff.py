@@ -7,13 +7,12 @@ import csv
 import json
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from collision_monitor.cli.progress import progress_bar
 from collision_monitor.cli.quantities import positive, whole
-from collision_monitor.errors import InputError, MessageError
+from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
     from collision_monitor.description import ObjectDescription
@@ -64,14 +63,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Measure and print. Raises InputError, ProfileError, SessionError."""
     from collision_monitor.profiles import Profile
-    from collision_monitor.tradeoff import tradeoff
+    from collision_monitor.tradeoff import recorded, tradeoff
 
     if args.session is not None and args.scene:
         raise InputError("tradeoff: expected a session or scenes, got both")
     profiles = [Profile.named(name) for name in args.profile or Profile.names()]
     if not args.profile:
         profiles.sort(key=lambda profile: -profile.impact_tolerance)
-    inputs = [_recorded(args.session)] if args.session else [_played(name, args) for name in args.scene or SCENES]
+    inputs = [recorded(args.session)] if args.session else [_played(name, args) for name in args.scene or SCENES]
     rows = []
     for name, descriptions, steps in inputs:
         with progress_bar(name, 2 * len(steps) * len(profiles)) as progress:
@@ -99,27 +98,6 @@ def _played(name: str, args: argparse.Namespace) -> tuple[str, list[ObjectDescri
         states = scene.step()
         steps.append((round(scene.time * 1e9), states))
     return name, scene.descriptions, steps
-
-
-def _recorded(path: Path) -> tuple[str, list[ObjectDescription], list[Step]]:
-    """All objects are known from the first step on, as they were described last; what is malformed is left out."""
-    from collision_monitor.codec import decode_descriptions, decode_states
-    from collision_monitor.description import ObjectDescription
-    from collision_monitor.session import Session
-
-    described: dict[int, ObjectDescription] = {}
-    steps = []
-    for message in Session(path).messages():
-        with suppress(MessageError):
-            if message.type == "ObjectDescriptionArray":
-                changes = decode_descriptions(message.data).objects
-                described.update({it.object_id: it for it in changes if isinstance(it, ObjectDescription)})
-            elif message.type == "ObjectStateArray":
-                states = decode_states(message.data)
-                steps.append((states.stamp_ns, states.states.copy()))
-    if not described or not steps:
-        raise InputError(f"{path}: expected object shapes and states, found {len(described)} and {len(steps)} of them")
-    return path.stem, list(described.values()), steps
 
 
 def _number(value: float) -> str:

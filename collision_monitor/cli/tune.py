@@ -1,0 +1,103 @@
+"""`collision-monitor tune`: the cheapest settings that are good enough for your own recording."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from collision_monitor.cli.progress import progress_bar
+from collision_monitor.cli.quantities import positive
+from collision_monitor.errors import InputError
+
+if TYPE_CHECKING:
+    from collision_monitor.tune import Trial
+
+EXIT_NONE = 3
+
+EPILOG = """\
+Each profile is run over the recording and every answer compared with exact ones that are computed anew at every step.
+The errors are those of 99 %% of the predictions and of the worst contact, the time is that of 99 %% of the steps.
+
+exit codes: 0 a profile was found and written, 3 none meets the demands (it is said which fails, and by how much)
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Register the command."""
+    parser = subparsers.add_parser(
+        "tune",
+        help="find the cheapest settings that keep the errors on your recording",
+        description="Search tolerances on a recording: the cheapest that keep the demands, as a parameter file.",
+        epilog=EPILOG.replace("%%", "%"),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("session", type=Path, metavar="SESSION", help="a .mcap file, or a folder that holds one")
+    parser.add_argument("--max-distance-error", type=positive, metavar="M", help="of contacts, in m")
+    parser.add_argument("--max-ttc-error", type=positive, metavar="S", help="of predicted times to collision, in s")
+    parser.add_argument("--budget-ms", type=positive, metavar="MS", help="of a step, in ms on this machine")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="parameter file (default: SESSION.yaml here)")
+    parser.add_argument("--force", action="store_true", help="overwrite it")
+    parser.add_argument("--json", action="store_true", help="print one line of JSON")
+    parser.set_defaults(command=tune_command)
+
+
+def tune_command(args: argparse.Namespace) -> int:
+    """Return the exit code. Raises InputError, SessionError."""
+    from collision_monitor.session import Session
+    from collision_monitor.tradeoff import recorded
+    from collision_monitor.tune import Demands, candidates, parameter_file, tune
+
+    output = args.output or Path(f"{args.session.stem}.yaml")
+    if output.exists() and not args.force:
+        raise InputError(f"{output}: expected a new file, got one that exists; choose another name or --force")
+    demands = Demands(args.max_distance_error, args.max_ttc_error, args.budget_ms)
+    profile = Session(args.session).profile
+    name, descriptions, steps = recorded(args.session)
+    total = 2 * len(steps) * len(candidates(profile.horizon, profile.contact_margin))
+    with progress_bar("tune", total) as done:
+        chosen, trials = tune(
+            name, descriptions, steps, demands,
+            horizon=profile.horizon, contact_margin=profile.contact_margin, progress=done,
+        )  # fmt: skip
+    if args.json:
+        rows = [each.row.to_dict() | {"failures": each.failures} for each in trials]
+        print(json.dumps({"chosen": chosen and chosen.name, "demands": asdict(demands), "rows": rows}))
+    else:
+        print("\n".join(_as_text(trials, chosen.name if chosen else None)))
+    if chosen is None:
+        return EXIT_NONE
+    asked = ", ".join(f"{key} {value:g}" for key, value in asdict(demands).items() if value is not None)
+    notes = [f"Found by `collision-monitor tune` on {args.session.name}: {chosen.name}", f"asked: {asked or 'nothing'}"]
+    try:
+        output.write_text(parameter_file(chosen, notes), encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{output}: expected a file that can be written, got: {error.strerror}") from None
+    if not args.json:
+        print(f"written {output}; start the node with: collision-monitor run --params {output}")
+    return 0
+
+
+def _as_text(trials: list[Trial], chosen: str | None) -> list[str]:
+    heads = ("ms/step", "p99", "alarms", "distance m", "TTC p99 s", "worst")
+    widths = (8, 8, 9, 11, 10, 9)
+    lines = [f"  {'profile':<16} " + " ".join(f"{head:>{width}}" for head, width in zip(heads, widths, strict=True))]
+    for each in trials:
+        row = each.row
+        mark = "→ " if each.profile.name == chosen else "  "
+        numbers = (
+            row.step_ms,
+            row.step_ms_p99,
+            row.alarms,
+            row.distance_error_m,
+            row.ttc_error_s.p99,
+            row.ttc_error_s.worst,
+        )
+        shown = " ".join(f"{x:>{w}.3g}" if x == x else f"{'–':>{w}}" for x, w in zip(numbers, widths, strict=True))
+        lines.append(f"{mark}{each.profile.name:<16} {shown}  {'; '.join(each.failures) or 'meets all demands'}")
+    if chosen is None:
+        nearest = min(trials, key=lambda each: len(each.failures))
+        lines.append(f"none meets all demands; {nearest.profile.name} comes nearest: {'; '.join(nearest.failures)}")
+    return lines

@@ -1,0 +1,132 @@
+"""The cheapest tolerances that keep the errors of a recording below what its user allows.
+
+The profile `balanced` is made looser and tighter in steps, each is measured on the recording against exact answers, and
+of those that meet every demand the cheapest is chosen, and of those that cost the same the tightest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import yaml
+
+from collision_monitor.description import ObjectDescription
+from collision_monitor.errors import InputError
+from collision_monitor.profiles import Profile
+from collision_monitor.tradeoff import Row, Step, tradeoff
+
+FACTORS: Final = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.01)
+"""Of the tolerances of `balanced`, from loose to tight; `exact` is tried after them."""
+
+NOISE: Final = 1.05
+"""Times that differ by less than this factor count as the same."""
+
+TOLERANCES: Final = (
+    "impact_tolerance",
+    "position_tolerance",
+    "orientation_tolerance",
+    "velocity_tolerance",
+    "angular_velocity_tolerance",
+)
+
+
+@dataclass(frozen=True)
+class Demands:
+    """What must hold; None: nothing is asked. Lengths in m, times in s and ms.
+
+    distance_error: the worst of all contacts. ttc_error: of 99 % of the predictions. budget_ms: of 99 % of the steps.
+    """
+
+    distance_error: float | None = None
+    ttc_error: float | None = None
+    budget_ms: float | None = None
+
+    def failures(self, row: Row) -> list[str]:
+        """The demands that a row does not meet, in words: what was asked and what is there."""
+        found = []
+        if row.misses:
+            found.append(f"{row.misses} collisions missed")
+        if row.outside_bound:
+            found.append(f"{row.outside_bound} predictions outside of their bound")
+        for name, most, value, unit in (
+            ("distance error", self.distance_error, row.distance_error_m, "m"),
+            ("TTC error", self.ttc_error, row.ttc_error_s.p99, "s"),
+            ("step time", self.budget_ms, row.step_ms_p99, "ms"),
+        ):
+            if most is not None and value > most:  # NaN: there was none
+                found.append(f"{name} {value:.3g} {unit}, {value / most:.2g} times the {most:g} {unit} allowed")
+        return found
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One profile on the recording; failures: the demands that it does not meet."""
+
+    profile: Profile
+    row: Row
+    failures: list[str]
+
+
+def candidates(horizon: float, contact_margin: float) -> list[Profile]:
+    """The profiles that are tried, from loose to tight."""
+    base = Profile.named("balanced").replace(horizon=horizon, contact_margin=contact_margin)
+    loose = [
+        base.replace(
+            name=f"balanced × {factor:g}", **{name: _scaled(name, getattr(base, name) * factor) for name in TOLERANCES}
+        )
+        for factor in FACTORS
+    ]
+    return [*loose, Profile.named("exact").replace(horizon=horizon, contact_margin=contact_margin)]
+
+
+def _scaled(name: str, value: float) -> float:
+    """Within the range of the setting."""
+    setting = next(each for each in Profile.fields() if each.name == name)
+    return float(f"{min(max(value, setting.minimum), setting.maximum):.6g}")
+
+
+def tune(
+    scene: str,
+    descriptions: list[ObjectDescription],
+    steps: list[Step],
+    demands: Demands,
+    *,
+    horizon: float = 2.0,
+    contact_margin: float = 0.0,
+    progress: Callable[[int], None] = lambda done: None,
+) -> tuple[Profile | None, list[Trial]]:
+    """The profile to take, or None where none meets the demands, and all trials from loose to tight. Raises InputError.
+
+    progress is told how many steps were just done, of len(steps) * 2 * len(candidates(…)) in all.
+    """
+    for name, value in vars(demands).items():
+        if value is not None and not value > 0.0:
+            raise InputError(f"{name}: expected a number above 0, got {value!r}")
+    profiles = candidates(horizon, contact_margin)
+    rows = tradeoff(scene, descriptions, steps, profiles, progress)
+    trials = [Trial(profile, row, demands.failures(row)) for profile, row in zip(profiles, rows, strict=True)]
+    good = [trial for trial in trials if not trial.failures]
+    # what costs the same but for the clock's noise may as well be the tightest
+    least = min((trial.row.step_ms for trial in good), default=0.0)
+    cheap = [trial for trial in good if trial.row.step_ms <= NOISE * least]
+    return (cheap[-1].profile if cheap else None), trials
+
+
+def parameter_file(profile: Profile, notes: list[str]) -> str:
+    """The profile as a file of parameters for the node, with notes as comments."""
+    settings: dict[str, float | int | str] = {"profile": "balanced"}
+    base = Profile.named("balanced")
+    settings |= {
+        each.name: getattr(profile, each.name)
+        for each in Profile.fields()
+        if getattr(profile, each.name) != getattr(base, each.name)
+    }
+    text = yaml.safe_dump({"/**/object_monitor": {"ros__parameters": settings}}, sort_keys=False)
+    return "".join(f"# {note}\n" for note in _lines(notes)) + text
+
+
+def _lines(notes: list[str]) -> Iterator[str]:
+    for note in notes:
+        yield from note.splitlines()

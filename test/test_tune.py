@@ -1,0 +1,97 @@
+"""Tuning: the cheapest settings that keep the demands, as a file for the node; and what fails where none does."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import yaml
+
+from collision_monitor.cli.parameter_file import check_parameter_file
+from collision_monitor.errors import InputError
+from collision_monitor.profiles import Profile
+from collision_monitor.tradeoff import Errors, recorded
+from collision_monitor.tune import FACTORS, Demands, candidates, parameter_file, tune
+
+GOLDEN = Path(__file__).parent / "golden" / "balanced.mcap"
+PROGRAM = Path(sys.executable).with_name("collision-monitor")
+
+
+@pytest.fixture(scope="module")
+def trials():
+    name, descriptions, steps = recorded(GOLDEN)
+    told = []
+    chosen, trials = tune(name, descriptions, steps[:80], Demands(ttc_error=0.01), progress=told.append)
+    assert sum(told) == 2 * 80 * len(trials)
+    return chosen, trials
+
+
+def test_tighter_profiles_err_less_and_the_chosen_one_little_enough(trials) -> None:
+    chosen, found = trials
+    assert [each.profile.name for each in found] == [*(f"balanced × {factor:g}" for factor in FACTORS), "exact"]
+    errors = [each.row.ttc_error_s.p99 for each in found]
+    assert errors[0] > 0.01 > errors[-1]
+    assert all(bool(each.failures) == (each.row.ttc_error_s.p99 > 0.01) for each in found)
+    taken = next(each for each in found if each.profile is chosen)
+    assert not taken.failures
+    assert taken.row.step_ms <= 1.05 * min(each.row.step_ms for each in found if not each.failures)
+
+
+def test_each_demand_fails_with_its_measure(trials) -> None:
+    row = replace(
+        trials[1][0].row,
+        misses=0,
+        outside_bound=0,
+        distance_error_m=0.5,
+        ttc_error_s=Errors(0.1, 0.2, 0.3),
+        step_ms_p99=8.0,
+    )
+    assert Demands().failures(row) == []
+    assert Demands(0.1, 0.1, 4.0).failures(row) == [
+        "distance error 0.5 m, 5 times the 0.1 m allowed",
+        "TTC error 0.2 s, 2 times the 0.1 s allowed",
+        "step time 8 ms, 2 times the 4 ms allowed",
+    ]
+    assert Demands().failures(replace(row, misses=2)) == ["2 collisions missed"]
+    none = replace(row, distance_error_m=float("nan"))
+    assert Demands(distance_error=0.1).failures(none) == []
+
+
+def test_the_file_makes_the_profile_again(tmp_path: Path) -> None:
+    for profile in candidates(1.5, 0.1):
+        text = parameter_file(profile, ["two", "lines"])
+        assert text.startswith("# two\n# lines\n")
+        (tmp_path / "tuned.yaml").write_text(text)
+        check_parameter_file(tmp_path / "tuned.yaml")
+        settings = yaml.safe_load(text)["/**/object_monitor"]["ros__parameters"]
+        again = Profile.named(settings.pop("profile")).replace(**settings)
+        assert again.replace(name=profile.name) == profile
+
+
+def test_a_demand_of_nothing_is_refused() -> None:
+    with pytest.raises(InputError, match="budget_ms: expected a number above 0, got 0"):
+        tune("none", [], [], Demands(budget_ms=0.0))
+
+
+def test_the_command(tmp_path: Path) -> None:
+    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+        command = [PROGRAM, "tune", str(GOLDEN), *map(str, arguments)]
+        return subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=tmp_path)
+
+    good = run("--max-ttc-error", 0.05)
+    assert good.returncode == 0, good.stderr
+    assert "→ " in good.stdout and "written balanced.yaml" in good.stdout
+    check_parameter_file(tmp_path / "balanced.yaml")
+    again = run("--max-ttc-error", 0.05)
+    assert again.returncode == 1 and "--force" in again.stderr
+    none = run("--budget-ms", 1e-6, "--json", "-o", "none.yaml")
+    assert none.returncode == 3
+    answer = json.loads(none.stdout)
+    assert answer["chosen"] is None
+    assert all("step time" in each["failures"][-1] for each in answer["rows"])
+    assert not (tmp_path / "none.yaml").exists()
+    assert run("--budget-ms", 0).returncode == 2
