@@ -25,6 +25,7 @@ from collision_monitor.narrow_phase.dispatch import contact, separation
 from collision_monitor.prediction.motion import place_shape, relative_position, rotation_at
 from collision_monitor.prediction.support import support_value
 from collision_monitor.records import Method, PredictionStatus
+from collision_monitor.tolerances import EPSILON
 
 HIT: Final = int(PredictionStatus.HIT)
 UNRESOLVED: Final = int(PredictionStatus.UNRESOLVED)
@@ -71,35 +72,37 @@ def make_scratch() -> Scratch:
 
 
 @device
-def sphere_interval(dx, dy, dz, vx, vy, vz, reach, growth, end):
+def sphere_interval(dx, dy, dz, vx, vy, vz, reach, growth, end, outward):
     """First and last time in [0, end] at which |d + v t| <= reach + growth t; (inf, -inf): never.
 
-    Closed form; the root is taken as c / (-b + sqrt(D)), which does not cancel (Numerical Recipes 5.6).
-    The result is widened by the round-off of the discriminant: the first time is never late.
+    Rounded so that no such time is left out (outward = 1), or so that all between are such for certain (outward = -1).
+    Closed form: the discriminant as |reach v - growth d|^2 - |d x v|^2, the root as c / (-b + sqrt(D)): neither cancels
+    (Numerical Recipes 5.6; Haines et al., Precision improvements for ray/sphere intersection, 2019).
     """
-    c = dx * dx + dy * dy + dz * dz - reach * reach
-    a = vx * vx + vy * vy + vz * vz - growth * growth
-    b = dx * vx + dy * vy + dz * vz - reach * growth
-    if c <= 0.0:
-        first = 0.0
-        if a <= 0.0:
-            return first, end
-        return first, min(end, (-b + sqrt(max(b * b - a * c, 0.0))) / a)
-    if b >= 0.0 and a >= 0.0:
+    e = outward * EPSILON
+    pp = dx * dx + dy * dy + dz * dz
+    vv = vx * vx + vy * vy + vz * vz
+    q = sqrt((pp + reach * reach) * (vv + growth * growth))
+    c = pp - reach * reach - 4.0 * e * (pp + reach * reach)
+    a = vv - growth * growth - 4.0 * e * (vv + growth * growth)
+    b = dx * vx + dy * vy + dz * vz - reach * growth - 8.0 * e * q
+    if c > 0.0 and b >= 0.0 and a >= 0.0:
         return inf, -inf
-    discriminant = b * b - a * c
-    if discriminant < -1e-14 * b * b:
-        return inf, -inf
-    root = sqrt(max(discriminant, 0.0))
-    if root - b <= 0.0:
-        return inf, -inf
-    first = c / (root - b)
-    if first > end:
-        return inf, -inf
-    first *= 1.0 - 1e-7 if discriminant < 1e-14 * b * b else 1.0 - 1e-14
+    sx, sy, sz = reach * vx - growth * dx, reach * vy - growth * dy, reach * vz - growth * dz
+    ox, oy, oz = dy * vz - dz * vy, dz * vx - dx * vz, dx * vy - dy * vx
+    near, far = sx * sx + sy * sy + sz * sz, ox * ox + oy * oy + oz * oz
+    discriminant = near - far + 32.0 * e * q * (sqrt(near + far) + EPSILON * q)
+    first = 0.0
+    s = sqrt(max(discriminant, 0.0)) - b
+    if c > 0.0:
+        if discriminant < 0.0 or s <= 0.0:
+            return inf, -inf
+        first = c / s * (1.0 - 4.0 * e)
+        if first > end:
+            return inf, -inf
     if a <= 0.0:
         return first, end
-    return first, min(end, (root - b) / a)
+    return first, min(end, s / a * (1.0 + 4.0 * e))
 
 
 @inlined
@@ -293,7 +296,7 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
     first, last = 0.0, end - begin
     reach = A.radius + B.radius + margin
     if reach < inf:
-        first, last = sphere_interval(px, py, pz, vx, vy, vz, reach + tube_0, tube_1, last)
+        first, last = sphere_interval(px, py, pz, vx, vy, vz, reach + tube_0, tube_1, last, 1.0)
         if first > last:
             return 0
     event.i, event.j = i, j
@@ -352,13 +355,13 @@ def _sphere_impact(A, B, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, be
     event.shape_i, event.shape_j = a, b
     event.lower = begin + first
     sure = inf
-    if reach - tube_0 > 0.0:
-        sure, _ = sphere_interval(px, py, pz, vx, vy, vz, reach - tube_0, -tube_1, end - begin)
-        if reach - tube_0 - tube_1 * sure <= 0.0:  # the tube has outgrown the spheres: nothing is sure any more
+    certain = reach * (1.0 - 8.0 * EPSILON) - tube_0  # the radii are rounded up by nearly as much
+    if certain > 0.0:
+        sure, _ = sphere_interval(px, py, pz, vx, vy, vz, certain, -tube_1, end - begin, -1.0)
+        if certain - tube_1 * sure <= 0.0:  # the tube has outgrown the spheres: nothing is sure any more
             sure = inf
     event.status = HIT if sure < inf else UNRESOLVED
-    # rounded up: the closed form errs by a few units in the last place, near a graze by their square root
-    event.upper = begin + sure * (1.0 + 2e-7) if sure < inf else inf
+    event.upper = begin + sure if sure < inf else inf
     t = first if sure == inf else sure
     dx, dy, dz = px + vx * t, py + vy * t, pz + vz * t
     length = sqrt(dx * dx + dy * dy + dz * dz)

@@ -67,6 +67,32 @@ def test_spheres_against_the_exact_root(seed, exponent):
         assert answer.upper - answer.lower <= 1e-5
 
 
+def test_spheres_that_graze_from_afar():
+    """By a relative 1e-14 to 1e-1 of their radius, from up to 1e9 radii away: no root is left out, no miss is a hit."""
+    rng = np.random.default_rng(0)
+    statuses = []
+    for _ in range(300):
+        away, by = 10.0 ** rng.uniform(0.5, 9), 10.0 ** rng.uniform(-14, -1) * rng.choice([-1, 1])
+        v = turned(rng)[:3]
+        v /= np.linalg.norm(v)
+        side = np.cross(v, turned(rng)[:3])
+        p, v = -v * away + side / np.linalg.norm(side) * (1 + by), v * away
+        answer = time_of_impact(cm.Sphere(0.5), still(0, 0, 0), cm.Sphere(0.5), Motion(Pose(p), v), 2.0, 1e-9)
+        statuses.append(answer.status)
+        with localcontext(prec=100):
+            P, V = [Decimal(x) for x in p], [Decimal(x) for x in v]
+            a, b = sum(x * x for x in V), sum(x * y for x, y in zip(P, V, strict=True))
+            discriminant = b * b - a * (sum(x * x for x in P) - 1)
+            if discriminant < 0:
+                assert answer.status != "hit"
+                continue
+            assert answer.status != "clear"
+            assert answer.lower <= (-b - discriminant.sqrt()) / a <= answer.upper
+        if answer.status == "hit":
+            assert answer.upper - answer.lower < 1e-6
+    assert statuses.count("hit") > 60 and statuses.count("clear") > 60
+
+
 @pytest.mark.parametrize(("a", "b"), list(combinations_with_replacement(SOLIDS, 2)), ids=name)
 def test_every_pair_against_dense_samples(a, b):
     rng = np.random.default_rng(8)
