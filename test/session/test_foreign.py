@@ -376,3 +376,39 @@ def test_recorded_inputs_of_a_monitor_need_no_mapping(tmp_path: Path) -> None:
     assert import_bag(two, tmp_path / "b.mcap", node="/b").steps == 30
     with pytest.raises(SessionError, match=r"for other topics give a mapping file \(--map\)"):
         import_bag(write_bag(tmp_path / "other", scene(2)), tmp_path / "c.mcap")
+
+
+def test_recorded_inputs_of_a_monitor_replay_as_they_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Whatever the node was called, and without anything of ours but the topics."""
+    session = Session(monitor_bag(tmp_path / "bag.mcap", "/hall/monitor"))
+    assert (session.foreign, session.frame_id, session.profile.name) == (True, "world", "balanced")
+    messages = list(session.messages())
+    assert [m.data for m in messages] == [data for _, data in inputs(30)]
+    assert [m.sequence for m in messages] == list(range(len(messages)))
+    pipeline = Pipeline("balanced")
+    for topic, data in inputs(30):
+        (pipeline.on_shapes if topic == SHAPES else pipeline.on_states)(data)
+    report = replay(session)
+    assert (report.steps, report.digest) == (30, pipeline.monitor.digest)
+    assert report.verdict is Verdict.NOT_COMPARABLE
+    assert "replayed with the profile balanced" in report.notes[0]
+    assert main(["replay", str(tmp_path / "bag.mcap")]) == 4
+    assert "no answers to compare with" in capsys.readouterr().out
+    with pytest.raises(SessionError, match="got /a/objects/shapes and /b/objects/shapes; take one out with"):
+        list(Session(monitor_bag(tmp_path / "two.mcap", "/a", "/b")).messages())
+
+
+def test_answers_that_another_recorder_took_are_compared(recorded: Path, tmp_path: Path) -> None:
+    """As `ros2 bag record -a` beside a monitor with the same settings: equal bytes are equal."""
+    with (tmp_path / "bag.mcap").open("wb") as file:
+        writer = McapWriter(file)
+        writer.start("ros2", "another recorder")
+        channels: dict[str, int] = {}
+        for m in Session(recorded).messages():
+            if m.topic not in channels:
+                schema = writer.register_schema(f"collision_monitor_msgs/msg/{m.type}", "ros2msg", b"")
+                channels[m.topic] = writer.register_channel(m.topic, "cdr", schema)
+            writer.add_message(channels[m.topic], m.log_time, m.data, m.publish_time, 0)
+        writer.finish()
+    report = replay(Session(tmp_path / "bag.mcap"))
+    assert (report.verdict, report.digest) == (Verdict.IDENTICAL, replay(Session(recorded)).digest)

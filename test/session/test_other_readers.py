@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import NonSeekingReader
 from mcap_ros2.decoder import DecoderFactory
 from session_scene import CONTACTS, STATES, TYPES
 
@@ -38,6 +40,16 @@ def test_mcap_ros2_decodes_every_message(recorded: Path, tmp_path: Path) -> None
             distances = [c.signed_distance for c in message.contacts]
             np.testing.assert_array_equal(distances, expected.contacts["signed_distance"])
             assert list(message.names) == expected.names
+
+
+def test_mcaps_streaming_reader_decodes_every_message(recorded: Path, tmp_path: Path) -> None:
+    """From a pipe: it can neither seek nor look at the index."""
+    path = whole(recorded, tmp_path / "a.mcap")
+    with subprocess.Popen(["cat", path], stdout=subprocess.PIPE) as cat:
+        assert cat.stdout is not None
+        reader = NonSeekingReader(cat.stdout, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        decoded = [message.channel.topic for message in reader.iter_decoded_messages(log_time_order=False)]
+    assert decoded == [m.topic for m in Session(path).messages()]
 
 
 @pytest.mark.parametrize("name", ["a.mcap", "folder"])
