@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from collision_monitor.report.facts import Facts
 from collision_monitor.report.from_above import from_above
-from collision_monitor.report.picture import CONTACT, INK, PALETTE, POSSIBLE, STYLE, WARNING, Size
+from collision_monitor.report.picture import CONTACT, INK, PALETTE, POSSIBLE, STYLE, WARNING, Size, shortened
 from collision_monitor.session.alerts import stated_error
 from collision_monitor.session.history import Collision, Floats, History, Pair
 
@@ -49,13 +49,6 @@ def figures(history: History, facts: Facts, size: Size) -> dict[str, Figure]:
 def pair_name(history: History, pair: Pair, longest: int = 18) -> str:
     """Both names, shortened to what fits on a picture."""
     return " – ".join(shortened(history.name_of(object_id), longest) for object_id in pair)
-
-
-def shortened(name: str, longest: int = 18) -> str:
-    """The name; of a long one the beginning and the end, for names often differ there."""
-    if len(name) <= longest:
-        return name
-    return f"{name[: longest // 2]}…{name[len(name) - longest // 2 + 1 :]}"
 
 
 def drawn_collisions(facts: Facts) -> list[Collision]:
@@ -118,7 +111,7 @@ def _timeline(history: History, facts: Facts, size: Size) -> Figure | None:
     else:
         axes.set_yticks(range(len(pairs)), [pair_name(history, pair) for pair in pairs], fontsize=9)
         axes.set_ylim(len(pairs) - 0.5, -0.5)
-    axes.set_xlim(0.0, max(history.duration, shortest))
+    axes.set_xlim(0.0, max(history.duration, shortest) or 1.0)
     axes.set_xlabel("s from the first step")
     handles: list[Patch | Line2D] = [Patch(color=CONTACT, label="in contact"), Patch(color=WARNING, label="predicted")]
     if facts.answered:

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from collision_monitor.report.facts import Facts
-from collision_monitor.report.footprint import FAR, footprint
-from collision_monitor.report.picture import INK, PALETTE, Size
+from collision_monitor.report.footprint import footprint
+from collision_monitor.report.picture import INK, PALETTE, Size, shortened
 from collision_monitor.report.tracks import Track
 from collision_monitor.session.history import Collision, Floats, History
 
@@ -21,6 +21,8 @@ EVENTS: Final = 6
 """Collisions that are drawn."""
 AROUND: Final = 2.0
 """s of the tracks that are drawn before and after a collision."""
+ZOOM: Final = 4.0
+"""Half the width of a panel is at most this many times the larger body."""
 POINTS: Final = 400
 """Of a track, at most."""
 
@@ -40,7 +42,7 @@ def from_above(history: History, facts: Facts, size: Size) -> Figure | None:
     columns = min(len(chosen), size.columns)
     rows = -(-len(chosen) // columns)
     side = min(size.width / columns, 3.9)
-    figure = Figure(figsize=(size.width, (side + 0.45) * rows), layout="constrained")
+    figure = Figure(figsize=(size.width, (side + 0.75) * rows), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes, collision in zip(panels, chosen, strict=False):
         _panel(axes, history, facts, collision)
@@ -50,41 +52,48 @@ def from_above(history: History, facts: Facts, size: Size) -> Figure | None:
 
 
 def _panel(axes: Axes, history: History, facts: Facts, collision: Collision) -> None:
-    extents: list[Floats] = []
     now = np.array([collision.begin])
+    middle = _middle(history, facts, collision)
+    tracks: list[Floats] = []
+    bodies: list[Floats] = []
     for color, object_id in zip(PALETTE, collision.pair, strict=False):
         path, described = facts.tracks[object_id], history.objects.get(object_id)
-        name = history.name_of(object_id)
-        axes.plot([], [], color=color, linewidth=4, alpha=0.6, label=name if len(name) <= 20 else f"{name[:19]}…")
+        name = shortened(history.name_of(object_id), 22)
+        axes.plot([], [], color=color, linewidth=4, alpha=0.6, label=name)
         if path is None:
             continue
-        line = _line(path, collision.begin)
+        line = _line(path, collision.begin)[:, :2] - middle
         axes.plot(line[:, 0], line[:, 1], color=color, linewidth=1.2)
-        extents.append(line[np.isfinite(line[:, 0])])
+        tracks.append(line[np.isfinite(line[:, 0])])
         position, quaternion, _ = path.at(now)
         if described is None:
-            axes.plot(position[:, 0], position[:, 1], "o", color=color)
+            axes.plot(*(position[0, :2] - middle), "o", color=color)
             continue
-        outlines = footprint(described, position[0], quaternion[0])
-        for outline in outlines:
-            axes.fill(*outline.T, facecolor=color, edgecolor=color, alpha=0.4, linewidth=1.2)
-        extents += [outline for outline in outlines if np.ptp(outline, axis=0).max() < FAR]
+        for outline in footprint(described, position[0], quaternion[0]):
+            axes.fill(*(outline - middle).T, facecolor=color, edgecolor=color, alpha=0.4, linewidth=1.2)
+            if not described.static:
+                bodies.append(outline - middle)
         if np.any(path.linear) and collision.begin - 0.5 * AROUND >= path.time[0]:
             earlier = path.at(now - 0.5 * AROUND)
             for outline in footprint(described, earlier[0][0], earlier[1][0]):
-                axes.fill(*outline.T, facecolor="none", edgecolor=color, linestyle=":", linewidth=1)
-    rows = history.contacts[(history.contact_step == collision.step) & _of_pair(history, collision)]
-    point = rows["point_a"][np.isfinite(rows["point_a"]).all(axis=1)]
-    axes.plot(point[:, 0], point[:, 1], "x", color=INK, markersize=6)
-    _look_at(axes, point[:, :2], extents)
-    axes.set_title(f"{collision.begin:.2f} s")
+                axes.fill(*(outline - middle).T, facecolor="none", edgecolor=color, linestyle=":", linewidth=1)
+    axes.plot(0.0, 0.0, "x", color=INK, markersize=6)
+    _zoom(axes, tracks, bodies)
+    x, y = np.round(middle, 2) + 0.0  # no -0.00
+    axes.set_title(f"{collision.begin:.2f} s at ({x:.2f}, {y:.2f}) m")
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(0.0, -0.12), borderaxespad=0.0, handlelength=0.8)
     axes.tick_params(labelsize=8)
 
 
-def _of_pair(history: History, collision: Collision) -> Floats:
-    rows = history.contacts
-    return np.asarray((rows["id_a"] == collision.pair[0]) & (rows["id_b"] == collision.pair[1]))
+def _middle(history: History, facts: Facts, collision: Collision) -> Floats:
+    """The point of contact (2,), or where it is not known, the first object that is."""
+    rows = history.contacts[history.contact_step == collision.step]
+    rows = rows[(rows["id_a"] == collision.pair[0]) & (rows["id_b"] == collision.pair[1])]
+    points = rows["point_a"][np.isfinite(rows["point_a"]).all(axis=1)]
+    if not len(points):
+        paths = [path for path in map(facts.tracks.__getitem__, collision.pair) if path is not None]
+        points = np.array([path.at(np.array([collision.begin]))[0][0] for path in paths] or [np.zeros(3)])
+    return np.asarray(points[0, :2], np.float64)
 
 
 def _line(path: Track, begin: float) -> Floats:
@@ -95,14 +104,12 @@ def _line(path: Track, begin: float) -> Floats:
     return np.insert(path.position[near], jumps, np.nan, axis=0)
 
 
-def _look_at(axes: Axes, point: Floats, extents: list[Floats]) -> None:
-    """A square about the contact that holds the smaller of the two and where they came from, not all of a long wall."""
-    seen = [each for each in extents if len(each)]
-    if not seen:
-        return
-    middle = point[0] if len(point) else np.mean([each[:, :2].mean(axis=0) for each in seen], axis=0)
-    reaches = sorted(float(np.abs(each[:, :2] - middle).max()) for each in seen)
-    half = 1.1 * max(reaches[: max(len(reaches) - 1, 1)])
-    axes.set_xlim(middle[0] - half, middle[0] + half)
-    axes.set_ylim(middle[1] - half, middle[1] + half)
+def _zoom(axes: Axes, tracks: list[Floats], bodies: list[Floats]) -> None:
+    """A square about the contact, with what moves and where it came from, as far as that lets the bodies be seen."""
+    far = max((float(np.abs(each).max()) for each in (*tracks, *bodies) if len(each)), default=0.0)
+    largest = max((float(np.ptp(each, axis=0).max()) for each in bodies), default=far)
+    half = 1.1 * min(far, ZOOM * largest) or 1.0
+    axes.set_xlim(-half, half)
+    axes.set_ylim(-half, half)
     axes.set_aspect("equal")
+    axes.locator_params(nbins=5)

@@ -51,7 +51,7 @@ table { border-collapse: collapse; width: 100%; font-size: .9rem; font-variant-n
 th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }
 .number { text-align: right; white-space: nowrap; }
 .number:last-child { padding-right: 0; }
-.facts td { overflow-wrap: anywhere; }
+td:not(.number) { overflow-wrap: anywhere; min-width: 7rem; }
 @media print { body { max-width: none; } .scroll { max-height: none; } h2, p { break-after: avoid; }
   figure, tr, .verdict { break-inside: avoid; } }
 """
@@ -184,8 +184,8 @@ def _events_caption(facts: Facts) -> str:
     left = len(facts.collisions) - EVENTS
     out = f" Unpredicted and deepest first; {left} more left out." if left > 0 else ""
     return (
-        f"Tracks from {AROUND:g} s before to {AROUND:g} s after the contact began (m). Filled: then; dotted: "
-        f"{AROUND / 2:g} s before; cross: the point of contact.{out}"
+        f"Tracks from {AROUND:g} s before to {AROUND:g} s after the contact began, in m from the point of contact. "
+        f"Filled: then; dotted: {AROUND / 2:g} s before.{out}"
     )
 
 
@@ -224,7 +224,7 @@ def _collisions(history: History, facts: Facts) -> str:
         return ""
     rows = []
     for each in facts.collisions[:ROWS]:
-        names = " – ".join(escape(history.name_of(object_id)) for object_id in each.pair)
+        names = " – ".join(f"<bdi>{escape(history.name_of(object_id))}</bdi>" for object_id in each.pair)
         cells = "".join(f'<td class="number">{text(each, facts)}</td>' for _, text in _COLUMNS)
         rows.append(f"<tr><td>{names}</td>{cells}</tr>")
     heads = "".join(f'<th class="number">{head}</th>' for head, _ in _COLUMNS)

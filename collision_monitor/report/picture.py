@@ -53,6 +53,14 @@ NARROW: Final = Size("narrow", 3.9, 1)
 _WITHOUT_METADATA: Final[Any] = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 
 
+def shortened(name: str, longest: int = 18) -> str:
+    """The name on one line; of a long one the beginning and the end, for names often differ there."""
+    name = "".join(letter if letter.isprintable() else " " for letter in name)
+    if len(name) <= longest:
+        return name
+    return f"{name[: longest // 2]}…{name[len(name) - longest // 2 + 1 :]}"
+
+
 def as_svg(figure: Figure, name: str) -> str:
     """The picture as an SVG element to stand in HTML; the same bytes for the same picture.
 

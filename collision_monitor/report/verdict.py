@@ -87,8 +87,9 @@ def _doubts(history: History, facts: Facts) -> list[str]:
     unseen = [each.name for i, each in sorted(history.objects.items()) if not each.static and i not in seen]
     if unseen:
         lines.append(f"no state of {_names(unseen)} was ever received")
-    if (np.diff(history.times) < 0.0).any():
-        lines.append("the clock of the states was set back within the session")
+    if history.restarts:
+        often = _count(history.restarts, "time")
+        lines.append(f"the clock was set back ({often}): times go on as if it had stood still")
     lines += _some([f"no step from {a:.2f} s to {b:.2f} s" for a, b in facts.gaps], "gaps between the steps")
     if facts.possible:
         lines.append(f"{_count(len(facts.possible), 'further contact')} could not be excluded (UNRESOLVED)")

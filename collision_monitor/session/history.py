@@ -37,6 +37,9 @@ Pair = tuple[int, int]
 
 NANOSECOND: Final = 1e-9
 
+BLOCK: Final = 1 << 16
+"""Rows that are made room for at a time."""
+
 ANY: Final = "any"
 """In place of names: every pair."""
 
@@ -63,8 +66,10 @@ class Collision:
 class History:
     """A session, from its first step to its last.
 
-    times (n,): s of each step from the first. contacts, predictions: of all steps, records.CONTACT and
+    times (n,): s of each step from the first, never falling: where the clock was set back (restarts: how often) they
+    go on from where they were. contacts, predictions: of all steps, records.CONTACT and
     records.PREDICTION, and the step (index) of each row. states: of all messages, records.STATE, and the time (s).
+    objects: as they were described last; names: all that they had, and the ids of each.
     durations: s that steps took, as far as they were reported or measured. problems: why some of it may be unknown.
     """
 
@@ -73,6 +78,7 @@ class History:
     metadata: dict[str, str]
     replayed: bool
     begin_ns: int = 0
+    restarts: int = 0
     times: Floats = field(default_factory=lambda: np.zeros(0))
     contacts: Records = field(default_factory=lambda: np.zeros(0, records.CONTACT))
     contact_step: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
@@ -82,6 +88,7 @@ class History:
     state_time: Floats = field(default_factory=lambda: np.zeros(0))
     durations: Floats = field(default_factory=lambda: np.zeros(0))
     objects: dict[int, ObjectDescription] = field(default_factory=dict)
+    names: dict[str, set[int]] = field(default_factory=dict)
     status: Status | None = None
     problems: list[str] = field(default_factory=list)
     collisions: list[Collision] = field(default_factory=list)
@@ -101,23 +108,25 @@ class History:
         """The name of an object, or what stands for one that was never described."""
         return self.objects[object_id].name if object_id in self.objects else f"object_{object_id}"
 
-    def ids_of(self, name: str) -> set[int]:
-        """The ids of the objects of that name, with wildcards: `person_*`. Raises InputError where there is none."""
-        names = {each.name: each.object_id for each in self.objects.values()}
-        found = {i for each, i in names.items() if fnmatchcase(each, name)}
+    def ids_of(self, name: str | int) -> set[int]:
+        """The objects that have, or had, that name, with wildcards: `person_*`; or that id. Raises InputError."""
+        if isinstance(name, int):
+            found = {name} & set(self.objects)
+        else:
+            found = set().union(*(ids for each, ids in self.names.items() if fnmatchcase(each, name)))
         if not found:
-            known = ", ".join(sorted(names)) or "none"
-            raise InputError(f"expected the name of an object of the session, one of {known}; got {name!r}")
+            known = ", ".join(sorted(self.names)) or "none"
+            raise InputError(f"expected the name or id of an object of the session, one of {known}; got {name!r}")
         return found
 
-    def pairs_of(self, names: str | Iterable[str]) -> Callable[[Pair], bool]:
+    def pairs_of(self, names: str | Iterable[str | int]) -> Callable[[Pair], bool]:
         """Whether a pair is one of those named: ANY, or two names, with wildcards. Raises InputError."""
         if names == ANY:
             return lambda pair: True
         a, b = (self.ids_of(name) for name in names)
         return lambda pair: (pair[0] in a and pair[1] in b) or (pair[0] in b and pair[1] in a)
 
-    def collisions_of(self, names: str | Iterable[str] = ANY) -> list[Collision]:
+    def collisions_of(self, names: str | Iterable[str | int] = ANY) -> list[Collision]:
         """The collisions of the named pairs, by their begin. Raises InputError."""
         wanted = self.pairs_of(names)
         return [each for each in self.collisions if wanted(each.pair)]
@@ -148,9 +157,10 @@ class _Gathered:
         self._count = 0
         self._steps: list[int] = []  # stamps in ns
         self._step_of: dict[int, int] = {}
-        self._contacts: list[tuple[int, Records]] = []
-        self._predictions: list[tuple[int, Records]] = []
-        self._states: list[tuple[int, Records]] = []
+        self._contacts = _Rows(records.CONTACT)
+        self._predictions = _Rows(records.PREDICTION)
+        self._states = _Rows(records.STATE)
+        self._next_step: list[int] = []  # of each message of states, the index of the step that comes after it
         self._durations: list[float] = []
 
     def take(self, message: Recorded) -> None:
@@ -174,6 +184,7 @@ class _Gathered:
                 for each in decode_descriptions(message.data).objects:
                     if not isinstance(each, Removal):
                         self._history.objects[each.object_id] = each
+                        self._history.names.setdefault(each.name, set()).add(each.object_id)
             case "ObjectStateArray":
                 if self._pipeline is not None:
                     begin = time.perf_counter()
@@ -183,13 +194,15 @@ class _Gathered:
                         self._answer(outputs)
                 states = decode_states(message.data)
                 if states.frame_id in ("", self._session.frame_id):
-                    self._states.append((states.stamp_ns, states.states))
+                    self._states.append(states.stamp_ns, states.states)
+                    self._next_step.append(len(self._steps))
             case "ContactArray" if answers:
                 contacts = decode_contacts(message.data)
-                self._contacts.append((self._step(contacts.stamp_ns, contacts.step), contacts.contacts))
+                self._contacts.append(self._step(contacts.stamp_ns, contacts.step), contacts.contacts)
             case "PredictedCollisionArray" if answers:
                 predictions = decode_predictions(message.data)
-                self._predictions.append((self._step(predictions.stamp_ns, predictions.step), predictions.predictions))
+                step = self._step(predictions.stamp_ns, predictions.step)
+                self._predictions.append(step, predictions.predictions)
             case "MonitorStatus":
                 status = self._history.status = decode_status(message.data)
                 if answers and np.isfinite(status.step_duration):
@@ -198,8 +211,8 @@ class _Gathered:
     def _answer(self, outputs: Outputs) -> None:
         result = outputs.result
         step = self._step(result.stamp_ns, result.step)
-        self._contacts.append((step, result.contacts))
-        self._predictions.append((step, result.predictions))
+        self._contacts.append(step, result.contacts)
+        self._predictions.append(step, result.predictions)
 
     def _step(self, stamp_ns: int, number: int) -> int:
         """Index of the step with this number; contacts and predictions of one step share it."""
@@ -211,14 +224,19 @@ class _Gathered:
     def history(self) -> History:
         h = self._history
         h.problems += self._session.damage
-        if not self._states:
+        if not self._states.keys:
             raise SessionError(f"{self._session.path}: expected object states, found none")
         stamps = np.array(self._steps, np.int64)
-        h.begin_ns = int(stamps[0]) if len(stamps) else self._states[0][0]
-        h.times = np.asarray((stamps - h.begin_ns) * NANOSECOND, np.float64)
-        h.contacts, h.contact_step = _joined(self._contacts, records.CONTACT)
-        h.predictions, h.prediction_step = _joined(self._predictions, records.PREDICTION)
-        h.states, stamps_of = _joined(self._states, records.STATE)
+        h.begin_ns = int(stamps[0]) if len(stamps) else self._states.keys[0]
+        back = np.minimum(np.diff(stamps), 0)
+        h.restarts = int(np.count_nonzero(back))
+        forward = np.concatenate([[0], -np.cumsum(back)])  # ns, by which each step's clock is behind the session's
+        h.times = np.asarray((stamps + forward[: len(stamps)] - h.begin_ns) * NANOSECOND, np.float64)
+        h.contacts, h.contact_step = self._contacts.joined()
+        h.predictions, h.prediction_step = self._predictions.joined()
+        next_step = np.minimum(self._next_step, len(back))
+        self._states.keys = (np.array(self._states.keys, np.int64) + forward[next_step]).tolist()
+        h.states, stamps_of = self._states.joined()
         h.state_time = np.asarray((stamps_of - h.begin_ns) * NANOSECOND, np.float64)
         h.durations = np.array(self._durations)
         if not len(stamps):
@@ -227,11 +245,45 @@ class _Gathered:
         return h
 
 
-def _joined(parts: list[tuple[int, Records]], dtype: np.dtype[np.void]) -> tuple[Records, NDArray[np.int64]]:
-    if not parts:
-        return np.zeros(0, dtype), np.zeros(0, np.int64)
-    counts = [len(rows) for _, rows in parts]
-    return np.concatenate([rows for _, rows in parts]), np.repeat([key for key, _ in parts], counts)
+class _Rows:
+    """Rows that grow message by message, each with the key of its message; a message is not kept."""
+
+    def __init__(self, dtype: np.dtype[np.void]) -> None:
+        self.keys: list[int] = []
+        self._dtype = dtype
+        self._counts: list[int] = []
+        self._blocks: list[Records] = []
+        self._room = 0
+
+    def append(self, key: int, rows: Records) -> None:
+        """A copy of the rows."""
+        self.keys.append(key)
+        self._counts.append(len(rows))
+        if len(rows) > self._room:
+            self._close()
+            self._room = max(BLOCK, len(rows))
+            self._blocks.append(np.empty(self._room, self._dtype))
+        block = self._blocks[-1] if self._blocks else np.empty(0, self._dtype)
+        begin = len(block) - self._room
+        block[begin : begin + len(rows)] = rows
+        self._room -= len(rows)
+
+    def joined(self) -> tuple[Records, NDArray[np.int64]]:
+        """All rows and their keys. Blocks are let go as they are copied: a long session is not there twice."""
+        self._close()
+        keys = np.repeat(np.array(self.keys, np.int64), self._counts)
+        joined = np.empty(len(keys), self._dtype)
+        end = len(joined)
+        while self._blocks:
+            block = self._blocks.pop()
+            joined[end - len(block) : end] = block
+            end -= len(block)
+        return joined, keys
+
+    def _close(self) -> None:
+        if self._blocks and self._room:
+            self._blocks[-1] = self._blocks[-1][: -self._room]
+        self._room = 0
 
 
 def _keys(rows: Records) -> NDArray[np.uint64]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from played_session import record_drive, record_scene
+from played_session import drive_states, record_drive, record_scene, record_states
 
 from collision_monitor import Pose, Sphere, contact
 from collision_monitor.description import ObjectDescription
@@ -94,3 +94,17 @@ def test_footprints_hold_their_shapes(angle: float) -> None:
     (wall,) = footprint(ObjectDescription(1, HalfSpace((1, 0, 0), 2.0)), at, turn)
     n = np.array([np.cos(angle), np.sin(angle)])
     assert ((wall - at[:2]) @ n).max() == pytest.approx(2.0)
+
+
+def test_times_go_on_where_the_clock_is_set_back(tmp_path: Path) -> None:
+    descriptions, states = drive_states(2.0)
+    twice = [*states, *((t - 50.0, rows) for t, rows in states)]
+    history = read_history(Session(record_states(tmp_path / "loop.mcap", descriptions, twice)))
+    facts = gather(history)
+    assert history.restarts == 1 and np.all(np.diff(history.times) >= 0.0)
+    assert history.duration == pytest.approx(4.0, abs=3 * STEP)
+    first, second = (each.begin for each in facts.collisions if each.pair == (1, 2))
+    assert (first, second - first) == pytest.approx((1.5, 2.0), abs=2 * STEP)
+    times, distance = facts.tracks.distance((1, 2))
+    assert np.interp([1.0, 3.0], times, distance) == pytest.approx([0.5, 0.5], abs=3 * STEP)
+    assert any("the clock was set back (1 time)" in doubt for doubt in verdict(history, facts).doubts)

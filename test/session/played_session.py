@@ -87,6 +87,11 @@ NASTY = "<script>alert('$x$ & y')</script>"
 
 
 def record_drive(path: Path, seconds: float = 3.0, *, speed: float = 1.0, **options: Any) -> Path:
+    """A session of the drive."""
+    return record_states(path, *drive_states(seconds, speed), profile="exact", **options)
+
+
+def drive_states(seconds: float, speed: float = 1.0) -> tuple[list[ObjectDescription], list[tuple[float, States]]]:
     """A compound cart (1), named NASTY, drives into a post (2), which is 1.5 m ahead.
 
     A ball (3) comes towards it until 0.5 s, then turns back before it would have hit. speed: of the cart, m/s.
@@ -96,13 +101,11 @@ def record_drive(path: Path, seconds: float = 3.0, *, speed: float = 1.0, **opti
         ObjectDescription(2, Sphere(0.5), name="post", static=True, pose=Pose((2.7, 0, 0))),
         ObjectDescription(3, Sphere(0.3), name="ball"),
     ]
-
-    def states() -> Iterable[tuple[float, States]]:
-        for t in np.arange(0.0, seconds, 0.02):
-            rows = state_array(np.array([1, 3], np.uint32))
-            rows["position"][0], rows["linear"][0] = (speed * t, 0, 0), (speed, 0, 0)
-            rows["position"][1] = (1.5, 2.2 - min(t, 0.5) + max(t - 0.5, 0.0), 0)
-            rows["linear"][1] = (0, 1 if t > 0.5 else -1, 0)
-            yield float(t), rows
-
-    return record_states(path, objects, states(), profile="exact", **options)
+    states = []
+    for t in np.arange(0.0, seconds, 0.02):
+        rows = state_array(np.array([1, 3], np.uint32))
+        rows["position"][0], rows["linear"][0] = (speed * t, 0, 0), (speed, 0, 0)
+        rows["position"][1] = (1.5, 2.2 - min(t, 0.5) + max(t - 0.5, 0.0), 0)
+        rows["linear"][1] = (0, 1 if t > 0.5 else -1, 0)
+        states.append((float(t), rows))
+    return objects, states
