@@ -1,14 +1,14 @@
 """What touches now, what will touch next, when, how sure that is and what it costs to know.
 
-monitor         Monitor, StepResult, StepStatus        the core: states in, contacts and predictions out
-profiles        Profile                                the settings that trade speed for accuracy
-shapes, poses   Sphere, Box, …, Pose, Motion           what objects are made of and where they are
-description     ObjectDescription                      an object with its shapes, group and bounds
-contact         contact, Contact                       two shapes at two poses: distance, normal, points, bound
-impact          time_of_impact, Impact                 two shapes in motion: when they meet, as an interval
-impact_batch    time_of_impact_batch, Impacts          the same for many motions of two shapes
-feature_impact  vertex_face_impact, edge_edge_impact   the same for vertices, faces and edges in linear motion
-errors          CollisionMonitorError and its kinds    what can be wrong with an input
+    monitor         Monitor, StepResult, StepStatus        the core: states in, contacts and predictions out
+    profiles        Profile                                the settings that trade speed for accuracy
+    shapes, poses   Sphere, Box, …, Pose, Motion           what objects are made of and where they are
+    description     ObjectDescription                      an object with its shapes, group and bounds
+    contact         contact, Contact                       two shapes at two poses: distance, normal, points, bound
+    impact          time_of_impact, Impact                 two shapes in motion: when they meet, as an interval
+    impact_batch    time_of_impact_batch, Impacts          the same for many motions of two shapes
+    feature_impact  vertex_face_impact, edge_edge_impact   the same for vertices, faces and edges in linear motion
+    errors          CollisionMonitorError and its kinds    what can be wrong with an input
 """
 
 from __future__ import annotations
