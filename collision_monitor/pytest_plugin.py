@@ -3,6 +3,7 @@
     @pytest.mark.session("yard.mcap")
     def test_yard(session):
         assert session.contacts("cart", "wall_*") == []
+        assert all(each.lower > 0.5 for each in session.predictions("cart", "person_*"))
         session.check("expectations.yaml")
 
 The path is relative to the test's file. `replay=True` or `replay="fast"`: what this program answers to the inputs, with
@@ -12,14 +13,25 @@ the recorded profile or that one, in place of what was recorded.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
+
+from collision_monitor.errors import CollisionMonitorError
 
 if TYPE_CHECKING:
     from collision_monitor.session.history import Collision, History
 
 MARKER = "session(path, replay=False): the recorded session that the fixture `session` reads"
+
+
+class Prediction(NamedTuple):
+    """A predicted collision: the pair, when it was said (s), and in how many s it is due: not before `lower`."""
+
+    pair: tuple[int, int]
+    time: float
+    lower: float
+    upper: float
 
 
 class RecordedSession:
@@ -35,9 +47,19 @@ class RecordedSession:
         profile = Profile.named(replay) if isinstance(replay, str) else recorded.profile if replay else None
         self.history: History = read_history(recorded, profile)
 
-    def contacts(self, a: str = "*", b: str = "*") -> list[Collision]:
-        """The collisions between objects of these names, with wildcards. Raises InputError for an unknown name."""
+    def contacts(self, a: str | int = "*", b: str | int = "*") -> list[Collision]:
+        """The collisions between objects of such names, with wildcards, or ids. Raises InputError for unknown ones."""
         return self.history.collisions_of([a, b])
+
+    def predictions(self, a: str | int = "*", b: str | int = "*") -> list[Prediction]:
+        """Every prediction of a collision between them, in the order in which they were made. Raises InputError."""
+        wanted = self.history.pairs_of([a, b])
+        rows = zip(self.history.prediction_step.tolist(), self.history.predictions, strict=True)
+        return [
+            Prediction(pair, float(self.history.times[step]), float(row["lower"]), float(row["upper"]))
+            for step, row in rows
+            if wanted(pair := (int(row["id_a"]), int(row["id_b"])))
+        ]
 
     def replay(self) -> str:
         """`identical`, `not comparable` or `diverged`, and in which way: today's answers against the recorded ones."""
@@ -47,12 +69,12 @@ class RecordedSession:
 
     def check(self, expectations: str | Path | dict[str, Any]) -> None:
         """Assert what a YAML file, or a mapping like one, expects. A path is relative to the session's file."""
-        from collision_monitor.session.expectations import evaluate, load_expectations, parse_expectations
+        from collision_monitor.session.expectations import evaluate, parse_expectations, read_expectations
 
         if isinstance(expectations, dict):
             expected = parse_expectations(expectations)
         else:
-            expected = load_expectations(self.path.parent / expectations)
+            expected = parse_expectations(read_expectations(self.path.parent / expectations))
         failed = [each for each in evaluate(expected, self.history, self.replay) if not each.holds]
         assert not failed, "\n".join([str(self.path), *(f"  {each.expectation}: {each.found}" for each in failed)])
 
@@ -66,6 +88,9 @@ def pytest_configure(config: pytest.Config) -> None:
 def session(request: pytest.FixtureRequest) -> RecordedSession:
     """The recorded session that the test's marker names."""
     marker = request.node.get_closest_marker("session")
-    if marker is None or len(marker.args) != 1:
+    if marker is None or len(marker.args) != 1 or set(marker.kwargs) - {"replay"}:
         pytest.fail(f'expected a marker such as @pytest.mark.session("yard.mcap"): {MARKER}', pytrace=False)
-    return RecordedSession(request.path.parent / marker.args[0], **marker.kwargs)
+    try:
+        return RecordedSession(request.path.parent / marker.args[0], **marker.kwargs)
+    except CollisionMonitorError as error:
+        pytest.fail(str(error), pytrace=False)

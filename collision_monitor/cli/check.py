@@ -4,24 +4,27 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from collision_monitor.cli.engines import add_engine, engine_of
 from collision_monitor.cli.progress import progress_bar
-from collision_monitor.cli.quantities import whole
+from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
     from collision_monitor.session.check import Checked
 
-EXIT_FAILED = 3
 EXIT_ERROR = 1
+EXIT_USAGE = 2
+EXIT_FAILED = 3
 
 EXAMPLE = """\
 expect:
   - contact: [cart, person_3]     # they touch, first within this window (s from the session's first step)
     between: [4.0, 4.2]
-  - no_contact: [cart, "wall_*"]  # never, as far as is known; wildcards are allowed; any: no pair at all
+  - no_contact: [cart, "wall_*"]  # never, as far as is known; names with wildcards, or ids; any: no pair at all
   - no_prediction: any            # no collision is predicted to be due sooner than this
     under: 0.5                    # s
   - warned: any                   # each contact was predicted without a break from this long before it on
@@ -35,7 +38,8 @@ EPILOG = f"""\
 expectations.yaml, with everything that can be expected:
 
 {EXAMPLE}
-exit codes: 0 all hold, 1 a session could not be read, 3 an expectation does not hold
+exit codes: 0 all hold, 1 a session could not be read, 2 expectations.yaml is not as it should be,
+3 an expectation does not hold
 """
 
 
@@ -54,26 +58,38 @@ def add_parser(subparsers: Any) -> None:
         "--replay", nargs="?", const="", metavar="PROFILE",
         help="check what this program answers to the inputs, with the recorded profile or this one",
     )  # fmt: skip
-    parser.add_argument("--jobs", type=whole(1), metavar="N", help="processes (default: one for each core)")
+    add_engine(parser)
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
     parser.add_argument("--json", action="store_true", help="print the results as one JSON object")
     parser.set_defaults(command=check_command)
 
 
 def check_command(args: argparse.Namespace) -> int:
-    """Return the exit code. Raises InputError."""
-    from collision_monitor.session.check import check_sessions, find_sessions, junit_xml
+    """Return the exit code. Raises InputError, UnsupportedError."""
+    from collision_monitor.profiles import Profile
+    from collision_monitor.session.check import check_sessions, junit_xml
+    from collision_monitor.session.expectations import read_expectations
+    from collision_monitor.session.many import find_sessions
 
+    try:
+        expectations = read_expectations(args.expect)
+        if args.replay:
+            Profile.named(args.replay)
+    except InputError as error:
+        print(f"collision-monitor: error: {error}", file=sys.stderr)
+        return EXIT_USAGE
     paths = find_sessions(args.sessions)
+    if args.junit is not None:
+        _write(args.junit, "", "a")  # told before the work is done, not after it
     results = []
     with progress_bar("check", len(paths)) as done:
-        for each in check_sessions(paths, args.expect, with_profile=args.replay, jobs=args.jobs):
+        for each in check_sessions(paths, expectations, with_profile=args.replay, engine=engine_of(args)):
             results.append(each)
             done(1)
             if not args.json:
                 print(_as_text(each), flush=True)
     if args.junit is not None:
-        args.junit.write_text(junit_xml(results), encoding="utf-8")
+        _write(args.junit, junit_xml(results))
     if args.json:
         print(json.dumps({"sessions": [asdict(each) | {"holds": each.holds} for each in results]}, indent=2))
     else:
@@ -82,6 +98,14 @@ def check_command(args: argparse.Namespace) -> int:
     if any(each.error for each in results):
         return EXIT_ERROR
     return 0 if all(each.holds for each in results) else EXIT_FAILED
+
+
+def _write(path: Path, text: str, mode: str = "w") -> None:
+    try:
+        with path.open(mode, encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise InputError(f"{path}: expected a file that can be written, got: {error.strerror}") from None
 
 
 def _as_text(each: Checked) -> str:

@@ -1,23 +1,24 @@
-"""Checks many sessions at once: each for itself, on all cores, in the order they were named, whatever is broken."""
+"""Checks sessions against what is expected of them, and writes the outcomes as JUnit XML."""
 
 from __future__ import annotations
 
-import glob
-import os
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
-from itertools import repeat
-from multiprocessing import get_context
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
+from typing import Any, Final
 from xml.etree import ElementTree
 
-from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.profiles import Profile
-from collision_monitor.session.expectations import Outcome, evaluate, load_expectations
+from collision_monitor.session.expectations import Outcome, evaluate, parse_expectations
 from collision_monitor.session.history import read_history
+from collision_monitor.session.many import ALL_CORES, Engine, for_each
 from collision_monitor.session.reader import Session
 from collision_monitor.session.replay import replay
+
+_NOT_XML: Final = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""What a name may hold and XML may not."""
 
 
 @dataclass(frozen=True)
@@ -34,35 +35,22 @@ class Checked:
         return not self.error and all(each.holds for each in self.outcomes)
 
 
-def find_sessions(names: Iterable[str]) -> list[Path]:
-    """Session files: files as they are named, wildcards, and all in the folders below. Raises InputError where none."""
-    found: list[Path] = []
-    for name in names:
-        paths = sorted(glob.glob(name)) or [name]
-        for path in map(Path, paths):
-            if path.is_dir():
-                inside = sorted(path.rglob("*.mcap"))
-                if not inside:
-                    raise InputError(f"{path}: expected a folder with .mcap files, got none")
-                found += inside
-            else:
-                found.append(path)
-    return list(dict.fromkeys(found))
+def check_session(path: Path, expectations: Any, with_profile: str | None = None) -> Checked:
+    """One session against what `read_expectations` gives. Raises SessionError, ProfileError.
+
+    with_profile: not what was answered then, but what today's program answers with that profile, or with the recorded
+    one where it is empty.
+    """
+    session = Session(path)
+    profile = None
+    if with_profile is not None:
+        profile = Profile.named(with_profile) if with_profile else session.profile
+    history = read_history(session, profile)
+    return Checked(str(path), evaluate(parse_expectations(expectations), history, lambda: replay_verdict(path)))
 
 
-def check_session(path: Path, expectations: Path, with_profile: str | None = None) -> Checked:
-    """One session; with_profile: what today's program answers with that profile, or as recorded where it is empty."""
-    expected = load_expectations(expectations)
-    try:
-        session = Session(path)
-        profile = None
-        if with_profile is not None:
-            profile = Profile.named(with_profile) if with_profile else session.profile
-        history = read_history(session, profile)
-
-        return Checked(str(path), evaluate(expected, history, lambda: replay_verdict(path)))
-    except CollisionMonitorError as error:
-        return Checked(str(path), error=str(error))
+def _unread(path: Path, why: str) -> Checked:
+    return Checked(str(path), error=why)
 
 
 def replay_verdict(path: Path) -> str:
@@ -73,16 +61,16 @@ def replay_verdict(path: Path) -> str:
 
 
 def check_sessions(
-    paths: Sequence[Path], expectations: Path, *, with_profile: str | None = None, jobs: int | None = None
+    paths: Sequence[Path],
+    expectations: Any,
+    *,
+    with_profile: str | None = None,
+    engine: Engine = ALL_CORES,
 ) -> Iterator[Checked]:
-    """The outcomes of each session, in order; jobs: processes, by default one for each core. Raises InputError."""
-    load_expectations(expectations)
-    jobs = min(jobs or os.cpu_count() or 1, len(paths))
-    if jobs <= 1:
-        yield from map(check_session, paths, repeat(expectations), repeat(with_profile))
-        return
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        yield from pool.map(check_session, paths, repeat(expectations), repeat(with_profile))
+    """The outcomes of each session, in order. Raises what `for_each` does."""
+    each = partial(check_session, expectations=expectations, with_profile=with_profile)
+    for path, checked in zip(paths, for_each(each, paths, _unread, engine), strict=True):
+        yield replace(checked, session=str(path))  # as it was named here
 
 
 def junit_xml(results: Sequence[Checked]) -> str:
@@ -105,5 +93,7 @@ def junit_xml(results: Sequence[Checked]) -> str:
             case = ElementTree.SubElement(suite, "testcase", classname=each.session, name=outcome.expectation)
             if not outcome.holds:
                 ElementTree.SubElement(case, "failure", message=outcome.found)
+    for element in root.iter():
+        element.attrib = {key: _NOT_XML.sub("\ufffd", value) for key, value in element.attrib.items()}
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"

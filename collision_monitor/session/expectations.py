@@ -39,18 +39,29 @@ class Expectation:
     check: Check
 
 
-def load_expectations(path: str | Path) -> list[Expectation]:
-    """The expectations of a YAML file. Raises InputError, naming the file, the expectation and the choices."""
+def read_expectations(path: str | Path) -> Any:
+    """What a YAML file expects, for `parse_expectations`. Raises InputError, naming file, expectation and choices."""
     try:
-        content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        content = yaml.load(Path(path).read_text(encoding="utf-8"), _Loader)
     except OSError as error:
         raise InputError(f"{path}: expected a file that can be read, got: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
         raise InputError(f"{path}: expected YAML, got: {' '.join(str(error).split())}") from None
     try:
-        return parse_expectations(content)
+        parse_expectations(content)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+    return content
+
+
+class _Loader(yaml.SafeLoader):
+    """Refuses a key that is there twice, where YAML would forget the first: an expectation less."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys = [key.value for key, _ in node.value]
+        if len(set(map(str, keys))) < len(keys):
+            raise yaml.constructor.ConstructorError(None, None, f"the same key twice in {keys}", node.start_mark)
+        return super().construct_mapping(node, deep)
 
 
 def parse_expectations(content: Any) -> list[Expectation]:
@@ -125,10 +136,17 @@ def _shown(value: Any) -> str:
     return f"[{', '.join(map(_shown, value))}]" if isinstance(value, list) else str(value)
 
 
-def _names(value: Any, what: str) -> str | list[str]:
-    if value == ANY or (isinstance(value, list) and len(value) == 2 and all(isinstance(name, str) for name in value)):
+Names = str | list[str | int]
+
+
+def _names(value: Any, what: str) -> Names:
+    if value == ANY or (isinstance(value, list) and len(value) == 2 and all(_is_name(name) for name in value)):
         return value  # type: ignore[no-any-return]
-    raise InputError(f"{what}: expected [name, name] or {ANY}, got {value!r}")
+    raise InputError(f"{what}: expected two names or ids, [cart, 7], or {ANY}; got {value!r}")
+
+
+def _is_name(value: Any) -> bool:
+    return isinstance(value, str | int) and not isinstance(value, bool)
 
 
 def _number(value: Any, what: str) -> float:
@@ -163,7 +181,7 @@ def _pair(history: History, pair: Pair) -> str:
     return f"{history.name_of(pair[0])} and {history.name_of(pair[1])}"
 
 
-def _contact(names: str | list[str], low: float, high: float) -> Check:
+def _contact(names: Names, low: float, high: float) -> Check:
     def check(history: History, _: Callable[[], str]) -> tuple[bool, str]:
         collisions = [each for each in history.collisions_of(names) if each.certain]
         if not collisions:
@@ -174,7 +192,7 @@ def _contact(names: str | list[str], low: float, high: float) -> Check:
     return check
 
 
-def _no_contact(names: str | list[str]) -> Check:
+def _no_contact(names: Names) -> Check:
     def check(history: History, _: Callable[[], str]) -> tuple[bool, str]:
         for each in history.collisions_of(names):
             kind = "contact" if each.certain else "possible contact"
@@ -190,14 +208,14 @@ def _no_contact(names: str | list[str]) -> Check:
     return check
 
 
-def _unseen(history: History, names: str | list[str]) -> list[str]:
+def _unseen(history: History, names: Names) -> list[str]:
     """Names of the objects that are meant and that nothing was ever heard of."""
     ids = set(history.objects) if names == ANY else history.ids_of(names[0]) | history.ids_of(names[1])
     seen = set(history.states["id"].tolist())
     return sorted(history.name_of(i) for i in ids if i not in seen and not history.objects[i].static)
 
 
-def _no_prediction(names: str | list[str], under: float) -> Check:
+def _no_prediction(names: Names, under: float) -> Check:
     def check(history: History, _: Callable[[], str]) -> tuple[bool, str]:
         wanted = history.pairs_of(names)
         rows = history.predictions
@@ -211,7 +229,7 @@ def _no_prediction(names: str | list[str], under: float) -> Check:
     return check
 
 
-def _warned(names: str | list[str], before: float) -> Check:
+def _warned(names: Names, before: float) -> Check:
     def check(history: History, _: Callable[[], str]) -> tuple[bool, str]:
         collisions = history.collisions_of(names)
         least = math.inf

@@ -20,9 +20,10 @@ from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import InputError
 from collision_monitor.pipeline import Pipeline
 from collision_monitor.session import Recorder, Session
-from collision_monitor.session.check import check_sessions, find_sessions, junit_xml
-from collision_monitor.session.expectations import evaluate, parse_expectations
+from collision_monitor.session.check import Checked, check_sessions, junit_xml
+from collision_monitor.session.expectations import Outcome, evaluate, parse_expectations, read_expectations
 from collision_monitor.session.history import History, read_history
+from collision_monitor.session.many import Engine, find_sessions
 
 PROGRAM = Path(sys.executable).with_name("collision-monitor")
 SHAPES, STATES, CONTACTS, PREDICTIONS, STATUS = TYPES
@@ -107,6 +108,8 @@ def test_the_history_is_what_happened(yard: Path) -> None:
         ("{replay: identical}", True, "identical"),
         ("{complete: true}", True, "nothing is missing"),
         ("{no_contact: [cart, cat]}", False, "one of cart, person_1, person_2; got 'cat'"),
+        ("{contact: [1, 'person_*']}", True, "first contact at 2.26"),
+        ("{no_contact: [1, 77]}", False, "name or id of an object of the session"),
     ],
 )
 def test_expectations(yard: Path, text: str, holds: bool, found: str) -> None:
@@ -136,7 +139,7 @@ def test_the_example_of_the_help_is_one() -> None:
         (None, "expected a list under the one key `expect`"),
         ({"expect": []}, "at least one expectation"),
         ({"expect": ["contact"]}, "expectation 1: expected one of contact, no_contact"),
-        ({"expect": [{"contact": ["a"]}]}, r"expected \[name, name\] or any"),
+        ({"expect": [{"contact": ["a"]}]}, "expected two names or ids, .* or any"),
         ({"expect": [{"contact": ["a", "b"], "under": 1}]}, "expected only contact, between, got under"),
         ({"expect": [{"contact": ["a", "b"], "between": [3, 2]}]}, "does not end before it begins"),
         ({"expect": [{"warned": "any"}]}, "expected a number of seconds"),
@@ -159,8 +162,9 @@ def test_many_sessions_on_many_processes(yard: Path, tmp_path: Path) -> None:
     expect.write_text("expect:\n  - contact: [cart, person_1]\n  - no_contact: any\n")
     paths = find_sessions([str(folder)])
     assert [p.name for p in paths] == ["0.mcap", "1.mcap", "2.mcap"]
-    one = list(check_sessions(paths, expect, jobs=1))
-    assert list(check_sessions(paths, expect, jobs=2)) == one
+    expected = read_expectations(expect)
+    one = list(check_sessions(paths, expected, engine=Engine(jobs=1)))
+    assert list(check_sessions(paths, expected, engine=Engine(jobs=2))) == one
     assert "expected an MCAP file" in one[1].error
     assert [o.holds for o in one[0].outcomes] == [True, False] == [o.holds for o in one[2].outcomes]
     counts = [(s.get("tests"), s.get("failures"), s.get("errors")) for s in ElementTree.fromstring(junit_xml(one))]
@@ -191,9 +195,31 @@ def test_the_command_and_its_exit_codes(yard: Path, tmp_path: Path) -> None:
     assert json.loads(bad.stdout)["sessions"][0]["outcomes"][0]["holds"] is False
     assert ElementTree.parse(report).getroot()[0].get("failures") == "1"
     assert run("expect: [{contact: [cart, person_1]}]", str(yard), str(tmp_path / "none.mcap")).returncode == 1
-    wrong = run("expect: [{touch: any}]", str(yard))
-    assert wrong.returncode == 1
-    assert wrong.stderr.count("\n") == 1 and "expected one of contact" in wrong.stderr
+    for text, words in (
+        ("expect: [{touch: any}]", "expected one of contact"),
+        ("expect: [{no_contact: any, no_contact: [cart, cat]}]", "the same key twice"),
+        ("expect: " + "[" * 2000, "expected YAML"),
+    ):
+        wrong = run(text, str(yard))
+        assert wrong.returncode == 2
+        assert wrong.stderr.count("\n") == 1 and words in wrong.stderr
+    unwritable = run("expect: [{no_contact: any}]", str(yard), "--junit", str(tmp_path / "nowhere" / "junit.xml"))
+    assert unwritable.returncode == 1
+    assert "expected a file that can be written" in unwritable.stderr
+
+
+def test_objects_of_one_name_are_all_meant(yard: Path) -> None:
+    """Also under a name that an object had before."""
+    history = read_history(Session(yard))
+    history.names = {"cart": {1}, "person": {2, 3}, "visitor": {3}}
+    assert not outcome(history, "{no_contact: [cart, person]}").holds
+    assert outcome(history, "{no_contact: [cart, visitor]}").holds
+
+
+def test_junit_is_xml_whatever_the_names_are() -> None:
+    text = junit_xml([Checked("a\x00.mcap", [Outcome("no_contact: \x1b[1m", False, "\ud800 <&")])])
+    (case,) = ElementTree.fromstring(text)[0]
+    assert case.get("name") == "no_contact: \ufffd[1m"
 
 
 def test_the_pytest_plugin(yard: Path, tmp_path: Path) -> None:
@@ -206,6 +232,9 @@ import pytest
 @pytest.mark.session("yard.mcap")
 def test_yard(session):
     assert len(session.contacts("cart", "person_*")) == 1
+    first = session.predictions("person_1", "cart")[0]
+    assert first.time + first.lower < 2.26 < first.time + first.upper + 0.02
+    assert session.predictions("cart", 3) == []
     session.check("expect.yaml")
     assert session.replay() == "identical"
 
@@ -215,10 +244,16 @@ def test_fails_as_it_should(session):
 
 def test_without_a_marker(session):
     pass
+
+@pytest.mark.session("yard.mcap", replay="slow")
+def test_with_a_profile_that_is_none(session):
+    pass
 """
     )
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--strict-markers", str(tmp_path)]
     answer = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=tmp_path)
-    assert "1 failed, 1 passed, 1 error" in answer.stdout
+    assert "1 failed, 1 passed, 2 errors" in answer.stdout, answer.stdout
     assert "no_contact: any: contact at 2.2" in answer.stdout
     assert "expected a marker such as" in answer.stdout
+    assert "one of balanced, exact, fast" in answer.stdout
+    assert "history.py" not in answer.stdout  # no traceback of ours for a mistake of theirs

@@ -1,0 +1,145 @@
+"""One function over many sessions, on all cores or on a Ray cluster: results in order, each for itself.
+
+What goes wrong with one, were it the end of its process, is that one's result and nobody else's.
+"""
+
+from __future__ import annotations
+
+import glob
+import logging
+import os
+import signal
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from collision_monitor.errors import CollisionMonitorError, InputError, UnsupportedError
+
+Result = TypeVar("Result")
+
+ENGINES: Final = ("processes", "ray")
+ENDED: Final = "the process that worked on it was ended: by the system, if memory ran out"
+
+
+@dataclass(frozen=True)
+class Engine:
+    """Where the work is done. jobs: at a time, by default one for each core. address: of a Ray cluster; else local."""
+
+    name: str = "processes"
+    jobs: int | None = None
+    address: str | None = None
+
+
+ALL_CORES: Final = Engine()
+
+
+def find_sessions(names: Iterable[str]) -> list[Path]:
+    """Session files: files as they are named, wildcards, and all in the folders below. Raises InputError where none."""
+    found: list[Path] = []
+    for name in names:
+        paths = [name] if Path(name).exists() else sorted(glob.glob(name)) or [name]
+        for path in map(Path, paths):
+            if path.is_dir():
+                inside = sorted(path.rglob("*.mcap"))
+                if not inside:
+                    raise InputError(f"{path}: expected a folder with .mcap files, got none")
+                found += inside
+            else:
+                found.append(path)
+    return list(dict.fromkeys(found))
+
+
+def for_each(
+    function: Callable[[Path], Result],
+    paths: Sequence[Path],
+    failed: Callable[[Path, str], Result],
+    engine: Engine = ALL_CORES,
+) -> Iterator[Result]:
+    """function(path) of each, in order; failed(path, why) where it raises or its process ends.
+
+    Raises UnsupportedError where the engine is not there, InputError where it cannot be reached.
+    """
+    if engine.name == "ray":
+        yield from _on_ray(function, paths, failed, engine)
+        return
+    jobs = min(engine.jobs or os.cpu_count() or 1, len(paths))
+    if jobs <= 1:
+        yield from (_guarded(function, path, failed) for path in paths)
+    else:
+        yield from _in_processes(function, paths, failed, jobs)
+
+
+def _guarded(function: Callable[[Path], Result], path: Path, failed: Callable[[Path, str], Result]) -> Result:
+    try:
+        return function(path)
+    except CollisionMonitorError as error:
+        return failed(path, str(error))
+    except Exception as error:  # the others are still to be done
+        return failed(path, f"an error of collision_monitor itself: {error!r}")
+
+
+def _in_processes(
+    function: Callable[[Path], Result], paths: Sequence[Path], failed: Callable[[Path, str], Result], jobs: int
+) -> Iterator[Result]:
+    todo = list(paths)
+    while todo:
+        pool = _pool(jobs)
+        try:
+            futures = [pool.submit(_guarded, function, path, failed) for path in todo]
+            for future in futures:
+                yield future.result()
+                todo.pop(0)
+        except BrokenProcessPool:  # by the one that was waited for, or another: that shows when it is alone
+            yield _alone(function, todo.pop(0), failed)
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _alone(function: Callable[[Path], Result], path: Path, failed: Callable[[Path, str], Result]) -> Result:
+    with _pool(1) as pool:
+        try:
+            return pool.submit(_guarded, function, path, failed).result()
+        except BrokenProcessPool:
+            return failed(path, ENDED)
+
+
+def _pool(jobs: int) -> ProcessPoolExecutor:
+    """Spawned, because a fork of a process with threads may lock up; Ctrl-C ends them without a word."""
+    return ProcessPoolExecutor(
+        jobs, mp_context=get_context("spawn"), initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_DFL)
+    )
+
+
+def _on_ray(
+    function: Callable[[Path], Result], paths: Sequence[Path], failed: Callable[[Path, str], Result], engine: Engine
+) -> Iterator[Result]:
+    """On a cluster, whose machines have to see the files under the same paths and have collision_monitor installed."""
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # or Ray reports to its makers
+    try:
+        import ray
+    except ImportError:
+        raise UnsupportedError(
+            "--engine ray needs Ray, which is not installed: pip install 'collision_monitor[ray]'"
+        ) from None
+    where: dict[str, Any] = {"address": engine.address or "local"}
+    if engine.address is None:
+        where |= {"num_cpus": engine.jobs, "include_dashboard": False, "_node_ip_address": "127.0.0.1"}
+    try:
+        ray.init(**where, log_to_driver=False, logging_level=logging.CRITICAL)
+    except (ConnectionError, ValueError, RuntimeError, OSError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"Ray at {engine.address or 'this machine'}: expected a cluster, got: {reason}") from None
+    try:
+        task = ray.remote(max_retries=0)(_guarded)
+        references = [task.remote(function, path.absolute(), failed) for path in paths]
+        for path, reference in zip(paths, references, strict=True):
+            try:
+                yield ray.get(reference)
+            except ray.exceptions.RayError:
+                yield failed(path, ENDED)
+    finally:
+        ray.shutdown()

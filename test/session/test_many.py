@@ -1,0 +1,77 @@
+"""One function over many files: in order, whatever becomes of one of them."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from collision_monitor.errors import InputError, SessionError, UnsupportedError
+from collision_monitor.session.many import ENDED, Engine, find_sessions, for_each
+
+
+def work(path: Path) -> str:
+    match path.name:
+        case "ends":
+            os._exit(9)
+        case "refuses":
+            raise SessionError("expected more")
+        case "fails":
+            raise ZeroDivisionError
+    return path.name.upper()
+
+
+def failed(path: Path, why: str) -> str:
+    return f"{path.name}: {why}"
+
+
+@pytest.fixture(autouse=True)
+def importable_by_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pytest's import mode leaves this module out of `sys.path`, and a spawned process looks for it there."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    monkeypatch.setattr(work, "__module__", "test_many")
+    monkeypatch.setattr(failed, "__module__", "test_many")
+    monkeypatch.setitem(sys.modules, "test_many", sys.modules[__name__])
+
+
+def test_one_that_breaks_does_not_stop_the_others() -> None:
+    paths = [Path(name) for name in ("a", "refuses", "fails", "ends", "b", "ends", "c")]
+    found = list(for_each(work, paths, failed, Engine(jobs=2)))
+    assert found == [
+        "A",
+        "refuses: expected more",
+        "fails: an error of collision_monitor itself: ZeroDivisionError()",
+        f"ends: {ENDED}",
+        "B",
+        f"ends: {ENDED}",
+        "C",
+    ]
+
+
+def test_the_number_of_jobs_does_not_matter() -> None:
+    paths = [Path(f"file {k}") for k in range(9)]
+    one = list(for_each(work, paths, failed, Engine(jobs=1)))
+    assert one == [f"FILE {k}" for k in range(9)]
+    assert list(for_each(work, paths, failed, Engine(jobs=3))) == one
+
+
+def test_ray_is_optional_and_said_to_be() -> None:
+    try:
+        import ray  # noqa: F401
+    except ImportError:
+        with pytest.raises(UnsupportedError, match=r"pip install 'collision_monitor\[ray\]'"):
+            list(for_each(work, [Path("a")], failed, Engine("ray")))
+
+
+def test_sessions_are_found_by_name_wildcard_and_folder(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    for name in ("b.mcap", "a[1].mcap", "in/c.mcap", "in/notes.txt"):
+        (tmp_path / name).touch()
+    names = [p.name for p in find_sessions([f"{tmp_path}/*.mcap", str(tmp_path), f"{tmp_path}/a[1].mcap"])]
+    assert names == ["a[1].mcap", "b.mcap", "c.mcap"]
+    assert find_sessions(["missing.mcap"]) == [Path("missing.mcap")]  # whoever opens it says so
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="got none"):
+        find_sessions([str(tmp_path / "empty")])
