@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from collision_monitor.report.tracks import Tracks
 from collision_monitor.session.alerts import Alert, Outcome, alert_before, alerts_of
 from collision_monitor.session.history import Collision, Floats, History, Pair
-
-ANSWER_GAP: Final = 5.0
-"""Steps of the usual length without one that count as a gap, where that is longer than the profile's stale_after."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +44,7 @@ def gather(history: History) -> Facts:
     before = {each: alert_before(alerts.get(each.pair, []), each) for each in certain}
     return Facts(
         period=period,
-        gaps=_gaps(history.times, max(history.profile.stale_after, ANSWER_GAP * period)),
+        gaps=_gaps(history.times, history.longest_step),
         collisions=certain,
         surprises=[each for each in certain if each.warned == 0.0],
         possible=[each for each in history.collisions if not each.certain],

@@ -82,7 +82,7 @@ def _doubts(history: History, facts: Facts) -> list[str]:
     if not len(history.times):
         return [*lines, "no step was answered"]
     if not history.objects:
-        lines.append("no object was described: nothing could be monitored")
+        lines.append("no object is described in it")
     seen = set(history.states["id"].tolist())
     unseen = [each.name for i, each in sorted(history.objects.items()) if not each.static and i not in seen]
     if unseen:

@@ -16,8 +16,8 @@ class Outcome(Enum):
     """What became of an alert."""
 
     CONTACT = "the pair touched when it was due"
-    NOTHING = "it was withdrawn"
-    OPEN = "the session ends before"
+    NOTHING = "it ended without a contact"
+    OPEN = "the session ends, or has a gap, before"
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +48,13 @@ class Alert:
 
 def alerts_of(history: History) -> list[Alert]:
     """All alerts of a history, by begin and pair."""
-    period = history.period
+    period, longest = history.period, history.longest_step
+    unseen = np.append(np.diff(history.times) > longest, True)  # (n,): nothing is known of what comes after the step
     rows, steps = history.predictions, history.prediction_step
     keys = (rows["id_a"].astype(np.uint64) << np.uint64(32)) | rows["id_b"].astype(np.uint64)
     order = np.lexsort((steps, keys))
-    breaks = np.flatnonzero((np.diff(keys[order]) != 0) | (np.diff(steps[order]) != 1)) + 1
+    apart = (np.diff(steps[order]) != 1) | unseen[steps[order][:-1]]
+    breaks = np.flatnonzero((np.diff(keys[order]) != 0) | apart) + 1
     begins: dict[Pair, list[float]] = {}
     for collision in history.collisions:
         begins.setdefault(collision.pair, []).append(collision.begin)
@@ -62,7 +64,7 @@ def alerts_of(history: History) -> list[Alert]:
         time, lower, upper = history.times[steps[run]], rows["lower"][run], rows["upper"][run]
         due = float((time + np.where(np.isfinite(upper), upper, history.profile.horizon)).max()) + 2.0 * period
         touched = any(time[0] < begin <= due for begin in begins.get(pair, ()))
-        last = int(steps[run[-1]]) + 1 == len(history.times)
+        last = unseen[steps[run[-1]]]
         found.append(
             Alert(
                 pair=pair,

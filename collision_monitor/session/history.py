@@ -37,6 +37,9 @@ Pair = tuple[int, int]
 
 NANOSECOND: Final = 1e-9
 
+STEPS_MISSING: Final = 5.0
+"""Steps of the usual length without one that are a gap, where that is longer than the profile's stale_after."""
+
 BLOCK: Final = 1 << 16
 """Rows that are made room for at a time."""
 
@@ -103,6 +106,11 @@ class History:
         """s from one step to the next, the median; 0 where there are less than two."""
         apart = np.diff(self.times)
         return float(np.median(apart[apart > 0.0])) if (apart > 0.0).any() else 0.0
+
+    @property
+    def longest_step(self) -> float:
+        """s: what is longer from one step to the next is a gap of which nothing is known."""
+        return max(self.profile.stale_after, STEPS_MISSING * self.period)
 
     def name_of(self, object_id: int) -> str:
         """The name of an object, or what stands for one that was never described."""
@@ -299,7 +307,9 @@ def _collisions(h: History) -> list[Collision]:
     order = np.lexsort((steps, keys))
     predicted = _steps_by_pair(_keys(h.predictions), h.prediction_step)
     found = []
+    time, longest = h.times[steps[order]], h.longest_step
     begins = rows["phase"][order] == Phase.BEGIN  # also where one ends in the step in which the next begins
+    begins[1:] |= time[1:] - rows["duration"][order][1:] > time[:-1] + NANOSECOND  # unseen, while steps are missing
     breaks = np.flatnonzero((np.diff(keys[order]) != 0) | (np.diff(steps[order]) != 1) | begins[1:]) + 1
     for run in np.split(order, breaks) if len(order) else ():
         first, last = int(steps[run[0]]), int(steps[run[-1]])
@@ -312,7 +322,7 @@ def _collisions(h: History) -> list[Collision]:
                 step=first,
                 deepest=float(rows["signed_distance"][run].min()),
                 certain=bool((rows["status"][run] == ContactStatus.TOUCHING).any()),
-                warned=_warned(h.times, first, predicted.get(int(keys[run[0]]), np.zeros(0, np.int64))),
+                warned=_warned(h.times, first, predicted.get(int(keys[run[0]]), np.zeros(0, np.int64)), longest),
             )
         )
     return sorted(found, key=lambda c: (c.begin, c.pair))
@@ -325,12 +335,13 @@ def _steps_by_pair(keys: NDArray[np.uint64], steps: NDArray[np.int64]) -> dict[i
     return {int(keys[run[0]]): steps[run] for run in np.split(order, breaks) if len(run)}
 
 
-def _warned(times: Floats, begin: int, steps: NDArray[np.int64]) -> float:
-    """s by which the unbroken run of predictions right before step `begin` came before it."""
+def _warned(times: Floats, begin: int, steps: NDArray[np.int64], longest: float) -> float:
+    """s by which the unbroken run of predictions right before step `begin` came before it; longest: step, s."""
     if begin == 0:
         return float("nan")
-    before = steps[steps < begin]
-    run = 0
-    while run < len(before) and before[-1 - run] == begin - 1 - run:
-        run += 1
-    return float(times[begin] - times[begin - run])
+    first = begin
+    for step in steps[steps < begin][::-1]:
+        if step != first - 1 or times[first] - times[step] > longest:
+            break
+        first = int(step)
+    return float(times[begin] - times[first])

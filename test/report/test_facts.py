@@ -108,3 +108,15 @@ def test_times_go_on_where_the_clock_is_set_back(tmp_path: Path) -> None:
     times, distance = facts.tracks.distance((1, 2))
     assert np.interp([1.0, 3.0], times, distance) == pytest.approx([0.5, 0.5], abs=3 * STEP)
     assert any("the clock was set back (1 time)" in doubt for doubt in verdict(history, facts).doubts)
+
+
+def test_nothing_is_concluded_across_a_gap(tmp_path: Path) -> None:
+    descriptions, states = drive_states(3.0)
+    seen = [(t, rows) for t, rows in states if not 0.31 < t < 1.19 and not 1.79 < t < 2.61]
+    history = read_history(Session(record_states(tmp_path / "gaps.mcap", descriptions, seen)))
+    facts = gather(history)
+    assert np.ravel(facts.gaps) == pytest.approx([0.3, 1.2, 1.78, 2.62], abs=STEP)
+    assert not facts.nothing  # of the ball nothing is known after 0.3 s
+    first = next(each for each in facts.collisions if each.pair == (1, 2))
+    assert first.warned == pytest.approx(0.3, abs=2 * STEP)  # since the gap
+    assert [each.pair for each in facts.collisions].count((1, 2)) == 1  # it is known to have lasted through the second

@@ -100,7 +100,7 @@ def test_a_session_without_answers_or_shapes_says_so(tmp_path: Path) -> None:
     scene = Crossing(None, None)
     record_states(tmp_path / "bare.mcap", [], played(scene, 0.2))
     text = report(tmp_path / "bare.mcap", tmp_path, "bare.html")
-    assert "no object was described: nothing could be monitored" in text
+    assert "no object is described in it" in text
     assert "unknown id" in text and 'class="verdict unknown"' in text
 
 

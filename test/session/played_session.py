@@ -41,7 +41,7 @@ def record_states(
 ) -> Path:
     """A session of these states (s, records.STATE), from `start` (ns) on; without answers: the inputs alone."""
     pipeline = Pipeline(profile)
-    recorder = Recorder(path, TYPES, pipeline.metadata(node=NODE))
+    recorder = Recorder(path, TYPES, pipeline.metadata(node=NODE), patient=True)
     shapes = encode_descriptions(start, "world", descriptions, snapshot=True)
     pipeline.on_shapes(shapes)
     recorder.write(SHAPES, shapes, start, start)
