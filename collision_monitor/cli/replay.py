@@ -7,8 +7,13 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from collision_monitor.cli.engines import add_engine, engine_of
+from collision_monitor.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from collision_monitor.session import Session
@@ -16,8 +21,11 @@ if TYPE_CHECKING:
 
 EPILOG = """\
 exit codes: 0 the answers are identical, 1 the session cannot be read, 3 they differ (the first difference is named),
-4 they cannot be compared: they differ and were recorded by another version or machine, or messages are missing
+4 they cannot be compared: they differ and were recorded by another version or machine, or messages are missing;
+of several sessions: the first of 1, 3, 4 that one of them came to
 """
+
+EXIT_ERROR = 1
 
 
 def add_parser(subparsers: Any) -> None:
@@ -29,22 +37,79 @@ def add_parser(subparsers: Any) -> None:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("session", type=Path, metavar="SESSION", help="a .mcap file, or a folder that holds one")
+    parser.add_argument("sessions", nargs="+", metavar="SESSION", help="session files, folders of them, or wildcards")
     parser.add_argument("--threads", type=int, metavar="N", help="threads of the kernels (default: as recorded)")
+    add_engine(parser)
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
     parser.set_defaults(command=replay_command)
 
 
 def replay_command(args: argparse.Namespace) -> int:
-    """Return the exit code. Raises SessionError."""
+    """Return the exit code. Raises InputError, SessionError."""
+    from collision_monitor.session import Session
+    from collision_monitor.session.many import find_sessions
+    from collision_monitor.session.replay import replay
+
+    paths = find_sessions(args.sessions)
+    if len(paths) > 1:
+        return _replay_many(paths, args)
+    session = Session(paths[0])
+    with _progress_bar(session) as progress:
+        report = replay(session, threads=args.threads, progress=progress)
+    print(json.dumps(_as_json(report, paths[0]), indent=2) if args.json else _as_text(report))
+    return int(report.verdict)
+
+
+@dataclass(frozen=True)
+class _Replayed:
+    """A session and what its replay came to, or why it could not be read."""
+
+    report: Report | None
+    error: str = ""
+
+
+def _replay_one(path: Path, threads: int | None) -> _Replayed:
     from collision_monitor.session import Session
     from collision_monitor.session.replay import replay
 
-    session = Session(args.session)
-    with _progress_bar(session) as progress:
-        report = replay(session, threads=args.threads, progress=progress)
-    print(json.dumps(_as_json(report, args.session), indent=2) if args.json else _as_text(report))
-    return int(report.verdict)
+    return _Replayed(replay(Session(path), threads=threads))
+
+
+def _unread(_path: Path, why: str) -> _Replayed:
+    return _Replayed(None, why)
+
+
+def _replay_many(paths: list[Path], args: argparse.Namespace) -> int:
+    from collision_monitor.session.many import for_each
+
+    found: list[_Replayed] = []
+    with progress_bar("replay", len(paths)) as done:
+        for path, each in zip(
+            paths, for_each(partial(_replay_one, threads=args.threads), paths, _unread, engine_of(args)), strict=True
+        ):
+            found.append(each)
+            done(1)
+            if not args.json:
+                print(_as_lines(path, each), flush=True)
+    if args.json:
+        sessions = [
+            {"session": str(path), "error": each.error} if each.report is None else _as_json(each.report, path)
+            for path, each in zip(paths, found, strict=True)
+        ]
+        print(json.dumps({"sessions": sessions}, indent=2))
+    codes = {EXIT_ERROR if each.report is None else int(each.report.verdict) for each in found}
+    return next((code for code in sorted(codes) if code), 0)
+
+
+def _as_lines(path: Path, each: _Replayed) -> str:
+    """Nothing in it depends on how long it took: it is the same for any number of jobs."""
+    if each.report is None:
+        return f"{path}: cannot be read\n  {each.error}"
+    report = each.report
+    lines = [f"{path}: {_verdict(report)}, {report.steps} steps, digest {report.digest:016x}"]
+    lines += [f"  note       {note}" for note in report.notes]
+    lines += [f"  different  {report.first_difference}"] if report.first_difference is not None else []
+    return "\n".join(lines)
 
 
 @contextmanager
@@ -71,9 +136,15 @@ def _progress_bar(session: Session) -> Iterator[Callable[[Report], None] | None]
         yield show
 
 
-def _as_text(report: Report) -> str:
+def _verdict(report: Report) -> str:
     from collision_monitor.session.replay import Verdict
 
+    if report.verdict is Verdict.DIVERGED:
+        return f"diverged in {report.differing} of {report.steps} steps"
+    return report.verdict.name.lower().replace("_", " ")
+
+
+def _as_text(report: Report) -> str:
     lines = [
         f"steps      {report.steps}",
         f"messages   {report.messages}, of which {report.compared} answers were compared",
@@ -84,12 +155,7 @@ def _as_text(report: Report) -> str:
     ]
     if report.first_difference is not None:
         lines.append(f"different  {report.first_difference}")
-    verdicts = {
-        Verdict.IDENTICAL: "identical",
-        Verdict.DIVERGED: f"diverged in {report.differing} of {report.steps} steps",
-        Verdict.NOT_COMPARABLE: "not comparable",
-    }
-    return "\n".join([*lines, f"verdict    {verdicts[report.verdict]}"])
+    return "\n".join([*lines, f"verdict    {_verdict(report)}"])
 
 
 def _as_json(report: Report, session: Path) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import glob
 import logging
 import os
+import re
 import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -38,19 +39,31 @@ ALL_CORES: Final = Engine()
 
 
 def find_sessions(names: Iterable[str]) -> list[Path]:
-    """Session files: files as they are named, wildcards, and all in the folders below. Raises InputError where none."""
+    """Sessions: files as they are named, wildcards, and all in the folders below. Raises InputError where none.
+
+    A folder that a recorder made is one session, whatever the number of its files.
+    """
     found: list[Path] = []
     for name in names:
         paths = [name] if Path(name).exists() else sorted(glob.glob(name)) or [name]
         for path in map(Path, paths):
-            if path.is_dir():
-                inside = sorted(path.rglob("*.mcap"))
-                if not inside:
-                    raise InputError(f"{path}: expected a folder with .mcap files, got none")
-                found += inside
-            else:
-                found.append(path)
+            inside = list(_inside(path)) if path.is_dir() else [path]
+            if not inside:
+                raise InputError(f"{path}: expected a folder with .mcap files, got none")
+            found += inside
     return list(dict.fromkeys(found))
+
+
+def _inside(folder: Path) -> Iterator[Path]:
+    files = sorted(folder.glob("*.mcap"))
+    parts = [file for file in files if re.fullmatch(re.escape(folder.name) + r"_\d+", file.stem)]
+    if files and ((folder / "metadata.yaml").exists() or parts == files):
+        yield folder
+        return
+    yield from files
+    for below in sorted(folder.iterdir()):
+        if below.is_dir() and not below.is_symlink() and below not in files:  # a link may lead round in a circle
+            yield from _inside(below)
 
 
 def for_each(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -72,6 +73,30 @@ def test_sessions_are_found_by_name_wildcard_and_folder(tmp_path: Path) -> None:
     names = [p.name for p in find_sessions([f"{tmp_path}/*.mcap", str(tmp_path), f"{tmp_path}/a[1].mcap"])]
     assert names == ["a[1].mcap", "b.mcap", "c.mcap"]
     assert find_sessions(["missing.mcap"]) == [Path("missing.mcap")]  # whoever opens it says so
+    (tmp_path / "in" / "split").mkdir()
+    for part in ("split_0.mcap", "split_1.mcap"):
+        (tmp_path / "in" / "split" / part).touch()
+    assert [p.name for p in find_sessions([str(tmp_path / "in")])] == ["c.mcap", "split"], "a folder that is a session"
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="got none"):
         find_sessions([str(tmp_path / "empty")])
+
+
+def test_replay_takes_many_sessions(recorded: Path, tmp_path: Path) -> None:
+    for k in range(3):
+        (tmp_path / f"{k}.mcap").write_bytes(recorded.read_bytes())
+    (tmp_path / "1.mcap").write_bytes(b"no session")
+
+    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+        command = [Path(sys.executable).with_name("collision-monitor"), "replay", *map(str, arguments)]
+        return subprocess.run(command, capture_output=True, text=True, timeout=120)
+
+    one, two = run(tmp_path, "--jobs", 1), run(tmp_path, "--jobs", 2)
+    assert one.returncode == two.returncode == 1
+    assert one.stdout == two.stdout
+    assert [line.split(": ")[1].split(",")[0] for line in one.stdout.splitlines() if not line.startswith(" ")] == [
+        "identical",
+        "cannot be read",
+        "identical",
+    ]
+    assert run(tmp_path / "0.mcap", tmp_path / "2.mcap", "--json").returncode == 0
