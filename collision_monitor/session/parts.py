@@ -76,6 +76,7 @@ class Parts:
         self._types = dict(types)
         self._metadata = dict(metadata)
         self._splitting = splitting
+        self._splits = bool(splitting.size or splitting.duration)
         self._overwrite = overwrite
         self._definitions = {name: definition(full_name(name)).encode() for name in self._types.values()}
         self._inputs = {topic for topic, name in self._types.items() if name in _INPUTS}
@@ -101,11 +102,20 @@ class Parts:
         """Bytes of all files that the operating system has."""
         return self._finished_bytes + (self._file.size if self._file else 0)
 
-    def write(self, entry: Entry) -> int:
-        """Take in the next message; how many were written for it, of those that came before too."""
-        if self._window is None:
-            self._put(entry)
-            return 1
+    def write(self, entries: Sequence[Entry]) -> int:
+        """Take in the next messages; how many were written for them, of those that came before too."""
+        if self._window is not None:
+            return sum(map(self._select, entries))
+        if self._splits:
+            for entry in entries:
+                self._put(entry)
+        else:
+            assert self._file is not None
+            self._file.write(entries)
+        return len(entries)
+
+    def _select(self, entry: Entry) -> int:
+        assert self._window is not None
         written = 0
         for each, kept in self._window.take(entry):
             if kept:
@@ -139,7 +149,7 @@ class Parts:
         if self._file is None:
             self._open(entry)
         assert self._file is not None
-        self._file.write(entry.topic, entry.data, entry.log_time, entry.publish_time, entry.sequence)
+        self._file.write([entry])
         if entry.objects is not None:
             self._objects = entry.objects
 
@@ -167,7 +177,7 @@ class Parts:
             assert first is not None and self._shapes is not None
             frame_id, at = self._metadata.get("frame_id", ""), first.log_time
             data = encode_descriptions(at, frame_id, self._objects, snapshot=True)
-            self._file.write(self._shapes, data, at, at, (first.sequence - 1) & 0xFFFFFFFF)
+            self._file.write([Entry(self._shapes, data, at, at, (first.sequence - 1) & 0xFFFFFFFF)])
 
     def _finish(self) -> None:
         if self._file is None:

@@ -29,6 +29,13 @@ _WAKE_BYTES: Final = 4 << 20
 """Waiting bytes that wake the thread before the next flush is due."""
 
 
+_TURN: Final = 256
+"""Messages (0.3 ms) after which the thread lets go of Python's lock: else a step may wait 5 ms to get it back."""
+
+_PAUSE: Final = 20e-6
+"""s, long enough that a thread which waits for the lock wakes up and takes it."""
+
+
 class Recording(IntEnum):
     """`MonitorStatus.recording`."""
 
@@ -106,15 +113,16 @@ class Recorder:
             sequence = self._next_sequence & 0xFFFFFFFF
             self._last_log_time = max(self._last_log_time, log_time)
             entry = Entry(topic, data, self._last_log_time, max(0, publish_time), sequence, event, objects)
-            while self._patient and self._state is Recording.ON and self._waiting + entry.cost > self._queue_bytes:
+            cost = entry.cost
+            while self._patient and self._state is Recording.ON and self._waiting + cost > self._queue_bytes:
                 self._wake.notify()
                 self._wake.wait(FLUSH_PERIOD)
             self._next_sequence += 1
-            if self._closing or self._state is Recording.FAILED or self._waiting + entry.cost > self._queue_bytes:
+            if self._closing or self._state is Recording.FAILED or self._waiting + cost > self._queue_bytes:
                 self._dropped += 1
                 return
             self._queue.append(entry)
-            self._waiting += entry.cost
+            self._waiting += cost
             if self._waiting >= _WAKE_BYTES:
                 self._wake.notify()
 
@@ -173,9 +181,12 @@ class Recorder:
             size, closing = self._waiting, self._closing
         flushed = time.monotonic()
         taken = written = 0
-        for entry in batch:
-            written += self._parts.write(entry)
-            taken += 1
+        for begin in range(0, len(batch), _TURN):
+            turn = batch[begin : begin + _TURN]
+            written += self._parts.write(turn)
+            taken += len(turn)
+            if begin:
+                time.sleep(_PAUSE)
             if time.monotonic() - flushed >= FLUSH_PERIOD:
                 self._flush(taken, written)
                 flushed, taken, written = time.monotonic(), 0, 0

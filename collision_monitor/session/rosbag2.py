@@ -72,7 +72,7 @@ class Extent:
 
 def file_metadata(files: Mapping[str, Extent], types: Mapping[str, str]) -> str:
     """metadata.yaml; files: by name, in their order; types: topic -> name of its message."""
-    filled = [extent for extent in files.values() if extent.counts]
+    filled = [extent for extent in files.values() if extent.count]
     begin = min((extent.begin for extent in filled), default=0)
     end = max((extent.end for extent in filled), default=0)
     topics = [

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-from mcap.writer import Writer
-
 from collision_monitor._version import VERSION
+from collision_monitor.session.entry import Entry
+from collision_monitor.session.mcap_writer import McapWriter
 from collision_monitor.session.rosbag2 import Extent, channel_metadata, file_metadata, full_name
 
 METADATA: Final = "collision_monitor"
@@ -31,23 +30,20 @@ class SessionFile:
     ) -> None:
         self.path = path
         self._types = types
-        self._counts: Counter[str] = Counter()
-        self._begin = self._end = 0
+        self._begin: int | None = None
         self._stream = path.open("wb" if overwrite else "xb")
         try:
-            self._writer = Writer(self._stream)
-            self._writer.start(profile="ros2", library=f"collision_monitor {VERSION}")
-            self._writer.add_metadata(METADATA, dict(metadata))
+            self._writer = McapWriter(self._stream, profile="ros2", library=f"collision_monitor {VERSION}")
+            self._writer.add_metadata(METADATA, metadata)
             schemas = {
-                name: self._writer.register_schema(full_name(name), "ros2msg", text)
-                for name, text in definitions.items()
+                name: self._writer.add_schema(full_name(name), "ros2msg", text) for name, text in definitions.items()
             }
             # One channel for each topic. They go into the first chunk, before the first message.
             self._channels = {
-                topic: self._writer.register_channel(topic, "cdr", schemas[name], channel_metadata(name))
+                topic: self._writer.add_channel(topic, "cdr", schemas[name], channel_metadata(name))
                 for topic, name in types.items()
             }
-            self._writer.flush()  # type: ignore[no-untyped-call]
+            self._writer.flush()
         except BaseException:
             self.close()
             raise
@@ -60,30 +56,32 @@ class SessionFile:
     @property
     def begin(self) -> int | None:
         """Log time of the first message (ns)."""
-        return self._begin if self._counts else None
+        return self._begin
 
     @property
     def extent(self) -> Extent:
-        """What it holds so far."""
-        return Extent(self._begin, self._end, self._counts)
+        """What was flushed of it."""
+        counts = {topic: self._writer.counts[channel] for topic, channel in self._channels.items()}
+        return Extent(self._writer.begin, self._writer.end, counts)
 
-    def write(self, topic: str, data: bytes, log_time: int, publish_time: int, sequence: int) -> None:
-        """Append a message; log times must not decrease."""
-        self._writer.add_message(self._channels[topic], log_time, data, publish_time, sequence)
-        if not self._counts:
-            self._begin = log_time
-        self._end = log_time
-        self._counts[topic] += 1
+    def write(self, entries: Sequence[Entry]) -> None:
+        """Append messages; log times must not decrease."""
+        if self._begin is None and entries:
+            self._begin = entries[0].log_time
+        channels, add = self._channels, self._writer.add_message
+        for topic, data, log_time, publish_time, sequence, _, _ in entries:
+            add(channels[topic], data, log_time, publish_time, sequence)
 
     def flush(self) -> None:
         """Hand everything to the operating system, which keeps it when this process is killed."""
-        self._writer.flush()  # type: ignore[no-untyped-call]
+        self._writer.flush()
 
     def finish(self) -> None:
         """Write the summary, with rosbag2's metadata as a record, and close the file."""
+        self.flush()
         text = file_metadata({self.path.name: self.extent}, self._types)
         self._writer.add_metadata("rosbag2", {"serialized_metadata": text})
-        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._writer.finish()
         self._stream.close()
 
     def close(self) -> None:

@@ -1,0 +1,229 @@
+"""What recording costs and what a killed process loses.
+
+    python benchmarks/recording.py            # three minutes
+    python benchmarks/recording.py --quick    # half a minute
+
+Sustained: messages of 1 kB written as fast as the disk takes them, none dropped. Step: the same steps with and without
+a recorder beside them that takes 20,000 messages/s, in blocks that alternate within one run, so that whatever else
+the machine does meets both alike. Killed: a process that records 20,000 messages/s is killed (SIGKILL) at a random
+moment; lost is the time between the last message in the file and the signal.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from collision_monitor import records
+from collision_monitor.codec import encode_descriptions, encode_states
+from collision_monitor.description import ObjectDescription
+from collision_monitor.geometry.shapes import Box
+from collision_monitor.pipeline import Pipeline
+from collision_monitor.session import Recorder, Session
+from collision_monitor.session.replay import replay
+
+NODE = "/object_monitor"
+TYPES = {
+    f"{NODE}/objects/shapes": "ObjectDescriptionArray",
+    f"{NODE}/objects/states": "ObjectStateArray",
+    f"{NODE}/contacts": "ContactArray",
+    f"{NODE}/predictions": "PredictedCollisionArray",
+}
+SHAPES, STATES, CONTACTS, PREDICTIONS = TYPES
+OBJECTS = 200
+RATE = 20_000
+"""Messages/s that the recorder takes while steps are timed."""
+
+CHILD = """
+import sys, time
+import numpy as np
+from collision_monitor.session import Recorder
+data = bytes(np.random.default_rng(1).normal(size=120).tobytes())
+recorder = Recorder(sys.argv[1], {"/x/states": "ObjectStateArray"}, {"profile": "{}", "frame_id": "world"})
+print("ready", flush=True)
+begin, k = time.time(), 0
+while True:
+    while k < (time.time() - begin) * 20_000:
+        recorder.write("/x/states", k.to_bytes(8, "little") + data, time.time_ns(), 1)
+        k += 1
+    time.sleep(0.0005)
+"""
+
+
+def payload(k: int) -> bytes:
+    """About 1 kB that compresses as states do: little."""
+    return np.random.default_rng(k % 64).normal(size=128).tobytes()
+
+
+def sustained(folder: Path, seconds: float) -> dict[str, float]:
+    """Messages/s and MB/s that reach the operating system, queue and all."""
+    data = [payload(k) for k in range(64)]
+    recorder = Recorder(folder / "sustained.mcap", TYPES, {"profile": "{}"}, patient=True, queue_bytes=16 << 20)
+    begin, k = time.perf_counter(), 0
+    while time.perf_counter() - begin < seconds:
+        for _ in range(500):
+            recorder.write(STATES, data[k % 64], k, k)
+            k += 1
+    recorder.close()
+    took = time.perf_counter() - begin
+    status = recorder.status()
+    assert (status["recorded_messages"], status["recording_dropped"]) == (k, 0)
+    return {"messages_per_s": k / took, "MB_per_s": k * len(data[0]) / took / 1e6}
+
+
+class Crossing:
+    """Boxes in rows that cross each other's ways, all of them in every message."""
+
+    def __init__(self) -> None:
+        rng = np.random.default_rng(5)
+        self.size = rng.uniform(0.4, 1.2, (OBJECTS, 3))
+        self.start, self.velocity = rng.uniform(0, 14, (OBJECTS, 3)), rng.uniform(-1, 1, (OBJECTS, 3))
+
+    def shapes(self) -> bytes:
+        """ObjectDescriptionArray."""
+        objects = [ObjectDescription(i + 1, Box(tuple(size))) for i, size in enumerate(self.size)]
+        return encode_descriptions(0, "world", objects, snapshot=True)
+
+    def states(self, step: int) -> bytes:
+        """ObjectStateArray."""
+        rows = np.zeros(OBJECTS, records.STATE)
+        rows["id"] = np.arange(1, OBJECTS + 1)
+        rows["quaternion"][:, 3] = 1.0
+        phase = self.start + 0.02 * step * self.velocity
+        rows["position"] = np.abs((phase % 28.0) - 14.0)  # to and fro between walls
+        rows["linear"] = np.where(phase % 28.0 < 14.0, -self.velocity, self.velocity)
+        return encode_states(1_000_000_000 + step * 20_000_000, "world", step + 1, rows)
+
+
+def step_cost(folder: Path, blocks: int, block: float) -> dict[str, float]:
+    """Duration of a step beside a recorder and without one: median of the blocks' ratios; µs for each `write`."""
+    scene, pipeline, data = Crossing(), Pipeline("balanced"), [payload(k) for k in range(64)]
+    pipeline.on_shapes(scene.shapes())
+    step = 0
+    for step in range(200):
+        pipeline.on_states(scene.states(step))
+    durations: dict[bool, list[float]] = {False: [], True: []}
+    writing, written = 0.0, 0
+    recorder = Recorder(folder / "steps.mcap", TYPES, pipeline.metadata(), patient=False)
+    for k in range(2 * blocks):
+        recording = bool(k % 2) ^ bool(k // 2 % 2)  # off on on off …: drift meets both alike
+        begin, first, in_block = time.perf_counter(), written, []
+        while (now := time.perf_counter()) - begin < block:
+            step += 1
+            states = scene.states(step)
+            before = time.perf_counter()
+            outputs = pipeline.on_states(states)
+            in_block.append(time.perf_counter() - before)
+            assert outputs is not None
+            if recording:
+                before = time.perf_counter()
+                recorder.write(STATES, states, step, step)
+                recorder.write(CONTACTS, outputs.contacts, step, step)
+                recorder.write(PREDICTIONS, outputs.predictions, step, step)
+                written += 3
+                while written - first < (now - begin) * RATE:
+                    recorder.write(STATES, data[written % 64], step, step)
+                    written += 1
+                writing += time.perf_counter() - before
+            time.sleep(0.0005)
+        durations[recording].append(float(np.mean(in_block)))
+        while recording and recorder.status()["recorded_messages"] < written:
+            time.sleep(0.05)  # what waits for the disk belongs to this block
+    recorder.close()
+    assert recorder.status()["recording_dropped"] == 0
+    ratios = np.array(durations[True]) / np.array(durations[False])
+    return {
+        "step_ms": 1e3 * float(np.median(durations[False])),
+        "step_ms_recording": 1e3 * float(np.median(durations[True])),
+        "ratio": float(np.median(ratios)),
+        "ratio_10_percent": float(np.quantile(ratios, 0.1)),
+        "ratio_90_percent": float(np.quantile(ratios, 0.9)),
+        "write_us": 1e6 * writing / written,
+        "messages_per_s": written / (blocks * block),
+    }
+
+
+def killed(folder: Path, times: int) -> dict[str, object]:
+    """s lost by each of `times` processes that were killed while they recorded."""
+    lost, recovered, holes = [], [], 0
+    for k in range(times):
+        path = folder / f"killed_{k}.mcap"
+        child = subprocess.Popen([sys.executable, "-c", CHILD, path], stdout=subprocess.PIPE)
+        assert child.stdout is not None
+        child.stdout.readline()
+        time.sleep(random.uniform(0.6, 2.0))
+        at = time.time_ns()
+        os.kill(child.pid, signal.SIGKILL)
+        child.wait()
+        messages = list(Session(path).messages())
+        holes += [int.from_bytes(m.data[:8], "little") for m in messages] != list(range(len(messages)))
+        lost.append((at - messages[-1].log_time) * 1e-9)
+        recovered.append(len(messages))
+        path.unlink()
+    return {"lost_s": sorted(lost), "messages_recovered": recovered, "with_holes": holes}
+
+
+def replay_speed(folder: Path, steps: int) -> dict[str, float]:
+    """Times real time: 200 objects at 50 Hz, one thread."""
+    scene, pipeline = Crossing(), Pipeline("balanced")
+    with Recorder(folder / "replay.mcap", TYPES, pipeline.metadata(), patient=True) as recorder:
+        shapes = scene.shapes()
+        pipeline.on_shapes(shapes)
+        recorder.write(SHAPES, shapes, 0, 0)
+        for step in range(steps):
+            states, now = scene.states(step), step * 20_000_000
+            outputs = pipeline.on_states(states)
+            assert outputs is not None
+            recorder.write(STATES, states, now, now)
+            recorder.write(CONTACTS, outputs.contacts, now, now)
+            recorder.write(PREDICTIONS, outputs.predictions, now, now)
+    report = replay(Session(folder / "replay.mcap"))
+    return {"verdict": report.verdict.name.lower(), "times_real_time": report.speed, "steps": report.steps}
+
+
+def main() -> None:
+    """Run all and print them, or one JSON object."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer repetitions")
+    parser.add_argument("--folder", type=Path, help="on the disk that is to be measured (default: the temporary one)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory(dir=args.folder) as name:
+        folder = Path(name)
+        results: dict[str, dict[str, object]] = {
+            "sustained": {**sustained(folder, 3 if args.quick else 20)},
+            "step": {**step_cost(folder, 8 if args.quick else 40, 0.5 if args.quick else 1.0)},
+            "killed": killed(folder, 3 if args.quick else 20),
+            "replay": {**replay_speed(folder, 500 if args.quick else 3000)},
+        }
+    if args.json:
+        print(json.dumps(results, indent=2))
+        return
+    s, step, kill, again = results["sustained"], results["step"], results["killed"], results["replay"]
+    print(f"sustained  {s['messages_per_s']:9,.0f} messages/s of 1 kB, {s['MB_per_s']:.0f} MB/s, none dropped")
+    print(
+        f"step       {step['step_ms']:.3f} ms of {OBJECTS} boxes; {step['step_ms_recording']:.3f} ms beside "
+        f"{step['messages_per_s']:,.0f} messages/s: ratio {step['ratio']:.3f} "
+        f"({step['ratio_10_percent']:.3f} to {step['ratio_90_percent']:.3f}); {step['write_us']:.1f} µs for each write"
+    )
+    lost = kill["lost_s"]
+    assert isinstance(lost, list)
+    print(
+        f"killed     {len(lost)} times: lost {np.median(lost):.3f} s in the median, {lost[-1]:.3f} s at most; "
+        f"{kill['with_holes']} files with holes"
+    )
+    print(f"replay     {again['times_real_time']:.0f} × real time, {OBJECTS} boxes at 50 Hz: {again['verdict']}")
+
+
+if __name__ == "__main__":
+    main()
