@@ -57,13 +57,7 @@ def time_of_impact_batch(
     query = check_query(horizon, tolerance, separation, iterations)
     a, b = make_body(shape_a, _STILL, "A"), make_body(shape_b, _STILL, "B")
     check_bounded(a, b)
-    states = [
-        _states(poses, twists, name) for poses, twists, name in ((poses_a, twists_a, "A"), (poses_b, twists_b, "B"))
-    ]
-    try:
-        state_a, state_b = np.broadcast_arrays(*states)
-    except ValueError:
-        raise InputError(f"expected as many motions of A as of B, got {len(states[0])} and {len(states[1])}") from None
+    state_a, state_b = check_states(poses_a, twists_a, poses_b, twists_b)
     count = len(state_a)
     lower, upper = np.full(count, math.inf), np.full(count, math.inf)
     alone = np.ones(count, bool)
@@ -87,6 +81,15 @@ def _is_special(a: Body, b: Body, state_a: Array, state_b: Array) -> bool:
             if isinstance(shape, HalfSpace) and state[:, 10:].any():
                 return True
     return False
+
+
+def check_states(poses_a: ArrayLike, twists_a: ArrayLike, poses_b: ArrayLike, twists_b: ArrayLike) -> list[Array]:
+    """States (N, 13) of A and of B: poses and twists side by side. Raises InputError, PoseError."""
+    states = [_states(poses_a, twists_a, "A"), _states(poses_b, twists_b, "B")]
+    try:
+        return list(np.broadcast_arrays(*states))
+    except ValueError:
+        raise InputError(f"expected as many motions of A as of B, got {len(states[0])} and {len(states[1])}") from None
 
 
 def _states(poses: ArrayLike, twists: ArrayLike, name: str) -> Array:
@@ -122,31 +125,36 @@ def _motion(state: Array) -> Motion:
     return Motion(Pose(state[:3], state[3:7]), state[7:10], state[10:])
 
 
-def _solve(
-    a: Body, b: Body, state_a: Array, state_b: Array, query: Query, lower: Array, upper: Array
-) -> NDArray[np.bool_]:
-    """Fill lower and upper (N,); returns which (N,) touch at the start and are left."""
-    count = len(lower)
-    two = make_scene(a, b, query.horizon)
+def lay_out(a: Body, b: Body, state_a: Array, state_b: Array, horizon: float) -> tuple[Scene, NDArray[np.int32]]:
+    """The states (N, 13) as N bodies like a and N like b, and the pairs (N, 2) of those in one row."""
+    count = len(state_a)
+    two = make_scene(a, b, horizon)
     bodies = make_bodies(2 * count)
     for k, state in enumerate((state_a, state_b)):
         rows = slice(k * count, (k + 1) * count)
         motion = bodies.motion[rows]
-        motion["radius"], motion["cover"] = two.bodies.motion["radius"][k], query.horizon
+        motion["radius"], motion["cover"] = two.bodies.motion["radius"][k], horizon
         for column, field in enumerate(("x", "y", "z")):
             motion[field], motion[f"v{field}"], motion[f"w{field}"] = state[:, [column, 7 + column, 10 + column]].T
         motion["rotation"] = rotation_matrix(state[:, 3:7])
         bodies.first_shape[rows] = two.bodies.first_shape[k]
         bodies.spin_radius[rows] = two.bodies.spin_radius[k]
     bodies.motion["id"] = np.arange(2 * count)
-    scene = Scene(two.table, two.parts, bodies)
     pairs = np.arange(2 * count, dtype=np.int32).reshape(2, count).T.copy()
+    return Scene(two.table, two.parts, bodies), pairs
+
+
+def _solve(
+    a: Body, b: Body, state_a: Array, state_b: Array, query: Query, lower: Array, upper: Array
+) -> NDArray[np.bool_]:
+    """Fill lower and upper (N,); returns which (N,) touch at the start and are left."""
+    scene, pairs = lay_out(a, b, state_a, state_b, query.horizon)
     events = first_impacts(scene, pairs, 0.0, query)
     certain = (events["status"] == HIT) & (events["upper"] <= query.horizon)
     lower[events["i"]] = events["lower"]
     upper[events["i"]] = np.where(certain, events["upper"], math.inf)
     at_once = lower <= 0.0
-    radii = two.bodies.motion["radius"]
+    radii = scene.bodies.motion["radius"][[0, -1]]
     deep = query.separation - TOUCHING * float(radii[np.isfinite(radii)].sum())
     overlaps = first_impacts(scene, pairs[at_once], 0.0, query, deep)
     overlaps = overlaps[(overlaps["status"] == HIT) & (overlaps["upper"] <= 0.0)]

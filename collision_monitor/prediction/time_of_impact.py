@@ -217,7 +217,7 @@ def shape_impact(table, parts, A, B, a, b, begin, end, margin, tube_0, tube_1, t
 
 
 @device
-def _contact_at(table, parts, A, B, a, b, t, scratch):
+def contact_at(table, parts, A, B, a, b, t, scratch):
     """Contact of shape a in motion A with shape b in motion B at time t, into scratch.out; returns the signed distance.
 
     out as narrow_phase.dispatch.contact gives it, but relative to A's origin; out[15]: closing speed (m/s).
@@ -262,7 +262,7 @@ def _touching_by(table, parts, A, B, a, b, start, guess, end, tube_0, tube_1, be
     guessed = 0.0 < guess < end - start
     t = start + guess if guessed else start
     for _ in range(12):
-        distance = _contact_at(table, parts, A, B, a, b, t, scratch)
+        distance = contact_at(table, parts, A, B, a, b, t, scratch)
         excess = distance - margin + tube_0 + tube_1 * (t - begin)
         if excess <= 0.0:
             return t
@@ -330,7 +330,7 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
     a, b = event.shape_i, event.shape_j
     sure = _touching_by(table, parts, A, B, a, b, lower, guess, end, tube_0, tube_1, begin, margin, tolerance, scratch)
     if sure == inf:
-        _contact_at(table, parts, A, B, a, b, lower, scratch)
+        contact_at(table, parts, A, B, a, b, lower, scratch)
     event.lower, event.upper = lower, sure
     event.status = HIT if sure < inf else UNRESOLVED
     _set_geometry(event, A, sure if sure < inf else lower, scratch.out)
