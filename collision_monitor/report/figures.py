@@ -94,7 +94,7 @@ def _timeline(history: History, facts: Facts, size: Size) -> Figure | None:
                 runs = _runs(np.concatenate(times), 1.5 * shortest, shortest)
                 axes.broken_barh(runs, (row - 0.3 * reach, 0.6 * reach), color=color, linewidth=0)
         for each in of_pair[pair]:
-            end = history.duration if each.end is None else each.end
+            end = each.last if each.end is None else each.end
             color = CONTACT if each.certain else POSSIBLE
             bar = (each.begin, max(end - each.begin, shortest))
             axes.broken_barh([bar], (row - 0.7 * reach, 1.4 * reach), color=color, linewidth=0)

@@ -199,7 +199,7 @@ def _steps_caption(history: History) -> str:
 
 _COLUMNS: Final[tuple[tuple[str, Callable[[Collision, Facts], str]], ...]] = (
     ("began<br>(s)", lambda each, facts: f"{each.begin:.3f}"),
-    ("ended<br>(s)", lambda each, facts: "goes on" if each.end is None else f"{each.end:.3f}"),
+    ("ended<br>(s)", lambda each, facts: f"after {each.last:.3f}" if each.end is None else f"{each.end:.3f}"),
     ("depth<br>(m)", lambda each, facts: f"{max(-each.deepest, 0.0):.3g}"),
     ("warned<br>(s before)", lambda each, facts: _warned(each)),
     ("first stated<br>(s)", lambda each, facts: _stated(each, facts)),

@@ -51,14 +51,16 @@ ANY: Final = "any"
 class Collision:
     """Two objects in contact without a break. Times in s from the session's first step; step: index of the begin.
 
-    end: None where it went on to the end of the session. deepest: least signed distance (m). certain: they were known
-    to touch at some time, not only not known to be apart. warned: how long before the begin (s) the predictions of it
-    began that were not interrupted any more; 0 where there was none, NaN where the session begins with the contact.
+    end: None where it went on to the end of the session or to a gap; last: the last step in contact. deepest: least
+    signed distance (m). certain: they were known to touch at some time, not only not known to be apart. warned: how
+    long before the begin (s) the predictions of it began that were not interrupted any more; 0 where there was none,
+    NaN where the session begins with the contact.
     """
 
     pair: Pair
     begin: float
     end: float | None
+    last: float
     step: int
     deepest: float
     certain: bool
@@ -314,11 +316,13 @@ def _collisions(h: History) -> list[Collision]:
     for run in np.split(order, breaks) if len(order) else ():
         first, last = int(steps[run[0]]), int(steps[run[-1]])
         pair = (int(rows["id_a"][run[0]]), int(rows["id_b"][run[0]]))
+        ended = last + 1 < len(h.times) and h.times[last + 1] - h.times[last] <= longest
         found.append(
             Collision(
                 pair=pair,
                 begin=float(h.times[first]),
-                end=float(h.times[last + 1]) if last + 1 < len(h.times) else None,
+                end=float(h.times[last + 1]) if ended else None,
+                last=float(h.times[last]),
                 step=first,
                 deepest=float(rows["signed_distance"][run].min()),
                 certain=bool((rows["status"][run] == ContactStatus.TOUCHING).any()),

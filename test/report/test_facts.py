@@ -120,3 +120,11 @@ def test_nothing_is_concluded_across_a_gap(tmp_path: Path) -> None:
     first = next(each for each in facts.collisions if each.pair == (1, 2))
     assert first.warned == pytest.approx(0.3, abs=2 * STEP)  # since the gap
     assert [each.pair for each in facts.collisions].count((1, 2)) == 1  # it is known to have lasted through the second
+
+
+def test_the_end_of_a_contact_that_nobody_saw_is_not_known(tmp_path: Path) -> None:
+    descriptions, states = drive_states(2.0)
+    later = [(t + 5.0, rows) for t, rows in drive_states(0.5)[1]]  # they are apart again
+    history = read_history(Session(record_states(tmp_path / "gap.mcap", descriptions, [*states, *later])))
+    (collision,) = (each for each in history.collisions if each.pair == (1, 2))
+    assert collision.end is None and collision.last == pytest.approx(1.98)
