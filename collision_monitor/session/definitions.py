@@ -7,6 +7,7 @@ import os
 import re
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from collision_monitor.errors import SessionError
@@ -47,10 +48,24 @@ def _read(type_name: str, suffix: str) -> str:
         path = root / package / "msg" / f"{name}.{suffix}"
         if path.is_file():
             return path.read_text(encoding="utf-8")
+    if suffix == "msg" and type_name in _carried():
+        return _carried()[type_name]
     raise SessionError(
         f"{type_name}: expected {package}/msg/{name}.{suffix} under a ROS prefix (AMENT_PREFIX_PATH, {sys.prefix}), "
         "got none: build and source collision_monitor_msgs"
     )
+
+
+@cache
+def _carried() -> dict[str, str]:
+    """The definitions that a session needs, by name, for a machine without ROS: a copy of what is installed with it."""
+    sections = (Path(__file__).with_name("definitions.txt")).read_text(encoding="utf-8").split(f"{_SEPARATOR}\nMSG: ")
+    found = {}
+    for section in sections[1:]:
+        name, _, text = section.partition("\n")
+        package, _, message = name.partition("/")
+        found[f"{package}/msg/{message}"] = text.removesuffix("\n")
+    return found
 
 
 def _roots() -> Iterator[Path]:

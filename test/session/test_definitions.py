@@ -55,7 +55,28 @@ def test_the_hash_is_that_of_the_installed_type(name: str) -> None:
     assert definitions.type_hash(full_name(name)).startswith("RIHS01_")
 
 
+def test_a_machine_without_ros_has_the_same_definitions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The copy in the package is made anew with `python test/session/test_definitions.py`."""
+    with_ros = {name: definitions.definition(full_name(name)) for name in TYPES}
+    monkeypatch.setattr(definitions, "_roots", lambda: iter(()))
+    assert {name: definitions.definition(full_name(name)) for name in TYPES} == with_ros
+
+
 def test_an_unknown_type_is_named() -> None:
     with pytest.raises(SessionError, match="expected nowhere_msgs/msg/Nothing"):
         definitions.definition("nowhere_msgs/msg/Nothing")
     assert definitions.type_hash("nowhere_msgs/msg/Nothing") == ""
+
+
+if __name__ == "__main__":
+    separator = "=" * 80
+    titles = {
+        title
+        for each in TYPES
+        for title in [full_name(each).replace("/msg/", "/"), *definitions.definition(full_name(each)).split("MSG: ")[1:]]
+    }
+    lines = [
+        f"{separator}\nMSG: {name}\n{definitions._read(name.replace('/', '/msg/'), 'msg')}\n"
+        for name in sorted({title.partition("\n")[0] for title in titles})
+    ]
+    Path(definitions.__file__).with_name("definitions.txt").write_text("".join(lines))
