@@ -69,14 +69,9 @@ def test_an_unknown_type_is_named() -> None:
 
 
 if __name__ == "__main__":
-    separator = "=" * 80
-    titles = {
-        title
-        for each in TYPES
-        for title in [full_name(each).replace("/msg/", "/"), *definitions.definition(full_name(each)).split("MSG: ")[1:]]
-    }
-    lines = [
-        f"{separator}\nMSG: {name}\n{definitions._read(name.replace('/', '/msg/'), 'msg')}\n"
-        for name in sorted({title.partition("\n")[0] for title in titles})
+    texts = [f"MSG: {full_name(each).replace('/msg/', '/')}\n{definitions.definition(full_name(each))}" for each in TYPES]
+    titles = {line.removeprefix("MSG: ") for text in texts for line in text.splitlines() if line.startswith("MSG: ")}
+    sections = [
+        f"{'=' * 80}\nMSG: {title}\n{definitions._read(title.replace('/', '/msg/'), 'msg')}\n" for title in sorted(titles)
     ]
-    Path(definitions.__file__).with_name("definitions.txt").write_text("".join(lines))
+    Path(definitions.__file__).with_name("definitions.txt").write_text("".join(sections))
