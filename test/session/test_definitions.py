@@ -69,9 +69,12 @@ def test_an_unknown_type_is_named() -> None:
 
 
 if __name__ == "__main__":
-    texts = [f"MSG: {full_name(each).replace('/msg/', '/')}\n{definitions.definition(full_name(each))}" for each in TYPES]
+    texts = [
+        f"MSG: {full_name(each).replace('/msg/', '/')}\n{definitions.definition(full_name(each))}" for each in TYPES
+    ]
     titles = {line.removeprefix("MSG: ") for text in texts for line in text.splitlines() if line.startswith("MSG: ")}
     sections = [
-        f"{'=' * 80}\nMSG: {title}\n{definitions._read(title.replace('/', '/msg/'), 'msg')}\n" for title in sorted(titles)
+        f"{'=' * 80}\nMSG: {title}\n{definitions._read(title.replace('/', '/msg/'), 'msg')}\n"
+        for title in sorted(titles)
     ]
     Path(definitions.__file__).with_name("definitions.txt").write_text("".join(sections))
