@@ -43,7 +43,8 @@ examples:
   collision-monitor bench --scene boxes --n 10000         how long it takes to find all contacts
 
 exit codes: 0 done, 1 error, 2 wrong usage, 130 interrupted; 3 not as expected: replay and compare, the answers differ;
-check, an expectation does not hold; 4 cannot be told: replay, the answers cannot be compared; compare, not all is known
+check, an expectation does not hold; salvage, something is missing; 4 cannot be told: replay, the answers cannot be
+compared; compare, not all is known
 `collision-monitor COMMAND --help` says more about each command.
 """
 

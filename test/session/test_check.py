@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -206,6 +207,18 @@ def test_the_command_and_its_exit_codes(yard: Path, tmp_path: Path) -> None:
     unwritable = run("expect: [{no_contact: any}]", str(yard), "--junit", str(tmp_path / "nowhere" / "junit.xml"))
     assert unwritable.returncode == 1
     assert "expected a file that can be written" in unwritable.stderr
+
+
+def test_the_example_of_the_docs_is_what_it_prints(yard: Path, tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "check.md").read_text()
+    (expectations,) = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
+    (printed,) = re.findall(r"echo \$\?\n(.*?)3\n```", page, re.DOTALL)
+    (tmp_path / "yard.mcap").write_bytes(yard.read_bytes())
+    (tmp_path / "expectations.yaml").write_text(expectations)
+    command = [PROGRAM, "check", "yard.mcap", "--expect", "expectations.yaml"]
+    answer = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=tmp_path)
+    assert answer.stdout == printed
+    assert answer.returncode == 3
 
 
 def test_objects_of_one_name_are_all_meant(yard: Path) -> None:
