@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from collision_monitor.cli.progress import session_bar
+from collision_monitor.errors import SessionError
 
 
 def add_parser(subparsers: Any) -> None:
@@ -30,15 +31,18 @@ def add_parser(subparsers: Any) -> None:
 def report_command(args: argparse.Namespace) -> int:
     """Return the exit code. Raises SessionError, ProfileError."""
     from collision_monitor.profiles import Profile
-    from collision_monitor.report import write_report
+    from collision_monitor.report import check_outputs, write_report
     from collision_monitor.session import Session
     from collision_monitor.session.history import read_history
 
     session = Session(args.session)
+    output = args.output or Path(f"{args.session.resolve().stem}.html")
+    if output.exists() and output.samefile(args.session):
+        raise SessionError(f"{output}: expected another file than the session itself")
+    check_outputs([output], args.force)  # before what takes long
     profile = None if args.replay is None else Profile.named(args.replay) if args.replay else session.profile
     with session_bar("report", session) as show:
         history = read_history(session, profile, show)
-    output = args.output or Path(f"{args.session.resolve().stem}.html")
     for file in write_report(history, output, pictures=args.png, overwrite=args.force):
         print(file)
     return 0

@@ -72,6 +72,7 @@ def as_svg(figure: Figure, name: str) -> str:
     text = re.sub(r'\sxmlns(:xlink)?="[^"]*"', "", text)  # HTML knows what an SVG element is
     text = re.sub(r"(font: [^'\";]*?)'DejaVu Sans'[^\";]*", r"\1system-ui, sans-serif", text)
     text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.DOTALL)
+    text = text.replace("<svg ", f'<svg role="img" aria-label="{name}" ', 1)
     return text.replace("xlink:href=", "href=").replace(INK, "currentColor")
 
 

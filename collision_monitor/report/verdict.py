@@ -80,7 +80,7 @@ def _findings(facts: Facts) -> list[str]:
 def _doubts(history: History, facts: Facts) -> list[str]:
     lines = _some(history.problems, "problems with the recording")
     if not len(history.times):
-        return [*lines, "no step was answered"]
+        return [*lines, "no step was answered; --replay answers the inputs now"]
     if not history.objects:
         lines.append("no object is described in it")
     seen = set(history.states["id"].tolist())

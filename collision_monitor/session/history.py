@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import Final
 
@@ -72,10 +72,10 @@ class History:
     """A session, from its first step to its last.
 
     times (n,): s of each step from the first, never falling: where the clock was set back (restarts: how often) they
-    go on from where they were. contacts, predictions: of all steps, records.CONTACT and
-    records.PREDICTION, and the step (index) of each row. states: of all messages, records.STATE, and the time (s).
-    objects: as they were described last; names: all that they had, and the ids of each.
-    durations: s that steps took, as far as they were reported or measured. problems: why some of it may be unknown.
+    go on from where they were. contacts, predictions: of all steps, records.CONTACT and records.PREDICTION, and the
+    step (index) of each row. states: of all messages, records.STATE, and the time (s). objects: as they were described
+    last; names: all that they had, and the ids of each. durations: s that steps took, as far as they were reported or
+    measured. status: the last one, or the replay's. problems: why some of it may be unknown.
     """
 
     name: str
@@ -249,10 +249,20 @@ class _Gathered:
         h.states, stamps_of = self._states.joined()
         h.state_time = np.asarray((stamps_of - h.begin_ns) * NANOSECOND, np.float64)
         h.durations = np.array(self._durations)
+        if self._pipeline is not None:
+            h.status = self._status_of_replay(self._pipeline)
         if not len(stamps):
             h.problems.append("the session holds no answers")
         h.collisions = _collisions(h)
         return h
+
+    def _status_of_replay(self, pipeline: Pipeline) -> Status:
+        """What was refused and lost, by the replay; what the recorder dropped is missing here too."""
+        status, recorded = decode_status(pipeline.status()), self._history.status
+        if recorded is None:
+            return status
+        dropped, error = recorded.recording_dropped, recorded.recording_error
+        return replace(status, recording_dropped=dropped, recording_error=error)
 
 
 class _Rows:

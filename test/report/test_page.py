@@ -96,7 +96,9 @@ def test_nothing_is_called_clear_that_was_not_seen(tmp_path: Path) -> None:
 def test_a_session_without_answers_or_shapes_says_so(tmp_path: Path) -> None:
     record_drive(tmp_path / "inputs.mcap", 0.4, answers=False)
     text = report(tmp_path / "inputs.mcap", tmp_path, "inputs.html")
-    assert "no step was answered" in text and 'class="verdict unknown"' in text
+    assert "no step was answered; --replay" in text and 'class="verdict unknown"' in text
+    assert main(["report", str(tmp_path / "inputs.mcap"), "-o", str(tmp_path / "now.html"), "--replay"]) == 0
+    assert 'class="verdict clear"' in (tmp_path / "now.html").read_text()
     scene = Crossing(None, None)
     record_states(tmp_path / "bare.mcap", [], played(scene, 0.2))
     text = report(tmp_path / "bare.mcap", tmp_path, "bare.html")
@@ -147,6 +149,7 @@ def test_bad_input_is_one_line_and_nothing_is_overwritten(
         ([drive, "-o", tmp_path / "there.html"], "--force"),
         ([drive, "-o", tmp_path / "new.html", "--png", tmp_path / "png"], "--force"),
         ([drive, "-o", tmp_path], "got a folder"),
+        ([drive, "-o", drive, "--force"], "another file than the session itself"),
         ([drive, "-o", tmp_path / "file" / "r.html"], "able to write"),
         ([drive, "-o", tmp_path / "new.html", "--replay", "hasty"], "expected one of"),
     ):
