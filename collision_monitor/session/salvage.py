@@ -73,7 +73,13 @@ def salvage(source: str | Path, target: str | Path, *, unverified: bool = False,
     """
     source, target = Path(source), Path(target)
     if not source.is_file():
-        found = "no regular file" if source.exists() else "nothing there"
+        found = (
+            "a folder: name one of its files"
+            if source.is_dir()
+            else "something else"
+            if source.exists()
+            else "nothing there"
+        )
         raise SessionError(f"{source}: expected an MCAP file, got {found}")
     if target.exists():
         if source.samefile(target):
@@ -246,6 +252,8 @@ class _Copy:
 
     def _note_gap(self, sequence: int, log_time: int) -> None:
         """What is not there between the last message and this one. A session numbers its messages through."""
+        if self._last is None and not self._result.losses:
+            return  # a later file of a recording in several
         first = 0 if self._last is None else self._last[0] + 1
         if self._contents.library.startswith(LIBRARY) and 0 < sequence - first < 1 << 31:
             since = "the beginning" if self._last is None else self._seconds(self._last[1])

@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
+from rosbags.highlevel import AnyReader
 from session_scene import record
 
 from collision_monitor.errors import SessionError
@@ -248,6 +249,20 @@ def test_a_killed_recording_replays_after_salvage(tmp_path: Path) -> None:
     report = replay(Session(tmp_path / "out.mcap"))
     assert report.verdict is Verdict.IDENTICAL
     assert report.messages == result.messages
+    with AnyReader([tmp_path / "out.mcap"]) as reader:
+        assert sum(1 for _ in reader.messages()) == result.messages
+
+
+def test_a_later_file_of_a_recording_begins_where_it_begins(tmp_path: Path) -> None:
+    with (tmp_path / "part_1.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2", library="collision_monitor test")
+        channel = writer.register_channel("/a", "cdr", writer.register_schema("x", "ros2msg", b""))
+        for k in range(500, 510):
+            writer.add_message(channel, k, b"1234", k, k)
+        writer.finish()
+    result = salvage(tmp_path / "part_1.mcap", tmp_path / "out.mcap")
+    assert (result.messages, result.losses, result.notes) == (10, [], [])
 
 
 def test_the_command(tmp_path: Path) -> None:
