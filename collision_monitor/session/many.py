@@ -132,6 +132,7 @@ def _on_ray(
 ) -> Iterator[Result]:
     """On a cluster, whose machines have to see the files under the same paths and have collision_monitor installed."""
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # or Ray reports to its makers
+    os.environ.setdefault("RAY_worker_niceness", "0")  # or anything else on this machine comes first
     try:
         import ray
     except ImportError:
