@@ -26,8 +26,8 @@ Names = tuple[str, str]
 class Event:
     """A collision, or a warning that no collision followed. Times in s from A's first step.
 
-    end: None where it went on to the end or a gap. warned: s before the begin; None where the session begins with it, and for
-    warnings. certain: not only that it could not be excluded.
+    end: None where it went on to the end or a gap. warned: s before the begin; None where the session begins with it,
+    and for warnings. certain: not only that it could not be excluded.
     """
 
     what: str
