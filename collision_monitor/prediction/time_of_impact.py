@@ -82,15 +82,23 @@ def sphere_interval(dx, dy, dz, vx, vy, vz, reach, growth, end, outward):
     e = outward * EPSILON
     pp = dx * dx + dy * dy + dz * dz
     vv = vx * vx + vy * vy + vz * vz
-    q = sqrt((pp + reach * reach) * (vv + growth * growth))
+    qq = (pp + reach * reach) * (vv + growth * growth)
     c = pp - reach * reach - 4.0 * e * (pp + reach * reach)
     a = vv - growth * growth - 4.0 * e * (vv + growth * growth)
-    b = dx * vx + dy * vy + dz * vz - reach * growth - 8.0 * e * q
-    if c > 0.0 and b >= 0.0 and a >= 0.0:
+    b = dx * vx + dy * vy + dz * vz - reach * growth
+    # most pairs part or pass, and need no root to see it
+    if c > 0.0 and a >= 0.0 and b > 0.0 and b * b > 100.0 * EPSILON * EPSILON * qq:
         return inf, -inf
     sx, sy, sz = reach * vx - growth * dx, reach * vy - growth * dy, reach * vz - growth * dz
     ox, oy, oz = dy * vz - dz * vy, dz * vx - dx * vz, dx * vy - dy * vx
     near, far = sx * sx + sy * sy + sz * sz, ox * ox + oy * oy + oz * oz
+    miss = far - near
+    if c > 0.0 and miss > 100.0 * EPSILON * EPSILON * qq and miss * miss > 1e4 * EPSILON * EPSILON * qq * (near + far):
+        return inf, -inf
+    q = sqrt(qq)
+    b -= 8.0 * e * q
+    if c > 0.0 and b >= 0.0 and a >= 0.0:
+        return inf, -inf
     discriminant = near - far + 32.0 * e * q * (sqrt(near + far) + EPSILON * q)
     first = 0.0
     s = sqrt(max(discriminant, 0.0)) - b
