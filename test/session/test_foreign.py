@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import resource
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from foreign_bag import (
     SECOND,
     START,
@@ -412,3 +414,29 @@ def test_answers_that_another_recorder_took_are_compared(recorded: Path, tmp_pat
         writer.finish()
     report = replay(Session(tmp_path / "bag.mcap"))
     assert (report.verdict, report.digest) == (Verdict.IDENTICAL, replay(Session(recorded)).digest)
+
+
+def test_stamps_may_be_those_of_the_receipt(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", scene(3))
+    import_bag(bag, tmp_path / "a.mcap", make_mapping({**MAPPING, "stamps": "received"}))
+    messages = messages_of(tmp_path / "a.mcap", "ObjectStateArray")
+    assert [decode_states(m.data).stamp_ns for m in messages] == [m.log_time for m in messages]
+    assert messages[0].log_time == START + 1000
+
+
+def test_a_disk_that_is_full_leaves_no_half_of_a_session(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """RLIMIT_FSIZE makes the kernel refuse to grow the file, as a full disk does."""
+    bag = write_bag(tmp_path / "bag", scene(60))
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(MAPPING))
+    command = ["import", str(bag), "--map", str(tmp_path / "map.yaml"), "-o"]
+    assert main([*command, str(tmp_path / "a.mcap")]) == 0  # with this, everything is compiled
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    capsys.readouterr()
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
+    try:
+        code = main([*command, str(tmp_path / "b.mcap")])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert code == 1
+    assert capsys.readouterr().err == f"collision-monitor: error: {tmp_path / 'b.mcap'}: File too large\n"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap", "bag", "map.yaml"]
