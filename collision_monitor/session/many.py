@@ -10,6 +10,7 @@ import logging
 import os
 import re
 import signal
+import socket
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -139,6 +140,8 @@ def _on_ray(
         raise UnsupportedError(
             "--engine ray needs Ray, which is not installed: pip install 'collision_monitor[ray]'"
         ) from None
+    if engine.address is not None:
+        _reach(engine.address)
     where: dict[str, Any] = {"address": engine.address or "local"}
     if engine.address is None:
         where |= {"num_cpus": engine.jobs, "include_dashboard": False, "_node_ip_address": "127.0.0.1"}
@@ -157,3 +160,14 @@ def _on_ray(
                 yield failed(path, ENDED)
     finally:
         ray.shutdown()
+
+
+def _reach(address: str) -> None:
+    """Raises InputError where nobody listens; Ray itself tries for two minutes."""
+    host, colon, port = address.removeprefix("ray://").rpartition(":")
+    if not colon or not port.isdecimal() or not 0 < int(port) < 1 << 16:
+        raise InputError(f"address of the Ray cluster: expected HOST:PORT, got {address!r}")
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=10).close()
+    except OSError as error:
+        raise InputError(f"Ray at {address}: expected a cluster that listens there, got: {error}") from None
