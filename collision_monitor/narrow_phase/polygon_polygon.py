@@ -107,12 +107,13 @@ def planar_contact(table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: 
     distance = gap
     if not gap <= 0.0 or gap == -inf:
         squared, x0, y0, u, v = _nearest(table, a, b, RA, RB, px, py)
-        other, u1, v1, x1, y1 = _nearest(table, b, a, RB, RA, -px, -py)
+        dx, dy = u - x0, v - y0
+        other, u, v, x1, y1 = _nearest(table, b, a, RB, RA, -px, -py)
         if other < squared:
-            squared, x0, y0, u, v = other, x1 + px, y1 + py, u1 + px, v1 + py
-        distance = sqrt(squared)
+            dx, dy, x0, y0 = u - x1, v - y1, x1 + px, y1 + py
+        distance = sqrt(dx * dx + dy * dy)
         if distance > 0.0 and (gap == -inf or distance - gap > FACE_PREFERENCE * size):
-            nx, ny, x, y = (u - x0) / distance, (v - y0) / distance, x0, y0
+            nx, ny, x, y = dx / distance, dy / distance, x0, y0
         elif gap > 0.0:
             distance = gap  # the edge's normal is that of the distance, and has no noise however near they are
         else:
