@@ -58,6 +58,10 @@ IMPACT = np.dtype(
 """One predicted impact. The versions tell whether the motions it rests on still hold."""
 
 
+_SMALLEST: Final = 1e-240
+"""m^4/s^2: a product of a squared length and a squared speed whose round-off is near the smallest number there is."""
+
+
 class Scratch(NamedTuple):
     """Room for one thread's intermediate results, so that the kernels allocate nothing."""
 
@@ -79,6 +83,24 @@ def sphere_interval(dx, dy, dz, vx, vy, vz, reach, growth, end, outward):
     Closed form: the discriminant as |reach v - growth d|^2 - |d x v|^2, the root as c / (-b + sqrt(D)): neither cancels
     (Numerical Recipes 5.6; Haines et al., Precision improvements for ray/sphere intersection, 2019).
     """
+    size = dx * dx + dy * dy + dz * dz + reach * reach
+    rate = vx * vx + vy * vy + vz * vz + growth * growth
+    if size * rate < _SMALLEST and rate > 0.0:
+        # what is made of these would underflow: in units of their own, which only the time knows of
+        length = 1.0 / max(abs(dx), abs(dy), abs(dz), reach, 1e-300)
+        speed = 1.0 / max(abs(vx), abs(vy), abs(vz), abs(growth), 1e-300)
+        unit = length / speed
+        until = end * unit
+        first, last = _interval(
+            dx * length, dy * length, dz * length, vx * speed, vy * speed, vz * speed, reach * length, growth * speed,
+            until, outward,
+        )  # fmt: skip
+        return first / unit, end if last == until else last / unit
+    return _interval(dx, dy, dz, vx, vy, vz, reach, growth, end, outward)
+
+
+@inlined
+def _interval(dx, dy, dz, vx, vy, vz, reach, growth, end, outward):
     e = outward * EPSILON
     pp = dx * dx + dy * dy + dz * dz
     vv = vx * vx + vy * vy + vz * vz
@@ -271,7 +293,7 @@ def _touching_by(table, parts, A, B, a, b, start, guess, end, tube_0, tube_1, be
     t = start + guess if guessed else start
     for _ in range(12):
         distance = contact_at(table, parts, A, B, a, b, t, scratch)
-        excess = distance - margin + tube_0 + tube_1 * (t - begin)
+        excess = distance + scratch.out[10] - margin + tube_0 + tube_1 * (t - begin)
         if excess <= 0.0:
             return t
         speed = scratch.out[15] - tube_1
