@@ -24,7 +24,8 @@ demo: setup ## watch the monitor at work, live
 	@$(BIN)/collision-monitor demo
 
 test: lint ## set up, lint and run every test
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest -n auto --dist loadfile --ignore=test/ros --ignore=test/setup
+	@$(BIN)/python -m pytest test/ros test/setup
 
 lint: setup ## ruff and mypy --strict
 	@$(BIN)/ruff check .
