@@ -96,6 +96,18 @@ def _guarded(function: Callable[[Path], Result], path: Path, failed: Callable[[P
         return failed(path, f"an error of collision_monitor itself: {error!r}")
 
 
+def _guarded_in(
+    folder: Path, function: Callable[[Path], Result], path: Path, failed: Callable[[Path, str], Result]
+) -> Result:
+    """In the folder that the path is relative to, so that errors name the path as it was given."""
+    try:
+        if not path.is_absolute():
+            os.chdir(folder)
+    except OSError as error:
+        return failed(path, f"{folder}: expected the same folder on every machine, got: {error.strerror}")
+    return _guarded(function, path, failed)
+
+
 def _in_processes(
     function: Callable[[Path], Result], paths: Sequence[Path], failed: Callable[[Path, str], Result], jobs: int
 ) -> Iterator[Result]:
@@ -151,8 +163,8 @@ def _on_ray(
         reason = " ".join(str(error).split())
         raise InputError(f"Ray at {engine.address or 'this machine'}: expected a cluster, got: {reason}") from None
     try:
-        task = ray.remote(max_retries=0)(_guarded)
-        references = [task.remote(function, path.absolute(), failed) for path in paths]
+        task = ray.remote(max_retries=0)(_guarded_in)
+        references = [task.remote(Path.cwd(), function, path, failed) for path in paths]
         for path, reference in zip(paths, references, strict=True):
             try:
                 yield ray.get(reference)
