@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -58,12 +59,25 @@ def test_the_number_of_jobs_does_not_matter() -> None:
     assert list(for_each(work, paths, failed, Engine(jobs=3))) == one
 
 
-def test_ray_is_optional_and_said_to_be() -> None:
-    try:
-        import ray  # noqa: F401
-    except ImportError:
-        with pytest.raises(UnsupportedError, match=r"pip install 'collision_monitor\[ray\]'"):
-            list(for_each(work, [Path("a")], failed, Engine("ray")))
+def test_without_ray_it_is_said_what_to_install() -> None:
+    if find_spec("ray") is not None:
+        pytest.skip("Ray is installed")
+    with pytest.raises(UnsupportedError, match=r"pip install 'collision_monitor\[ray\]'"):
+        list(for_each(work, [Path("a")], failed, Engine("ray")))
+
+
+def test_ray_gives_what_processes_give(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("ray")
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent), prepend=":")
+    paths = [Path(name) for name in ("a", "refuses", "fails", "ends", "b")]
+    assert list(for_each(work, paths, failed, Engine("ray", jobs=2))) == list(for_each(work, paths, failed))
+
+
+def test_an_address_where_no_cluster_listens_is_told_at_once() -> None:
+    pytest.importorskip("ray")
+    for address, words in (("127.0.0.1:1", "expected a cluster that listens"), ("here", "expected HOST:PORT")):
+        with pytest.raises(InputError, match=words):
+            list(for_each(work, [Path("a")], failed, Engine("ray", address=address)))
 
 
 def test_sessions_are_found_by_name_wildcard_and_folder(tmp_path: Path) -> None:
