@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.engines import add_engine, engine_of
 from collision_monitor.cli.progress import progress_bar
+from collision_monitor.cli.quantities import positive
+from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
     from collision_monitor.session import Session
@@ -39,6 +41,11 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("sessions", nargs="+", metavar="SESSION", help="session files, folders of them, or wildcards")
     parser.add_argument("--threads", type=int, metavar="N", help="threads of the kernels (default: as recorded)")
+    parser.add_argument(
+        "--tolerance", type=positive, metavar="X", help="for other versions: equal is what differs by no more (m, s)"
+    )
+    parser.add_argument("--cut", type=Path, metavar="OUT", help="where answers differ, write the session up to there")
+    parser.add_argument("--force", action="store_true", help="overwrite OUT")
     add_engine(parser)
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
     parser.set_defaults(command=replay_command)
@@ -52,10 +59,17 @@ def replay_command(args: argparse.Namespace) -> int:
 
     paths = find_sessions(args.sessions)
     if len(paths) > 1:
+        if args.cut is not None:
+            raise InputError(f"--cut: expected one session, got {len(paths)}")
         return _replay_many(paths, args)
     session = Session(paths[0])
     with _progress_bar(session) as progress:
-        report = replay(session, threads=args.threads, progress=progress)
+        report = replay(session, threads=args.threads, tolerance=args.tolerance, progress=progress)
+    if args.cut is not None and report.first_message is not None:
+        from collision_monitor.session.cut import cut
+
+        count = cut(Session(paths[0]), report.first_message + 1, args.cut, overwrite=args.force)
+        report.notes.append(f"the {count} messages up to the first difference are in {args.cut}")
     print(json.dumps(_as_json(report, paths[0]), indent=2) if args.json else _as_text(report))
     return int(report.verdict)
 
@@ -68,11 +82,11 @@ class _Replayed:
     error: str = ""
 
 
-def _replay_one(path: Path, threads: int | None) -> _Replayed:
+def _replay_one(path: Path, threads: int | None, tolerance: float | None) -> _Replayed:
     from collision_monitor.session import Session
     from collision_monitor.session.replay import replay
 
-    return _Replayed(replay(Session(path), threads=threads))
+    return _Replayed(replay(Session(path), threads=threads, tolerance=tolerance))
 
 
 def _unread(_path: Path, why: str) -> _Replayed:
@@ -84,9 +98,8 @@ def _replay_many(paths: list[Path], args: argparse.Namespace) -> int:
 
     found: list[_Replayed] = []
     with progress_bar("replay", len(paths)) as done:
-        for path, each in zip(
-            paths, for_each(partial(_replay_one, threads=args.threads), paths, _unread, engine_of(args)), strict=True
-        ):
+        run = partial(_replay_one, threads=args.threads, tolerance=args.tolerance)
+        for path, each in zip(paths, for_each(run, paths, _unread, engine_of(args)), strict=True):
             found.append(each)
             done(1)
             if not args.json:
@@ -141,6 +154,8 @@ def _verdict(report: Report) -> str:
 
     if report.verdict is Verdict.DIVERGED:
         return f"diverged in {report.differing} of {report.steps} steps"
+    if report.within and report.verdict is Verdict.IDENTICAL:
+        return f"equal within {report.tolerance:g} m and s; the bytes of {report.within} answers differ"
     return report.verdict.name.lower().replace("_", " ")
 
 
@@ -155,6 +170,7 @@ def _as_text(report: Report) -> str:
     ]
     if report.first_difference is not None:
         lines.append(f"different  {report.first_difference}")
+        lines += [f"input      {each}" for each in report.inputs]
     return "\n".join([*lines, f"verdict    {_verdict(report)}"])
 
 

@@ -31,6 +31,7 @@ class Difference:
     field: str
     recorded: str
     replayed: str
+    pair: tuple[int, int] | None = None
 
     def __str__(self) -> str:
         where = f"step {self.step}, {self.topic}, {self.element}"
@@ -52,6 +53,42 @@ def compare_answers(kind: str, topic: str, step: int, recorded: bytes, replayed:
         or _field_difference(topic, step, theirs, ours, rows)
         or Difference(step, topic, "the message", "padding", f"{len(recorded)} bytes", f"{len(replayed)} bytes")
     )
+
+
+_WITHIN: Final = {"contacts": ("signed_distance",), "predictions": ("lower", "upper")}
+"""The numbers (m, s) that answers of other versions are compared by: where flat faces touch, points may be anywhere."""
+
+
+def compare_within(
+    kind: str, topic: str, step: int, recorded: bytes, replayed: bytes, tolerance: float
+) -> Difference | None:
+    """The first difference of two messages, pair by pair, that is more than the tolerance (m, s).
+
+    A contact that is no deeper, and a prediction no nearer to the horizon, may be there in one of them only.
+    """
+    decode, rows = _DECODERS[kind]
+    ours = decode(replayed)
+    try:
+        theirs = decode(recorded)
+    except MessageError as error:
+        return Difference(step, topic, "the message", "bytes", str(error), f"{len(replayed)} bytes that can be read")
+    there, here = ({_ids(row): row for row in getattr(message, rows)} for message in (theirs, ours))
+    horizon = getattr(theirs, "horizon", 0.0)
+    for ids in sorted(there.keys() | here.keys()):
+        element = _pair(theirs, there[ids]) if ids in there else _pair(ours, here[ids])
+        if ids not in there or ids not in here:
+            row = there[ids] if ids in there else here[ids]
+            slight = horizon - row["lower"] if rows == "predictions" else abs(row["signed_distance"])
+            if not slight <= tolerance:  # NaN: a contact that ended
+                recorded_is, replayed_is = ("there" if ids in each else "nothing" for each in (there, here))
+                return Difference(step, topic, element, "presence", recorded_is, replayed_is, ids)
+            continue
+        a, b = there[ids], here[ids]
+        for name in _WITHIN[rows]:
+            x, y = float(a[name]), float(b[name])
+            if not (x == y or abs(x - y) <= tolerance or (x != x and y != y)):
+                return Difference(step, topic, element, name, repr(x), repr(y), ids)
+    return None
 
 
 def compare_status(topic: str, step: int, recorded: bytes, replayed: bytes) -> Difference | None:
@@ -83,11 +120,12 @@ def _row_difference(rows: str, topic: str, step: int, theirs: Any, ours: Any) ->
         element = f"{rows}[{at}] {_pair(theirs, a[at])}"
         for name in a.dtype.names:
             if a[at][name].tobytes() != b[at][name].tobytes():
-                return Difference(step, topic, element, name, _text(a[at][name]), _text(b[at][name]))
+                return Difference(step, topic, element, name, _text(a[at][name]), _text(b[at][name]), _ids(a[at]))
     if len(a) != len(b):
         longer, side = (theirs, "only recorded") if len(a) > len(b) else (ours, "only replayed")
-        element = f"{rows}[{common}] {_pair(longer, getattr(longer, rows)[common])}, {side}"
-        return Difference(step, topic, element, "number", str(len(a)), str(len(b)))
+        row = getattr(longer, rows)[common]
+        element = f"{rows}[{common}] {_pair(longer, row)}, {side}"
+        return Difference(step, topic, element, "number", str(len(a)), str(len(b)), _ids(row))
     return None
 
 
@@ -108,6 +146,10 @@ def _pair(message: Any, row: Any) -> str:
     names = dict(zip(message.ids.tolist(), message.names, strict=False))
     a, b = int(row["id_a"]), int(row["id_b"])
     return f"pair ({a} {names.get(a, '')!r}, {b} {names.get(b, '')!r})"
+
+
+def _ids(row: Any) -> tuple[int, int]:
+    return int(row["id_a"]), int(row["id_b"])
 
 
 def _text(value: Any) -> str:

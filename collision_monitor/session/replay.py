@@ -7,10 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from collision_monitor.errors import SessionError
+import numpy as np
+
+from collision_monitor.codec import decode_states
+from collision_monitor.errors import MessageError, SessionError
 from collision_monitor.pipeline import Pipeline
 from collision_monitor.provenance import provenance
-from collision_monitor.session.compare import Difference, compare_answers, compare_status
+from collision_monitor.session.compare import Difference, compare_answers, compare_status, compare_within
 from collision_monitor.session.reader import Recorded, Session
 
 
@@ -27,7 +30,8 @@ class Report:
     """What a replay did and found. Durations in s; digest: of all answers that the replay gave.
 
     foreign: another program recorded it. hole: messages are missing, it ends there. late: the session begins after its
-    monitor, whose state then is not in it, so the answers are given anew and not compared.
+    monitor, whose state then is not in it, so the answers are given anew and not compared. within: answers whose bytes
+    differ by no more than the tolerance. inputs: of the first difference's step, its objects' states in words.
     """
 
     steps: int = 0
@@ -37,7 +41,12 @@ class Report:
     digest: int = 0
     recorded_duration: float = 0.0
     replay_duration: float = 0.0
+    within: int = 0
+    tolerance: float | None = None
     first_difference: Difference | None = None
+    first_message: int | None = None
+    """Number of the message with the first difference."""
+    inputs: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     foreign: bool = False
     hole: bool = False
@@ -47,7 +56,7 @@ class Report:
     def verdict(self) -> Verdict:
         """Equal bytes are equal wherever they come from; unequal ones say something only of the same program."""
         if self.first_difference is not None:
-            return Verdict.NOT_COMPARABLE if self.foreign else Verdict.DIVERGED
+            return Verdict.NOT_COMPARABLE if self.foreign and self.tolerance is None else Verdict.DIVERGED
         return Verdict.NOT_COMPARABLE if self.hole or not self.compared else Verdict.IDENTICAL
 
     @property
@@ -56,14 +65,23 @@ class Report:
         return self.recorded_duration / self.replay_duration if self.replay_duration > 0 else 0.0
 
 
-def replay(session: Session, *, threads: int | None = None, progress: Callable[[Report], None] | None = None) -> Report:
+def replay(
+    session: Session,
+    *,
+    threads: int | None = None,
+    tolerance: float | None = None,
+    progress: Callable[[Report], None] | None = None,
+) -> Report:
     """Replay a session; threads: instead of the recorded number. progress: called after every message.
+
+    tolerance (m, s): answers of another version are compared by their distances and times, and status messages not.
 
     Raises SessionError where the session holds no inputs or cannot be read.
     """
     profile = session.profile if threads is None else session.profile.replace(threads=threads)
     run = _Replay(Pipeline(profile, frame_id=session.frame_id))
     report = run.report
+    report.tolerance = tolerance
     report.foreign = session.metadata.get("determinism_key") != provenance()["determinism_key"]
     if session.foreign:
         report.notes.append(f"the recording has no settings in it: replayed with the profile {profile.name}")
@@ -117,6 +135,7 @@ class _Replay:
         self.report = Report(digest=pipeline.monitor.digest)
         self._open: dict[str, bytes] = {}
         self._differed_in = -1
+        self._states = b""
 
     def feed(self, message: Recorded, *, compare: bool = True) -> None:
         """One recorded message: an input is processed, an answer is compared."""
@@ -128,6 +147,7 @@ class _Replay:
                 self.pipeline.on_shapes(message.data)
             case "ObjectStateArray":
                 self.expect_nothing_more()
+                self._states = message.data
                 outputs = self.pipeline.on_states(message.data)
                 if outputs is not None:
                     self._open = {"ContactArray": outputs.contacts, "PredictedCollisionArray": outputs.predictions}
@@ -135,7 +155,7 @@ class _Replay:
                     self.report.digest = outputs.digest
             case "ContactArray" | "PredictedCollisionArray" if compare:
                 self._compare(message)
-            case "MonitorStatus" if compare:
+            case "MonitorStatus" if compare and self.report.tolerance is None:
                 self.report.compared += 1
                 step = self.report.steps
                 self._note(compare_status(message.topic, step, message.data, self.pipeline.status()))
@@ -154,17 +174,41 @@ class _Replay:
         if replayed is None:
             recorded = f"a {message.type} of {len(message.data)} bytes"
             self._note(Difference(step, message.topic, "the message", "presence", recorded, "nothing"))
-        else:
-            self._note(compare_answers(message.type, message.topic, step, message.data, replayed))
+            return
+        difference = compare_answers(message.type, message.topic, step, message.data, replayed)
+        tolerance = self.report.tolerance
+        if difference is not None and tolerance is not None:
+            difference = compare_within(message.type, message.topic, step, message.data, replayed, tolerance)
+            self.report.within += difference is None
+        self._note(difference)
 
     def _note(self, difference: Difference | None) -> None:
         if difference is None:
             return
         if self.report.first_difference is None:
             self.report.first_difference = difference
+            self.report.first_message = self.report.messages
+            self.report.inputs = _states_in_words(self._states, difference.pair)
         if self._differed_in != difference.step:
             self._differed_in = difference.step
             self.report.differing += 1
+
+
+def _states_in_words(data: bytes, pair: tuple[int, int] | None) -> list[str]:
+    """The states of the two objects in an ObjectStateArray; what is not there is left out."""
+    if pair is None or not data:
+        return []
+    try:
+        message = decode_states(data)
+    except MessageError:
+        return []
+    lines = []
+    for row in message.states[np.isin(message.states["id"], pair)]:
+        names = ("position", "quaternion", "linear", "angular")
+        lines.append(
+            f"object {row['id']} at {message.stamp_ns} ns: " + ", ".join(f"{n} {row[n].tolist()}" for n in names)
+        )
+    return lines
 
 
 def _provenance_differences(session: Session) -> str:

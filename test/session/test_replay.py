@@ -11,7 +11,7 @@ import pytest
 from session_scene import CONTACTS, PREDICTIONS, STATES, STATUS, TYPES, record
 
 from collision_monitor.cli.main import main
-from collision_monitor.codec import decode_contacts, decode_status, encode_status
+from collision_monitor.codec import decode_contacts, decode_status, encode_contacts, encode_status
 from collision_monitor.errors import SessionError
 from collision_monitor.pipeline import Pipeline
 from collision_monitor.session import Recorded, Recorder, Session
@@ -227,3 +227,56 @@ def test_the_command_names_the_verdict_and_exits_with_it(
     assert "Traceback" not in err
     assert main(["replay", str(recorded), "--threads", "0"]) == 1
     assert "threads: expected 1 to" in capsys.readouterr().err
+
+
+def nudged(recorded: Path, tmp_path: Path, by: float) -> Path:
+    """The session with each contact a little deeper."""
+
+    def change(message: Recorded) -> bytes:
+        if message.topic != CONTACTS:
+            return message.data
+        contacts = decode_contacts(message.data)
+        rows = contacts.contacts.copy()
+        rows["signed_distance"] -= by
+        return encode_contacts(contacts.stamp_ns, contacts.frame_id, contacts.step, rows, contacts.ids, contacts.names)
+
+    return rewritten(recorded, tmp_path / "nudged.mcap", change)
+
+
+def test_within_a_tolerance_answers_are_equal_and_beyond_they_are_not(recorded: Path, tmp_path: Path) -> None:
+    path = nudged(recorded, tmp_path, 1e-7)
+    assert replay(Session(path)).verdict is Verdict.DIVERGED
+    near = replay(Session(path), tolerance=1e-6)
+    assert near.verdict is Verdict.IDENTICAL
+    assert near.within > 30
+    far = replay(Session(path), tolerance=1e-8)
+    assert far.verdict is Verdict.DIVERGED
+    assert far.first_difference is not None and far.first_difference.field == "signed_distance"
+
+
+def test_a_difference_comes_with_its_inputs_and_can_be_cut_out(
+    recorded: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def change(message: Recorded) -> bytes:
+        if message.topic == CONTACTS and step_of(message) == 12:
+            contacts = decode_contacts(message.data)
+            rows = contacts.contacts.copy()
+            rows["signed_distance"][0] += 0.5
+            return encode_contacts(
+                contacts.stamp_ns, contacts.frame_id, contacts.step, rows, contacts.ids, contacts.names
+            )
+        return message.data
+
+    path = rewritten(recorded, tmp_path / "changed.mcap", change)
+    out = tmp_path / "cut.mcap"
+    assert main(["replay", str(path), "--cut", str(out)]) == Verdict.DIVERGED
+    text = capsys.readouterr().out
+    assert "different  step 12" in text
+    assert text.count("input      object ") == 2
+    assert "position [" in text
+    whole, part = (replay(Session(each)) for each in (path, out))
+    assert part.first_difference == whole.first_difference
+    assert part.steps == 12
+    assert part.messages == whole.first_message + 1
+    assert main(["replay", str(path), "--cut", str(out)]) == 1  # it is there already
+    assert main(["replay", str(path), "--cut", str(out), "--force"]) == Verdict.DIVERGED
