@@ -27,7 +27,7 @@ from collision_monitor.geometry.shapes import HalfSpace, Shape
 from collision_monitor.narrow_phase.models import monitored_model
 from collision_monitor.plan import ScenePlan, scene_plan
 from collision_monitor.prediction import active_pairs, answers, candidates, tracking
-from collision_monitor.prediction.event_list import EventList
+from collision_monitor.prediction.event_list import EventList, keep_first
 from collision_monitor.prediction.motion import Bodies, enlarge, make_bodies, make_parts
 from collision_monitor.prediction.time_of_impact import IMPACT, Scratch, make_scratch
 from collision_monitor.profiles import Profile
@@ -457,27 +457,31 @@ class Monitor:
     def _predict_moved(self, now: float, work: dict[str, int]) -> NDArray[np.void]:
         """Start the motion of bodies anew whose predictions no longer hold; their first impacts (IMPACT)."""
         p, bodies = self.profile, self._bodies
-        which = self._moved(now)
+        moved, ending = self._moved(now)
         if self._renewed:
             renewed = np.array([i for i in self._renewed if bodies.seen[i]], np.int32)
-            which = np.union1d(which, renewed).astype(np.int32)
+            moved, ending = np.union1d(moved, renewed).astype(np.int32), np.setdiff1d(ending, renewed)
             self._renewed.difference_update(renewed.tolist())
-        work["objects_moved"] = len(which)
+        work["objects_moved"] = len(moved)
+        which = np.concatenate([moved, ending])
         if len(which) == 0:
             return np.zeros(0, IMPACT)
         tracking.restart_motion(
-            bodies, self._grid, which, now, p.horizon, p.contact_margin, p.stale_acceleration,
+            bodies, self._grid, moved, now, p.horizon, p.contact_margin, p.stale_acceleration,
             p.position_tolerance, p.velocity_tolerance, p.orientation_tolerance,
             p.angular_velocity_tolerance,
         )  # fmt: skip
-        pairs = self._partners(which)
+        tracking.continue_motion(bodies, self._grid, ending, now, p.horizon, p.contact_margin)
+        pairs = self._partners(which, now)
         pairs = pairs[: candidates.keep_checked(bodies, self._allowed_keys, pairs)]
         work["candidate_pairs"] = len(pairs)
         events, queries = self._first_impacts(pairs, now)
         work["impact_queries"] += queries
+        events = events[: keep_first(events, now, bodies.motion, self._events.events, self._pairs)]
+        bodies.motion["covered"][which] = bodies.motion["cover"][which]
         return events
 
-    def _partners(self, which: NDArray[np.int32]) -> NDArray[np.int32]:
+    def _partners(self, which: NDArray[np.int32], now: float) -> NDArray[np.int32]:
         """Pairs (P, 2) of the bodies in `which` with all whose swept boxes meet theirs."""
         is_new = np.zeros(len(self._grid.box), np.bool_)
         is_new[which] = True
@@ -488,7 +492,9 @@ class Monitor:
             half[box["level"] < 0] = np.nan  # not in the grid: meets nothing
             return box_pairs(centre, half, is_new[: self._top])
         while True:
-            n = candidates.find_partners(self._grid, which, is_new, self._candidates)
+            n = candidates.find_partners(
+                self._bodies, self._grid, which, is_new, now, self.profile.contact_margin, self._candidates
+            )
             if n <= len(self._candidates):
                 return self._candidates[:n]
             self._candidates = np.zeros((2 * n, 2), np.int32)
@@ -511,12 +517,12 @@ class Monitor:
         parts = list(self._pool.map(part, np.array_split(pairs, len(self._scratch)), self._scratch))
         return np.concatenate([events for events, _ in parts]), sum(queries for _, queries in parts)
 
-    def _moved(self, now: float) -> NDArray[np.int32]:
-        """Slots of the bodies that left their predicted motion, or are not predicted far enough."""
-        moved = np.empty(self._top, np.int32)
+    def _moved(self, now: float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Slots of the bodies that left their predicted motion, and of others that are not predicted far enough."""
+        moved, ending = np.empty((2, self._top), np.int32)
         p = self.profile
-        n = tracking.find_moved(self._bodies, self._top, now, p.horizon, p.stale_acceleration, moved)
-        return moved[:n]
+        n, m = tracking.find_moved(self._bodies, self._top, now, p.horizon, p.stale_acceleration, moved, ending)
+        return moved[:n], ending[:m]
 
     def _examine_active(self, new: NDArray[np.void], now: float, work: dict[str, int]) -> NDArray[np.void]:
         """Look at the pairs that are due or touch; the contacts (records.CONTACT). New events go into the list."""

@@ -25,9 +25,10 @@ class PlainMonitor(Monitor):
             angular_velocity_tolerance=0.0,
         )
 
-    def _moved(self, now: float) -> NDArray[np.int32]:
+    def _moved(self, now: float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         bodies, top = self._bodies, self._top
-        return np.flatnonzero(bodies.used[:top] & bodies.seen[:top] & ~bodies.static[:top]).astype(np.int32)
+        moved = np.flatnonzero(bodies.used[:top] & bodies.seen[:top] & ~bodies.static[:top]).astype(np.int32)
+        return moved, np.zeros(0, np.int32)
 
 
 def _by_pair(answers: NDArray[np.void]) -> dict[tuple[int, int], Any]:

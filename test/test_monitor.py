@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from collision_monitor import records
 from collision_monitor.errors import InputError, PoseError, Refusal, ShapeError, UnsupportedError
 from collision_monitor.geometry.pose import Pose, from_rotation_vector, multiply, rotation_matrix
-from collision_monitor.geometry.shapes import Box, Capsule, Circle, HalfSpace, Sphere
+from collision_monitor.geometry.shapes import Box, Capsule, Circle, HalfSpace, Shape, Sphere
 from collision_monitor.monitor import Monitor, StepResult
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.plain import PlainMonitor, disagreements
@@ -110,6 +110,34 @@ def test_the_event_list_equals_plain_recomputation(noise: float, turn: float, ke
     assert seen > 500
     if turn == 0.0:
         assert moved < 60 * 150 / 10
+
+
+@pytest.mark.parametrize("shapes", [(Sphere(0.5), Sphere(0.5)), (Box((1, 1, 1)), Capsule(0.5, 1.0))])
+def test_a_motion_that_is_kept_is_continued_not_started_anew(shapes: tuple[Shape, Shape]) -> None:
+    """They come from 14 m apart and go on through each other: told once each, for sure in time, and in no step anew."""
+    monitor, rate, speed = Monitor(), 10, 1.0
+    for object_id, shape in enumerate(shapes):
+        monitor.add(object_id, shape)
+    twists = np.zeros((2, 6))
+    twists[:, 0] = speed, -speed
+    told: list[float] = []
+    touched = queries = 0
+    for step in range(12 * rate):
+        t = step / rate
+        result = monitor.step(step * SECOND // rate, [0, 1], still(speed * t, 14 - speed * t), twists)
+        assert result.status.objects_moved == (2 if step == 0 else 0)
+        assert len(result.predictions) + len(result.contacts) <= 1
+        for prediction in result.predictions:
+            told.append(t + prediction["lower"])
+            certain = prediction["status"] == records.PredictionStatus.HIT
+            assert certain or prediction["lower"] > 1.8  # near the end of what is predicted it may not be sure yet
+            assert prediction["lower"] <= 6.5 - t <= prediction["upper"] or prediction["lower"] == 0.0
+        touched += len(touching(result))
+        queries += result.status.impact_queries
+    assert len(told) >= 18
+    assert max(told) - min(told) < 0.01
+    assert touched >= 10
+    assert queries < 60
 
 
 def test_disagreements_are_noticed() -> None:

@@ -1,6 +1,6 @@
 """Hashed uniform grid with one resolution per size class, updated object by object.
 
-Each box lies in exactly one cell: the cell of its centre, at the level whose cells are at least as wide as the box.
+Each box lies in exactly one cell: the cell of its centre, at the level whose cells are at least half as wide as it.
 A query looks at the cells that a box of the level could reach from, so mixed sizes cost one look per occupied level.
 Cells are chains in a hash table: space between far objects costs nothing.
 Source: lecture slides "Efficient collision detection: spatial partitioning" (hash tables, multiresolution grids).
@@ -83,10 +83,9 @@ def _coordinate(x, cell):
 
 @inlined
 def _bucket(level, x, y, z, mask):
-    h = np.uint64(x) * np.uint64(0x9E3779B97F4A7C15)
-    h = (h ^ (h >> np.uint64(29)) ^ np.uint64(y)) * np.uint64(0xBF58476D1CE4E5B9)
-    h = (h ^ (h >> np.uint64(32)) ^ np.uint64(z)) * np.uint64(0x94D049BB133111EB)
-    h = (h ^ (h >> np.uint64(29)) ^ np.uint64(level)) * np.uint64(0x9E3779B97F4A7C15)
+    h = np.uint64(x) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(y) * np.uint64(0xBF58476D1CE4E5B9)
+    h += np.uint64(z) * np.uint64(0x94D049BB133111EB) + np.uint64(level) * np.uint64(0xD6E8FEB86659FD93)
+    h = (h ^ (h >> np.uint64(32))) * np.uint64(0x9E3779B97F4A7C15)
     return np.int64((h >> np.uint64(32)) & np.uint64(mask))
 
 
@@ -117,7 +116,7 @@ def put_box(grid, i, cx, cy, cz, hx, hy, hz):
     """Put box i (centre, half extents; m) in, or move it there."""
     remove_box(grid, i)
     box = grid.box[i]
-    level = _level_of(2.0 * max(hx, hy, hz))
+    level = _level_of(max(hx, hy, hz))
     size = 2.0 ** (level - LEVEL_OFFSET)
     x, y, z = _coordinate(cx, size), _coordinate(cy, size), _coordinate(cz, size)
     bucket = _bucket(level, x, y, z, grid.head.size - 1)
@@ -144,20 +143,19 @@ def _overlap(a, b):
 
 
 @device
-def query_box(grid, i, found):
-    """The boxes that overlap box i, into found[0:n], in no particular order; returns n.
+def query_box(grid, box, i, found):
+    """The boxes but number i that overlap `box` (its centre and half extents), into found[0:n], in no particular order.
 
-    n can be larger than found.size: then the rest was counted but not written.
+    Returns n. n can be larger than found.size: then the rest was counted but not written.
     """
     n = 0
-    box = grid.box[i]
     for level in range(LEVELS):
         count = grid.level_count[level]
         if count == 0:
             continue
         size = 2.0 ** (level - LEVEL_OFFSET)
-        # a box of this level reaches at most half a cell from its centre; the outermost level holds any size
-        reach = 0.5 * size if level < LEVELS - 1 else np.inf
+        # a box of this level reaches at most a cell from its centre; the outermost level holds any size
+        reach = size if level < LEVELS - 1 else np.inf
         x0, x1 = np.floor((box.x - box.hx - reach) / size), np.floor((box.x + box.hx + reach) / size)
         y0, y1 = np.floor((box.y - box.hy - reach) / size), np.floor((box.y + box.hy + reach) / size)
         z0, z1 = np.floor((box.z - box.hz - reach) / size), np.floor((box.z + box.hz + reach) / size)
@@ -218,7 +216,7 @@ def query_boxes(grid, which, pairs):
     n = 0
     for k in range(which.size):
         i = which[k]
-        count = query_box(grid, i, found)
+        count = query_box(grid, grid.box[i], i, found)
         for m in range(count):
             if n < pairs.shape[0]:
                 pairs[n, 0] = i

@@ -1,12 +1,13 @@
-"""Which pairs a body that starts a new motion has to be predicted against."""
+"""Which pairs a body that starts a new motion, or is predicted further, has to be predicted against."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from collision_monitor._jit import device, kernel
-from collision_monitor.broad_phase.hashed_grid import query_box
+from collision_monitor.broad_phase.hashed_grid import BOX, query_box
 from collision_monitor.prediction.time_of_impact import CLEAR, body_impact
+from collision_monitor.prediction.tracking import swept_box
 
 
 @device
@@ -20,18 +21,27 @@ def _allowed(allowed, id_a, id_b):
 
 
 @kernel
-def find_partners(grid, which, is_new, pairs):
+def find_partners(bodies, grid, which, is_new, now, margin, pairs):
     """Pairs of each body in `which` (M,) with all whose swept box meets its own, each pair once, into pairs (P, 2).
 
+    Only what a body sweeps after the time until which it was predicted before can meet what is not known yet.
     is_new (N,) bool marks the bodies in `which`. Returns how many there are; more than P: call again with more room.
     """
     found = np.empty(grid.box.size, np.int32)
+    new_part = np.empty(1, BOX)
+    box = new_part[0]
     n = 0
     for k in range(which.size):
         i = which[k]
-        for m in range(query_box(grid, i, found)):
+        covered = bodies.motion[i].covered
+        box.x, box.y, box.z, box.hx, box.hy, box.hz = swept_box(bodies, i, max(now, covered), margin)
+        for m in range(query_box(grid, box, i, found)):
             j = found[m]
-            if is_new[j] and j < i:
+            other = bodies.motion[j].covered
+            if is_new[j]:
+                if other < covered or (other == covered and j < i):
+                    continue  # j finds i
+            elif bodies.motion[j].cover <= covered:
                 continue
             if n < pairs.shape[0]:
                 pairs[n, 0] = i
@@ -62,15 +72,19 @@ def keep_checked(bodies, allowed, pairs):
 
 @kernel
 def predict_pairs(table, parts, bodies, pairs, now, margin, tolerance, budget, events, scratch):
-    """First impacts of pairs (P, 2) from `now` until both bodies' cover times, into events (IMPACT).
+    """First impacts of pairs (P, 2) until both bodies' cover times, into events (IMPACT).
 
+    They are looked for from `now`, or from the time until which the pair was predicted before.
     Returns (how many impacts, distance queries made).
     """
     n = queries = 0
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
+        begin = max(now, min(bodies.motion[i].covered, bodies.motion[j].covered))
         end = min(bodies.motion[i].cover, bodies.motion[j].cover)
-        queries += body_impact(table, parts, bodies, i, j, now, end, margin, tolerance, budget, scratch, events[n])
+        if begin > now and begin >= end:
+            continue
+        queries += body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budget, scratch, events[n])
         if events[n].status != CLEAR:
             n += 1
     return n, queries

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.prediction.time_of_impact import IMPACT
+from collision_monitor.prediction.time_of_impact import HIT, IMPACT, UNRESOLVED
 
 Events = NDArray[np.void]
 
@@ -85,6 +85,68 @@ def merge(old, new, order, motion, merged):
             k += 1
             n += 1
     return n
+
+
+@inlined
+def _hash(key, mask):
+    return np.int64(((key * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(32)) & np.uint64(mask))
+
+
+@device
+def _place(key, new, place):
+    """Where in the hash table `place` (a power of two) of indices into `new` the key is, or belongs."""
+    mask = place.size - 1
+    at = _hash(key, mask)
+    while place[at] >= 0 and new[place[at]].key != key:
+        at = (at + 1) & mask
+    return at
+
+
+@kernel
+def keep_first(new, now, motion, pending, pairs):
+    """Move those of `new` to the front that are the first impact of their pair; returns how many.
+
+    Where a pair was predicted further, it may have an earlier impact: in `pending`, or in the active pairs, which are
+    looked at in every step. An earlier one that was not sure to happen ends where the later one is sure.
+    """
+    later = 0
+    for k in range(new.size):
+        later += _begins_later(new[k], now, motion)
+    if later == 0:
+        return new.size
+    size = 4
+    while size < 4 * later:
+        size *= 2
+    place = np.full(size, -1, np.int32)
+    for k in range(new.size):
+        if _begins_later(new[k], now, motion):
+            place[_place(new[k].key, new, place)] = k
+    keep = np.ones(new.size, np.bool_)
+    for k in range(pending.size):
+        at = place[_place(pending[k].key, new, place)]
+        if at >= 0 and _holds(motion, pending[k]):
+            keep[at] = False
+            if pending[k].status == UNRESOLVED and new[at].status == HIT:
+                lower = pending[k].lower
+                pending[k] = new[at]
+                pending[k].lower = lower
+    for k in range(pairs.size):
+        if pairs[k].leaving == 0:
+            at = place[_place(pairs[k].key, new, place)]
+            if at >= 0:
+                keep[at] = False
+    n = 0
+    for k in range(new.size):
+        if keep[k]:
+            new[n] = new[k]
+            n += 1
+    return n
+
+
+@inlined
+def _begins_later(event, now, motion):
+    """Was its pair predicted until after `now` before this step?"""
+    return min(motion[event.i].covered, motion[event.j].covered) > now
 
 
 class EventList:

@@ -1,7 +1,7 @@
 """Bodies and how they move: constant twist from a reference state, and how far the truth may be from it.
 
-The deviation of a body is bounded by a tube: every point of it stays within tube_0 + tube_1 * (t - time) metres of
-where the reference motion puts it. While that holds, what was predicted from the reference holds too.
+The deviation of a body is bounded by a tube: every point of it stays within tube_0 + tube_1 * (t - tube_time) metres
+of where the reference motion puts it. While that holds, what was predicted from the reference holds too.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ MOTION = np.dtype(
         ("time", np.float64),  # s after the monitor's origin, like all times
         ("tube_0", np.float64),  # m
         ("tube_1", np.float64),  # m/s
+        ("tube_time", np.float64),  # when the body was last within tube_0 of the reference
         ("cover", np.float64),  # collisions are predicted until this time
+        ("covered", np.float64),  # and were, before this step; -inf: nothing was
         ("wx", np.float64),  # rad/s
         ("wy", np.float64),
         ("wz", np.float64),
@@ -73,6 +75,8 @@ class Parts(NamedTuple):
 def make_bodies(capacity: int) -> Bodies:
     """Empty slots."""
     n = capacity
+    motion = np.zeros(n, MOTION)
+    motion["covered"] = -np.inf
     return Bodies(
         used=np.zeros(n, np.bool_),
         static=np.zeros(n, np.bool_),
@@ -85,7 +89,7 @@ def make_bodies(capacity: int) -> Bodies:
         excess=np.zeros(n),
         concave=np.zeros(n, np.bool_),
         slack=np.zeros(n),
-        motion=np.zeros(n, MOTION),
+        motion=motion,
         ref_quaternion=np.zeros((n, 4)),
         time=np.zeros(n),
         position=np.zeros((n, 3)),

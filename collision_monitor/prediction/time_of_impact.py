@@ -319,7 +319,7 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
     A, B = bodies.motion[i], bodies.motion[j]
     event.status = CLEAR
     tube_1 = A.tube_1 + B.tube_1
-    tube_0 = A.tube_0 + B.tube_0 + A.tube_1 * (begin - A.time) + B.tube_1 * (begin - B.time)
+    tube_0 = A.tube_0 + B.tube_0 + A.tube_1 * (begin - A.tube_time) + B.tube_1 * (begin - B.tube_time)
     px, py, pz = relative_position(A, B, begin)
     vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
     # the time in which the bounding spheres overlap holds every impact

@@ -1,4 +1,7 @@
-"""Following the bodies: taking states in, noticing which left their predicted motion, and starting those anew."""
+"""Following the bodies: taking states in, noticing which left their predicted motion, and starting those anew.
+
+A body that keeps its motion is never started anew: where its predictions end too soon, they are continued.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,8 @@ STATE_NUMBERS: Final = 20
 
 FIRST_SLACK: Final = 0.5
 SHORTEST_SLACK: Final = 0.0625
-"""How far beyond the horizon a body is predicted, in horizons: at first, and at least."""
+LONGEST_SLACK: Final = 2.0
+"""How far beyond the horizon a body is predicted, in horizons: at first, at least, and at most."""
 
 GOLDEN_RATIO: Final = 0.6180339887498949
 PLASTIC_RATIO: Final = 0.7548776662466927
@@ -105,14 +109,15 @@ def _estimate_twist(bodies, i, numbers, k, x, y, z, w, elapsed):
 
 
 @kernel
-def find_moved(bodies, count, now, horizon, stale_acceleration, moved):
+def find_moved(bodies, count, now, horizon, stale_acceleration, moved, ending):
     """Slots among the first `count` whose predictions no longer hold at `now`, into moved; returns how many.
 
+    Those that hold but end within the horizon go into `ending`, their number is returned second.
     A body's surface may be off its reference by tube_0 now and drift by tube_1 a second; both are checked, with the
     drift that an unheard-of body may have made. Its slack is halved where it left its motion and doubled where that
     held until it was predicted no further: who turns often is not predicted far.
     """
-    n = 0
+    n = n_ending = 0
     turned = np.empty(4)
     for i in range(count):
         if not bodies.used[i] or not bodies.seen[i] or bodies.static[i]:
@@ -140,13 +145,43 @@ def find_moved(bodies, count, now, horizon, stale_acceleration, moved):
             apart += r * (angle + off * age)
         if not (apart <= m.tube_0 and drift <= m.tube_1):
             bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
+            moved[n] = i
+            n += 1
         elif m.cover < now + horizon:
-            bodies.slack[i] = min(2.0 * bodies.slack[i], horizon)
-        else:
-            continue
-        moved[n] = i
-        n += 1
-    return n
+            bodies.slack[i] = min(2.0 * bodies.slack[i], LONGEST_SLACK * horizon)
+            ending[n_ending] = i
+            n_ending += 1
+    return n, n_ending
+
+
+@device
+def _cover(bodies, i, now, horizon):
+    """Predict body i over the horizon and some slack; the rest of the step knows from `covered` what is new of it.
+
+    Cover times are spread over (1/2, 1] of the slack by the body's slot and time, so that they do not end together.
+    """
+    m = bodies.motion[i]
+    if bodies.static[i]:
+        m.cover = np.inf
+        return
+    if bodies.slack[i] == 0.0:
+        bodies.slack[i] = FIRST_SLACK * horizon
+    spread = (i * GOLDEN_RATIO + now * PLASTIC_RATIO / horizon) % 1.0
+    m.cover = now + horizon + bodies.slack[i] * (0.5 + 0.5 * spread)
+
+
+@device
+def swept_box(bodies, i, begin, margin):
+    """Centre and half extents (m) of a box that holds body i, and `margin` more, from `begin` until its cover time."""
+    m = bodies.motion[i]
+    sweep = 0.0 if bodies.static[i] else m.cover - begin
+    half = m.radius + margin + m.tube_0 + m.tube_1 * (begin - m.tube_time + sweep)
+    ahead = 0.5 * sweep
+    middle = begin - m.time + ahead
+    return (
+        m.x + middle * m.vx, m.y + middle * m.vy, m.z + middle * m.vz,
+        half + ahead * abs(m.vx), half + ahead * abs(m.vy), half + ahead * abs(m.vz),
+    )  # fmt: skip
 
 
 @kernel
@@ -154,11 +189,7 @@ def restart_motion(
     bodies, grid, which, now, horizon, margin, stale_acceleration,
     position_tolerance, velocity_tolerance, orientation_tolerance, angular_velocity_tolerance,
 ):  # fmt: skip
-    """Make the last state of each body in `which` (M,) its reference from `now` on and put what it sweeps in the grid.
-
-    Cover times are spread over (1/2, 1] of the slack by the body's slot and version, so that they do not expire
-    together.
-    """
+    """Make the last state of each body in `which` (M,) its reference; the grid gets what it sweeps from `now` on."""
     q = np.empty(4)
     for k in range(which.size):
         i = which[k]
@@ -174,31 +205,30 @@ def restart_motion(
         for c in range(4):
             bodies.ref_quaternion[i, c] = q[c]
         quaternion_to_matrix(bodies.ref_quaternion, i, m.rotation)
-        m.time = now
-        sweep = 0.0
-        m.cover = np.inf
+        m.time = m.tube_time = now
+        m.covered = -np.inf
         m.tube_0 = m.tube_1 = 0.0
+        _cover(bodies, i, now, horizon)
         if not bodies.static[i]:
-            if bodies.slack[i] == 0.0:
-                bodies.slack[i] = FIRST_SLACK * horizon
-            spread = (i * GOLDEN_RATIO + m.version * PLASTIC_RATIO) % 1.0
-            sweep = horizon + bodies.slack[i] * (0.5 + 0.5 * spread)
-            m.cover = now + sweep
             r = bodies.spin_radius[i]
             m.tube_0 = position_tolerance + r * orientation_tolerance
             m.tube_1 = velocity_tolerance + r * angular_velocity_tolerance
             if age > 0.0:
                 m.tube_0 += 2.0 * stale_acceleration * age * age
                 m.tube_1 += 2.0 * stale_acceleration * age
-        half = m.radius + margin + m.tube_0 + m.tube_1 * sweep
-        ahead = 0.5 * sweep
-        put_box(
-            grid,
-            i,
-            m.x + ahead * m.vx,
-            m.y + ahead * m.vy,
-            m.z + ahead * m.vz,
-            half + ahead * abs(m.vx),
-            half + ahead * abs(m.vy),
-            half + ahead * abs(m.vz),
-        )
+        put_box(grid, i, *swept_box(bodies, i, now, margin))
+
+
+@kernel
+def continue_motion(bodies, grid, which, now, horizon, margin):
+    """Predict each body in `which` (M,), which is on its reference, further; what it sweeps from `now` on in the grid.
+
+    That it is within its tube at `now` is known again, so the tube starts to widen from here.
+    """
+    for k in range(which.size):
+        i = which[k]
+        m = bodies.motion[i]
+        m.tube_time = now
+        m.covered = m.cover
+        _cover(bodies, i, now, horizon)
+        put_box(grid, i, *swept_box(bodies, i, now, margin))
