@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor import records
 from collision_monitor.broad_phase.dense_grid import box_pairs
-from collision_monitor.broad_phase.hashed_grid import make_hashed_grid, put_boxes, remove_boxes
+from collision_monitor.broad_phase.hashed_grid import make_hashed_grid, regridded, remove_boxes
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import CollisionMonitorError, InputError, Refusal, UnsupportedError
 from collision_monitor.geometry.pieces import is_planar
@@ -143,6 +143,11 @@ class Monitor:
         return self._names[object_id]
 
     @property
+    def last(self) -> StepResult | None:
+        """The answers of the last step that was accepted; None before the first."""
+        return self._last
+
+    @property
     def plan(self) -> ScenePlan:
         """Which tests and grid cells the objects described now require; `print` it."""
         return scene_plan(self._shapes.table, self._bodies, self._parts.next, self._grid)
@@ -264,12 +269,7 @@ class Monitor:
             bodies = make_bodies(capacity)
             enlarge(self._bodies, bodies)
             self._bodies = bodies
-            box = self._grid.box
-            inside = np.flatnonzero(box["level"] >= 0).astype(np.int32)
-            centre = np.stack([box["x"], box["y"], box["z"]], axis=1)
-            half = np.stack([box["hx"], box["hy"], box["hz"]], axis=1)
-            self._grid = make_hashed_grid(capacity)
-            put_boxes(self._grid, inside, centre, half)
+            self._grid = regridded(self._grid.box, capacity)
         self._top += 1
         return self._top - 1
 

@@ -25,13 +25,18 @@ from collision_monitor.codec import (
 )
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import CollisionMonitorError, InputError, MessageError, Refusal
+from collision_monitor.freeze import freeze, thaw
 from collision_monitor.monitor import Monitor, StepResult
 from collision_monitor.profiles import Profile
 from collision_monitor.provenance import provenance
+from collision_monitor.snapshot import Snapshot
 
 Records = NDArray[np.void]
 
 STDDEVS: Final = ("position_stddev", "orientation_stddev", "velocity_stddev", "angular_velocity_stddev")
+
+_PIPELINE: Final = "pipeline"
+"""Whose facts these are, in a snapshot."""
 
 LARGEST_WRAP: Final = 1 << 16
 """A sequence number that falls is the counter's wrap at 2^32 if it lost at most this many messages, else a restart."""
@@ -62,7 +67,6 @@ class Pipeline:
         self._static: set[int] = set()
         self._names: dict[int, str] = {}  # also of what was removed since the last step, whose contacts end in the next
         self._removed: set[int] = set()
-        self._last: StepResult | None = None
 
     # -- in
 
@@ -112,7 +116,6 @@ class Pipeline:
         result = self.monitor.step(message.stamp_ns, _with_stddevs(message))
         if not result.accepted:
             return None
-        self._last = result
         return self._outputs(result)
 
     # -- out
@@ -122,7 +125,7 @@ class Pipeline:
 
         silent: states no longer arrive, so every moving object that was seen counts as stale.
         """
-        monitor, last = self.monitor, self._last
+        monitor, last = self.monitor, self.monitor.last
         if last is not None:
             values = dataclasses.asdict(last.status)
             values.update(stamp_ns=last.stamp_ns, step=last.step)
@@ -150,6 +153,37 @@ class Pipeline:
         profile = json.dumps(self.monitor.profile.to_dict(), sort_keys=True)
         return {**provenance(), "profile": profile, "frame_id": self.frame_id, "node": node}
 
+    # -- snapshots
+
+    def snapshot(self) -> Snapshot:
+        """All that later answers depend on, copied: 0.1 ms for 200 objects."""
+        snapshot = freeze(self.monitor)
+        snapshot.facts[_PIPELINE] = {
+            "messages_lost": self.messages_lost,
+            "sequence": self._sequence,
+            "static": sorted(self._static),
+            "names": {str(object_id): name for object_id, name in self._names.items()},
+            "removed": sorted(self._removed),
+        }
+        return snapshot
+
+    @classmethod
+    def restored(cls, snapshot: Snapshot, profile: Profile | str, frame_id: str) -> Pipeline:
+        """Goes on from there with the same answers; `objects` holds only what is described from now on.
+
+        Raises InputError where the snapshot cannot be used.
+        """
+        pipeline = cls(profile, frame_id)
+        pipeline.monitor = thaw(profile, snapshot)
+        try:
+            facts = snapshot.facts[_PIPELINE]
+            pipeline.messages_lost, pipeline._sequence = facts["messages_lost"], facts["sequence"]
+            pipeline._static, pipeline._removed = set(facts["static"]), set(facts["removed"])
+            pipeline._names = {int(object_id): name for object_id, name in facts["names"].items()}
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise InputError(f"snapshot: expected the state of a pipeline of this version, got: {error!r}") from None
+        return pipeline
+
     # -- parts
 
     def _is_our_frame(self, frame_id: str, message: str) -> bool:
@@ -174,7 +208,7 @@ class Pipeline:
         """Removing what is not there is no error: the sender's wish is met."""
         with suppress(InputError):
             self.monitor.remove(object_id)
-            del self.objects[object_id]
+            self.objects.pop(object_id, None)  # not there where a snapshot was restored
             self._static.discard(object_id)
             self._removed.add(object_id)
 

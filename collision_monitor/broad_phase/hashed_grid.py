@@ -12,6 +12,7 @@ from math import frexp
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
 
@@ -65,6 +66,15 @@ def make_hashed_grid(capacity: int) -> HashedGrid:
         level_head=np.full(LEVELS, -1, np.int32),
         level_count=np.zeros(LEVELS, np.int32),
     )
+
+
+def regridded(box: NDArray[np.void], capacity: int) -> HashedGrid:
+    """A grid of this capacity that holds those of the boxes (N,) BOX that were in a grid."""
+    grid = make_hashed_grid(capacity)
+    centre = np.stack([box["x"], box["y"], box["z"]], axis=1)
+    half = np.stack([box["hx"], box["hy"], box["hz"]], axis=1)
+    put_boxes(grid, np.flatnonzero(box["level"] >= 0).astype(np.int32), centre, half)
+    return grid
 
 
 @device

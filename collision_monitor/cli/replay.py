@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.engines import add_engine, engine_of
 from collision_monitor.cli.progress import progress_bar
-from collision_monitor.cli.quantities import positive
+from collision_monitor.cli.quantities import not_negative, positive
 from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
@@ -42,6 +42,10 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("sessions", nargs="+", metavar="SESSION", help="session files, folders of them, or wildcards")
     parser.add_argument("--threads", type=int, metavar="N", help="threads of the kernels (default: as recorded)")
     parser.add_argument(
+        "--from", dest="start", type=not_negative, metavar="T", default=0.0,
+        help="begin with the last snapshot before T seconds after the first message (default: 0)",
+    )  # fmt: skip
+    parser.add_argument(
         "--tolerance", type=positive, metavar="X", help="for other versions: equal is what differs by no more (m, s)"
     )
     parser.add_argument("--cut", type=Path, metavar="OUT", help="where answers differ, write the session up to there")
@@ -64,12 +68,12 @@ def replay_command(args: argparse.Namespace) -> int:
         return _replay_many(paths, args)
     session = Session(paths[0])
     with _progress_bar(session) as progress:
-        report = replay(session, threads=args.threads, tolerance=args.tolerance, progress=progress)
+        report = replay(session, **_options(args), progress=progress)
     if args.cut is not None and report.first_message is not None:
         from collision_monitor.session.cut import cut
 
-        count = cut(Session(paths[0]), report.first_message + 1, args.cut, overwrite=args.force)
-        report.notes.append(f"the {count} messages up to the first difference are in {args.cut}")
+        count = cut(Session(paths[0]), report.first_message, args.cut, overwrite=args.force)
+        report.notes.append(f"{count} messages that show the first difference are in {args.cut}")
     print(json.dumps(_as_json(report, paths[0]), indent=2) if args.json else _as_text(report))
     return int(report.verdict)
 
@@ -82,11 +86,15 @@ class _Replayed:
     error: str = ""
 
 
-def _replay_one(path: Path, threads: int | None, tolerance: float | None) -> _Replayed:
+def _options(args: argparse.Namespace) -> dict[str, Any]:
+    return {"threads": args.threads, "tolerance": args.tolerance, "start": args.start}
+
+
+def _replay_one(path: Path, options: dict[str, Any]) -> _Replayed:
     from collision_monitor.session import Session
     from collision_monitor.session.replay import replay
 
-    return _Replayed(replay(Session(path), threads=threads, tolerance=tolerance))
+    return _Replayed(replay(Session(path), **options))
 
 
 def _unread(_path: Path, why: str) -> _Replayed:
@@ -98,7 +106,7 @@ def _replay_many(paths: list[Path], args: argparse.Namespace) -> int:
 
     found: list[_Replayed] = []
     with progress_bar("replay", len(paths)) as done:
-        run = partial(_replay_one, threads=args.threads, tolerance=args.tolerance)
+        run = partial(_replay_one, options=_options(args))
         for path, each in zip(paths, for_each(run, paths, _unread, engine_of(args)), strict=True):
             found.append(each)
             done(1)
@@ -161,6 +169,7 @@ def _verdict(report: Report) -> str:
 
 def _as_text(report: Report) -> str:
     lines = [
+        *([f"from       {report.begin:.3f} s"] if report.begin else []),
         f"steps      {report.steps}",
         f"messages   {report.messages}, of which {report.compared} answers were compared",
         f"recorded   {report.recorded_duration:.3f} s",

@@ -128,6 +128,38 @@ class ShapeTableBuilder:
         self._blocks: dict[bytes, tuple[int, int]] = {}  # the points' bytes -> start, count
         self._users: dict[int, tuple[bytes, int]] = {}  # start -> its key, how many slots share the block
 
+    @classmethod
+    def restored(cls, table: ShapeTable, free_slots: list[int], free_blocks: dict[int, list[int]]) -> ShapeTableBuilder:
+        """Goes on from what `used` gave and what was free then: of slots, and of blocks by their length."""
+        slots, vertices = len(table.kind), len(table.vertex_index)
+        builder = cls()
+        builder.table = _resized(table, max(slots, len(builder.table.kind)), max(vertices, LANES))
+        builder._slots, builder._vertices = slots, vertices
+        builder._free_slots, builder._free_blocks = free_slots, free_blocks
+        for slot in np.flatnonzero(table.vertex_count):
+            start, count = int(table.vertex_start[slot]), int(table.vertex_count[slot])
+            index = table.vertex_index[start : start + count]
+            chosen = index[: len(np.unique(index))]  # without the last one's repetitions
+            key = chosen.tobytes() + table.vertices[:, start : start + len(chosen)].T.tobytes()
+            builder._blocks[key] = start, count
+            builder._users[start] = key, builder._users.get(start, (key, 0))[1] + 1
+        return builder
+
+    @property
+    def used(self) -> ShapeTable:
+        """The part of the table that has been used so far, a view."""
+        by_vertex = {
+            "vertices": self.table.vertices[:, : self._vertices],
+            "vertex_index": self.table.vertex_index[: self._vertices],
+        }
+        rows = {name: column[: self._slots] for name, column in self.table._asdict().items() if name not in by_vertex}
+        return ShapeTable(**rows, **by_vertex)
+
+    @property
+    def free(self) -> tuple[list[int], dict[int, list[int]]]:
+        """Slots, and blocks of vertices by their length, that are used next, from the last one on."""
+        return list(self._free_slots), {count: list(starts) for count, starts in self._free_blocks.items()}
+
     def __len__(self) -> int:
         """How many shapes the table holds."""
         return self._slots - len(self._free_slots)

@@ -115,7 +115,7 @@ class MonitorNode(Node):
         }
         try:
             metadata = self._pipeline.metadata(node=self.get_fully_qualified_name())
-            return Recorder(path, types, metadata, splitting=self.settings.splitting)
+            return Recorder(path, types, metadata, splitting=self.settings.splitting, snapshots=True)
         except SessionError as error:
             self.get_logger().error(f"not recording: {error}")
             self._no_recording = {
@@ -158,6 +158,8 @@ class MonitorNode(Node):
         if ended - self._last_status >= STATUS_PERIOD:
             self._publish_status()
         self._publish_markers(data, outputs, ended)
+        if self._recorder is not None and self._recorder.snapshot_due:
+            self._recorder.write_snapshot(self._pipeline.snapshot())
 
     def _on_watchdog(self) -> None:
         self._tell_of_recording()

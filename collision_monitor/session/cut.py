@@ -1,17 +1,24 @@
-"""The least of a session that still shows a difference: all that was put in until then, and what was answered."""
+"""The least of a session that still shows a difference: from the last snapshot before it, or from the start."""
 
 from __future__ import annotations
 
-from itertools import islice
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from collision_monitor.codec import encode_descriptions
 from collision_monitor.errors import SessionError
-from collision_monitor.session.reader import Session
-from collision_monitor.session.recorder import Recorder, Recording
+from collision_monitor.pipeline import Pipeline
+from collision_monitor.session.definitions import definition
+from collision_monitor.session.entry import Entry
+from collision_monitor.session.parts import REPEATED
+from collision_monitor.session.reader import Recorded, RecordedSnapshot, Session
+from collision_monitor.session.replay import replay
+from collision_monitor.session.rosbag2 import TYPES, full_name
+from collision_monitor.session.session_file import SessionFile
 
 
-def cut(session: Session, messages: int, target: Path, *, overwrite: bool = False) -> int:
-    """Copy the first `messages` of a session into a new one; returns how many there were.
+def cut(session: Session, sequence: int, target: Path, *, overwrite: bool = False) -> int:
+    """Copy what shows the difference in message `sequence` into a new session; returns how many messages that takes.
 
     Raises SessionError where the target cannot be written or is the session itself, or where there are no settings.
     """
@@ -19,13 +26,60 @@ def cut(session: Session, messages: int, target: Path, *, overwrite: bool = Fals
         raise SessionError(f"{session.path}: expected a session with its settings in it, got another program's")
     if target.exists() and target.samefile(session.path):
         raise SessionError(f"{target}: expected another path than that of the session itself")
-    found = list(islice(session.messages(), messages))
-    types = {message.topic: message.type for message in found}
-    recorder = Recorder(target, types, session.metadata, overwrite=overwrite, patient=True)
-    with recorder:
-        for message in found:
-            recorder.write(message.topic, message.data, message.log_time, message.publish_time)
-    told = recorder.status()
-    if told["recording"] == Recording.FAILED:
-        raise SessionError(str(told["recording_error"]))
-    return len(found)
+    if target.exists() and not overwrite:
+        raise SessionError(f"{target}: expected a new file, got one that exists; choose another name or remove it")
+    found = list(_until(session, sequence))
+    snapshots = [k for k, each in enumerate(found) if isinstance(each, RecordedSnapshot)]
+    for start in (*snapshots[-1:], 0):
+        try:
+            count = _write(session, found, start, target)
+        except OSError as error:
+            raise SessionError(f"{target}: expected to be able to write there, got: {error.strerror}") from None
+        # From the snapshot it may agree where from the start it does not: then what went wrong is older.
+        if start and replay(Session(target)).first_message == sequence:
+            break
+    return count
+
+
+def _until(session: Session, sequence: int) -> Iterator[Recorded | RecordedSnapshot]:
+    """What a replay takes in up to that message."""
+    for k, each in enumerate(session.entries()):
+        if isinstance(each, RecordedSnapshot) or not each.repeated or k == 0:
+            yield each
+        if isinstance(each, Recorded) and not each.repeated and each.sequence == sequence:
+            return
+
+
+def _write(session: Session, found: Sequence[Recorded | RecordedSnapshot], start: int, target: Path) -> int:
+    """From the snapshot at `start` on, behind a message that says what the objects are then; or all of it."""
+    types = {each.topic: each.type for each in found if isinstance(each, Recorded) and each.type in TYPES}
+    definitions = {name: definition(full_name(name)).encode() for name in types.values()}
+    metadata = {**session.metadata, REPEATED: "1"} if start else session.metadata
+    file = SessionFile(target, types, metadata, definitions, overwrite=True)
+    count = 0
+    try:
+        if start:
+            file.write([_objects(session, found[:start], types)])
+        for each in found[start:]:
+            if isinstance(each, RecordedSnapshot):
+                file.write_snapshot(each.data, each.sequence, each.log_time)
+            elif each.topic in types:
+                file.write([Entry(each.topic, each.data, each.log_time, each.publish_time, each.sequence)])
+                count += not each.repeated
+        file.finish()
+    finally:
+        file.close()
+    return count
+
+
+def _objects(session: Session, before: Sequence[Recorded | RecordedSnapshot], types: dict[str, str]) -> Entry:
+    """All that were described, in one message; there is a step that differs, so there is one that described them."""
+    pipeline = Pipeline(session.profile, session.frame_id)
+    messages = [each for each in before if isinstance(each, Recorded)]
+    for each in messages:
+        if each.type == "ObjectDescriptionArray":
+            pipeline.on_shapes(each.data)
+    last = messages[-1]
+    topic = next(topic for topic, name in types.items() if name == "ObjectDescriptionArray")
+    data = encode_descriptions(last.log_time, session.frame_id, list(pipeline.objects.values()), snapshot=True)
+    return Entry(topic, data, last.log_time, last.log_time, last.sequence)

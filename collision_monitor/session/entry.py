@@ -1,4 +1,4 @@
-"""A message on its way to the disk."""
+"""A message, or a snapshot between two, on its way to the disk."""
 
 from __future__ import annotations
 
@@ -6,13 +6,17 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from collision_monitor.description import ObjectDescription
+from collision_monitor.snapshot import Snapshot
 
 _OVERHEAD: Final = 128
 """Bytes that a waiting message costs beside its data, so that empty ones are bounded too."""
 
 
 class Entry(NamedTuple):
-    """event: a collision begins in it. objects: all that are described once it was taken in, where it changed them."""
+    """event: a collision begins in it. objects: all that are described once it was taken in, where it changed them.
+
+    snapshot: then it is no message but the monitor as it is before message `sequence`.
+    """
 
     topic: str
     data: bytes
@@ -21,8 +25,9 @@ class Entry(NamedTuple):
     sequence: int
     event: bool = False
     objects: Sequence[ObjectDescription] | None = None
+    snapshot: Snapshot | None = None
 
     @property
     def cost(self) -> int:
         """Bytes of memory, about."""
-        return len(self.data) + _OVERHEAD
+        return len(self.data) + _OVERHEAD + (self.snapshot.nbytes if self.snapshot else 0)

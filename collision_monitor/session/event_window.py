@@ -12,13 +12,17 @@ class EventWindow:
     """Holds back what came last, to keep it if an event follows.
 
     before, after: s around each event that are kept. limit: most bytes that are held back, for the oldest go first.
+    from_snapshots: what is kept begins with a snapshot, or where all began, so that it can be replayed: the last one
+    before those `before` seconds.
     """
 
-    def __init__(self, before: float, after: float, limit: int) -> None:
+    def __init__(self, before: float, after: float, limit: int, *, from_snapshots: bool = False) -> None:
         self._before = round(before * 1e9)
         self._after = round(after * 1e9)
         self._limit = limit
+        self._from_snapshots = from_snapshots
         self._held: deque[Entry] = deque()
+        self._snapshots: deque[Entry] = deque()  # of those held
         self._bytes = 0
         self._until = -1
 
@@ -28,15 +32,27 @@ class EventWindow:
             self._until = entry.log_time + self._after
         self._held.append(entry)
         self._bytes += entry.cost
+        if entry.snapshot is not None:
+            self._snapshots.append(entry)
         # All messages of a step have its log time, so steps are kept or not kept as a whole.
-        while self._held[0].log_time < entry.log_time - self._before:
+        while self._is_past(entry.log_time - self._before):
             yield self._pop(), False
         while self._held and entry.log_time <= self._until:
             yield self._pop(), True
         while self._bytes > self._limit:
             yield self._pop(), False
 
+    def _is_past(self, oldest: int) -> bool:
+        """Whether the first entry held back is not needed for what begins at `oldest` or later."""
+        first = self._held[0]
+        if not self._from_snapshots:
+            return first.log_time < oldest
+        following = next((each for each in self._snapshots if each is not first), None)
+        return following is not None and following.log_time < oldest
+
     def _pop(self) -> Entry:
         entry = self._held.popleft()
         self._bytes -= entry.cost
+        if entry.snapshot is not None:
+            self._snapshots.popleft()
         return entry

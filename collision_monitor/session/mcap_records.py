@@ -3,22 +3,37 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+import zlib
+from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Any, BinaryIO, Final, NamedTuple
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Header, Message, Metadata, Schema
-from mcap.stream_reader import breakup_chunk
+from mcap.records import Attachment, Channel, Chunk, Header, Metadata, Schema
+from mcap.stream_reader import get_chunk_data_stream
 
 from collision_monitor.errors import SessionError
 
 _MAGIC: Final = b"\x89MCAP0\r\n"
 _HEAD: Final = struct.Struct("<BQ")
+_MESSAGE: Final = struct.Struct("<HIQQ")
 _LARGEST_CHUNK: Final = 1 << 30
 """Bytes, unpacked. rosbag2 writes less than 1 MiB; what claims more than this is damaged."""
+
+_GLANCE: Final = 256
+"""Bytes of a record that show when it is from and what its name is."""
+
+
+class Message(NamedTuple):
+    """Times in ns."""
+
+    channel_id: int
+    sequence: int
+    log_time: int
+    publish_time: int
+    data: bytes
 
 
 class McapRecords:
@@ -42,7 +57,14 @@ class McapRecords:
             raise SessionError(f"{path}: expected an MCAP file, but {what}")
 
     def __iter__(self) -> Iterator[Any]:
-        """Header, schemas, channels, messages and metadata, from chunks as well. What is damaged is noted, left out."""
+        """Header, schemas, channels, messages, metadata and attachments, from chunks as well, but for what is damaged.
+
+        That is noted.
+        """
+        return self.read()
+
+    def read(self, begin: int = 0) -> Iterator[Any]:
+        """The same; begin: the byte where a record starts, before which only what names the topics is read."""
         self.damage = []
         with self.path.open("rb") as file:
             for start, opcode, payload in self._whole(file):
@@ -53,11 +75,28 @@ class McapRecords:
                     reason = str(error) or repr(error)
                     self.damage.append(f"{_name(opcode)} of {len(payload)} bytes at byte {start} is damaged: {reason}")
                     continue
-                yield from records
+                for record in records:
+                    if start < begin and isinstance(record, Message):
+                        file.seek(begin)
+                        break
+                    yield record
+
+    def glance(self) -> Iterator[tuple[int, int, bytes]]:
+        """Where each record starts, its opcode and its first bytes, of all that is there and without unpacking it."""
+        self.damage = []
+        with self.path.open("rb") as file:
+            for start, opcode, length in self._heads(file):
+                yield start, opcode, file.read(min(length, _GLANCE))
+                file.seek(start + _HEAD.size + length)
 
     def _whole(self, file: BinaryIO) -> Iterator[tuple[int, int, bytes]]:
-        """Where each record starts, its opcode and its payload, up to the end of the data or of what is there."""
-        file.read(len(_MAGIC))
+        """Where each record starts, its opcode and its payload."""
+        for start, opcode, length in self._heads(file):
+            yield start, opcode, file.read(length)
+
+    def _heads(self, file: BinaryIO) -> Iterator[tuple[int, int, int]]:
+        """Where each record starts, its opcode and its length, up to the end of the data or of what is there."""
+        file.seek(len(_MAGIC))
         while True:
             self.position = start = file.tell()
             head = file.read(_HEAD.size)
@@ -73,30 +112,54 @@ class McapRecords:
             if opcode == Opcode.DATA_END:
                 self.position = self.size
                 return
-            yield start, opcode, file.read(length)
+            yield start, opcode, length
 
 
 def _unpack(opcode: int, payload: bytes) -> list[Any]:
     """The records in the payload; raises anything where it is damaged."""
+    if opcode == Opcode.MESSAGE:
+        return [_message(payload, 0, len(payload))]
     stream = ReadDataStream(BytesIO(payload))
     if opcode == Opcode.CHUNK:
         chunk = Chunk.read(stream)
         if chunk.uncompressed_size > _LARGEST_CHUNK:
             raise ValueError(f"it claims {chunk.uncompressed_size} bytes")
-        return list(breakup_chunk(chunk, validate_crc=True))
-    if opcode == Opcode.MESSAGE:
-        return [Message.read(stream, len(payload))]
-    for kind, read in _KINDS.items():
-        if opcode == kind:
-            return [read(stream)]
-    return []
+        records, size = get_chunk_data_stream(chunk, validate_crc=True)
+        return _in_chunk(records.read(size))
+    if opcode == Opcode.ATTACHMENT and int.from_bytes(payload[-4:], "little") not in (0, zlib.crc32(payload[:-4])):
+        raise ValueError("its checksum is wrong")
+    return [_KINDS[opcode](stream)] if opcode in _KINDS else []
 
 
-_KINDS: Final = {
+def _in_chunk(data: bytes) -> list[Any]:
+    """Most of what is in a chunk are messages, so these are unpacked without the library, which takes longer."""
+    records: list[Any] = []
+    at = 0
+    while at < len(data):
+        opcode, length = _HEAD.unpack_from(data, at)
+        begin, at = at + _HEAD.size, at + _HEAD.size + length
+        if at > len(data):
+            raise ValueError(f"a record of {length} bytes in it is cut off")
+        if opcode == Opcode.MESSAGE:
+            records.append(_message(data, begin, at))
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            records += _unpack(opcode, data[begin:at])
+    return records
+
+
+def _message(data: bytes, begin: int, end: int) -> Message:
+    if end - begin < _MESSAGE.size:
+        raise ValueError(f"a message of {end - begin} bytes is none")
+    channel_id, sequence, log_time, publish_time = _MESSAGE.unpack_from(data, begin)
+    return Message(channel_id, sequence, log_time, publish_time, data[begin + _MESSAGE.size : end])
+
+
+_KINDS: Final[dict[int, Callable[[ReadDataStream], Any]]] = {
     Opcode.HEADER: Header.read,
     Opcode.METADATA: Metadata.read,
     Opcode.SCHEMA: Schema.read,
     Opcode.CHANNEL: Channel.read,
+    Opcode.ATTACHMENT: Attachment.read,
 }
 
 

@@ -1,7 +1,7 @@
 """The files of a recording: one, or a folder with as many as splitting and events make of it.
 
 Each file can be read alone: its metadata says where in the recording it stands, and the objects that were described
-before are in its first message again.
+before are in its first message again. Where snapshots come, it begins with one and can be replayed alone, too.
 """
 
 from __future__ import annotations
@@ -20,10 +20,17 @@ from collision_monitor.session.entry import Entry
 from collision_monitor.session.event_window import EventWindow
 from collision_monitor.session.rosbag2 import Extent, file_metadata, full_name
 from collision_monitor.session.session_file import SessionFile
+from collision_monitor.snapshot import Snapshot
 
 RECORDING, NUMBER, REPEATED = "recording", "file", "repeated"
 """Keys of a file's metadata: an id that the files of one recording share, its place among them from 0, and how many of
 its first messages only repeat what was in force when it begins."""
+
+SNAPSHOT_PERIOD: Final = 10.0
+"""s between two snapshots in a file: a replay from the last one is 5 s away on average, at its own speed."""
+
+SNAPSHOT_SHARE: Final = 0.05
+"""Part of a file that may be snapshots: of quiet sessions they are rarer."""
 
 HELD_BYTES: Final = 256 << 20
 """Most bytes that wait for an event."""
@@ -71,6 +78,7 @@ class Parts:
         splitting: Splitting,
         *,
         overwrite: bool,
+        snapshots: bool = False,
     ) -> None:
         self._path = path
         self._types = dict(types)
@@ -78,6 +86,9 @@ class Parts:
         self._splitting = splitting
         self._splits = bool(splitting.size or splitting.duration)
         self._overwrite = overwrite
+        self._snapshots = snapshots
+        self._last_time = 0  # of what was put into a file
+        self._next_snapshot = (0, 0)  # log time and bytes of the file from which on it takes another
         self._definitions = {name: definition(full_name(name)).encode() for name in self._types.values()}
         self._inputs = {topic for topic, name in self._types.items() if name in _INPUTS}
         self._shapes = next((topic for topic, name in self._types.items() if name == "ObjectDescriptionArray"), None)
@@ -85,7 +96,11 @@ class Parts:
         self._extents: dict[str, Extent] = {}
         self._finished_bytes = 0
         self._file: SessionFile | None = None
-        self._window = EventWindow(splitting.before, splitting.after, HELD_BYTES) if splitting.on_event else None
+        self._window = (
+            EventWindow(splitting.before, splitting.after, HELD_BYTES, from_snapshots=snapshots)
+            if splitting.on_event
+            else None
+        )
         self._folder = None if path.suffix == ".mcap" else path
         if self._folder is None and splitting.makes_files:
             raise SessionError(
@@ -102,30 +117,27 @@ class Parts:
         """Bytes of all files that the operating system has."""
         return self._finished_bytes + (self._file.size if self._file else 0)
 
-    def write(self, entries: Sequence[Entry]) -> int:
-        """Take in the next messages; how many were written for them, of those that came before too."""
-        if self._window is not None:
-            return sum(map(self._select, entries))
-        if self._splits:
-            for entry in entries:
-                self._put(entry)
-        else:
-            assert self._file is not None
-            self._file.write(entries)
-        return len(entries)
+    @property
+    def is_full(self) -> bool:
+        """Whether another file is to follow, once there is a snapshot to begin it with."""
+        return self._splits and self._is_full(self._last_time)
 
-    def _select(self, entry: Entry) -> int:
-        assert self._window is not None
-        written = 0
-        for each, kept in self._window.take(entry):
-            if kept:
-                self._put(each)
-                written += 1
-                continue
-            self._finish()
-            if each.objects is not None:
-                self._objects = each.objects
-        return written
+    def write(self, entries: Sequence[Entry]) -> int:
+        """Take in what comes next; how many messages were written for it, of those that came before too."""
+        if self._window is None:
+            return self._put(entries)
+        written, kept = 0, list[Entry]()
+        for entry in entries:
+            for each, is_kept in self._window.take(entry):
+                if is_kept:
+                    kept.append(each)
+                    continue
+                written += self._put(kept)
+                kept = []
+                self._finish()
+                if each.objects is not None:
+                    self._objects = each.objects
+        return written + self._put(kept)
 
     def flush(self) -> None:
         """Hand everything that is to be kept to the operating system."""
@@ -143,26 +155,58 @@ class Parts:
         if self._file is not None:
             self._file.close()
 
-    def _put(self, entry: Entry) -> None:
-        if self._file is not None and entry.topic in self._inputs and self._is_full(entry):
-            self._finish()
+    def _put(self, entries: Sequence[Entry]) -> int:
+        """Into as few calls as there are files and snapshots between them."""
+        run: list[Entry] = []
+        written = 0
+        for entry in entries:
+            if entry.snapshot is not None or (self._splits and not self._snapshots and entry.topic in self._inputs):
+                written += self._put_run(run)
+                run = []
+                if self._file is not None and self._splits and self._is_full(entry.log_time):
+                    self._finish()
+                if entry.snapshot is not None:
+                    self._put_snapshot(entry, entry.snapshot)
+                    continue
+            if self._file is None:
+                self._open(entry)
+            run.append(entry)
+            if entry.objects is not None:
+                self._objects = entry.objects
+        return written + self._put_run(run)
+
+    def _put_run(self, run: Sequence[Entry]) -> int:
+        if run:
+            assert self._file is not None
+            self._file.write(run)
+            self._last_time = run[-1].log_time
+        return len(run)
+
+    def _put_snapshot(self, entry: Entry, snapshot: Snapshot) -> None:
+        """As the beginning of a file, or into the one there is, if that did not have one for long enough."""
         if self._file is None:
             self._open(entry)
-        assert self._file is not None
-        self._file.write([entry])
-        if entry.objects is not None:
-            self._objects = entry.objects
+            return
+        time, size = self._next_snapshot
+        if entry.log_time >= time and self._file.size >= size:
+            self._write_snapshot(self._file, entry, snapshot)
 
-    def _is_full(self, entry: Entry) -> bool:
-        assert self._file is not None
-        size, duration = self._splitting.size, self._splitting.duration
-        begin = self._file.begin
-        if begin is None:
+    def _write_snapshot(self, file: SessionFile, entry: Entry, snapshot: Snapshot) -> None:
+        data = snapshot.encode()
+        file.write_snapshot(data, entry.sequence, entry.log_time)
+        self._next_snapshot = (
+            entry.log_time + round(SNAPSHOT_PERIOD * 1e9),
+            file.size + round(len(data) / SNAPSHOT_SHARE),
+        )
+
+    def _is_full(self, now: int) -> bool:
+        if self._file is None or self._file.begin is None:
             return False
-        return bool(size and self._file.size >= size) or bool(duration and entry.log_time - begin >= duration * 1e9)
+        size, duration = self._splitting.size, self._splitting.duration
+        return bool(size and self._file.size >= size) or bool(duration and now - self._file.begin >= duration * 1e9)
 
     def _open(self, first: Entry | None) -> None:
-        """The next file; first: the message that it begins with, None for the first file of all."""
+        """The next file; first: the message or snapshot that it begins with, None for the first file of all."""
         if self._folder is None:
             self._file = SessionFile(
                 self._path, self._types, self._metadata, self._definitions, overwrite=self._overwrite
@@ -173,11 +217,16 @@ class Parts:
         metadata = {**self._metadata, NUMBER: str(number), REPEATED: str(int(repeated))}
         path = self._folder / f"{self._folder.name}_{number}.mcap"
         self._file = SessionFile(path, self._types, metadata, self._definitions)
+        self._next_snapshot = 0, 0
+        if first is None:
+            return
         if repeated:
-            assert first is not None and self._shapes is not None
+            assert self._shapes is not None
             frame_id, at = self._metadata.get("frame_id", ""), first.log_time
             data = encode_descriptions(at, frame_id, self._objects, snapshot=True)
             self._file.write([Entry(self._shapes, data, at, at, (first.sequence - 1) & 0xFFFFFFFF)])
+        if first.snapshot is not None:
+            self._write_snapshot(self._file, first, first.snapshot)
 
     def _finish(self) -> None:
         if self._file is None:

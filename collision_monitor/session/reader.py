@@ -7,21 +7,23 @@ from __future__ import annotations
 
 import json
 import re
+import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import yaml
-from mcap.records import Channel, Header, Message, Metadata, Schema
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
 from collision_monitor.codec import Descriptions, States, decode_descriptions, decode_states
 from collision_monitor.errors import MessageError, ProfileError, SessionError
 from collision_monitor.profiles import Profile
-from collision_monitor.session.mcap_records import McapRecords
+from collision_monitor.session.mcap_records import McapRecords, Message
 from collision_monitor.session.parts import NUMBER, RECORDING, REPEATED
 from collision_monitor.session.rosbag2 import TYPES, full_name
-from collision_monitor.session.session_file import METADATA
+from collision_monitor.session.session_file import METADATA, SNAPSHOT
 
 SALVAGE: Final = "collision_monitor_salvage"
 """Name of the metadata record that says what is missing in a file that was salvaged."""
@@ -34,10 +36,17 @@ _INPUTS: Final[dict[str, Callable[[bytes], States | Descriptions]]] = {
 _OURS: Final = "collision_monitor"
 """How the header names the writer of our files."""
 
+_SNAPSHOT: Final = re.compile(re.escape(SNAPSHOT) + r"(\d{1,10})\.npz")
+_TIMES: Final = struct.Struct("<QQ")
+_LOG_TIME: Final = 6
+"""Where a message has it; chunks and attachments begin with their times."""
 
-@dataclass(frozen=True, slots=True)
-class Recorded:
-    """One message: its topic, the name of its type such as `ContactArray`, and its bytes. Times in ns."""
+
+class Recorded(NamedTuple):
+    """One message: its topic, the name of its type such as `ContactArray`, and its bytes. Times in ns.
+
+    repeated: it only says again, at the start of a file, what the objects are.
+    """
 
     topic: str
     type: str
@@ -45,6 +54,33 @@ class Recorded:
     sequence: int
     log_time: int
     publish_time: int
+    repeated: bool = False
+
+
+class RecordedSnapshot(NamedTuple):
+    """The monitor before message `sequence`, as `Snapshot.encode` has it. log_time: of the message before it (ns)."""
+
+    data: bytes
+    sequence: int
+    log_time: int
+
+
+class Place(NamedTuple):
+    """Where a snapshot is: which of the session's files, and the byte; and when it was taken (ns)."""
+
+    file: int
+    at: int
+    sequence: int
+    log_time: int
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """Log times of the first and the last message (ns; 0: there is none), and the snapshots in between, in order."""
+
+    begin: int
+    end: int
+    snapshots: tuple[Place, ...]
 
 
 class Session:
@@ -75,24 +111,40 @@ class Session:
 
     def messages(self) -> Iterator[Recorded]:
         """All messages whose bytes are whole, in recorded order. Raises SessionError for a foreign encoding."""
+        return (each for each in self.entries() if isinstance(each, Recorded))
+
+    def entries(self, begin: Place | None = None) -> Iterator[Recorded | RecordedSnapshot]:
+        """The same with the snapshots between them; from the snapshot at `begin` on. Raises SessionError."""
         self.damage = [f"{name} is not there" for name in _absent(self.path)]
         last: int | None = None
         count = 0
-        for part in self._parts:
-            repeated = part.repeated
-            for message in part.messages():
-                repeats, repeated = repeated > 0, repeated - 1
-                if repeats and message.sequence == last:
-                    continue  # it goes on where the last file ended
-                last = message.sequence
-                if self.foreign:
-                    message = Recorded(
-                        message.topic, message.type, message.data, count, message.log_time, message.publish_time
-                    )
-                    count += 1
-                yield message
+        for number, part in enumerate(self._parts):
+            if begin is not None and number < begin.file:
+                continue
+            for each in part.entries(begin.at if begin is not None and number == begin.file else 0):
+                if isinstance(each, Recorded):
+                    if each.repeated and each.sequence == last:
+                        continue  # it goes on where the last file ended
+                    last = each.sequence
+                    if self.foreign:
+                        each = each._replace(sequence=count)
+                        count += 1
+                yield each
             prefix = f"{part.records.path.name}: " if len(self._parts) > 1 else ""
             self.damage += [prefix + text for text in part.damage]
+
+    def timeline(self) -> Timeline:
+        """When it begins and ends and where its snapshots are, without unpacking any message."""
+        begin = end = 0
+        snapshots: list[Place] = []
+        for number, part in enumerate(self._parts):
+            for at, opcode, data in part.records.glance():
+                if opcode in (Opcode.CHUNK, Opcode.MESSAGE) and len(data) >= 22:
+                    first, last = _TIMES.unpack_from(data, 0 if opcode == Opcode.CHUNK else _LOG_TIME)
+                    begin, end = begin or first, max(end, last if opcode == Opcode.CHUNK else first)
+                elif opcode == Opcode.ATTACHMENT and (found := _SNAPSHOT.search(data.decode("latin-1"))):
+                    snapshots.append(Place(number, at, int(found[1]), *_TIMES.unpack_from(data)[:1]))
+        return Timeline(begin, end, tuple(snapshots))
 
     def _profile(self) -> Profile:
         try:
@@ -117,32 +169,30 @@ class _Part:
         self.repeated = _number(self.metadata.get(REPEATED))
         self.number = _number(self.metadata.get(NUMBER))
 
-    def messages(self) -> Iterator[Recorded]:
-        """As `Session.messages`."""
+    def entries(self, begin: int) -> Iterator[Recorded | RecordedSnapshot]:
+        """As `Session.entries`; begin: the byte of the snapshot."""
         self.damage = []
         schemas: dict[int, str] = {}
-        channels: dict[int, Channel] = {}
+        channels: dict[int, tuple[str, str]] = {}  # topic and type
         inputs: dict[str, str] = {}
-        for record in self.records:
-            if isinstance(record, Schema):
+        repeated = 0 if begin else self.repeated  # these come before the first snapshot
+        for record in self.records.read(begin):
+            if isinstance(record, Message):
+                if record.channel_id in channels:
+                    number, sequence, log_time, publish_time, data = record
+                    yield Recorded(*channels[number], data, sequence, log_time, publish_time, repeated > 0)
+                    repeated -= 1
+            elif isinstance(record, Schema):
                 schemas[record.id] = record.name
             elif isinstance(record, Channel):
                 self._check(record, schemas, inputs)
-                channels[record.id] = record
+                name = schemas.get(record.schema_id, "")
+                channels[record.id] = record.topic, _NAMES.get(name, name)
             elif isinstance(record, Metadata) and record.name == SALVAGE:
                 losses = record.metadata.get("losses", "").splitlines()
                 self.damage += [f"lost before it was salvaged: {loss}" for loss in losses]
-            elif isinstance(record, Message) and record.channel_id in channels:
-                channel = channels[record.channel_id]
-                name = schemas.get(channel.schema_id, "")
-                yield Recorded(
-                    topic=channel.topic,
-                    type=_NAMES.get(name, name),
-                    data=record.data,
-                    sequence=record.sequence,
-                    log_time=record.log_time,
-                    publish_time=record.publish_time,
-                )
+            elif isinstance(record, Attachment) and (found := _SNAPSHOT.fullmatch(record.name)):
+                yield RecordedSnapshot(record.data, int(found[1]), record.log_time)
         self.damage += self.records.damage
 
     def _read_metadata(self) -> dict[str, str]:

@@ -13,9 +13,10 @@ from typing import Final
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import SessionError
 from collision_monitor.session.entry import Entry
-from collision_monitor.session.parts import ONE_FILE, Parts, Splitting
+from collision_monitor.session.parts import ONE_FILE, SNAPSHOT_PERIOD, Parts, Splitting
 from collision_monitor.session.rosbag2 import TYPES
 from collision_monitor.session.session_file import METADATA
+from collision_monitor.snapshot import Snapshot
 
 __all__ = ["METADATA", "Recorder", "Recording", "Splitting"]
 
@@ -29,8 +30,12 @@ _WAKE_BYTES: Final = 4 << 20
 """Waiting bytes that wake the thread before the next flush is due."""
 
 
+EVENT_SNAPSHOT_PERIODS: Final = (0.1, 1.0)
+"""s between two snapshots of a recording on events, at least and at most, and half of what is wanted before each event
+in between: they are held back and mostly dropped, and so much more than what is wanted is kept."""
+
 _TURN: Final = 256
-"""Messages (0.3 ms) after which the thread lets go of Python's lock: else a step may wait 5 ms to get it back."""
+"""Messages (0.1 ms) after which the thread lets go of Python's lock: else a step may wait 5 ms to get it back."""
 
 _PAUSE: Final = 20e-6
 """s, long enough that a thread which waits for the lock wakes up and takes it."""
@@ -50,6 +55,7 @@ class Recorder:
     path: a new `.mcap` file, or a new folder of any other name (then with a metadata.yaml, as `ros2 bag record` does).
     types: topic -> message name, such as `ContactArray`. metadata: what `Pipeline.metadata` says.
     patient: `write` waits for the disk where the queue is full, instead of dropping: for a caller who has the time.
+    snapshots: the caller gives one whenever `snapshot_due`; a replay can begin there, and every file begins with one.
     Raises SessionError where the file cannot be made or is there already (unless overwrite).
     """
 
@@ -63,6 +69,7 @@ class Recorder:
         overwrite: bool = False,
         queue_bytes: int = QUEUE_BYTES,
         patient: bool = False,
+        snapshots: bool = False,
     ) -> None:
         unknown = [name for name in types.values() if name not in TYPES]
         if unknown:
@@ -71,6 +78,10 @@ class Recorder:
         self._topics = frozenset(types)
         self._queue_bytes = queue_bytes
         self._patient = patient
+        self._snapshots = snapshots
+        self._snapshot_period = round(_snapshot_period(splitting) * 1e9)
+        self._last_snapshot: int | None = None  # when, or when the recording began
+        self._is_full = False
 
         self._wake = threading.Condition()
         self._queue: list[Entry] = []
@@ -84,7 +95,7 @@ class Recorder:
         self._recorded = 0
         self._recorded_bytes = 0
         self._taken = 0  # by the thread, written or not kept
-        self._parts = _create(self.path, types, metadata, splitting, overwrite)
+        self._parts = _create(self.path, types, metadata, splitting, overwrite, snapshots)
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 
@@ -112,6 +123,8 @@ class Recorder:
         with self._wake:
             sequence = self._next_sequence & 0xFFFFFFFF
             self._last_log_time = max(self._last_log_time, log_time)
+            if self._last_snapshot is None:
+                self._last_snapshot = self._last_log_time
             entry = Entry(topic, data, self._last_log_time, max(0, publish_time), sequence, event, objects)
             cost = entry.cost
             while self._patient and self._state is Recording.ON and self._waiting + cost > self._queue_bytes:
@@ -125,6 +138,24 @@ class Recorder:
             self._waiting += cost
             if self._waiting >= _WAKE_BYTES:
                 self._wake.notify()
+
+    @property
+    def snapshot_due(self) -> bool:
+        """Whether it is time for a snapshot: every 10 s, or where another file is to begin."""
+        if not self._snapshots or self._last_snapshot is None:
+            return False
+        return self._is_full or self._last_log_time - self._last_snapshot >= self._snapshot_period
+
+    def write_snapshot(self, snapshot: Snapshot) -> None:
+        """Put the monitor as it is after all messages so far on the queue; left out where that is full."""
+        with self._wake:
+            self._last_snapshot = self._last_log_time
+            self._is_full = False
+            sequence = self._next_sequence & 0xFFFFFFFF
+            entry = Entry("", b"", self._last_log_time, 0, sequence, snapshot=snapshot)
+            if not self._closing and self._state is Recording.ON and self._waiting + entry.cost <= self._queue_bytes:
+                self._queue.append(entry)
+                self._waiting += entry.cost
 
     def status(self) -> dict[str, int | str]:
         """The recording fields of MonitorStatus. What is counted as recorded is with the operating system."""
@@ -184,7 +215,7 @@ class Recorder:
         for begin in range(0, len(batch), _TURN):
             turn = batch[begin : begin + _TURN]
             written += self._parts.write(turn)
-            taken += len(turn)
+            taken += sum(entry.snapshot is None for entry in turn)
             if begin:
                 time.sleep(_PAUSE)
             if time.monotonic() - flushed >= FLUSH_PERIOD:
@@ -194,6 +225,7 @@ class Recorder:
             self._flush(taken, written)
         with self._wake:
             self._waiting -= size
+            self._is_full = self._parts.is_full
             self._wake.notify_all()
         return not closing
 
@@ -205,12 +237,24 @@ class Recorder:
             self._recorded_bytes = self._parts.size
 
 
+def _snapshot_period(splitting: Splitting) -> float:
+    if not splitting.on_event:
+        return SNAPSHOT_PERIOD
+    least, most = EVENT_SNAPSHOT_PERIODS
+    return min(max(least, 0.5 * splitting.before), most)
+
+
 def _create(
-    path: Path, types: Mapping[str, str], metadata: Mapping[str, str], splitting: Splitting, overwrite: bool
+    path: Path,
+    types: Mapping[str, str],
+    metadata: Mapping[str, str],
+    splitting: Splitting,
+    overwrite: bool,
+    snapshots: bool,
 ) -> Parts:
     """The new file, in a new folder unless the path ends in `.mcap`. Raises SessionError."""
     try:
-        return Parts(path, types, metadata, splitting, overwrite=overwrite)
+        return Parts(path, types, metadata, splitting, overwrite=overwrite, snapshots=snapshots)
     except FileExistsError:
         raise SessionError(
             f"{path}: expected a new file, got one that exists; choose another name or remove it"

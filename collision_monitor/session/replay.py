@@ -5,16 +5,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import IntEnum
+from enum import Enum, IntEnum
 
 import numpy as np
 
 from collision_monitor.codec import decode_states
-from collision_monitor.errors import MessageError, SessionError
+from collision_monitor.errors import InputError, MessageError, SessionError
 from collision_monitor.pipeline import Pipeline
+from collision_monitor.profiles import Profile
 from collision_monitor.provenance import provenance
 from collision_monitor.session.compare import Difference, compare_answers, compare_status, compare_within
-from collision_monitor.session.reader import Recorded, Session
+from collision_monitor.session.reader import Place, Recorded, RecordedSnapshot, Session
+from collision_monitor.snapshot import Snapshot
 
 
 class Verdict(IntEnum):
@@ -29,11 +31,14 @@ class Verdict(IntEnum):
 class Report:
     """What a replay did and found. Durations in s; digest: of all answers that the replay gave.
 
-    foreign: another program recorded it. hole: messages are missing, it ends there. late: the session begins after its
-    monitor, whose state then is not in it, so the answers are given anew and not compared. within: answers whose bytes
-    differ by no more than the tolerance. inputs: of the first difference's step, its objects' states in words.
+    begin: s after the session's first message. foreign: another program recorded it. hole: messages are missing, and
+    behind them nothing could be compared up to the next snapshot. late: the session begins after its monitor, whose
+    state then is not in it, so up to the first snapshot the answers are given anew and not compared. within: answers
+    whose bytes differ by no more than the tolerance. inputs: of the first difference's step, its objects' states in
+    words; first_message: the sequence number of the message with it.
     """
 
+    begin: float = 0.0
     steps: int = 0
     messages: int = 0
     compared: int = 0
@@ -45,7 +50,6 @@ class Report:
     tolerance: float | None = None
     first_difference: Difference | None = None
     first_message: int | None = None
-    """Number of the message with the first difference."""
     inputs: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     foreign: bool = False
@@ -57,7 +61,7 @@ class Report:
         """Equal bytes are equal wherever they come from; unequal ones say something only of the same program."""
         if self.first_difference is not None:
             return Verdict.NOT_COMPARABLE if self.foreign and self.tolerance is None else Verdict.DIVERGED
-        return Verdict.NOT_COMPARABLE if self.hole or not self.compared else Verdict.IDENTICAL
+        return Verdict.NOT_COMPARABLE if self.hole or self.late or not self.compared else Verdict.IDENTICAL
 
     @property
     def speed(self) -> float:
@@ -70,16 +74,18 @@ def replay(
     *,
     threads: int | None = None,
     tolerance: float | None = None,
+    start: float = 0.0,
     progress: Callable[[Report], None] | None = None,
 ) -> Report:
     """Replay a session; threads: instead of the recorded number. progress: called after every message.
 
     tolerance (m, s): answers of another version are compared by their distances and times, and status messages not.
+    start (s after the first message): begin with the last snapshot before it.
 
-    Raises SessionError where the session holds no inputs or cannot be read.
+    Raises SessionError where the session holds no inputs or cannot be read, InputError where it has no such time.
     """
     profile = session.profile if threads is None else session.profile.replace(threads=threads)
-    run = _Replay(Pipeline(profile, frame_id=session.frame_id))
+    run = _Replay(profile, session.frame_id)
     report = run.report
     report.tolerance = tolerance
     report.foreign = session.metadata.get("determinism_key") != provenance()["determinism_key"]
@@ -87,31 +93,23 @@ def replay(
         report.notes.append(f"the recording has no settings in it: replayed with the profile {profile.name}")
     elif report.foreign:
         report.notes.append(f"recorded by another program: {_provenance_differences(session)}")
+    place = run.find_start(session, start) if start else None
 
     topics: set[str] = set()
     inputs = 0
     begin: int | None = None
-    first = 0
     started = time.perf_counter()
-    for count, message in enumerate(session.messages()):
-        if count == 0 and message.sequence:
-            first, report.late = message.sequence, True
-            report.notes.append(
-                f"it begins {first} messages after its recording: what the monitor knew then is not in it, "
-                "so its answers are given anew and not compared"
-            )
-        missing = (message.sequence - first - count) & 0xFFFFFFFF
-        if missing:
-            report.hole = True
-            done = "replayed" if report.late else "replayed and compared"
-            report.notes.append(f"{missing} messages are missing after step {report.steps}: {done} up to there")
-            break
-        topics.add(message.topic)
-        inputs += message.type in ("ObjectStateArray", "ObjectDescriptionArray")
-        begin = message.log_time if begin is None else begin
-        run.feed(message, compare=not report.late)
-        report.messages = count + 1
-        report.recorded_duration = (message.log_time - begin) * 1e-9
+    for each in session.entries(place):
+        if isinstance(each, RecordedSnapshot):
+            run.meet(each)
+            continue
+        topics.add(each.topic)
+        inputs += each.type in ("ObjectStateArray", "ObjectDescriptionArray")
+        if not run.take(each):
+            continue
+        begin = each.log_time if begin is None else begin
+        report.messages += 1
+        report.recorded_duration = (each.log_time - begin) * 1e-9
         report.replay_duration = time.perf_counter() - started
         if progress is not None:
             progress(report)
@@ -127,18 +125,97 @@ def replay(
     return report
 
 
+class _Mode(Enum):
+    """What is known of the recorded monitor's state."""
+
+    EXACT = 0  # all of it
+    ANEW = 1  # what it was given from some time on
+    STOPPED = 2  # not what it was given last
+
+
 class _Replay:
     """The pipeline, and the answers that it gave and the session has not shown yet."""
 
-    def __init__(self, pipeline: Pipeline) -> None:
-        self.pipeline = pipeline
-        self.report = Report(digest=pipeline.monitor.digest)
+    def __init__(self, profile: Profile, frame_id: str) -> None:
+        self._profile = profile
+        self._frame_id = frame_id
+        self.pipeline = Pipeline(profile, frame_id=frame_id)
+        self.report = Report(digest=self.pipeline.monitor.digest)
+        self._mode = _Mode.EXACT
+        self._next = 0  # sequence number of the message that comes next
         self._open: dict[str, bytes] = {}
         self._differed_in = -1
         self._states = b""
 
-    def feed(self, message: Recorded, *, compare: bool = True) -> None:
-        """One recorded message: an input is processed, an answer is compared."""
+    # -- where it begins and goes on
+
+    def find_start(self, session: Session, start: float) -> Place | None:
+        """The last snapshot before it (s); None: the start of the session. Raises InputError."""
+        timeline = session.timeline()
+        length = (timeline.end - timeline.begin) * 1e-9
+        if not 0 <= start <= length:
+            raise InputError(f"{session.path}: expected a time from 0 to {length:.3f} s to replay from, got {start:g}")
+        before = [each for each in timeline.snapshots if each.log_time <= timeline.begin + start * 1e9]
+        if not before:
+            self.report.notes.append(f"there is no snapshot in the first {start:g} s: replayed from the start")
+            return None
+        self.report.begin = (before[-1].log_time - timeline.begin) * 1e-9
+        self._mode = _Mode.STOPPED
+        return before[-1]
+
+    def meet(self, recorded: RecordedSnapshot) -> None:
+        """A snapshot: of no use where the state is known already."""
+        missing = (recorded.sequence - self._next) & 0xFFFFFFFF
+        if self._mode is _Mode.EXACT and not missing:
+            return
+        try:
+            snapshot = Snapshot.decode(recorded.data)
+            self.pipeline = Pipeline.restored(snapshot, self._profile, self._frame_id)
+        except InputError as error:
+            if self.report.begin and not self.report.messages:
+                raise SessionError(f"replay it from the start, for the {error}") from None
+            self.report.notes.append(f"the snapshot before message {recorded.sequence} cannot be used: {error}")
+            return
+        step = self.pipeline.monitor.last.step if self.pipeline.monitor.last else 0
+        if self._mode is _Mode.EXACT and self.report.messages:
+            self._note_gap(missing, f"goes on with the snapshot behind them, in step {step}")
+        elif self._mode is _Mode.EXACT:
+            text = f"it begins {recorded.sequence} messages after its recording, with a snapshot in step {step}"
+            self.report.notes.append(text)
+        else:
+            self.report.notes.append(f"compared from the snapshot in step {step} on")
+        self.report.digest = self.pipeline.monitor.digest
+        self._mode, self._next, self._open = _Mode.EXACT, recorded.sequence, {}
+
+    def take(self, message: Recorded) -> bool:
+        """One recorded message; False: it was passed over, because what came before it is not known."""
+        if message.repeated:
+            if not self.report.messages and self._mode is _Mode.EXACT:
+                self.pipeline.on_shapes(message.data)
+            return False
+        missing = (message.sequence - self._next) & 0xFFFFFFFF
+        if missing and self._mode is _Mode.EXACT and not self.report.messages:
+            self._mode, self.report.late = _Mode.ANEW, True
+            self.report.notes.append(
+                f"it begins {missing} messages after its recording: what the monitor knew then is not in it, "
+                "so its answers are given anew and not compared"
+            )
+        elif missing and self._mode is not _Mode.STOPPED:
+            done = "replayed and compared" if self._mode is _Mode.EXACT else "replayed"
+            self._note_gap(missing, f"{done} up to there")
+            self._mode, self.report.hole = _Mode.STOPPED, True
+        self._next = (message.sequence + 1) & 0xFFFFFFFF
+        if self._mode is not _Mode.STOPPED:
+            self._feed(message, compare=self._mode is _Mode.EXACT)
+        return self._mode is not _Mode.STOPPED
+
+    def _note_gap(self, missing: int, what: str) -> None:
+        self.report.notes.append(f"{missing} messages are missing after step {self.report.steps}: {what}")
+
+    # -- messages
+
+    def _feed(self, message: Recorded, *, compare: bool) -> None:
+        """An input is processed, an answer is compared."""
         if not compare:
             self._open = {}
         match message.type:
@@ -187,7 +264,7 @@ class _Replay:
             return
         if self.report.first_difference is None:
             self.report.first_difference = difference
-            self.report.first_message = self.report.messages
+            self.report.first_message = (self._next - 1) & 0xFFFFFFFF
             self.report.inputs = _states_in_words(self._states, difference.pair)
         if self._differed_in != difference.step:
             self._differed_in = difference.step

@@ -212,6 +212,7 @@ class _Copy:
         if isinstance(record, Metadata):
             self._writer.add_metadata(record.name, record.metadata)
         elif record is not None:
+            self._writer.flush()  # type: ignore[no-untyped-call]  # it stays behind the messages before it
             self._writer.add_attachment(
                 record.create_time, record.log_time, record.name, record.media_type, record.data
             )

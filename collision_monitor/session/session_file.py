@@ -15,6 +15,9 @@ from collision_monitor.session.rosbag2 import Extent, channel_metadata, file_met
 METADATA: Final = "collision_monitor"
 """Name of the metadata record that makes an MCAP file a session."""
 
+SNAPSHOT: Final = "snapshot_before_"
+"""How the names of snapshots begin; the number of the message that follows comes next."""
+
 
 class SessionFile:
     """Being written. definitions: of each type in types.values(). Raises OSError, as all of its methods do."""
@@ -66,11 +69,16 @@ class SessionFile:
 
     def write(self, entries: Sequence[Entry]) -> None:
         """Append messages; log times must not decrease."""
-        if self._begin is None and entries:
-            self._begin = entries[0].log_time
-        channels, add = self._channels, self._writer.add_message
-        for topic, data, log_time, publish_time, sequence, _, _ in entries:
-            add(channels[topic], data, log_time, publish_time, sequence)
+        if not entries:
+            return
+        self._begin = entries[0].log_time if self._begin is None else self._begin
+        topics, data, log_times, publish_times, sequences, *_ = zip(*entries, strict=True)
+        channels = list(map(self._channels.__getitem__, topics))
+        self._writer.add_messages(channels, data, log_times, publish_times, sequences)
+
+    def write_snapshot(self, data: bytes, sequence: int, log_time: int) -> None:
+        """Append the monitor before message `sequence`, as `Snapshot.encode` has it."""
+        self._writer.add_attachment(f"{SNAPSHOT}{sequence}.npz", "application/x-npz", data, log_time)
 
     def flush(self) -> None:
         """Hand everything to the operating system, which keeps it when this process is killed."""

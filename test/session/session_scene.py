@@ -79,6 +79,8 @@ def record(
             recorder.write(PREDICTIONS, outputs.predictions, now, stamp)
             if outputs.result.step % 5 == 0:
                 recorder.write(STATUS, pipeline.status(recording=1, rate=100.0), now, now)
+        if recorder.snapshot_due:
+            recorder.write_snapshot(pipeline.snapshot())
     if close:
         recorder.close()
     return recorder
