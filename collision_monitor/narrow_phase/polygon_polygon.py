@@ -12,7 +12,7 @@ from typing import Any
 from collision_monitor._jit import device
 from collision_monitor.geometry.shape_table import CIRCLE
 from collision_monitor.narrow_phase.answer import write
-from collision_monitor.tolerances import FACE_PREFERENCE, FEATURE_TIE, SAT_ROUND_OFF
+from collision_monitor.tolerances import FEATURE_TIE, SAT_ROUND_OFF
 
 
 @device
@@ -98,6 +98,7 @@ def planar_contact(table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: 
     if table.kind[b] == CIRCLE:
         rb += table.size[b, 0]
     tie = FEATURE_TIE * size
+    round_off = SAT_ROUND_OFF * (size + abs(px) + abs(py))
     gap, nx, ny, x, y = _widest_gap(table, a, b, RA, RB, px, py, tie)
     other, mx, my, u, v = _widest_gap(table, b, a, RB, RA, -px, -py, tie)
     if other > gap:
@@ -112,11 +113,12 @@ def planar_contact(table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: 
         if other < squared:
             dx, dy, x0, y0 = u - x1, v - y1, x1 + px, y1 + py
         distance = sqrt(dx * dx + dy * dy)
-        if distance > 0.0 and (gap == -inf or distance - gap > FACE_PREFERENCE * size):
+        # beside the edge's normal by more than round-off: a corner is nearest, though the gap may be as long to 1e-9
+        if distance > 0.0 and (gap == -inf or abs(dx * ny - dy * nx) > round_off):
             nx, ny, x, y = dx / distance, dy / distance, x0, y0
         elif gap > 0.0:
             distance = gap  # the edge's normal is that of the distance, and has no noise however near they are
         else:
             distance, x, y = 0.0, x0, y0  # the centres of two circles coincide: every direction is as good
-    bound = SAT_ROUND_OFF * (size + ra + rb + abs(px) + abs(py))
+    bound = round_off + SAT_ROUND_OFF * (ra + rb)
     write(out, distance - ra - rb, nx, ny, 0.0, x + ra * nx, y + ra * ny, 0.0, bound)

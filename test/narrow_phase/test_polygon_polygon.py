@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from decimal import Decimal, localcontext
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -65,6 +67,24 @@ def test_convex_polygons_against_the_minkowski_difference(seed):
         assert np.linalg.norm(polygon + t[:, None] * along - point[:2], axis=1).min() < 1e-12
     s = contact(b, Y, a, X)
     assert s.signed_distance == pytest.approx(c.signed_distance, abs=1e-14)
+
+
+@pytest.mark.parametrize("aside", [2.0**-k for k in (4, 10, 14, 16, 20, 24, 28, 40, 52)])
+@pytest.mark.parametrize("gap", [2.0**-k for k in (0, 10, 20, 30)])
+def test_corners_nearly_across_an_edge(gap, aside):
+    """Two corners are nearest, in a direction that is nearly an edge's normal: the gap across that edge is shorter."""
+    low = Polygon([(-1, -1), (0, -1), (0, 0), (-1, 0)])
+    high = Polygon([(0, 0), (1, 1), (0.5, 2)])
+    c = contact(low, Pose(), high, Pose((aside, gap, 0)))
+    with localcontext() as context:
+        context.prec = 60
+        expected = float((Decimal(gap) ** 2 + Decimal(aside) ** 2).sqrt())
+    assert abs(c.signed_distance - expected) <= c.error_bound <= 1e-13
+    np.testing.assert_allclose(c.point_a, (0, 0, 0), atol=1e-13)
+    np.testing.assert_allclose(c.point_b, (aside, gap, 0), atol=1e-13)
+    # where the corners are clearly beside each other, their difference is the normal
+    if aside > 1e-12:
+        np.testing.assert_allclose(c.normal, np.array([aside, gap, 0]) / np.hypot(aside, gap), atol=1e-9)
 
 
 @settings(max_examples=100, deadline=None)
