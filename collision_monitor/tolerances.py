@@ -35,6 +35,10 @@ HULL_DROP: Final = 1e-14
 """A point that stands out of its hull by less than this part of the hull's size is dropped with the interior ones.
 Larger: visible corners vanish. Smaller: round-off keeps points that lie in a face, and each costs time."""
 
+OPPOSED: Final = 8 * EPSILON
+"""Two half-spaces face each other where their normals add up to at most this: what turning both by one pose leaves.
+Larger: planes that meet far away count as parallel. Smaller: a floor and a ceiling overlap without end."""
+
 FEATURE_TIE: Final = 1e-9
 """An edge or face counts as touching as a whole when its ends differ by less than this part of the size in depth.
 Larger: witness points leave the surface visibly. Smaller: resting faces are reported as a vertex that jumps about."""

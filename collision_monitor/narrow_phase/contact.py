@@ -20,9 +20,10 @@ from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shape_table import ShapeTableBuilder
 from collision_monitor.geometry.shapes import ConvexHull, HalfSpace, Mesh, Shape
 from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.narrow_phase.models import Modelled, containing_model
 from collision_monitor.records import Model
-from collision_monitor.tolerances import UNIT_QUATERNION
+from collision_monitor.tolerances import FEATURE_TIE, UNIT_QUATERNION
 
 Array = NDArray[np.float64]
 Compound = Shape | Sequence[tuple[Shape, Pose]]
@@ -37,9 +38,11 @@ FIRST_BATCH: Final = 64
 class Contact:
     """How two shapes stand to each other, in the world frame, lengths in m.
 
-    signed_distance: negative where they overlap. error_bound: the true value is within it. normal: unit, from A to B.
-    point_a, point_b: the nearest points, or where they overlap the deepest ones; point_b - point_a is
-    signed_distance * normal. model_a, model_b: what answered for the shapes.
+    signed_distance: negative where they overlap; -inf for two half-spaces that do not face each other, which no
+    translation parts (the points are then one that both have). error_bound: the true value is within it. normal: unit,
+    from A to B. point_a, point_b: the nearest points, or where they overlap the deepest ones; point_b - point_a is
+    signed_distance * normal. points_a, points_b (k, 3): the corners of the patch where a face or an edge of polytopes
+    lies on the other's, at most four, else those two points alone. model_a, model_b: what answered for the shapes.
     """
 
     signed_distance: float
@@ -47,6 +50,8 @@ class Contact:
     normal: Array
     point_a: Array
     point_b: Array
+    points_a: Array
+    points_b: Array
     model_a: Model
     model_b: Model
 
@@ -83,25 +88,30 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
         _check_in_plane(a)
         _check_in_plane(b)
     offset = b.pose.position - a.pose.position
-    row = _deepest(a, b, offset)
+    row, patch = _deepest(a, b, offset)
     distance, bound = float(row[0]), float(row[10])
     enclosed = distance > 0.0 and (_holds(a, b, offset) or _holds(b, a, -offset))
     if enclosed:
         # no faces meet, but one is inside of the other, at least this deep
         distance, row[1:4] = -distance, -row[1:4]
+        patch = row[None, 4:7]
     convex = len(a.position) == len(b.position) == 1
-    if distance <= 0.0 and not convex:
+    unbounded = distance == -np.inf  # a fact about the two, with no length to be wrong about
+    if distance <= 0.0 and not convex and not unbounded:
         bound += max(_parting(a, b, offset, row[1:4]) + distance, 0.0)
     excess = a.modelled.excess + b.modelled.excess
     if distance <= 0.0 and excess > 0.0 and not (a.modelled.convex and b.modelled.convex):
         bound -= distance  # the models may overlap deeply where the concave objects do not meet at all
-    point = a.pose.position + row[4:7]
+    point, points = a.pose.position + row[4:7], a.pose.position + patch
+    across = np.zeros(3) if unbounded else distance * row[1:4]
     return Contact(
         signed_distance=distance,
         error_bound=bound + excess,
         normal=row[1:4],
         point_a=point,
-        point_b=point + distance * row[1:4],
+        point_b=point + across,
+        points_a=points,
+        points_b=points + across,
         model_a=a.modelled.model,
         model_b=b.modelled.model,
     )
@@ -127,10 +137,11 @@ def _check_in_plane(side: _Side) -> None:
         raise PoseError(f"expected a turn about z for a shape of the plane, got the quaternion {side.pose.quaternion}")
 
 
-def _deepest(a: _Side, b: _Side, offset: Array) -> Array:
-    """The contact (15,) of the nearest or deepest pair of pieces, about A's origin (see answer.py).
+def _deepest(a: _Side, b: _Side, offset: Array) -> tuple[Array, Array]:
+    """The contact (15,) of the nearest or deepest pair of pieces, about A's origin (see answer.py), and its patch on A.
 
-    Pairs are looked at in the order of their bounding spheres' distances, until no other can be nearer.
+    Pairs are looked at in the order of their bounding spheres' distances, until no other can be nearer. The patch
+    (k, 3) is that of all pairs that touch in the same plane: a floor of triangles is one.
     """
     n, m = len(a.position), len(b.position)
     builder = ShapeTableBuilder(slots=n + m)
@@ -147,17 +158,26 @@ def _deepest(a: _Side, b: _Side, offset: Array) -> Array:
     lower = np.ravel(lower)
     order = np.argsort(lower, kind="stable")
     best: Any = None
+    looked_at = []
     begin, size = 0, FIRST_BATCH
     while begin < len(order) and (best is None or lower[order[begin]] <= best[0]):
         some = order[begin : begin + size]
         pairs = np.stack([some // m, n + some % m], axis=1).astype(np.int32)
         rows = contact_batch(builder.table, position, rotation, pairs)
+        looked_at.append((pairs, rows))
         k = int(rows[:, 0].argmin())
         if best is None or rows[k, 0] < best[0]:
-            best = rows[k]
-            best[4:7] += position[pairs[k, 0]]
+            best, pair = rows[k].copy(), pairs[k]
         begin, size = begin + size, 2 * size
-    return np.asarray(best)
+    tie = FEATURE_TIE * float(radius[pair][np.isfinite(radius[pair])].sum())
+    patches = []
+    for pairs, rows in looked_at:
+        level = (rows[:, 0] <= best[0] + tie) & (rows[:, 1:4] @ best[1:4] >= 1.0 - FEATURE_TIE)
+        count, points = manifold_batch(builder.table, position, rotation, pairs[level], rows[level])
+        patches += [points[i, : count[i]] + position[pairs[level][i, 0]] for i in range(len(count))]
+    best[4:7] += position[pair[0]]
+    patch = patches[0] if len(patches) == 1 else outline(np.concatenate(patches), best[1:4], tie)
+    return best, patch if len(patch) > 1 else best[None, 4:7]
 
 
 def _holds(outer: _Side, inner: _Side, offset: Array) -> bool:

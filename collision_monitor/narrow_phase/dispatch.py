@@ -19,7 +19,7 @@ from collision_monitor.narrow_phase.box_box import axis_direction, box_box_separ
 from collision_monitor.narrow_phase.capsule_capsule import capsule_capsule_contact
 from collision_monitor.narrow_phase.convex_convex import convex_contact, convex_separation
 from collision_monitor.narrow_phase.cylinder_cylinder import is_parallel, parallel_cylinders_contact
-from collision_monitor.narrow_phase.half_space import half_space_contact
+from collision_monitor.narrow_phase.half_space import half_space_contact, half_spaces_contact
 from collision_monitor.narrow_phase.polygon_polygon import planar_contact
 from collision_monitor.narrow_phase.sphere_box import sphere_box_contact, sphere_box_separation
 from collision_monitor.narrow_phase.sphere_cone import sphere_cone_contact
@@ -75,11 +75,6 @@ def _separation(
         return sphere_box_separation(
             table.size[a, 0] + margin, table.size[b, 0], table.size[b, 1], table.size[b, 2], RB, px, py, pz, out
         )
-    if ka == HALF_SPACE:
-        out[0] = 0.0
-        out[1] = 0.0
-        out[2] = 1.0
-        return -inf
     # the closed forms that are left: a contact costs little more than a distance
     answer = work[0:CONTACT_SIZE]
     if _closed_form(table, a, b, RA, RB, px, py, pz, answer):
@@ -97,7 +92,10 @@ def _closed_form(
     """The contact into out, where one formula gives it; sphere-sphere, sphere-box and box-box are not looked for."""
     ka, kb = table.kind[a], table.kind[b]
     if kb == HALF_SPACE:
-        half_space_contact(table, a, b, RA, RB, px, py, pz, out)
+        if ka == HALF_SPACE:
+            half_spaces_contact(table, a, b, RA, RB, px, py, pz, out)
+        else:
+            half_space_contact(table, a, b, RA, RB, px, py, pz, out)
         return True
     if ka >= CIRCLE:
         planar_contact(table, a, b, RA, RB, px, py, out)
@@ -189,12 +187,6 @@ def _contact(
             table.size[a, 0] + table.margin[a], table.size[b, 0], table.size[b, 1], table.size[b, 2],
             table.margin[b], RB, px, py, pz, out,
         )  # fmt: skip
-    elif ka == HALF_SPACE:
-        # both unbounded: they overlap without end but where they face away from each other
-        for i in range(CONTACT_SIZE):
-            out[i] = 0.0
-        out[0] = -inf
-        out[3] = 1.0
     elif not _closed_form(table, a, b, RA, RB, px, py, pz, out):
         return convex_contact(table, a, b, RA, RB, px, py, pz, limit, out, work)
     return True

@@ -153,6 +153,31 @@ def test_half_spaces_with_compounds():
     assert deep.error_bound < 1e-12
 
 
+@pytest.mark.filterwarnings("error")
+def test_two_half_spaces():
+    """Facing each other they are a floor and a ceiling; else no translation parts them."""
+    rng = np.random.default_rng(8)
+    floor, ceiling = cm.HalfSpace((0, 0, 1), 0.25), cm.HalfSpace((0, 0, -1), 0.5)
+    for gap in (2.0, 0.0, -3.0):
+        for _ in range(20):
+            X = random_pose(rng)
+            c = contact(floor, X, ceiling, X @ Pose((1, 2, 0.75 + gap)))
+            assert c.signed_distance == pytest.approx(gap, abs=c.error_bound) and c.error_bound < 1e-12
+            np.testing.assert_allclose(c.normal, X.rotation[:, 2], atol=1e-15)
+            for point, height in ((c.point_a, 0.25), (c.point_b, 0.25 + gap)):
+                assert ((point - X.position) @ X.rotation)[2] == pytest.approx(height)
+    for _ in range(50):
+        a, b = (cm.HalfSpace(rng.normal(size=3), rng.normal()) for _ in "ab")
+        X, Y = random_pose(rng), random_pose(rng)
+        for c in (contact(a, X, b, Y), contact(b, Y, a, X), contact([(a, Pose()), (ROCK, Pose())], X, b, Y)):
+            assert c.signed_distance == -np.inf and c.overlaps and c.error_bound == 0.0
+            np.testing.assert_array_equal(c.point_a, c.point_b)
+            for shape, pose in ((a, X), (b, Y)):
+                assert (c.point_a - pose.position) @ pose.rotation @ shape.normal <= shape.offset + 1e-12
+    same = contact(floor, Pose(), floor, Pose((0, 0, -1)))
+    assert same.signed_distance == -np.inf and same.point_a[2] == -0.75
+
+
 @pytest.mark.parametrize(
     ("arguments", "error", "words"),
     [

@@ -1,0 +1,54 @@
+"""Which features of two polytopes a contact is between: "vertex 3 of A on face 7 of B"."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.errors import UnsupportedError
+from collision_monitor.geometry.bounding_volumes import convex_hull
+from collision_monitor.geometry.contact_features import Feature, FeatureContact, FeatureType, feature_at
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape
+from collision_monitor.narrow_phase.contact import Contact
+
+Array = NDArray[np.float64]
+
+# Corners of a box by their sides as bits (x, y, z), and two triangles for each face: +x -x +y -y +z -z.
+_SIDES: Final = np.array([[(k >> axis & 1) - 0.5 for axis in range(3)] for k in range(8)])
+_QUADS: Final = np.array([[1, 3, 7, 5], [0, 4, 6, 2], [2, 6, 7, 3], [0, 1, 5, 4], [4, 5, 7, 6], [0, 2, 3, 1]])
+_TRIANGLES: Final = _QUADS[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+
+
+def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Shape, pose_b: Pose) -> FeatureContact:
+    """The features of A and of B at the witness points of their contact, for Box, ConvexHull and Mesh.
+
+    A mesh's vertices and faces have its own numbers, a hull's vertices those of its points, and its faces those of
+    `convex_hull`. A box has its corners numbered by their sides (bit 0: +x, 1: +y, 2: +z) and its faces
+    +x -x +y -y +z -z. Raises UnsupportedError for other shapes.
+    """
+    return FeatureContact(
+        _feature(shape_a, pose_a, contact.point_a, contact.normal),
+        _feature(shape_b, pose_b, contact.point_b, -contact.normal),
+    )
+
+
+def _feature(shape: Shape, pose: Pose, point: Array, normal: Array) -> Feature:
+    at, towards = (point - pose.position) @ pose.rotation, normal @ pose.rotation
+    match shape:
+        case Mesh():
+            return feature_at(at, towards, shape.vertices, shape.faces)
+        case ConvexHull():
+            hull = convex_hull(shape.points)
+            found = feature_at(at, towards, hull.vertices, hull.faces)
+            same = (shape.points == hull.vertices[list(found.vertices), None]).all(axis=-1)
+            return found._replace(vertices=tuple(same.argmax(axis=1).tolist()))
+        case Box():
+            found = feature_at(at, towards, _SIDES * shape.size, _TRIANGLES)
+            if found.type is FeatureType.FACE:
+                return Feature(FeatureType.FACE, tuple(_QUADS[found.face // 2].tolist()), found.face // 2)
+            return found
+    kind = type(shape).__name__
+    raise UnsupportedError(f"{kind} has no vertices, edges and faces; supported are Box, ConvexHull, Mesh")

@@ -1,0 +1,342 @@
+"""Contact manifolds of polytopes: the patch in which a face or an edge lies on the other, as at most four points.
+
+The features that touch are the corners within FEATURE_TIE of the supporting planes across the contact's normal. Seen
+along it they are two convex polygons, and what these share is the patch; four of its corners stand for it.
+(Sutherland and Hodgman, 1974, for the clipping; Andrew, 1979, for the outline)
+"""
+
+from __future__ import annotations
+
+from math import copysign, inf, sqrt
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor._jit import device, kernel
+from collision_monitor.geometry.shape_table import BOX, CONVEX_HULL, HALF_SPACE
+from collision_monitor.narrow_phase.answer import work_array
+from collision_monitor.tolerances import EPSILON, FEATURE_TIE, SAT_ROUND_OFF, TOUCHING
+
+MOST_POINTS: Final = 4
+
+CORNERS: Final = 512
+"""Corners of one feature that are looked at; a face with more is cut down to its first ones."""
+
+# Where in the scratch memory polygons are, rows of (x, y): A's, B's, and two to work with. Clipping adds corners.
+_ROOM: Final = 8 * CORNERS + 16
+_A, _B, _C, _D = 0, _ROOM, 2 * _ROOM, 3 * _ROOM
+
+
+@device
+def _basis(nx: float, ny: float, nz: float) -> Any:
+    """Two unit vectors across n and each other, the same for n and -n."""
+    if abs(nx) >= abs(ny) and abs(nx) >= abs(nz):
+        sign = copysign(1.0, nx)
+        ux, uy, uz = -sign * ny, sign * nx, 0.0
+    elif abs(ny) >= abs(nz):
+        sign = copysign(1.0, ny)
+        ux, uy, uz = 0.0, -sign * nz, sign * ny
+    else:
+        sign = copysign(1.0, nz)
+        ux, uy, uz = sign * nz, 0.0, -sign * nx
+    length = sqrt(ux * ux + uy * uy + uz * uz)
+    ux, uy, uz = ux / length, uy / length, uz / length
+    return ux, uy, uz, sign * (ny * uz - nz * uy), sign * (nz * ux - nx * uz), sign * (nx * uy - ny * ux)
+
+
+@device
+def _corner(table: Any, slot: int, k: int) -> Any:
+    """Corner k of a box or a hull in its own frame."""
+    if table.kind[slot] == BOX:
+        return (
+            copysign(table.size[slot, 0], (k & 1) - 0.5),
+            copysign(table.size[slot, 1], (k & 2) - 1.0),
+            copysign(table.size[slot, 2], (k & 4) - 2.0),
+        )
+    at = table.vertex_start[slot] + k
+    return table.vertices[0, at], table.vertices[1, at], table.vertices[2, at]
+
+
+@device
+def _outline(work: Any, at: int, count: int, tie: float) -> int:
+    """Put points (count rows of 2 at `at`) into their convex outline, counter-clockwise; how many there are.
+
+    What stands out by `tie` (m) or less is left out. Andrew's monotone chain, sorted by insertion.
+    """
+    for k in range(1, count):
+        x, y = work[at + 2 * k], work[at + 2 * k + 1]
+        j = k - 1
+        while j >= 0 and (work[at + 2 * j] > x or (work[at + 2 * j] == x and work[at + 2 * j + 1] > y)):
+            work[at + 2 * j + 2], work[at + 2 * j + 3] = work[at + 2 * j], work[at + 2 * j + 1]
+            j -= 1
+        work[at + 2 * j + 2], work[at + 2 * j + 3] = x, y
+    kept = 0
+    for turn in range(2):  # along the lower side, and back along the upper one
+        first = kept
+        for step in range(count):
+            k = step if turn == 0 else count - 1 - step
+            x, y = work[at + 2 * k], work[at + 2 * k + 1]
+            while kept - first >= 2:
+                p, q = _C + 2 * (kept - 2), _C + 2 * (kept - 1)
+                ux, uy = x - work[p], y - work[p + 1]
+                if (work[q] - work[p]) * uy - (work[q + 1] - work[p + 1]) * ux > tie * sqrt(ux * ux + uy * uy):
+                    break
+                kept -= 1
+            work[_C + 2 * kept], work[_C + 2 * kept + 1] = x, y
+            kept += 1
+        kept -= 1  # the last one begins the other side
+    kept = max(kept, 1)
+    if kept == 2 and max(abs(work[_C] - work[_C + 2]), abs(work[_C + 1] - work[_C + 3])) <= tie:
+        kept = 1
+    for k in range(2 * kept):
+        work[at + k] = work[_C + k]
+    return kept
+
+
+@device
+def _touching(
+    table: Any, slot: int, R: Any, nx: float, ny: float, nz: float, height_tie: float, tie: float,
+    ux: float, uy: float, uz: float, vx: float, vy: float, vz: float, x: float, y: float, work: Any, at: int,
+) -> int:  # fmt: skip
+    """The outline of the corners within `height_tie` of the farthest along n, in coordinates u, v about (x, y)."""
+    count = 8 if table.kind[slot] == BOX else int(table.vertex_count[slot])
+    farthest = -inf
+    kept = 0
+    for scan in range(2):
+        for k in range(count):
+            cx, cy, cz = _corner(table, slot, k)
+            wx = R[0, 0] * cx + R[0, 1] * cy + R[0, 2] * cz
+            wy = R[1, 0] * cx + R[1, 1] * cy + R[1, 2] * cz
+            wz = R[2, 0] * cx + R[2, 1] * cy + R[2, 2] * cz
+            height = nx * wx + ny * wy + nz * wz
+            if scan == 0:
+                farthest = max(farthest, height)
+            elif height >= farthest - height_tie and kept < CORNERS:
+                work[at + 2 * kept] = x + ux * wx + uy * wy + uz * wz
+                work[at + 2 * kept + 1] = y + vx * wx + vy * wy + vz * wz
+                kept += 1
+    return _outline(work, at, kept, tie)
+
+
+@device
+def _clip_to_edge(
+    work: Any, source: int, target: int, count: int, x: float, y: float, ux: float, uy: float, round_off: float
+) -> int:
+    """Of a polygon, what is left of the line through (x, y) along (ux, uy) or on it; its corners."""
+    kept = 0
+    slack = round_off * sqrt(ux * ux + uy * uy)
+    for k in range(count):
+        here, there = source + 2 * k, source + 2 * ((k + 1) % count)
+        d0 = ux * (work[here + 1] - y) - uy * (work[here] - x) + slack
+        d1 = ux * (work[there + 1] - y) - uy * (work[there] - x) + slack
+        if d0 >= 0.0:
+            work[target + 2 * kept], work[target + 2 * kept + 1] = work[here], work[here + 1]
+            kept += 1
+        if (d0 > 0.0 and d1 < 0.0) or (d0 < 0.0 and d1 > 0.0):
+            f = d0 / (d0 - d1)
+            work[target + 2 * kept] = work[here] + f * (work[there] - work[here])
+            work[target + 2 * kept + 1] = work[here + 1] + f * (work[there + 1] - work[here + 1])
+            kept += 1
+    return kept
+
+
+@device
+def _shared(work: Any, a: int, na: int, b: int, nb: int, round_off: float) -> int:
+    """What the polygon at a (na >= 3 corners) and the polygon or segment at b have in common, at b; its corners."""
+    source, target = b, _D
+    for k in range(na):
+        x, y = work[a + 2 * k], work[a + 2 * k + 1]
+        after = a + 2 * ((k + 1) % na)
+        nb = _clip_to_edge(work, source, target, nb, x, y, work[after] - x, work[after + 1] - y, round_off)
+        source, target = target, source
+        if nb == 0:
+            return 0
+    for k in range(2 * nb):
+        work[b + k] = work[source + k]
+    return nb
+
+
+@device
+def _shared_line(work: Any, a: int, b: int, tie: float) -> int:
+    """What two segments on one line have in common, at b: 2, or 0 where they are not on one line."""
+    ux, uy = work[a + 2] - work[a], work[a + 3] - work[a + 1]
+    length = sqrt(ux * ux + uy * uy)
+    ux, uy = ux / length, uy / length
+    first, last = inf, -inf
+    for k in range(2):
+        x, y = work[b + 2 * k] - work[a], work[b + 2 * k + 1] - work[a + 1]
+        if abs(ux * y - uy * x) > tie:
+            return 0
+        first, last = min(first, ux * x + uy * y), max(last, ux * x + uy * y)
+    first, last = max(first, 0.0), min(last, length)
+    if first > last + tie:
+        return 0
+    work[b], work[b + 1] = work[a] + first * ux, work[a + 1] + first * uy
+    work[b + 2], work[b + 3] = work[a] + last * ux, work[a + 1] + last * uy
+    return 2
+
+
+@device
+def _four(work: Any, at: int, count: int, tie: float) -> int:
+    """Put the corners that stand for a polygon first, in its order: at most four. Of equals the first is taken.
+
+    The two farthest from each other, as found from the middle, and those farthest from their line on either side.
+    """
+    if count <= MOST_POINTS:
+        return count
+    mx = my = 0.0
+    for k in range(count):
+        mx += work[at + 2 * k] / count
+        my += work[at + 2 * k + 1] / count
+    i = _farthest(work, at, count, mx, my, 0.0, 0.0, tie)
+    ix, iy = work[at + 2 * i], work[at + 2 * i + 1]
+    j = _farthest(work, at, count, ix, iy, 0.0, 0.0, tie)
+    ux, uy = work[at + 2 * j] - ix, work[at + 2 * j + 1] - iy
+    left = _farthest(work, at, count, ix, iy, ux, uy, tie)
+    right = _farthest(work, at, count, ix, iy, -ux, -uy, tie)
+    kept = 0
+    for k in range(count):
+        if k == i or k == j or k == left or k == right:
+            work[at + 2 * kept], work[at + 2 * kept + 1] = work[at + 2 * k], work[at + 2 * k + 1]
+            kept += 1
+    return kept
+
+
+@device
+def _farthest(work: Any, at: int, count: int, x: float, y: float, ux: float, uy: float, tie: float) -> int:
+    """The corner farthest from (x, y), or left of the line through it along u where that is not zero."""
+    best, chosen = -inf, 0
+    length = sqrt(ux * ux + uy * uy)
+    for k in range(count):
+        dx, dy = work[at + 2 * k] - x, work[at + 2 * k + 1] - y
+        far = (ux * dy - uy * dx) / length if length > 0.0 else sqrt(dx * dx + dy * dy)
+        if far > best + tie:
+            best, chosen = far, k
+    return chosen
+
+
+@device
+def manifold(
+    table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float, pz: float, row: Any, out: Any, work: Any
+) -> int:
+    """The points on A (4, 3) of a contact (`row`, see answer.py), about A's origin in world axes; how many there are.
+
+    One, the witness, where no face or edge touches as a whole or one of the two is not a polytope.
+    """
+    for i in range(3):
+        out[0, i] = row[4 + i]
+    ka, kb = table.kind[a], table.kind[b]
+    flat_a, flat_b = ka == BOX or ka == CONVEX_HULL, kb == BOX or kb == CONVEX_HULL
+    if not ((flat_a or ka == HALF_SPACE) and (flat_b or kb == HALF_SPACE) and (flat_a or flat_b)):
+        return 1
+    nx, ny, nz = row[1], row[2], row[3]
+    size = 0.0
+    if flat_a:
+        size += table.radius[a]
+    if flat_b:
+        size += table.radius[b]
+    tie = FEATURE_TIE * size
+    height_tie = tie
+    core = row[0] + table.margin[a] + table.margin[b]
+    if core > TOUCHING * size:
+        # GJK's normal of two hulls is no better than their round-off over their distance
+        height_tie += 8.0 * EPSILON * size * size / core
+    ux, uy, uz, vx, vy, vz = _basis(nx, ny, nz)
+    na = nb = 0
+    if flat_a:
+        na = _touching(table, a, RA, nx, ny, nz, height_tie, tie, ux, uy, uz, vx, vy, vz, 0.0, 0.0, work, _A)
+    if flat_b:
+        x, y = ux * px + uy * py + uz * pz, vx * px + vy * py + vz * pz
+        nb = _touching(table, b, RB, -nx, -ny, -nz, height_tie, tie, ux, uy, uz, vx, vy, vz, x, y, work, _B)
+    at = _B
+    if na == 0:
+        count = nb
+    elif nb == 0:
+        at, count = _A, na
+    elif na == 1 or nb == 1:
+        return 1
+    elif na >= 3:
+        count = _shared(work, _A, na, _B, nb, SAT_ROUND_OFF * size)
+    elif nb >= 3:
+        at, count = _A, _shared(work, _B, nb, _A, na, SAT_ROUND_OFF * size)
+    else:
+        count = _shared_line(work, _A, _B, tie)
+    if count < 2:
+        return 1
+    count = _four(work, at, _outline(work, at, count, tie), tie)
+    height = nx * row[4] + ny * row[5] + nz * row[6]
+    for k in range(count):
+        x, y = work[at + 2 * k], work[at + 2 * k + 1]
+        out[k, 0] = x * ux + y * vx + height * nx
+        out[k, 1] = x * uy + y * vy + height * ny
+        out[k, 2] = x * uz + y * vz + height * nz
+    return count
+
+
+@device
+def _manifolds(
+    table: Any, position: Any, rotation: Any, pairs: Any, contacts: Any, count: Any, out: Any, work: Any
+) -> None:
+    for k in range(len(pairs)):
+        a, b = pairs[k, 0], pairs[k, 1]
+        count[k] = manifold(
+            table, a, b, rotation[a], rotation[b], position[b, 0] - position[a, 0], position[b, 1] - position[a, 1],
+            position[b, 2] - position[a, 2], contacts[k], out[k], work,
+        )  # fmt: skip
+
+
+@kernel
+def _manifold_serial(
+    table: Any, position: Any, rotation: Any, pairs: Any, contacts: Any, count: Any, out: Any, work: Any
+) -> None:
+    _manifolds(table, position, rotation, pairs, contacts, count, out, work)
+
+
+@device
+def _basis_into(normal: Any, out: Any) -> None:
+    out[0, 0], out[0, 1], out[0, 2], out[1, 0], out[1, 1], out[1, 2] = _basis(normal[0], normal[1], normal[2])
+
+
+@kernel
+def _reduce(points: Any, normal: Any, tie: float, axes: Any, work: Any) -> int:
+    """Of points (m, 3) in one plane, those that stand for their outline come first; how many."""
+    _basis_into(normal, axes)
+    base_x, base_y, base_z = points[0, 0], points[0, 1], points[0, 2]
+    for k in range(len(points)):
+        x, y, z = points[k, 0] - base_x, points[k, 1] - base_y, points[k, 2] - base_z
+        work[_A + 2 * k] = axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z
+        work[_A + 2 * k + 1] = axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z
+    count = _four(work, _A, _outline(work, _A, len(points), tie), tie)
+    for k in range(count):
+        x, y = work[_A + 2 * k], work[_A + 2 * k + 1]
+        points[k, 0] = base_x + x * axes[0, 0] + y * axes[1, 0]
+        points[k, 1] = base_y + x * axes[0, 1] + y * axes[1, 1]
+        points[k, 2] = base_z + x * axes[0, 2] + y * axes[1, 2]
+    return count
+
+
+def manifold_batch(
+    table: Any,
+    position: NDArray[np.float64],
+    rotation: NDArray[np.float64],
+    pairs: NDArray[np.int32],
+    contacts: NDArray[np.float64],
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Number of points (M,) and the points on A (M, 4, 3) of the contacts (M, 15) that `contact_batch` gave for pairs.
+
+    About A's origin, in world axes; those on B are a signed distance along the normal away. Unused ones are zero.
+    """
+    count = np.zeros(len(pairs), np.int32)
+    out = np.zeros((len(pairs), MOST_POINTS, 3))
+    _manifold_serial(table, position, rotation, pairs, contacts, count, out, work_array())
+    return count, out
+
+
+def outline(points: NDArray[np.float64], normal: NDArray[np.float64], tie: float) -> NDArray[np.float64]:
+    """At most four points (k, 3) that stand for points (m, 3) of a plane across the normal: patches put together."""
+    while len(points) > CORNERS:
+        parts = np.array_split(points, len(points) // CORNERS + 1)
+        points = np.concatenate([outline(part, normal, tie) for part in parts])
+    points = np.array(points)
+    return points[: _reduce(points, np.array(normal), tie, np.zeros((2, 3)), work_array())]
