@@ -1,0 +1,59 @@
+"""Arrays of axis-aligned boxes: the door of the space partitions, and the comparison of many at a time."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from collision_monitor.errors import InputError
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+AT_ONCE: Final = 1 << 20
+"""Candidates that are compared at a time: their table stays in 100 MB."""
+
+
+def box_arrays(lower: ArrayLike, upper: ArrayLike) -> tuple[Array, Array]:
+    """Boxes by their corners (N, 2 or 3) in m. Raises InputError for ones that have no end or are inside out."""
+    low, high = np.asarray(lower, np.float64), np.asarray(upper, np.float64)
+    if low.ndim != 2 or low.shape[1] not in (2, 3) or low.shape != high.shape:
+        raise InputError(f"boxes: expected corners of shape (N, 2 or 3), got {low.shape} and {high.shape}")
+    if not (np.isfinite(low).all() and np.isfinite(high).all() and (low <= high).all()):
+        raise InputError("boxes: expected finite corners with lower <= upper, got others")
+    return low, high
+
+
+def ranges(first: Indices, count: Indices) -> tuple[Indices, Indices]:
+    """The numbers first[k] … first[k] + count[k] - 1 of all k one after the other, and the k of each."""
+    owner = np.repeat(np.arange(len(count)), count)
+    return np.arange(len(owner)) + np.repeat(first - (np.cumsum(count) - count), count), owner
+
+
+def overlaps_in_ranges(low: Array, high: Array, box: Indices, first: Indices, count: Indices) -> Indices:
+    """Pairs (M, 2) of the boxes `box` (K,) with those numbered first[k] … that they overlap or touch."""
+    found = [np.zeros((0, 2), np.int64)]
+    done = np.cumsum(count)
+    begin = 0
+    while begin < len(box):
+        end = max(int(np.searchsorted(done, (done[begin - 1] if begin else 0) + AT_ONCE, side="right")), begin + 1)
+        j, owner = ranges(first[begin:end], count[begin:end])
+        found.append(overlaps(low, high, box[begin:end][owner], j))
+        begin = end
+    return np.concatenate(found)
+
+
+def overlaps(low: Array, high: Array, i: Indices, j: Indices) -> Indices:
+    """Those (M, 2) of the pairs i, j whose boxes overlap or touch; axis by axis, as most fail on the first."""
+    for axis in range(low.shape[1]):
+        meet = (low[i, axis] <= high[j, axis]) & (low[j, axis] <= high[i, axis])
+        i, j = i[meet], j[meet]
+    return np.stack([i, j], axis=1)
+
+
+def in_order(pairs: Indices) -> Indices:
+    """Pairs with the smaller number first, sorted."""
+    pairs = np.sort(pairs, axis=1)
+    return np.asarray(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))])
