@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 import time
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import IO
 
@@ -87,19 +88,31 @@ def _run(pending: list[stages.Stage], reason: str, ros: machine.RosInstall | Non
         log.write(f"{reason}\n")
         for stage in pending:
             _stamp(stage).unlink(missing_ok=True)
-        for stage in pending:
-            print(f"  {stage.name:<12} {stage.text:<34}", end="", flush=True)
-            start = time.monotonic()
-            inputs = stage.inputs(ros)
-            try:
-                stage.run(ros, log)
-            except (OSError, subprocess.CalledProcessError) as error:
-                print("failed", flush=True)
-                log.write(f"{error}\n")
-                raise machine.SetupError(f"{stage.name}: {_explain(log)} (log: build/{LOG.name})") from error
-            STAMPS.mkdir(exist_ok=True)
-            _stamp(stage).write_text(inputs)
-            print(f"{time.monotonic() - start:5.1f} s", flush=True)
+        with ThreadPoolExecutor() as pool:
+            running: list[tuple[stages.Stage, Future[None]]] = []
+            for stage in pending:
+                print(f"  {stage.name:<12} {stage.text:<34}", end="", flush=True)
+                start = time.monotonic()
+                running.append((stage, pool.submit(_finish, stage, ros, log)))
+                if stage.alongside and stage is not pending[-1]:
+                    print("…", flush=True)
+                    continue
+                for each, work in running:
+                    try:
+                        work.result()
+                    except (OSError, subprocess.CalledProcessError) as error:
+                        print("failed", flush=True)
+                        log.write(f"{error}\n")
+                        raise machine.SetupError(f"{each.name}: {_explain(log)} (log: build/{LOG.name})") from error
+                running.clear()
+                print(f"{time.monotonic() - start:5.1f} s", flush=True)
+
+
+def _finish(stage: stages.Stage, ros: machine.RosInstall | None, log: IO[str]) -> None:
+    inputs = stage.inputs(ros)
+    stage.run(ros, log)
+    STAMPS.mkdir(exist_ok=True)
+    _stamp(stage).write_text(inputs)
 
 
 def main() -> int:

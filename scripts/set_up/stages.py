@@ -24,12 +24,16 @@ MESSAGES = "collision_monitor_msgs"
 
 @dataclass(frozen=True)
 class Stage:
-    """One step: its name, what it says while it runs, the digest of what it is made from, and its work."""
+    """One step: its name, what it says while it runs, the digest of what it is made from, and its work.
+
+    alongside: it may run beside the stage that follows it.
+    """
 
     name: str
     text: str
     inputs: Callable[[machine.RosInstall | None], str]
     run: Callable[[machine.RosInstall | None, IO[str]], None]
+    alongside: bool = False
 
 
 def _digest(*parts: str, files: Iterable[Path] = ()) -> str:
@@ -103,7 +107,9 @@ def _packages_inputs(ros: machine.RosInstall | None) -> str:
 
 
 def _install_packages(ros: machine.RosInstall | None, log: IO[str]) -> None:
-    _call(log, ros, PYTHON, "-m", "pip", "install", "--no-user", "--disable-pip-version-check", *requirements(ros))
+    # --no-compile: half of the modules are never imported, and the others are compiled when they are
+    pip = (PYTHON, "-m", "pip", "install", "--no-user", "--no-compile", "--disable-pip-version-check")
+    _call(log, ros, *pip, *requirements(ros))
     if not ros:
         correct_exported_paths(log)
 
@@ -190,8 +196,8 @@ def _warm_up(ros: machine.RosInstall | None, log: IO[str]) -> None:
 STAGES = (
     Stage("environment", "making .venv", _environment_inputs, _make_environment),
     Stage("packages", "installing Python packages", _packages_inputs, _install_packages),
-    Stage("messages", "building collision_monitor_msgs", _messages_inputs, _build_messages),
     Stage("package", "installing collision-monitor", _package_inputs, _install_package),
+    Stage("messages", "building collision_monitor_msgs", _messages_inputs, _build_messages, alongside=True),
     Stage("warm-up", "compiling the kernels", _warm_up_inputs, _warm_up),
 )
 
