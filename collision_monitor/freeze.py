@@ -19,7 +19,9 @@ from collision_monitor.geometry.shape_table import LANES, POLYGON, ShapeTable, S
 from collision_monitor.monitor import Monitor, StepResult, StepStatus
 from collision_monitor.prediction import active_pairs
 from collision_monitor.prediction.motion import Bodies, Parts, enlarge, make_bodies, make_parts
+from collision_monitor.prediction.spread import Spread
 from collision_monitor.prediction.time_of_impact import IMPACT
+from collision_monitor.prediction.uncertain_predictions import ENTRY
 from collision_monitor.profiles import Profile
 from collision_monitor.records import ShapeType
 from collision_monitor.snapshot import Snapshot, check_range
@@ -34,11 +36,13 @@ def freeze(monitor: Monitor) -> Snapshot:
     free_shapes, free_blocks = m._shapes.free
     arrays = {
         **{f"bodies.{name}": column[:top].copy() for name, column in m._bodies._asdict().items()},
+        **{f"spread.{name}": column[:top].copy() for name, column in m._uncertain.spread._asdict().items()},
         **{f"parts.{name}": column[: len(shapes.kind)].copy() for name, column in m._parts._asdict().items()},
         **{f"shapes.{name}": column.T.copy().T for name, column in shapes._asdict().items()},
         "shapes.vertices": shapes.vertices.T.copy(),
         "boxes": m._grid.box[:top].copy(),
         "events": m._events.events.copy(),
+        "possible": m._uncertain.entries.copy(),
         "pairs": m._pairs.copy(),
         "pair_events": m._pair_events.copy(),
     }
@@ -52,6 +56,7 @@ def freeze(monitor: Monitor) -> Snapshot:
         "names": {str(object_id): name for object_id, name in m._names.items()},
         "allowed": {str(object_id): sorted(others) for object_id, others in m._allowed.items()},
         "planar": m._planar,
+        "uncertain": m._uncertain.active,
         "origin_ns": m._origin_ns,
         "now_ns": m._now_ns,
         "jump_ns": m._jump_ns,
@@ -75,6 +80,7 @@ def thaw(profile: Profile | str, snapshot: Snapshot) -> Monitor:
         _thaw_bodies(m, snapshot, facts, len(used))
         _thaw_pairs(m, snapshot)
         m._step, m.digest, m._planar = facts["step"], facts["digest"], facts["planar"]
+        m._uncertain.active = facts["uncertain"]
         m.refused = {reason: facts["refused"][reason.value] for reason in Refusal}
         m.last_refusal = facts["last_refusal"]
         m._origin_ns, m._now_ns, m._jump_ns = facts["origin_ns"], facts["now_ns"], facts["jump_ns"]
@@ -126,6 +132,10 @@ def _thaw_bodies(m: Monitor, snapshot: Snapshot, facts: dict[str, Any], top: int
     m._top, m._bodies, m._parts = top, make_bodies(capacity), make_parts(len(m._shapes.table.kind))
     enlarge(Bodies(**bodies), m._bodies)
     enlarge(Parts(**parts), m._parts)
+    m._uncertain.enlarge(capacity)
+    like = m._uncertain.spread._asdict()
+    spread = {name: snapshot.array(f"spread.{name}", column, top) for name, column in like.items()}
+    enlarge(Spread(**spread), m._uncertain.spread)
     m._grid = regridded(snapshot.array("boxes", m._grid.box, top), capacity)
     used = np.flatnonzero(bodies["used"])
     m._slots = dict(zip(bodies["motion"]["id"][used].tolist(), used.tolist(), strict=True))
@@ -156,10 +166,12 @@ def _thaw_pairs(m: Monitor, snapshot: Snapshot) -> None:
     events = snapshot.array("events", np.empty(0, IMPACT))
     pairs = snapshot.array("pairs", np.empty(0, active_pairs.PAIR))
     of_pairs = snapshot.array("pair_events", np.empty(0, IMPACT), len(pairs))
-    for name, rows in (("events", events), ("pairs", pairs), ("pair_events", of_pairs)):
+    possible = snapshot.array("possible", np.empty(0, ENTRY))
+    for name, rows in (("events", events), ("pairs", pairs), ("pair_events", of_pairs), ("possible", possible)):
         check_range(name, rows["i"], 0, m._top)
         check_range(name, rows["j"], 0, m._top)
     for rows in (events, of_pairs):
         for shape in ("shape_i", "shape_j"):  # never read where the pair does not meet, and then anything
             np.clip(rows[shape], 0, max(len(m._parts.next) - 1, 0), out=rows[shape])
     m._events.events, m._pairs, m._pair_events = events, pairs, of_pairs
+    m._uncertain.entries = possible

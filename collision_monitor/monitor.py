@@ -29,7 +29,9 @@ from collision_monitor.plan import ScenePlan, scene_plan
 from collision_monitor.prediction import active_pairs, answers, candidates, tracking
 from collision_monitor.prediction.event_list import EventList, keep_first
 from collision_monitor.prediction.motion import Bodies, enlarge, make_bodies, make_parts
+from collision_monitor.prediction.spread import worst_stddevs
 from collision_monitor.prediction.time_of_impact import IMPACT, Scratch, make_scratch
+from collision_monitor.prediction.uncertain_predictions import Scene, UncertainPredictions
 from collision_monitor.profiles import Profile
 from collision_monitor.records import Model
 
@@ -45,7 +47,8 @@ _VERDICTS = {
     tracking.UNKNOWN_ID: (Refusal.UNKNOWN_ID, "expected the id of an object that was described, got {id}"),
     tracking.NON_FINITE: (
         Refusal.NON_FINITE,
-        "object {id}: expected finite numbers up to 1e18 in pose and twist and standard deviations >= 0, got {row}",
+        "object {id}: expected finite numbers up to 1e18 in pose and twist, standard deviations >= 0 and covariances "
+        "that are positive semi-definite (a negative one here is minus the root of a negative eigenvalue), got {row}",
     ),
     tracking.QUATERNION: (Refusal.QUATERNION, "object {id}: expected a unit quaternion within 1e-3, got {quaternion}"),
     tracking.OLD: (
@@ -53,6 +56,21 @@ _VERDICTS = {
         "object {id}: expected one state a message, newer than its last one, and none of a static object",
     ),
 }
+
+
+def _covariances(covariance: Any, states: NDArray[np.void]) -> NDArray[np.float64]:
+    """Covariances (N, 12), or (0, 12) for none; the states' standard deviations are then set to their worst."""
+    if covariance is None:
+        return np.empty((0, 12))
+    try:
+        given = np.asarray(covariance, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("covariance: expected an array of numbers") from None
+    if given.shape != (len(states), 12):
+        raise InputError(f"covariance: expected shape ({len(states)}, 12), got {given.shape}")
+    known, stddevs = worst_stddevs(given)
+    states["position_stddev"], states["velocity_stddev"] = stddevs.T
+    return known
 
 
 @dataclass(frozen=True)
@@ -120,6 +138,7 @@ class Monitor:
         self._renewed: set[int] = set()  # slots whose description changed: predicted anew in the next step
         self._buffer = np.empty(64, records.STATE)
         self._events = EventList()
+        self._uncertain = UncertainPredictions(64)
         self._scratch = [make_scratch() for _ in range(self.profile.threads)]
         self._pool = ThreadPoolExecutor(self.profile.threads) if self.profile.threads > 1 else None
         self._pairs = np.zeros(0, active_pairs.PAIR)
@@ -211,6 +230,7 @@ class Monitor:
             remove_boxes(self._grid, np.array([i], np.int32))
         bodies.static[i] = d.static
         bodies.motion["version"][i] += 1
+        self._uncertain.describe(i, d)
         self._names[d.object_id] = d.name
         self._allow(d.object_id, frozenset(d.allowed))
         self._end_pairs([k for k in self._pairs_of(i) if not self._is_checked(self._pairs[k])])
@@ -235,6 +255,7 @@ class Monitor:
         self._end_pairs(self._pairs_of(i))
         remove_boxes(self._grid, np.array([i], np.int32))
         self._drop_shapes(i)
+        self._uncertain.forget(i)
         self._bodies.used[i] = self._bodies.seen[i] = self._bodies.static[i] = False
         self._bodies.motion["version"][i] += 1
         self._renewed.discard(i)
@@ -270,6 +291,7 @@ class Monitor:
             enlarge(self._bodies, bodies)
             self._bodies = bodies
             self._grid = regridded(self._grid.box, capacity)
+            self._uncertain.enlarge(capacity)
         self._top += 1
         return self._top - 1
 
@@ -325,22 +347,27 @@ class Monitor:
         remove_boxes(self._grid, np.arange(self._top, dtype=np.int32))
         self._renewed = {i for i in range(self._top) if bodies.used[i]}
 
-    def step(self, stamp_ns: int, ids: ArrayLike, poses: Any = None, twists: Any = None) -> StepResult:
+    def step(
+        self, stamp_ns: int, ids: ArrayLike, poses: Any = None, twists: Any = None, covariance: Any = None
+    ) -> StepResult:
         """Take in the states of some objects at `stamp_ns` and answer for all objects at the latest time so far.
 
         Either ids (N,), poses (N, 7: position, quaternion xyzw), twists (N, 6: linear, angular; default 0), or as
         `ids` a structured array of records.STATE. World frame, SI units.
+        covariance (N, 12): of position and of linear velocity, upper triangles row by row, in place of the states'
+        standard deviations along one axis, which then tell how large they are at most.
         Single rows that cannot be used are refused and counted (`refused`), never raised. Raises InputError for
         arrays of another shape.
         """
         if not isinstance(stamp_ns, int | np.integer) or isinstance(stamp_ns, bool):
             raise InputError(f"stamp_ns: expected an integer number of nanoseconds, got {stamp_ns!r}")
         states = self._states(ids, poses, twists)
+        covariances = _covariances(covariance, states)
         if not self._accept_time(int(stamp_ns)):
             return self._repeat()
         assert self._origin_ns is not None
         now = (self._now_ns - self._origin_ns) * NANOSECOND
-        self._take(states, (int(stamp_ns) - self._origin_ns) * NANOSECOND)
+        self._take(states, covariances, (int(stamp_ns) - self._origin_ns) * NANOSECOND)
         self._step += 1
         work = dict.fromkeys(
             ("objects_moved", "candidate_pairs", "narrow_phase_tests", "impact_queries", "events_due", "deferred"), 0
@@ -422,7 +449,7 @@ class Monitor:
             return StepResult(last.stamp_ns, last.step, last.contacts, last.predictions, last.status, accepted=False)
         raise AssertionError("the first stamp is always accepted")
 
-    def _take(self, states: NDArray[np.void], time: float) -> None:
+    def _take(self, states: NDArray[np.void], covariances: NDArray[np.float64], time: float) -> None:
         if len(states) == 0:
             return
         slots = self._slots_of(states["id"])
@@ -430,7 +457,11 @@ class Monitor:
         numbers = used.view(np.float64).reshape(len(states), -1)
         verdicts = np.empty(len(states), np.uint8)
         flags = np.ascontiguousarray(states["flags"])
-        if tracking.take_states(self._bodies, slots, numbers, flags, time, verdicts) == len(states):
+        accepted, uncertain = tracking.take_states(self._bodies, slots, numbers, flags, time, verdicts)
+        if uncertain or self._uncertain.active:
+            taken = np.where(verdicts == tracking.ACCEPTED, slots, np.int32(-1))
+            self._uncertain.take(taken, numbers, covariances, self._planar)
+        if accepted == len(states):
             return
         for verdict, (reason, text) in _VERDICTS.items():
             rows = np.flatnonzero(verdicts == verdict)
@@ -466,15 +497,20 @@ class Monitor:
         which = np.concatenate([moved, ending])
         if len(which) == 0:
             return np.zeros(0, IMPACT)
+        spread, sigmas = self._uncertain.spread, self._uncertain.sigmas(p)
         tracking.restart_motion(
-            bodies, self._grid, moved, now, p.horizon, p.contact_margin, p.stale_acceleration,
+            bodies, spread, sigmas, self._grid, moved, now, p.horizon, p.contact_margin, p.stale_acceleration,
             p.position_tolerance, p.velocity_tolerance, p.orientation_tolerance,
             p.angular_velocity_tolerance,
         )  # fmt: skip
-        tracking.continue_motion(bodies, self._grid, ending, now, p.horizon, p.contact_margin)
+        tracking.continue_motion(
+            bodies, spread, sigmas, self._grid, ending, now, p.horizon, p.contact_margin, p.stale_acceleration
+        )
         pairs = self._partners(which, now)
         pairs = pairs[: candidates.keep_checked(bodies, self._allowed_keys, pairs)]
         work["candidate_pairs"] = len(pairs)
+        if self._uncertain.active:
+            self._uncertain.add_pairs(pairs, bodies, now)
         events, queries = self._first_impacts(pairs, now)
         work["impact_queries"] += queries
         events = events[: keep_first(events, now, bodies.motion, self._events.events, self._pairs)]
@@ -521,7 +557,10 @@ class Monitor:
         """Slots of the bodies that left their predicted motion, and of others that are not predicted far enough."""
         moved, ending = np.empty((2, self._top), np.int32)
         p = self.profile
-        n, m = tracking.find_moved(self._bodies, self._top, now, p.horizon, p.stale_acceleration, moved, ending)
+        n, m = tracking.find_moved(
+            self._bodies, self._uncertain.spread, self._uncertain.sigmas(p), self._top, now, p.horizon,
+            p.stale_acceleration, moved, ending,
+        )  # fmt: skip
         return moved[:n], ending[:m]
 
     def _examine_active(self, new: NDArray[np.void], now: float, work: dict[str, int]) -> NDArray[np.void]:
@@ -576,14 +615,21 @@ class Monitor:
         pending = self._events.events
         within = int(np.searchsorted(pending["lower"], now + p.horizon, side="right"))
         predictions = np.empty(within + len(self._pairs), records.PREDICTION)
+        slots = np.empty((len(predictions), 2), np.int32)
         n, unresolved = answers.write_predictions(
             self._pairs, self._pair_events, pending[:within], self._bodies, self._parts.index, now, p.horizon,
             p.stale_after,
             predictions.view(np.float64).reshape(-1, 16),
             predictions.view(np.uint32).reshape(-1, 32),
             predictions.view(np.uint8).reshape(-1, 128),
+            slots,
         )  # fmt: skip
-        return predictions[:n], int(unresolved)
+        predictions = predictions[:n]
+        if self._uncertain.active and p.horizon > 0.0:
+            touching = self._pairs["key"][self._pairs["touching"] == 1]
+            scene = Scene(self._shapes.table, self._parts, self._bodies, now, p, self._planar)
+            predictions = self._uncertain.complete(predictions, slots[:n], touching, scene)
+        return predictions, int(unresolved)
 
     def _status(
         self,

@@ -15,7 +15,6 @@ from collision_monitor._version import VERSION
 from collision_monitor.codec import (
     Descriptions,
     Removal,
-    States,
     Status,
     decode_descriptions,
     decode_states,
@@ -32,8 +31,6 @@ from collision_monitor.provenance import provenance
 from collision_monitor.snapshot import Snapshot
 
 Records = NDArray[np.void]
-
-STDDEVS: Final = ("position_stddev", "orientation_stddev", "velocity_stddev", "angular_velocity_stddev")
 
 _PIPELINE: Final = "pipeline"
 """Whose facts these are, in a snapshot."""
@@ -113,7 +110,8 @@ class Pipeline:
                 f"got {len(message.covariance)}",
             )
             return None
-        result = self.monitor.step(message.stamp_ns, _with_stddevs(message))
+        covariance = message.covariance.reshape(-1, 12) if len(message.covariance) else None
+        result = self.monitor.step(message.stamp_ns, message.states, covariance=covariance)
         if not result.accepted:
             return None
         return self._outputs(result)
@@ -247,30 +245,3 @@ class Pipeline:
         ids = np.sort(np.concatenate([answers["id_a"], answers["id_b"]]))  # np.unique hashes, four times as slow
         ids = ids[np.diff(ids, prepend=ids[:1] + 1) != 0]
         return ids, list(map(self._names.__getitem__, ids.tolist()))
-
-
-def _with_stddevs(message: States) -> Records:
-    """The states with standard deviations that are numbers: unknown is 0, and covariances take their place."""
-    states = message.states
-    unknown = [name for name in STDDEVS if np.isnan(states[name]).any()]
-    if unknown or len(message.covariance):
-        states = states.copy()  # else not: for 1,000 states the copy costs as much as the rest of this module
-    for name in unknown:
-        states[name][np.isnan(states[name])] = 0.0
-    if len(message.covariance):
-        triangles = message.covariance.reshape(-1, 2, 6)
-        states["position_stddev"] = _largest_stddev(triangles[:, 0])
-        states["velocity_stddev"] = _largest_stddev(triangles[:, 1])
-    return states
-
-
-def _largest_stddev(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Standard deviation along the worst axis of covariances (n, 6), upper triangles: sqrt of the largest eigenvalue.
-
-    NaN (unknown) gives 0. What is no covariance gives a number that the monitor refuses: infinite or negative.
-    """
-    known = np.where(np.isfinite(triangles).all(axis=1, keepdims=True), triangles, 0.0)
-    matrices = known[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
-    largest = np.linalg.eigvalsh(matrices)[:, -1]
-    largest[np.isinf(triangles).any(axis=1)] = np.inf
-    return np.sign(largest) * np.sqrt(np.abs(largest))

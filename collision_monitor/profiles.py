@@ -60,6 +60,13 @@ class Profile:
     stale_acceleration: float = _setting(
         1.0, 0.0, 1e4, "m/s^2", "How hard an object may accelerate while it is not heard of: widens its bounds."
     )
+    uncertainty_samples: int = _setting(
+        256, 16, 4096, "1", "Samples of what is uncertain, for each pair that may meet, where states declare it."
+    )
+    confidence: float = _setting(0.95, 0.5, 0.9999, "1", "At which the earliest and latest times are stated.")
+    min_probability: float = _setting(
+        0.01, 1e-6, 1.0, "1", "From which on pairs are told that would meet only because of what is uncertain."
+    )
     max_time_step: float = _setting(
         10.0, 1e-3, 1e9, "s", "A stamp that jumps by more is refused unless the next agrees."
     )
@@ -125,10 +132,11 @@ _NAMED: dict[str, dict[str, Any]] = {
     "balanced": {},
     "fast": {
         "impact_tolerance": 1e-3,
+        "uncertainty_samples": 64,
         "position_tolerance": 1e-2,
         "orientation_tolerance": 1e-2,
         "velocity_tolerance": 2e-2,
         "angular_velocity_tolerance": 2e-2,
     },
-    "exact": {"impact_tolerance": 1e-6, "impact_iterations": 256, **_EXACT_MOTION},
+    "exact": {"impact_tolerance": 1e-6, "impact_iterations": 256, "uncertainty_samples": 1024, **_EXACT_MOTION},
 }

@@ -105,6 +105,7 @@ class PredictionStatus(IntEnum):
 
     HIT = 0
     UNRESOLVED = 1
+    POSSIBLE = 2
 
 
 class Method(IntEnum):
@@ -115,6 +116,7 @@ class Method(IntEnum):
     SWEPT_SAT = 3
     BISECTION = 4
     BOUND = 5
+    SAMPLING = 6
 
 
 class Model(IntEnum):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.monitor import Monitor
+from collision_monitor.records import STATE
 
 OBJECTS = 70  # more than the arrays have room for at first: growing them is warmed up too
 
@@ -30,6 +32,17 @@ def main() -> None:
         twists[step, :] *= -1.0  # one leaves its motion
     monitor.remove(1)
     monitor.step(3_000_000_000, np.arange(2, OBJECTS), poses[2:], twists[2:])
+    _step_uncertain(monitor, poses[2:])
+
+
+def _step_uncertain(monitor: Monitor, poses: NDArray[np.float64]) -> None:
+    """The same with states that declare an uncertainty, and then with covariances."""
+    states = np.zeros(len(poses), STATE)
+    states["id"] = np.arange(2, OBJECTS)
+    states["position"], states["quaternion"] = poses[:, :3], poses[:, 3:]
+    states["position_stddev"] = states["orientation_stddev"] = 0.1
+    monitor.step(3_010_000_000, states)
+    monitor.step(3_020_000_000, states, covariance=np.zeros((len(poses), 12)))
 
 
 if __name__ == "__main__":

@@ -212,52 +212,42 @@ def test_a_refused_stamp_gives_no_new_answer() -> None:
     assert (after.refused_time, after.step, after.digest) == (1, before.step, before.digest)
 
 
-class Spy:
-    """Sees the states that the pipeline hands to the real monitor."""
-
-    def __init__(self, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.states = np.empty(0, records.STATE)
-        real = run.pipeline.monitor.step
-
-        def step(stamp_ns: int, states: np.ndarray) -> Any:
-            self.states = states.copy()
-            return real(stamp_ns, states)
-
-        monkeypatch.setattr(run.pipeline.monitor, "step", step)
+def approaching() -> np.ndarray:
+    """States of two balls that meet in 0.85 s if they are where they say, 0.6 m beside each other's path."""
+    states = rows((1, 0, 0), (2, 2.5, -2))
+    states["position"][1, 1] = 0.6
+    return states
 
 
-def test_unknown_standard_deviations_are_zero_and_others_pass(monkeypatch: pytest.MonkeyPatch) -> None:
-    run = Run(ball(1), ball(2))
-    spy = Spy(run, monkeypatch)
-    states = rows((1, 0, 0), (2, 5, 0))
-    states["position_stddev"] = [np.nan, -1.0]
-    states["angular_velocity_stddev"] = [0.25, np.inf]
-    run.step(states)
-    assert spy.states["position_stddev"].tolist() == [0.0, -1.0]
-    assert spy.states["angular_velocity_stddev"].tolist() == [0.25, np.inf]
+def test_unknown_standard_deviations_are_none() -> None:
+    states = approaching()
+    for name in ("position_stddev", "orientation_stddev", "velocity_stddev", "angular_velocity_stddev"):
+        states[name] = np.nan
+    outputs = Run(ball(1), ball(2)).step(states)
+    assert outputs is not None
+    assert np.isnan(outputs.result.predictions["probability"]).tolist() == [True]
 
 
-def test_a_covariance_takes_the_place_of_both_standard_deviations(monkeypatch: pytest.MonkeyPatch) -> None:
-    run = Run(ball(1), ball(2))
-    spy = Spy(run, monkeypatch)
-    states = rows((1, 0, 0), (2, 5, 0))
-    states["position_stddev"] = 9.0
-    generator = np.random.default_rng(0)
-    factors = generator.normal(size=(2, 2, 3, 3))
-    covariance = factors @ factors.transpose(0, 1, 3, 2)
-    triangles = covariance[..., *np.triu_indices(3)]
-    run.step(states, triangles.ravel())
-    worst = np.linalg.norm(factors, ord=2, axis=(-2, -1))  # the largest singular value of the factor
-    np.testing.assert_allclose(spy.states["position_stddev"], worst[:, 0], rtol=1e-12)
-    np.testing.assert_allclose(spy.states["velocity_stddev"], worst[:, 1], rtol=1e-12)
+def test_a_covariance_takes_the_place_of_both_standard_deviations() -> None:
+    """Off along the path it decides when they meet, off across it whether they do."""
+    probabilities = []
+    for along, across in ((0.3, 0.0), (0.0, 0.3)):
+        states = approaching()
+        states["position_stddev"] = 9.0
+        covariance = np.zeros((2, 12))
+        covariance[0, 0], covariance[0, 3] = along**2, across**2
+        outputs = Run(ball(1), ball(2)).step(states, covariance.ravel())
+        assert outputs is not None
+        probabilities.append(float(outputs.result.predictions["probability"][0]))
+    assert probabilities[0] == pytest.approx(1.0)
+    assert 0.8 < probabilities[1] < 0.95  # 0.4 m from where they would just touch: 1.33 standard deviations
 
 
-@pytest.mark.parametrize(("value", "expected"), [(np.nan, 0.0), (np.inf, np.inf), (-4.0, -2.0), (1e308, 1e154)])
-def test_covariances_that_are_none(value: float, expected: float, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("value", "refused"), [(np.nan, 0), (np.inf, 1), (-4.0, 1), (1e308, 1)])
+def test_covariances_that_are_none(value: float, refused: int) -> None:
     run = Run(ball(1))
-    spy = Spy(run, monkeypatch)
     run.step(rows((1, 0, 0)), np.array([value, 0, 0, value, 0, value, *np.zeros(6)]))
-    assert spy.states["position_stddev"][0] == pytest.approx(expected)
+    assert run.status.refused_non_finite == refused
 
 
 @pytest.mark.parametrize(

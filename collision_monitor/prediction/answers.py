@@ -61,10 +61,13 @@ def write_contacts(pairs, results, bodies, shape_index, now, floats, words, octe
 
 
 @kernel
-def write_predictions(pairs, active, pending, bodies, shape_index, now, horizon, stale_after, floats, words, octets):
+def write_predictions(
+    pairs, active, pending, bodies, shape_index, now, horizon, stale_after, floats, words, octets, slots
+):  # fmt: skip
     """Predictions of the active pairs that do not touch, then of the pending events within the horizon.
 
-    floats (n, 16), words (n, 32), octets (n, 128): one array of records.PREDICTION. Returns (how many, unresolved).
+    floats (n, 16), words (n, 32), octets (n, 128): one array of records.PREDICTION; slots (n, 2): of the bodies.
+    Returns (how many, unresolved).
     """
     n = unresolved = 0
     for k in range(pairs.size + pending.size):
@@ -77,6 +80,7 @@ def write_predictions(pairs, active, pending, bodies, shape_index, now, horizon,
             if event.lower > now + horizon:
                 break
         i, j = event.i, event.j
+        slots[n, 0], slots[n, 1] = i, j
         floats[n, 0] = max(event.lower - now, 0.0)
         floats[n, 1] = max(event.upper - now, 0.0) if event.upper < inf else inf
         floats[n, 2:6] = nan

@@ -26,6 +26,8 @@ MOTION = np.dtype(
         ("time", np.float64),  # s after the monitor's origin, like all times
         ("tube_0", np.float64),  # m
         ("tube_1", np.float64),  # m/s
+        ("spread_0", np.float64),  # m: what its box allows for its uncertainty, from tube_time on
+        ("spread_1", np.float64),  # m/s
         ("tube_time", np.float64),  # when the body was last within tube_0 of the reference
         ("cover", np.float64),  # collisions are predicted until this time
         ("covered", np.float64),  # and were, before this step; -inf: nothing was

@@ -191,7 +191,7 @@ def _spin(table, s, rate2):
     return rate2 * (offset + table.radius[s])
 
 
-@inlined
+@device
 def shape_impact(table, parts, A, B, a, b, begin, end, margin, tube_0, tube_1, tolerance, budget, scratch):
     """When the gap between shape a in motion A and shape b in motion B (MOTION) first is within the wanted one.
 

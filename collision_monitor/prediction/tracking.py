@@ -13,6 +13,7 @@ import numpy as np
 from collision_monitor._jit import device, kernel
 from collision_monitor.broad_phase.hashed_grid import put_box
 from collision_monitor.prediction.motion import angle_between, quaternion_to_matrix, turn_quaternion
+from collision_monitor.prediction.spread import surface_spread
 from collision_monitor.records import StateFlag
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 
@@ -30,6 +31,9 @@ SHORTEST_SLACK: Final = 0.0625
 LONGEST_SLACK: Final = 2.0
 """How far beyond the horizon a body is predicted, in horizons: at first, at least, and at most."""
 
+WIDER: Final = 1.1
+"""Room for standard deviations that vary a little from state to state."""
+
 GOLDEN_RATIO: Final = 0.6180339887498949
 PLASTIC_RATIO: Final = 0.7548776662466927
 """Multiples of these, modulo 1, fill the unit interval evenly."""
@@ -43,9 +47,11 @@ def take_states(bodies, slots, numbers, flags, time, verdicts):
     """Store states as the bodies' last ones.
 
     slots (M,) int32, -1: unknown id; numbers (M, 21) float64: the rows of records.STATE; flags (M,) uint32;
-    time: of all states, in seconds. verdicts (M,) uint8: ACCEPTED or why not. Returns how many were accepted.
+    time: of all states, in seconds. verdicts (M,) uint8: ACCEPTED or why not.
+    Returns (how many were accepted, whether any of them is uncertain).
     """
     accepted = 0
+    uncertain = False
     for k in range(slots.size):
         i = slots[k]
         if i < 0:
@@ -86,7 +92,9 @@ def take_states(bodies, slots, numbers, flags, time, verdicts):
         bodies.seen[i] = True
         verdicts[k] = ACCEPTED
         accepted += 1
-    return accepted
+        for c in range(16, STATE_NUMBERS):
+            uncertain |= numbers[k, c] > 0.0
+    return accepted, uncertain
 
 
 @device
@@ -109,13 +117,14 @@ def _estimate_twist(bodies, i, numbers, k, x, y, z, w, elapsed):
 
 
 @kernel
-def find_moved(bodies, count, now, horizon, stale_acceleration, moved, ending):
+def find_moved(bodies, spread, sigmas, count, now, horizon, stale_acceleration, moved, ending):
     """Slots among the first `count` whose predictions no longer hold at `now`, into moved; returns how many.
 
     Those that hold but end within the horizon go into `ending`, their number is returned second.
     A body's surface may be off its reference by tube_0 now and drift by tube_1 a second; both are checked, with the
-    drift that an unheard-of body may have made. Its slack is halved where it left its motion and doubled where that
-    held until it was predicted no further: who turns often is not predicted far.
+    drift that an unheard-of body may have made; and so is whether it may be further off, by `sigmas` standard
+    deviations, than its box allows for. Its slack is halved where it left its motion and doubled where that held until
+    it was predicted no further: who turns often is not predicted far.
     """
     n = n_ending = 0
     turned = np.empty(4)
@@ -147,11 +156,37 @@ def find_moved(bodies, count, now, horizon, stale_acceleration, moved, ending):
             bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
             moved[n] = i
             n += 1
+        elif sigmas > 0.0 and not _is_covered(bodies, spread, sigmas, i, now, horizon, stale_acceleration):
+            moved[n] = i
+            n += 1
         elif m.cover < now + horizon:
             bodies.slack[i] = min(2.0 * bodies.slack[i], LONGEST_SLACK * horizon)
             ending[n_ending] = i
             n_ending += 1
     return n, n_ending
+
+
+@device
+def _is_covered(bodies, spread, sigmas, i, now, horizon, stale_acceleration):
+    """Is body i as certain as its box allows for?"""
+    m = bodies.motion[i]
+    age = now - bodies.time[i]
+    off, growth = surface_spread(spread, i, bodies.spin_radius[i], age, horizon, stale_acceleration)
+    return sigmas * off <= m.spread_0 + m.spread_1 * (now - m.tube_time) and sigmas * growth <= m.spread_1
+
+
+@device
+def _cover_spread(bodies, spread, sigmas, i, now, most_0, most_1, stale_acceleration):
+    """Let the box of body i allow for its uncertainty from now until its cover time: most_0 + most_1 t at most (m).
+
+    That holds until it has been silent for twice as long, and for states that are a little less certain.
+    """
+    m = bodies.motion[i]
+    m.spread_0 = m.spread_1 = 0.0
+    if sigmas > 0.0 and not bodies.static[i]:
+        age = 2.0 * (now - bodies.time[i])
+        off, growth = surface_spread(spread, i, bodies.spin_radius[i], age, m.cover - now, stale_acceleration)
+        m.spread_0, m.spread_1 = min(WIDER * sigmas * off, most_0), min(WIDER * sigmas * growth, most_1)
 
 
 @device
@@ -166,8 +201,8 @@ def _cover(bodies, i, now, horizon):
         return
     if bodies.slack[i] == 0.0:
         bodies.slack[i] = FIRST_SLACK * horizon
-    spread = (i * GOLDEN_RATIO + now * PLASTIC_RATIO / horizon) % 1.0
-    m.cover = now + horizon + bodies.slack[i] * (0.5 + 0.5 * spread)
+    share = (i * GOLDEN_RATIO + now * PLASTIC_RATIO / horizon) % 1.0
+    m.cover = now + horizon + bodies.slack[i] * (0.5 + 0.5 * share)
 
 
 @device
@@ -175,7 +210,7 @@ def swept_box(bodies, i, begin, margin):
     """Centre and half extents (m) of a box that holds body i, and `margin` more, from `begin` until its cover time."""
     m = bodies.motion[i]
     sweep = 0.0 if bodies.static[i] else m.cover - begin
-    half = m.radius + margin + m.tube_0 + m.tube_1 * (begin - m.tube_time + sweep)
+    half = m.radius + margin + m.tube_0 + m.spread_0 + (m.tube_1 + m.spread_1) * (begin - m.tube_time + sweep)
     ahead = 0.5 * sweep
     middle = begin - m.time + ahead
     return (
@@ -186,10 +221,13 @@ def swept_box(bodies, i, begin, margin):
 
 @kernel
 def restart_motion(
-    bodies, grid, which, now, horizon, margin, stale_acceleration,
+    bodies, spread, sigmas, grid, which, now, horizon, margin, stale_acceleration,
     position_tolerance, velocity_tolerance, orientation_tolerance, angular_velocity_tolerance,
 ):  # fmt: skip
-    """Make the last state of each body in `which` (M,) its reference; the grid gets what it sweeps from `now` on."""
+    """Make the last state of each body in `which` (M,) its reference; the grid gets what it sweeps from `now` on.
+
+    sigmas: by how many standard deviations that is widened; 0: nothing is uncertain.
+    """
     q = np.empty(4)
     for k in range(which.size):
         i = which[k]
@@ -216,11 +254,12 @@ def restart_motion(
             if age > 0.0:
                 m.tube_0 += 2.0 * stale_acceleration * age * age
                 m.tube_1 += 2.0 * stale_acceleration * age
+        _cover_spread(bodies, spread, sigmas, i, now, np.inf, np.inf, stale_acceleration)
         put_box(grid, i, *swept_box(bodies, i, now, margin))
 
 
 @kernel
-def continue_motion(bodies, grid, which, now, horizon, margin):
+def continue_motion(bodies, spread, sigmas, grid, which, now, horizon, margin, stale_acceleration):
     """Predict each body in `which` (M,), which is on its reference, further; what it sweeps from `now` on in the grid.
 
     That it is within its tube at `now` is known again, so the tube starts to widen from here.
@@ -228,7 +267,10 @@ def continue_motion(bodies, grid, which, now, horizon, margin):
     for k in range(which.size):
         i = which[k]
         m = bodies.motion[i]
+        allowed_0, allowed_1 = m.spread_0 + m.spread_1 * (now - m.tube_time), m.spread_1
         m.tube_time = now
         m.covered = m.cover
         _cover(bodies, i, now, horizon)
+        # no more than it did: what it could meet until `covered` is known already
+        _cover_spread(bodies, spread, sigmas, i, now, allowed_0, allowed_1, stale_acceleration)
         put_box(grid, i, *swept_box(bodies, i, now, margin))

@@ -1,0 +1,237 @@
+"""Are the probabilities and times of impact under uncertainty right? Random scenes, each against 20,000 true futures.
+
+Two bodies with random shapes, motions and uncertainties; the monitor's answer is compared with what becomes of them
+when the errors are drawn anew for each future, position, velocity, orientation and angular velocity each on its own.
+Prints a Markdown table and ends with 1 where an answer is off by more than stated.
+
+    python benchmarks/calibration.py                              about half a minute
+    python benchmarks/calibration.py --png docs/images/calibration.png
+    python benchmarks/calibration.py --scenes 1000 --futures 5000 --seed 7
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import collision_monitor as cm
+from collision_monitor.geometry.pose import from_rotation_vector, multiply
+from collision_monitor.profiles import Profile
+from collision_monitor.records import STATE
+
+Array = NDArray[np.float64]
+Shape = cm.Sphere | cm.Box | cm.Capsule | cm.Cylinder | cm.Cone | cm.ConvexHull
+HORIZON = 2.0
+UNCERTAIN = ("position", "orientation", "velocity", "angular_velocity")
+MOST_OFF = 0.03
+"""Of a probability; what is asked for."""
+
+KINDS: dict[str, Callable[[np.random.Generator], Shape]] = {
+    "sphere": lambda rng: cm.Sphere(rng.uniform(0.1, 0.6)),
+    "box": lambda rng: cm.Box(rng.uniform(0.1, 1.5, 3)),
+    "capsule": lambda rng: cm.Capsule(rng.uniform(0.05, 0.4), rng.uniform(0.2, 1.5)),
+    "cylinder": lambda rng: cm.Cylinder(rng.uniform(0.1, 0.4), rng.uniform(0.1, 1.8)),
+    "hull": lambda rng: cm.ConvexHull(rng.normal(0, 0.3, (12, 3))),
+}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Two bodies: their kinds, shapes, states (13,) as pose and twist, standard deviations (4,) as in ObjectState."""
+
+    kinds: tuple[str, str]
+    shapes: tuple[Shape, Shape]
+    states: tuple[Array, Array]
+    sigmas: tuple[Array, Array]
+
+
+@dataclass(frozen=True)
+class Row:
+    """What became of a scene. told: the monitor predicted the pair; too_early: of the impacts, before `earliest`.
+
+    late: of the futures, without an impact until `latest`; NaN: none was stated. us: what the uncertainty cost.
+    """
+
+    kinds: str
+    told: bool
+    status: int
+    probability: float
+    truth: float
+    too_early: float
+    late: float
+    us: float
+
+
+def random_scene(rng: np.random.Generator, turning: bool) -> Scene:
+    """On a course that brings them near each other in the next seconds, with a miss from none to some sizes."""
+    names = list(KINDS)
+    kinds = (names[rng.integers(len(names))], names[rng.integers(len(names))])
+    shapes = (KINDS[kinds[0]](rng), KINDS[kinds[1]](rng))
+    velocity = rng.normal(0, 1, 3)
+    velocity *= rng.uniform(0.2, 3.0) / np.linalg.norm(velocity)
+    across = np.cross(velocity, rng.normal(0, 1, 3))
+    across /= np.linalg.norm(across)
+    p = -velocity * rng.uniform(0.4, 2.6) + across * rng.uniform(0.0, 2.0)
+    carried = rng.normal(0, 1, 3)
+    states = []
+    for position, linear in ((rng.uniform(-5, 5, 3), carried), (None, carried + velocity)):
+        q = rng.normal(0, 1, 4)
+        angular = rng.normal(0, 1.0, 3) if turning else np.zeros(3)
+        at = position if position is not None else states[0][:3] + p
+        states.append(np.concatenate([at, q / np.linalg.norm(q), linear, angular]))
+    scale = rng.choice([0.05, 0.2, 0.5])
+    most = scale * np.array([1.0, 0.5 if turning else 0.0, 1.0, 0.5 if turning else 0.0])
+    return Scene(kinds, shapes, (states[0], states[1]), (most * rng.uniform(0.1, 1, 4), most * rng.uniform(0.1, 1, 4)))
+
+
+def predicted(scene: Scene, profile: Profile) -> tuple[np.void | None, bool, float]:
+    """The monitor's prediction of the pair, None: not told; whether they touch at once; and µs that it cost."""
+    monitors = [cm.Monitor(profile) for _ in range(2)]
+    seconds = []
+    result = None
+    for monitor, certain in zip(monitors, (True, False), strict=True):
+        for k, shape in enumerate(scene.shapes):
+            monitor.add(k, shape)
+        rows = np.zeros(2, STATE)
+        rows["id"] = 0, 1
+        for k, state in enumerate(scene.states):
+            rows["position"][k], rows["quaternion"][k] = state[:3], state[3:7]
+            rows["linear"][k], rows["angular"][k] = state[7:10], state[10:]
+            for name, sigma in zip(UNCERTAIN, scene.sigmas[k], strict=True):
+                rows[f"{name}_stddev"][k] = 0.0 if certain else sigma
+        result = monitor.step(0, rows)
+        took = []
+        for k in range(20):
+            begin = time.perf_counter()
+            monitor.step(k + 1, rows)
+            took.append(time.perf_counter() - begin)
+        seconds.append(np.median(took))
+    assert result is not None
+    told = result.predictions[0] if len(result.predictions) else None
+    return told, len(result.contacts) > 0, 1e6 * float(seconds[1] - seconds[0])
+
+
+def impact_times(scene: Scene, futures: int, rng: np.random.Generator) -> Array:
+    """When they meet in each of so many futures (s); infinite: not within the horizon."""
+    motions = []
+    for state, sigma in zip(scene.states, scene.sigmas, strict=True):
+        off = rng.normal(size=(4, futures, 3)) * sigma[:, None, None]
+        turned = multiply(from_rotation_vector(off[1]), np.tile(state[3:7], (futures, 1)))
+        poses = np.column_stack([state[:3] + off[0], turned])
+        motions.append((poses, np.column_stack([state[7:10] + off[2], state[10:] + off[3]])))
+    a, b = scene.shapes
+    answers = cm.time_of_impact_batch(a, *motions[0], b, *motions[1], HORIZON, tolerance=1e-5)
+    return np.where(answers.status == "clear", inf, answers.lower)
+
+
+def compare(scene: Scene, profile: Profile, futures: int, rng: np.random.Generator) -> Row | None:
+    """One row; None where the pair touches from the start, which is no prediction."""
+    told, touching, us = predicted(scene, profile)
+    if touching:
+        return None
+    times = impact_times(scene, futures, rng)
+    hits = times[times < inf]
+    kinds = "–".join(sorted(scene.kinds))
+    if told is None:
+        return Row(kinds, False, -1, 0.0, len(hits) / futures, 0.0, np.nan, us)
+    late = np.mean(times > told["latest"]) if told["latest"] < inf else np.nan
+    early = np.mean(hits < told["earliest"]) if len(hits) > 20 else np.nan
+    return Row(
+        kinds, True, int(told["status"]), float(told["probability"]), len(hits) / futures, float(early), float(late), us
+    )
+
+
+def table(rows: list[Row], confidence: float) -> list[str]:
+    """Markdown."""
+    groups: dict[str, list[Row]] = {
+        "stated to meet": [r for r in rows if r.told and r.status != 2],
+        "stated to pass, told": [r for r in rows if r.told and r.status == 2],
+        "stated to pass, not told": [r for r in rows if not r.told],
+        "all": rows,
+    }
+    lines = [
+        f"| scenes | | probability off by, worst | RMS | before `earliest`, worst (stated {1 - confidence:.2f}) | mean "
+        f"| after `latest`, worst (stated {1 - confidence:.2f}) | µs, median | worst |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    for name, group in groups.items():
+        if not group:
+            continue
+        off = np.array([r.probability - r.truth for r in group])
+        early = np.array([r.too_early for r in group if np.isfinite(r.too_early) and r.told] or [np.nan])
+        late = np.array([r.late for r in group if np.isfinite(r.late)] or [np.nan])
+        us = np.array([r.us for r in group])
+        lines.append(
+            f"| {name} | {len(group)} | {np.abs(off).max():.3f} | {np.sqrt(np.mean(off**2)):.4f} | {early.max():.3f} "
+            f"| {early.mean():.3f} | {late.max():.3f} | {np.median(us):.0f} | {us.max():.0f} |"
+        )
+    return lines
+
+
+def draw(rows: list[Row], confidence: float, path: Path) -> None:
+    """Stated against true probability, and how often the earliest time was violated."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
+        figure = Figure(figsize=(10, 4.4), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        line = np.array([0.0, 1.0])
+        left.fill_between(line, line - MOST_OFF, line + MOST_OFF, color="0.9", label=f"within {MOST_OFF:g}")
+        left.plot(line, line, color="0.5", linewidth=0.8)
+        for name, color, which in (
+            ("stated to meet", "tab:red", lambda r: r.told and r.status != 2),
+            ("stated to pass each other", "tab:blue", lambda r: r.told and r.status == 2),
+            ("not told", "0.3", lambda r: not r.told),
+        ):
+            chosen = [r for r in rows if which(r)]
+            x, y = [r.truth for r in chosen], [r.probability for r in chosen]
+            left.plot(x, y, "o", color=color, markersize=4, alpha=0.7, label=f"{name}: {len(chosen)} scenes")
+        left.set_xlabel("part of 20,000 futures in which they meet within 2 s")
+        left.set_ylabel("stated probability")
+        left.legend(frameon=False)
+        early = np.sort([r.too_early for r in rows if r.told and np.isfinite(r.too_early)])[::-1]
+        right.bar(np.arange(len(early)), early, width=1.0, color="tab:blue")
+        right.axhline(1.0 - confidence, color="tab:red", linewidth=1, label=f"stated: at most {1 - confidence:.2f}")
+        right.set_xlabel("scenes, sorted")
+        right.set_ylabel("part of the impacts before `earliest`")
+        right.legend(frameon=False)
+        figure.savefig(path, dpi=110)
+
+
+def main() -> int:
+    """Ends with 1 where a probability is off by more than MOST_OFF."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", type=int, default=120)
+    parser.add_argument("--futures", type=int, default=20_000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--profile", default="balanced", choices=Profile.names())
+    parser.add_argument("--samples", type=int, help="in place of the profile's")
+    parser.add_argument("--png", type=Path)
+    args = parser.parse_args()
+    profile = Profile.named(args.profile).replace(horizon=HORIZON)
+    if args.samples:
+        profile = profile.replace(uncertainty_samples=args.samples)
+    rng = np.random.default_rng(args.seed)
+    rows: list[Row] = []
+    while len(rows) < args.scenes:
+        row = compare(random_scene(rng, turning=len(rows) % 2 == 1), profile, args.futures, rng)
+        if row is not None:
+            rows.append(row)
+    print("\n".join(table(rows, profile.confidence)))
+    if args.png:
+        draw(rows, profile.confidence, args.png)
+    noise = 4.0 * np.sqrt(0.25 / args.futures)
+    return int(any(abs(r.probability - r.truth) > MOST_OFF + noise for r in rows))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,284 @@
+"""How early, how often and how wrongly does the monitor warn of real people and carts? Recorded clips, looked back at.
+
+At every frame the monitor predicts who comes within a clearance of whom; what really happened then is in the recording.
+With uncertainty, how far objects of their kind strayed from their stated motion in the *other* clips is declared.
+Prints a Markdown table.
+
+    python benchmarks/warnings.py ../shared/data/citr
+    python benchmarks/warnings.py ../shared/data/citr --png docs/images/warnings.png
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+import collision_monitor as cm
+from collision_monitor.geometry.pose import rotation_matrix
+from collision_monitor.geometry.shape_table import ShapeTableBuilder
+from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.profiles import Profile
+from collision_monitor.world.trajectory import FRAME_RATE, Trajectory
+
+Array = NDArray[np.float64]
+HORIZONS = (0.5, 1.0, 2.0)
+THRESHOLDS = (0.1, 0.3, 0.5)
+LAGS = (0.25, 0.5, 1.0, 1.5, 2.0)
+"""s: at which the strayings are measured."""
+BALL = 2.23606797749979
+"""The radius of a ball in which what is anywhere has a standard deviation of 1 along each axis."""
+
+
+@dataclass(frozen=True)
+class Strayings:
+    """Variances along one axis at LAGS, of one kind of object in one clip, and how many there were."""
+
+    variance: Array
+    count: int
+
+
+@dataclass(frozen=True)
+class Clip:
+    """states: of each frame. distance (F, P): of the pairs in each frame (m), NaN where one is not tracked."""
+
+    name: str
+    scene: Trajectory
+    states: list[NDArray[np.void]]
+    pairs: list[tuple[int, int]]
+    distance: Array
+
+
+@dataclass(frozen=True)
+class Told:
+    """What was said of one clip at one horizon, (F, P): warned from the stated motions alone; the probability."""
+
+    stated: NDArray[np.bool_]
+    probability: Array
+
+
+def load(prefix: Path) -> Clip:
+    """All frames of a clip, and how far apart everybody was."""
+    scene = Trajectory(None, None, prefix)
+    frames = round(scene.duration * FRAME_RATE) + 1
+    states = []
+    for frame in range(frames):
+        scene.time = frame / FRAME_RATE
+        states.append(scene.states())
+    ids = [d.object_id for d in scene.descriptions]
+    pairs = list(combinations(sorted(ids), 2))
+    builder = ShapeTableBuilder()
+    slot = {d.object_id: builder.append(*d.shapes[0]) for d in scene.descriptions}
+    distance = np.full((frames, len(pairs)), np.nan)
+    position, rotation = np.zeros((len(ids), 3)), np.tile(np.eye(3), (len(ids), 1, 1))
+    for frame, rows in enumerate(states):
+        here = [slot[i] for i in rows["id"].tolist()]
+        position[here], rotation[here] = rows["position"], rotation_matrix(rows["quaternion"])
+        known = set(rows["id"].tolist())
+        both = [k for k, (a, b) in enumerate(pairs) if a in known and b in known]
+        slots = np.array([[slot[i] for i in pairs[k]] for k in both], np.int32).reshape(-1, 2)
+        distance[frame, both] = contact_batch(builder.table, position, rotation, slots)[:, 0]
+    return Clip(prefix.name, scene, states, pairs, distance)
+
+
+def strayings(clip: Clip, kind: str) -> Strayings:
+    """How far objects of a kind were from where their twist would have brought them."""
+    ids = {d.object_id for d in clip.scene.descriptions if kind in d.name}
+    tracks: dict[int, dict[int, np.void]] = {i: {} for i in ids}
+    for frame, rows in enumerate(clip.states):
+        for row in rows:
+            if int(row["id"]) in ids:
+                tracks[int(row["id"])][frame] = row
+    variance, count = [], 0
+    for lag in LAGS:
+        n = round(lag * FRAME_RATE)
+        off = [
+            track[frame + n]["position"] - row["position"] - row["linear"] * n / FRAME_RATE
+            for track in tracks.values()
+            for frame, row in track.items()
+            if frame + n in track
+        ]
+        variance.append(np.mean(np.array(off)[:, :2] ** 2))
+        count = len(off)
+    return Strayings(np.array(variance), count)
+
+
+def fit(all_of: list[Strayings]) -> Array:
+    """Standard deviations of position, velocity and acceleration that explain the variances best, relative to them."""
+    variance = np.average([s.variance for s in all_of], axis=0, weights=[s.count for s in all_of])
+    t = np.array(LAGS)
+    rows = np.stack([np.ones_like(t), t**2, 0.25 * t**4], axis=1) / variance[:, None]
+    return np.sqrt(nnls(rows, np.ones_like(t))[0])
+
+
+def watch(clip: Clip, horizon: float, clearance: float, sigmas: dict[str, Array] | None) -> Array:
+    """What the monitor says at each frame: (F, P) 1 where it warns or the probability where `sigmas` are declared."""
+    profile = Profile.named("balanced").replace(horizon=horizon, contact_margin=clearance)
+    monitor = cm.Monitor(profile)
+    kind_of = {}
+    for d in clip.scene.descriptions:
+        kind = kind_of[d.object_id] = "cart" if "cart" in d.name else "person"
+        bound = BALL * float(sigmas[kind][2]) if sigmas else 0.0
+        monitor.describe(replace(d, max_linear_acceleration=bound))
+    column = {pair: k for k, pair in enumerate(clip.pairs)}
+    told = np.zeros_like(clip.distance)
+    for frame, rows in enumerate(clip.states):
+        states = rows.copy()
+        if sigmas:
+            of = np.array([sigmas[kind_of[i]] for i in rows["id"].tolist()]).reshape(-1, 3)
+            states["position_stddev"], states["velocity_stddev"] = of[:, 0], of[:, 1]
+        for p in monitor.step(round(frame / FRAME_RATE * 1e9), states).predictions:
+            if not p["stale"]:
+                told[frame, column[int(p["id_a"]), int(p["id_b"])]] = p["probability"] if sigmas else 1.0
+    return told
+
+
+@dataclass
+class Score:
+    """Counted over moments, a pair in a frame: apart now, tracked for the whole horizon."""
+
+    near: int = 0
+    warned: int = 0
+    right: int = 0
+    encounters: int = 0
+    warned_encounters: int = 0
+    alerts: int = 0
+    seconds: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.leads: list[float] = []
+        self.nearest: list[float] = []
+
+    def add(self, clip: Clip, warned: NDArray[np.bool_], horizon: float, clearance: float) -> None:
+        """Compare what was said with what happened."""
+        n = round(horizon * FRAME_RATE)
+        coming, judged = look_ahead(clip.distance, n, clearance)
+        near = judged & (coming <= clearance)
+        said = judged & warned
+        self.near += int(near.sum())
+        self.warned += int(said.sum())
+        self.right += int((said & near).sum())
+        self.nearest += (coming[said & ~near] - clearance).tolist()
+        self.alerts += int((said[1:] & ~said[:-1]).sum())
+        self.seconds += len(clip.distance) / FRAME_RATE
+        apart = clip.distance > clearance
+        for frame, pair in zip(*np.nonzero(apart[:-1] & (clip.distance[1:] <= clearance)), strict=True):
+            begin = frame + 1
+            if begin < n or not apart[begin - n : begin, pair].all():
+                continue  # not seen, or within the clearance a moment ago
+            quiet = np.flatnonzero(~warned[begin - n : begin, pair])
+            lead = n - 1 - quiet[-1] if len(quiet) else n
+            self.encounters += 1
+            self.warned_encounters += lead > 0
+            self.leads.append(lead / FRAME_RATE)
+
+    def row(self, horizon: float, how: str) -> str:
+        """Of the Markdown table."""
+        lead = np.median(self.leads) if self.leads else np.nan
+        precision = self.right / self.warned if self.warned else np.nan
+        off = np.median(self.nearest) if self.nearest else np.nan
+        return (
+            f"| {horizon:g} | {how} | {self.warned_encounters} of {self.encounters} | {lead:.2f} "
+            f"| {100 * self.right / max(self.near, 1):.0f} % | {100 * precision:.0f} % | {off:.2f} "
+            f"| {60 * self.alerts / self.seconds:.0f} |"
+        )
+
+
+def look_ahead(distance: Array, n: int, clearance: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Least distance in the n frames after each, and whether it is known of a pair that is apart now, (F, P)."""
+    coming = np.full_like(distance, np.nan)
+    for frame in range(len(distance) - n):
+        coming[frame] = distance[frame + 1 : frame + 1 + n].min(axis=0)  # NaN where one is lost on the way
+    return coming, np.isfinite(coming) & (distance > clearance)
+
+
+def draw(clips: list[Clip], said: dict[float, list[Told]], clearance: float, path: Path) -> None:
+    """Warnings that are right against encounters that are found; and whether the probabilities are those of life."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
+        figure = Figure(figsize=(10, 4.4), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        levels = np.concatenate([[0.01, 0.02, 0.05], np.arange(0.1, 1.0, 0.1)])
+        for horizon, color in zip(HORIZONS, ("tab:green", "tab:orange", "tab:blue"), strict=True):
+            points = []
+            for level in [*levels, None]:
+                score = Score()
+                for clip, told in zip(clips, said[horizon], strict=True):
+                    score.add(clip, told.stated if level is None else told.probability >= level, horizon, clearance)
+                points.append((score.right / max(score.near, 1), score.right / max(score.warned, 1)))
+            x, y = 100 * np.array(points).T
+            left.plot(x[:-1], y[:-1], ".-", color=color, linewidth=1, label=f"{horizon:g} s, by probability")
+            left.plot(x[-1], y[-1], "s", color=color, markersize=8, markerfacecolor="none", label="stated motion alone")
+            p = np.concatenate([t.probability.ravel() for t in said[horizon]])
+            happened, judged = [], []
+            for clip in clips:
+                coming, known = look_ahead(clip.distance, round(horizon * FRAME_RATE), clearance)
+                happened.append((coming <= clearance).ravel())
+                judged.append(known.ravel())
+            use, came = np.concatenate(judged), np.concatenate(happened)
+            edges = np.array([0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0 + 1e-9])
+            which = np.digitize(p[use], edges)
+            bins = [k for k in range(1, len(edges)) if (which == k).sum() >= 20]
+            right.plot(
+                [p[use][which == k].mean() for k in bins], [came[use][which == k].mean() for k in bins],
+                "o-", color=color, linewidth=1, markersize=4, label=f"{horizon:g} s ahead",
+            )  # fmt: skip
+        left.set_xlabel("moments before an encounter that were warned of, %")
+        left.set_ylabel("warnings that came true, %")
+        left.set_xlim(0, 102)
+        left.set_ylim(0, 102)
+        left.legend(frameon=False)
+        right.plot([0, 1], [0, 1], color="0.6", linewidth=0.8)
+        right.set_xlabel("stated probability")
+        right.set_ylabel(f"part that came within {clearance:g} m")
+        right.legend(frameon=False)
+        figure.savefig(path, dpi=110)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, help="of clips: NAME_ped.csv and NAME_veh.csv")
+    parser.add_argument("--clearance", type=float, default=0.5, help="m, between surfaces: nearer is an encounter")
+    parser.add_argument("--png", type=Path)
+    args = parser.parse_args()
+    prefixes = sorted({f.with_name(f.name.removesuffix("_ped.csv")) for f in args.folder.glob("*_ped.csv")})
+    if len(prefixes) < 2:
+        parser.error(f"folder: expected at least two clips NAME_ped.csv, found {len(prefixes)} in {args.folder}")
+    clips = [load(prefix) for prefix in prefixes]
+    strayed = [{kind: strayings(clip, kind) for kind in ("person", "cart")} for clip in clips]
+    declared = [
+        {kind: fit([s[kind] for s in strayed if s is not own]) for kind in ("person", "cart")} for own in strayed
+    ]
+    for clip, of in zip(clips, declared, strict=True):
+        values = "; ".join(f"{kind} {s[0]:.2f} m, {s[1]:.2f} m/s, {s[2]:.2f} m/s²" for kind, s in of.items())
+        print(f"{clip.name}: {len(clip.states)} frames, declared from the other clips: {values}")
+    print(
+        f"\n| s ahead | warned | encounters within {args.clearance:g} m | median lead (s) | moments found "
+        "| warnings right | wrong ones missed by (m) | alerts a minute |\n|---:|---|---:|---:|---:|---:|---:|---:|"
+    )
+    said: dict[float, list[Told]] = {}
+    for horizon in HORIZONS:
+        said[horizon] = [
+            Told(watch(c, horizon, args.clearance, None) > 0.0, watch(c, horizon, args.clearance, sigmas))
+            for c, sigmas in zip(clips, declared, strict=True)
+        ]
+        for threshold in (None, *THRESHOLDS):
+            score = Score()
+            for clip, told in zip(clips, said[horizon], strict=True):
+                warned = told.stated if threshold is None else told.probability >= threshold
+                score.add(clip, warned, horizon, args.clearance)
+            print(score.row(horizon, "stated motion alone" if threshold is None else f"probability ≥ {threshold:g}"))
+    if args.png:
+        draw(clips, said, args.clearance, args.png)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,185 @@
+"""What declared uncertainty adds to the predictions of a step: when and how likely, and pairs that may meet after all.
+
+Pairs whose stated motions pass each other are kept in a list like the event list: an entry holds as long as the
+motions of both bodies do. Nothing here runs before a state declares an uncertainty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from math import inf, nan
+from statistics import NormalDist
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor._jit import kernel
+from collision_monitor.description import ObjectDescription
+from collision_monitor.prediction.motion import Bodies, enlarge
+from collision_monitor.prediction.normal_samples import normal_samples
+from collision_monitor.prediction.spread import is_uncertain, make_spread, take_spread
+from collision_monitor.prediction.uncertainty import PROBABILITY, impact_probabilities, make_room
+from collision_monitor.records import PREDICTION, Method, PredictionStatus
+
+ANSWERS: Final = ("earliest", "most_likely", "latest", "probability")
+
+ENTRY = np.dtype(
+    [
+        ("key", np.uint64),  # (smaller id << 32) | larger id
+        ("until", np.float64),  # s: looked for until then; what comes near each other later is found again
+        ("i", np.int32),  # body slots; body i has the smaller id
+        ("j", np.int32),
+        ("version_i", np.uint32),
+        ("version_j", np.uint32),
+    ]
+)
+
+Records = NDArray[np.void]
+Pairs = NDArray[np.int32]
+Judge = Callable[[Pairs, bool], NDArray[np.float64]]
+
+
+@kernel
+def renew(entries, pairs, bodies, spread, now, renewed):
+    """The entries that still hold, then those of the pairs (P, 2) in which a body is uncertain, into renewed.
+
+    Returns how many.
+    """
+    n = 0
+    motion = bodies.motion
+    for k in range(entries.size):
+        entry = entries[k]
+        holds = motion[entry.i].version == entry.version_i and motion[entry.j].version == entry.version_j
+        if holds and entry.until >= now:
+            renewed[n] = entry
+            n += 1
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        if not (is_uncertain(spread, i) or is_uncertain(spread, j)):
+            continue
+        if motion[i].id > motion[j].id:
+            i, j = j, i
+        entry = renewed[n]
+        entry.key = (np.uint64(motion[i].id) << np.uint64(32)) | np.uint64(motion[j].id)
+        entry.until = min(motion[i].cover, motion[j].cover)
+        entry.i, entry.j = i, j
+        entry.version_i, entry.version_j = motion[i].version, motion[j].version
+        n += 1
+    return n
+
+
+@lru_cache(maxsize=8)
+def reported_sigmas(least_probability: float, confidence: float) -> float:
+    """How many standard deviations off a body may be for a pair that stays apart to be left out.
+
+    For flat faces: to meet, one of the errors of the two positions and the two velocities must exceed it. Four times
+    what one does that is less than the least probability that is reported, and than what the confidence leaves.
+    """
+    return NormalDist().inv_cdf(1.0 - 0.25 * min(least_probability, 1.0 - confidence))
+
+
+class Scene(NamedTuple):
+    """What is asked about: the shapes and bodies as the kernels read them, the time (s), the settings."""
+
+    table: Any
+    parts: Any
+    bodies: Bodies
+    now: float
+    profile: Any  # profiles.Profile
+    planar: bool
+
+
+class UncertainPredictions:
+    """The uncertainties of all bodies, and the pairs that only they could bring together."""
+
+    def __init__(self, capacity: int) -> None:
+        self.active = False
+        """Whether any state has declared an uncertainty."""
+        self.spread = make_spread(capacity)
+        self.entries: Records = np.empty(0, ENTRY)
+        """The pairs, by key."""
+        self._room = make_room()
+
+    def enlarge(self, capacity: int) -> None:
+        """Room for more bodies; the slots stay."""
+        spread = make_spread(capacity)
+        enlarge(self.spread, spread)
+        self.spread = spread
+
+    def describe(self, i: int, d: ObjectDescription) -> None:
+        """Take in what the object in slot i has declared of its accelerations."""
+        bounds = (0.0, 0.0) if d.static else (d.max_linear_acceleration, d.max_angular_acceleration)
+        self.spread.acceleration[i] = bounds
+
+    def forget(self, i: int) -> None:
+        """The body in slot i is gone."""
+        for array in self.spread:
+            array[i] = 0.0
+        self.active = bool(self.spread.stddev.any())
+
+    def take(self, slots: Pairs, numbers: Any, covariance: NDArray[np.float64], planar: bool) -> None:
+        """Take in the uncertainties of states that were accepted; arguments as of `take_spread`."""
+        take_spread(self.spread, slots, numbers, covariance, planar)
+        self.active = True
+
+    def sigmas(self, profile: Any) -> float:
+        """By how many standard deviations swept boxes are widened; 0 while nobody is uncertain."""
+        return reported_sigmas(profile.min_probability, profile.confidence) if self.active else 0.0
+
+    def add_pairs(self, pairs: Pairs, bodies: Bodies, now: float) -> None:
+        """Pairs (P, 2) whose swept boxes meet, found in this step; what no longer holds is dropped."""
+        renewed = np.empty(len(self.entries) + len(pairs), ENTRY)
+        entries = renewed[: renew(self.entries, pairs, bodies, self.spread, now, renewed)]
+        if len(pairs):
+            entries = entries[np.lexsort((entries["until"], entries["key"]))]
+            entries = entries[np.append(entries["key"][1:] != entries["key"][:-1], True)[: len(entries)]]
+        self.entries = entries
+
+    def complete(self, predictions: Records, slots: Pairs, touching: NDArray[np.uint64], scene: Scene) -> Records:
+        """Fill in times and probabilities, and add the pairs that may meet though they are stated to pass.
+
+        predictions (n,): of stated motions, with the body slots (n, 2); touching: keys of the pairs that touch now.
+        Returns them soonest first.
+        """
+        for name, column in zip(ANSWERS, self._judge(slots, True, scene).T, strict=True):
+            predictions[name] = column
+        self.add_pairs(np.empty((0, 2), np.int32), scene.bodies, scene.now)
+        known = (predictions["id_a"].astype(np.uint64) << np.uint64(32)) | predictions["id_b"]
+        entries = self.entries[~np.isin(self.entries["key"], np.concatenate([known, touching]))]
+        if len(entries) == 0:
+            return predictions
+        slots = np.stack([entries["i"], entries["j"]], axis=1)
+        answers = self._judge(slots, False, scene)
+        kept = answers[:, PROBABILITY] >= scene.profile.min_probability
+        both = np.concatenate([predictions, _possible(entries["key"][kept], slots[kept], answers[kept], scene)])
+        return both[np.lexsort((both["id_b"], both["id_a"], both["lower"]))]
+
+    def _judge(self, slots: Pairs, stated: bool, scene: Scene) -> NDArray[np.float64]:
+        p = scene.profile
+        answers = np.empty((len(slots), len(ANSWERS)))
+        samples = normal_samples(p.uncertainty_samples)
+        impact_probabilities(
+            scene.table, scene.parts, scene.bodies, self.spread, slots, stated, scene.now, p.horizon, p.contact_margin,
+            p.stale_acceleration, p.impact_tolerance, p.impact_iterations, p.confidence,
+            reported_sigmas(p.min_probability, p.confidence), scene.planar, *samples, self._room, answers,
+        )  # fmt: skip
+        return answers
+
+
+def _possible(keys: NDArray[np.uint64], slots: Pairs, answers: NDArray[np.float64], scene: Scene) -> Records:
+    """Predictions (records.PREDICTION) of pairs that may meet though they are stated to pass."""
+    p, bodies = scene.profile, scene.bodies
+    rows = np.zeros(len(keys), PREDICTION)
+    for name, column in zip(ANSWERS, answers.T, strict=True):
+        rows[name] = column
+    rows["lower"], rows["upper"] = rows["earliest"], inf
+    for name in ("point", "normal", "closing_speed"):
+        rows[name] = nan
+    rows["id_a"], rows["id_b"] = keys >> np.uint64(32), keys & np.uint64(0xFFFFFFFF)
+    rows["status"], rows["method"] = PredictionStatus.POSSIBLE, Method.SAMPLING
+    rows["model_a"], rows["model_b"] = bodies.model[slots].T
+    old = ~bodies.static[slots] & (scene.now - bodies.time[slots] > p.stale_after)
+    rows["stale"] = old.any(axis=1)
+    return rows

@@ -1,0 +1,402 @@
+"""When and how likely two bodies meet whose states are uncertain: earliest, most likely, latest time, probability.
+
+The relative motion is a straight line whose start and velocity are normally distributed (spread.py). Evenly spread
+samples of it, each followed exactly as the stated motion is, give the distribution of the time of impact
+(docs/uncertainty.md). The samples are laid along what matters: the error of the position at the time of closest
+approach decides whether they meet, its part across the path first; what is left of the velocity's error comes after.
+"""
+
+from __future__ import annotations
+
+from math import inf, nan, sqrt
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from collision_monitor._jit import device, inlined, kernel
+from collision_monitor.prediction.motion import MOTION, quaternion_to_matrix, turn_quaternion
+from collision_monitor.prediction.spread import FIFTH_ROOT, is_uncertain, surface_spread, unknown_acceleration
+from collision_monitor.prediction.time_of_impact import (
+    CLEAR,
+    Scratch,
+    contact_at,
+    make_scratch,
+    shape_impact,
+    sphere_interval,
+)
+
+EARLIEST: Final = 0
+MOST_LIKELY: Final = 1
+LATEST: Final = 2
+PROBABILITY: Final = 3
+
+NODES: Final = 9
+"""Times between now and the horizon at which the gap is compared with its uncertainty."""
+
+SAMPLE_TOLERANCE: Final = 0.02
+"""Within how many standard deviations of the gap a sample's impact is settled: its probability is off by 0.004."""
+
+OUTWARD: Final = 1.0
+"""Standard errors of a quantile by which the earliest time is earlier and the latest later than the samples' own."""
+
+
+class Room(NamedTuple):
+    """Room for one thread's intermediate results."""
+
+    motion: Any  # (2,) MOTION: the two bodies, from now on
+    quaternion: Any  # (1, 4)
+    rotation: Any  # (2, 3, 3): the stated orientations now
+    frame: Any  # (3, 3): rows across the path, along it, and across both
+    joint: Any  # (6, 6): covariance of position at the time of closest approach and of velocity, then its root
+    block: Any  # (3, 3)
+    scratch: Scratch
+
+
+def make_room() -> Room:
+    """Room for one thread."""
+    return Room(
+        np.zeros(2, MOTION),
+        np.zeros((1, 4)),
+        np.zeros((2, 3, 3)),
+        np.zeros((3, 3)),
+        np.zeros((6, 6)),
+        np.zeros((3, 3)),
+        make_scratch(),
+    )
+
+
+@device
+def _carry_on(bodies, i, now, q, m):
+    """Body i's last state carried on to `now` as the motion m (MOTION), whose time 0 is now; returns its age (s)."""
+    age = 0.0 if bodies.static[i] else now - bodies.time[i]
+    m.x = bodies.position[i, 0] + bodies.linear[i, 0] * age
+    m.y = bodies.position[i, 1] + bodies.linear[i, 1] * age
+    m.z = bodies.position[i, 2] + bodies.linear[i, 2] * age
+    m.vx, m.vy, m.vz = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
+    m.wx, m.wy, m.wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
+    turn_quaternion(bodies.quaternion, i, m.wx, m.wy, m.wz, age, q[0])
+    quaternion_to_matrix(q, 0, m.rotation)
+    m.time = 0.0
+    m.radius = bodies.motion[i].radius
+    return age
+
+
+@device
+def _first_contact(table, parts, bodies, i, j, end, margin, tube_0, tube_1, tolerance, budget, room):
+    """First time in [0, end] at which bodies i and j, moving as in room.motion, are within margin + tube_0 + tube_1 t.
+
+    In metres; infinite: never.
+    """
+    A, B = room.motion[0], room.motion[1]
+    first, last = 0.0, end
+    reach = A.radius + B.radius + margin + tube_0
+    if reach < inf:
+        vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
+        first, last = sphere_interval(B.x - A.x, B.y - A.y, B.z - A.z, vx, vy, vz, reach, tube_1, end, 1.0)
+        if bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0:  # single spheres
+            return first
+        if first > last:
+            return inf
+    best = inf
+    a = bodies.first_shape[i]
+    while a >= 0:
+        b = bodies.first_shape[j]
+        while b >= 0:
+            status, t, _, _ = shape_impact(
+                table, parts, A, B, a, b, first, last,
+                margin, tube_0 + tube_1 * first, tube_1, tolerance, budget, room.scratch,
+            )  # fmt: skip
+            if status != CLEAR:
+                best = last = t
+            b = parts.next[b]
+        a = parts.next[a]
+    return best
+
+
+@device
+def _gap_at(table, parts, first_a, first_b, t, room):
+    """Signed distance (m) of the bodies' shapes at t; its direction into room.block[0]."""
+    A, B, out, normal = room.motion[0], room.motion[1], room.scratch.out, room.block[0]
+    best = inf
+    a = first_a
+    while a >= 0:
+        b = first_b
+        while b >= 0:
+            gap = contact_at(table, parts, A, B, a, b, t, room.scratch)
+            if gap < best:
+                best = gap
+                normal[0], normal[1], normal[2] = out[1], out[2], out[3]
+            b = parts.next[b]
+        a = parts.next[a]
+    return best
+
+
+@device
+def _set_frame(frame, vx, vy, vz):
+    """Complete the frame whose first row is a direction n: the second the part of v across n, the third across both.
+
+    Where the first row is 0 it becomes some direction across v.
+    """
+    n = sqrt(frame[0, 0] ** 2 + frame[0, 1] ** 2 + frame[0, 2] ** 2)
+    v = sqrt(vx * vx + vy * vy + vz * vz)
+    if n > 0.0:
+        nx, ny, nz = frame[0, 0] / n, frame[0, 1] / n, frame[0, 2] / n
+    else:
+        nx, ny, nz = _across(vx, vy, vz)
+    along = vx * nx + vy * ny + vz * nz
+    ux, uy, uz = vx - along * nx, vy - along * ny, vz - along * nz
+    u = sqrt(ux * ux + uy * uy + uz * uz)
+    if u > 1e-6 * v:
+        ux, uy, uz = ux / u, uy / u, uz / u
+    else:
+        ux, uy, uz = _across(nx, ny, nz)
+    frame[0, 0], frame[0, 1], frame[0, 2] = nx, ny, nz
+    frame[1, 0], frame[1, 1], frame[1, 2] = ux, uy, uz
+    frame[2, 0], frame[2, 1], frame[2, 2] = ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
+
+
+@inlined
+def _across(x, y, z):
+    """A unit vector across (x, y, z); level where that is possible."""
+    level = sqrt(x * x + y * y)
+    if level > 1e-6 * abs(z):
+        return -y / level, x / level, 0.0
+    return 1.0, 0.0, 0.0
+
+
+@device
+def _add_covariance(spread, i, age, t, stale_acceleration, planar, room):
+    """Add body i's part to room.joint, the covariance of (position t seconds from now, velocity) along the frame.
+
+    The acceleration nobody told acts as an error of the velocity that is right at t.
+    """
+    at = age + t
+    s = unknown_acceleration(spread, i, age > 0.0, 0, stale_acceleration)
+    ahead = 0.5 * t if unknown_acceleration(spread, i, False, 0, stale_acceleration) > 0.0 else 0.0
+    velocity = s * (age + ahead)
+    position = s * 0.5 * age * age + velocity * t
+    C, frame, joint, block = spread.covariance, room.frame, room.joint, room.block
+    for part in range(3):
+        row, column = 3 * (part == 2), 3 * (part > 0)
+        factor = at if part == 1 else at * at
+        extra = (position * position, position * velocity, velocity * velocity)[part]
+        k = 0
+        for r in range(3):
+            for c in range(r, 3):
+                value = C[i, 6 + k] if part == 2 else factor * C[i, 6 + k] + (C[i, k] if part == 0 else 0.0)
+                if r == c and not (planar and r == 2):
+                    value += extra
+                block[r, c] = block[c, r] = value
+                k += 1
+        for r in range(3):
+            x = y = z = 0.0
+            for k in range(3):
+                x += frame[r, k] * block[k, 0]
+                y += frame[r, k] * block[k, 1]
+                z += frame[r, k] * block[k, 2]
+            for c in range(3):
+                joint[row + r, column + c] += x * frame[c, 0] + y * frame[c, 1] + z * frame[c, 2]
+
+
+@device
+def _take_root(joint):
+    """The lower Cholesky factor of a covariance (6, 6), of which the upper triangle is read, in its place.
+
+    A coordinate without variance of its own gets an empty column.
+    """
+    for c in range(6):
+        d = joint[c, c]
+        scale = d
+        for k in range(c):
+            d -= joint[c, k] * joint[c, k]
+        root = sqrt(d) if d > 1e-12 * scale else 0.0
+        for r in range(c + 1, 6):
+            value = joint[c, r]
+            for k in range(c):
+                value -= joint[r, k] * joint[c, k]
+            joint[r, c] = value / root if root > 0.0 else 0.0
+        joint[c, c] = root
+
+
+@inlined
+def _turn(m, R, dx, dy, dz):
+    """Set the rotation of the motion m (MOTION) to R turned by the rotation vector d (rad)."""
+    angle = sqrt(dx * dx + dy * dy + dz * dz)
+    c = 2.0 * np.sin(0.5 * angle) ** 2
+    s = np.sin(angle)
+    if angle > 0.0:
+        dx, dy, dz = dx / angle, dy / angle, dz / angle
+    for j in range(3):
+        x, y, z = R[0, j], R[1, j], R[2, j]
+        ax, ay, az = dy * z - dz * y, dz * x - dx * z, dx * y - dy * x
+        m.rotation[0, j] = x + s * ax + c * (dy * az - dz * ay)
+        m.rotation[1, j] = y + s * ay + c * (dz * ax - dx * az)
+        m.rotation[2, j] = z + s * az + c * (dx * ay - dy * ax)
+
+
+@device
+def _orientation_spread(spread, i, radius, at):
+    """Standard deviation (rad) of the orientation `at` seconds after the last state; 0 where turning moves nothing."""
+    if radius == 0.0:
+        return 0.0
+    turning = 0.5 * FIFTH_ROOT * spread.acceleration[i, 1] * at * at
+    rate = spread.stddev[i, 3] * at
+    return sqrt(spread.stddev[i, 1] ** 2 + rate * rate + turning * turning)
+
+
+@device
+def _summarise(times, weights, order, confidence, safe, answer):
+    """Quantiles of the samples' times of impact into answer (4,); safe: a time before which hardly any impact is.
+
+    earliest: of the impacts at most 1 - confidence are before; `safe` where there are too few samples to tell.
+    Both quantiles are moved outward by what they may be off for so few samples.
+    """
+    n = 0
+    total = squares = all_squares = 0.0
+    for k in range(order.size):
+        w = weights[order[k]]
+        all_squares += w * w
+        if times[order[k]] < inf:
+            total += w
+            squares += w * w
+            n += 1
+    answer[PROBABILITY] = min(total, 1.0)
+    answer[EARLIEST] = answer[MOST_LIKELY] = answer[LATEST] = inf
+    if n == 0:
+        return
+    doubt = 1.0 - confidence
+    variance = doubt * confidence
+    few = total * (doubt - OUTWARD * sqrt(variance * squares) / total)
+    answer[EARLIEST] = min(safe, times[order[0]])
+    below = 0.0
+    for k in range(n):
+        below += weights[order[k]]
+        if below > few:
+            break
+        answer[EARLIEST] = times[order[k]]
+    most = confidence + OUTWARD * sqrt(variance * all_squares)
+    below = 0.0
+    for k in range(n):
+        below += weights[order[k]]
+        if below >= most:
+            answer[LATEST] = times[order[k]]
+            break
+    # the shortest time in which half of the impacts are
+    low = 0
+    inside = 0.0
+    shortest = inf
+    for high in range(n):
+        inside += weights[order[high]]
+        while inside - weights[order[low]] >= 0.5 * total:
+            inside -= weights[order[low]]
+            low += 1
+        length = times[order[high]] - times[order[low]]
+        if inside >= 0.5 * total and length < shortest:
+            shortest = length
+            answer[MOST_LIKELY] = 0.5 * (times[order[high]] + times[order[low]])
+
+
+@device
+def _lay_along(table, parts, bodies, i, j, stated, margin, horizon, tube_0, tube_1, room):
+    """The time that matters most, returned, and the frame to lay the samples along, into room.frame.
+
+    Stated to meet, or two spheres: the closest approach of the centres, and the miss across the path. Else, and where
+    a body has no end: where the gap is smallest in standard deviations, the design point of reliability theory.
+    """
+    A, B, frame, normal = room.motion[0], room.motion[1], room.frame, room.block[0]
+    vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
+    px, py, pz = B.x - A.x, B.y - A.y, B.z - A.z
+    round = bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0
+    t = 0.0
+    if (stated or round) and A.radius + B.radius < inf:
+        vv = vx * vx + vy * vy + vz * vz
+        if vv > 0.0:
+            t = min(max(-(px * vx + py * vy + pz * vz) / vv, 0.0), horizon)
+        frame[0, 0], frame[0, 1], frame[0, 2] = px + t * vx, py + t * vy, pz + t * vz
+    else:
+        least = inf
+        for node in range(NODES):
+            at = horizon * node / (NODES - 1)
+            gap = _gap_at(table, parts, bodies.first_shape[i], bodies.first_shape[j], at, room)
+            beta = (gap - margin) / max(tube_0 + at * tube_1, 1e-300)
+            if beta < least:
+                t, least = at, beta
+                frame[0, 0], frame[0, 1], frame[0, 2] = normal[0], normal[1], normal[2]
+    _set_frame(frame, vx, vy, vz)
+    return t
+
+
+@device
+def _shift(room, z, t, px, py, pz, vx, vy, vz):
+    """Put body j where sample z (12,) of the errors has it: position p + what is off at t, velocity v + what is off."""
+    B, L, F, y = room.motion[1], room.joint, room.frame, room.block
+    for r in range(6):
+        value = 0.0
+        for c in range(r + 1):
+            value += L[r, c] * z[c]
+        y[r // 3, r % 3] = value
+    dx = y[1, 0] * F[0, 0] + y[1, 1] * F[1, 0] + y[1, 2] * F[2, 0]
+    dy = y[1, 0] * F[0, 1] + y[1, 1] * F[1, 1] + y[1, 2] * F[2, 1]
+    dz = y[1, 0] * F[0, 2] + y[1, 1] * F[1, 2] + y[1, 2] * F[2, 2]
+    B.vx, B.vy, B.vz = vx + dx, vy + dy, vz + dz
+    B.x = px + y[0, 0] * F[0, 0] + y[0, 1] * F[1, 0] + y[0, 2] * F[2, 0] - t * dx
+    B.y = py + y[0, 0] * F[0, 1] + y[0, 1] * F[1, 1] + y[0, 2] * F[2, 1] - t * dy
+    B.z = pz + y[0, 0] * F[0, 2] + y[0, 1] * F[1, 2] + y[0, 2] * F[2, 2] - t * dz
+
+
+@kernel
+def impact_probabilities(
+    table, parts, bodies, spread, pairs, stated, now, horizon, margin, stale_acceleration, tolerance, budget,
+    confidence, sigmas, planar, points, weights, room, answers,
+):  # fmt: skip
+    """Times and probabilities of impact of pairs (P, 2) of body slots from `now` on into answers (P, 4).
+
+    stated: the pairs meet as they are stated to move; else those that do not within `sigmas` standard deviations are
+    left out. NaN: left out, or neither body has declared any uncertainty. points (S, 12), weights (S,): normal_samples.
+    """
+    times = np.empty(weights.size)
+    A, B = room.motion[0], room.motion[1]
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        answers[k, :] = nan
+        if not (is_uncertain(spread, i) or is_uncertain(spread, j)):
+            continue
+        age_i = _carry_on(bodies, i, now, room.quaternion, A)
+        age_j = _carry_on(bodies, j, now, room.quaternion, B)
+        r_i, r_j = bodies.spin_radius[i], bodies.spin_radius[j]
+        now_i, growth_i = surface_spread(spread, i, r_i, age_i, horizon, stale_acceleration)
+        now_j, growth_j = surface_spread(spread, j, r_j, age_j, horizon, stale_acceleration)
+        tube_0, tube_1 = now_i + now_j, growth_i + growth_j
+        coarse = max(tolerance, SAMPLE_TOLERANCE * tube_0)
+        safe = _first_contact(
+            table, parts, bodies, i, j, horizon, margin, sigmas * tube_0, sigmas * tube_1, coarse, budget, room
+        )
+        if safe == inf and not stated:
+            continue
+        t = _lay_along(table, parts, bodies, i, j, stated, margin, horizon, tube_0, tube_1, room)
+        room.joint[:] = 0.0
+        if not bodies.static[i]:
+            _add_covariance(spread, i, age_i, t, stale_acceleration, planar, room)
+        if not bodies.static[j]:
+            _add_covariance(spread, j, age_j, t, stale_acceleration, planar, room)
+        _take_root(room.joint)
+        turn_i = _orientation_spread(spread, i, r_i, age_i + t)
+        turn_j = _orientation_spread(spread, j, r_j, age_j + t)
+        for r in range(3):
+            for c in range(3):
+                room.rotation[0, r, c] = A.rotation[r, c]
+                room.rotation[1, r, c] = B.rotation[r, c]
+        level = 0.0 if planar else 1.0
+        coarse = max(tolerance, SAMPLE_TOLERANCE * room.joint[0, 0])
+        bias = 0.0 if r_i == 0.0 and r_j == 0.0 else -0.5 * coarse
+        px, py, pz = B.x, B.y, B.z
+        vx, vy, vz = B.vx, B.vy, B.vz
+        for n in range(weights.size):
+            z = points[n]
+            _shift(room, z, t, px, py, pz, vx, vy, vz)
+            if turn_i > 0.0:
+                _turn(A, room.rotation[0], level * turn_i * z[6], level * turn_i * z[7], turn_i * z[8])
+            if turn_j > 0.0:
+                _turn(B, room.rotation[1], level * turn_j * z[9], level * turn_j * z[10], turn_j * z[11])
+            times[n] = _first_contact(table, parts, bodies, i, j, horizon, margin, bias, 0.0, coarse, budget, room)
+        _summarise(times, weights, np.argsort(times), confidence, safe, answers[k])

@@ -1,0 +1,189 @@
+"""Times and probabilities of impact under uncertainty: against Monte Carlo in NumPy and the normal integral."""
+
+from __future__ import annotations
+
+from math import inf
+from statistics import NormalDist
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import collision_monitor as cm
+from collision_monitor.errors import InputError, Refusal
+from collision_monitor.prediction.normal_samples import DIMENSIONS, normal_samples
+from collision_monitor.profiles import Profile
+from collision_monitor.records import STATE, ContactStatus, PredictionStatus
+
+SECOND = 1_000_000_000
+HORIZON = 2.0
+SAMPLES = 100_000
+Array = NDArray[np.float64]
+
+
+def state(object_id: int, position: Array | tuple[float, ...], velocity: Array | tuple[float, ...], *sigmas: float):
+    row = np.zeros(1, STATE)
+    row["id"], row["position"], row["quaternion"], row["linear"] = object_id, position, (0, 0, 0, 1), velocity
+    row["position_stddev"], row["velocity_stddev"] = sigmas
+    return row
+
+
+def predict(shapes: list[cm.Shape], states: NDArray[np.void], covariance: Array | None = None) -> np.void | None:
+    """The prediction of the only pair; None: not told."""
+    monitor = cm.Monitor(Profile.named("balanced").replace(horizon=HORIZON))
+    for object_id, shape in enumerate(shapes):
+        fixed = isinstance(shape, cm.HalfSpace)
+        monitor.add(object_id, shape, static=fixed, pose=cm.Pose() if fixed else None)
+    found = monitor.step(0, states, covariance=covariance).predictions
+    return found[0] if len(found) else None
+
+
+def sphere_impacts(reach: float, p: Array, v: Array) -> Array:
+    """First times (n,) in [0, HORIZON] at which |p + v t| <= reach, infinite for none: the quadratic's root."""
+    a, b, c = (v * v).sum(1), (p * v).sum(1), (p * p).sum(1) - reach**2
+    discriminant = b * b - a * c
+    root = (-b - np.sqrt(np.maximum(discriminant, 0.0))) / a
+    hit = (discriminant > 0.0) & (root >= 0.0) & (root <= HORIZON)
+    return np.where(c <= 0.0, 0.0, np.where(hit, root, inf))
+
+
+@pytest.mark.parametrize("with_covariance", [False, True])
+def test_spheres_agree_with_monte_carlo(with_covariance: bool) -> None:
+    rng = np.random.default_rng(5 + with_covariance)
+    told = possible = 0
+    errors = []
+    for _ in range(40):
+        reach = rng.uniform(0.3, 1.2)
+        v = rng.normal(0, 1.5, 3)
+        p = rng.normal(0, 0.8, 3) - v * rng.uniform(0.5, 2.5)  # on a course that brings them near each other
+        if np.linalg.norm(p) < 1.2 * reach:
+            continue
+        factors = rng.normal(0, 0.3, (2, 2, 3, 3)) * rng.uniform(0.1, 1.5, (2, 2, 1, 1))
+        sigmas = rng.uniform(0.02, 0.5, (2, 2))
+        isotropic = sigmas[..., None, None] ** 2 * np.eye(3)
+        each = factors @ factors.transpose(0, 1, 3, 2) if with_covariance else isotropic
+        covariance = each[..., *np.triu_indices(3)].reshape(2, 12) if with_covariance else None
+        rows = np.concatenate([state(0, (0, 0, 0), (0, 0, 0), *sigmas[0]), state(1, p, v, *sigmas[1])])
+        answer = predict([cm.Sphere(0.4 * reach), cm.Sphere(0.6 * reach)], rows, covariance)
+        total = each.sum(0)
+        ps = rng.multivariate_normal(p, total[0], SAMPLES)
+        vs = rng.multivariate_normal(v, total[1], SAMPLES)
+        times = sphere_impacts(reach, ps, vs)
+        truth = np.isfinite(times).mean()
+        if answer is None:
+            assert truth < 0.015
+            continue
+        told += 1
+        possible += answer["status"] == PredictionStatus.POSSIBLE
+        errors.append(answer["probability"] - truth)
+        hits = times[np.isfinite(times)]
+        assert (hits < answer["earliest"]).mean() <= 0.05 + 0.02
+        assert answer["earliest"] <= answer["most_likely"]
+        if answer["latest"] < inf:
+            assert 0.92 <= (times <= answer["latest"]).mean() <= 0.98
+        else:
+            assert truth < 0.98
+    assert told >= 15
+    assert possible >= 3
+    assert np.abs(errors).max() < 0.03
+    assert np.sqrt(np.mean(np.square(errors))) < 0.01
+
+
+@pytest.mark.parametrize(
+    "shape", [cm.Sphere(0.5), cm.Box((1, 1, 1)), cm.Cylinder(0.4, 1.0)], ids=["ball", "box", "can"]
+)
+@pytest.mark.parametrize("gap", [1.0, 1.9, 2.6])
+def test_a_wall_is_the_normal_integral(shape: cm.Shape, gap: float) -> None:
+    """A flat wall is met if the height at the end of the horizon is below that of the shape: one normal variable."""
+    sigma_p, sigma_v, speed = 0.1, 0.2, 1.0
+    rows = state(1, (0, 0, gap + 0.5), (0.3, 0, -speed), sigma_p, sigma_v)
+    answer = predict([cm.HalfSpace((0, 0, 1)), shape], rows)
+    at_end = NormalDist(gap - speed * HORIZON, float(np.hypot(sigma_p, sigma_v * HORIZON)))
+    assert answer is not None
+    assert answer["probability"] == pytest.approx(at_end.cdf(0.0), abs=0.01)
+    assert answer["status"] == (PredictionStatus.HIT if gap < speed * HORIZON else PredictionStatus.POSSIBLE)
+
+
+def test_what_nobody_declares_is_not_computed() -> None:
+    rows = np.concatenate([state(0, (0, 0, 0), (0, 0, 0), 0, 0), state(1, (3, 0, 0), (-2, 0, 0), 0, np.nan)])
+    answer = predict([cm.Sphere(0.5), cm.Sphere(0.5)], rows)
+    assert answer is not None
+    assert all(np.isnan(answer[name]) for name in ("earliest", "most_likely", "latest", "probability"))
+
+
+def test_pairs_far_from_meeting_are_not_told() -> None:
+    """A crowd that stands 2 m apart and is known to 5 cm: nobody may meet anybody, though the boxes are widened."""
+    side = 8
+    monitor = cm.Monitor()
+    grid = np.stack(np.meshgrid(*[2.0 * np.arange(side)] * 2), -1).reshape(-1, 2)
+    for object_id in range(len(grid)):
+        monitor.add(object_id, cm.Cylinder(0.25, 1.75))
+    rows = np.concatenate([state(k, (*at, 0), (0, 0, 0), 0.05, 0.05) for k, at in enumerate(grid)])
+    assert len(monitor.step(0, rows).predictions) == 0
+    rows["velocity_stddev"] = 0.5  # 1 m after two seconds: neighbours may meet, and nobody else
+    told = monitor.step(SECOND // 100, rows).predictions
+    assert len(told) == 2 * side * (side - 1) + 2 * (side - 1) ** 2
+    assert (told["status"] == PredictionStatus.POSSIBLE).all()
+    assert (told["lower"] == told["earliest"]).all()
+    assert (told["upper"] == inf).all()
+
+
+def test_it_grows_while_an_object_is_not_heard_of() -> None:
+    """Two that stand 1 m apart: the longer one is silent, the more likely they meet, until they may touch already."""
+    monitor = cm.Monitor()
+    for object_id in (0, 1):
+        monitor.add(object_id, cm.Sphere(0.5))
+    probabilities = []
+    for k in range(40):
+        still = state(0, (0, 0, 0), (0, 0, 0), 0.05, 0.05)
+        rows = np.concatenate([still, state(1, (0, 2, 0), (0, 0, 0), 0.05, 0.05)]) if k == 0 else still
+        result = monitor.step(k * SECOND // 20, rows)
+        if len(result.contacts):
+            break
+        told = result.predictions
+        probabilities.append(float(told["probability"][0]) if len(told) else 0.0)
+    assert result.contacts["status"][0] == ContactStatus.UNRESOLVED
+    assert probabilities[0] == 0.0
+    assert probabilities[-1] > 0.03
+    assert (np.diff(probabilities) > -0.01).all()
+
+
+def test_a_declared_acceleration_widens_it() -> None:
+    answers = []
+    for bound in (0.0, 2.0):
+        monitor = cm.Monitor()
+        monitor.add(0, cm.Sphere(0.5), max_linear_acceleration=bound)
+        monitor.add(1, cm.Sphere(0.5))
+        rows = np.concatenate([state(0, (0, 0, 0), (1, 0, 0), 0.05, 0.0), state(1, (2, 1.4, 0), (0, 0, 0), 0.05, 0.0)])
+        told = monitor.step(0, rows).predictions
+        answers.append(float(told["probability"][0]) if len(told) else 0.0)
+    # 2 m/s^2 in any direction: 0.9 along an axis, which is 0.45 m after a second, when the gap of 0.4 m is smallest
+    assert answers[0] < 0.01
+    assert answers[1] > 0.1
+
+
+def test_covariances_that_cannot_be_are_refused() -> None:
+    monitor = cm.Monitor()
+    monitor.add(1, cm.Sphere(0.5))
+    rows = state(1, (0, 0, 0), (0, 0, 0), 0.1, 0.1)
+    unit = np.array([[1.0, 0, 0, 1, 0, 1, 1, 0, 0, 1, 0, 1]])
+    for place, value in ((1, 2.0), (9, -1.0), (3, inf)):
+        bad = unit.copy()
+        bad[0, place] = value
+        monitor.step(place * SECOND, rows, covariance=bad)
+        assert "positive semi-definite" in monitor.last_refusal
+    assert monitor.refused[Refusal.NON_FINITE] == 3
+    with pytest.raises(InputError, match=r"covariance: expected shape \(1, 12\), got \(12,\)"):
+        monitor.step(10 * SECOND, rows, covariance=unit[0])
+
+
+def test_the_samples_are_standard_normal() -> None:
+    points, weights = normal_samples(128)
+    assert points.shape == (128, DIMENSIONS)
+    assert weights.sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(weights @ points, 0.0, atol=0.05)
+    np.testing.assert_allclose(weights @ points**2, 1.0, atol=0.1)
+    edge = 1.0
+    exact = NormalDist().cdf(edge)
+    for direction in np.eye(DIMENSIONS):
+        assert weights @ (points @ direction < edge) == pytest.approx(exact, abs=0.02)
