@@ -4,8 +4,8 @@ At every frame the monitor predicts who comes within a clearance of whom; what r
 With uncertainty, how far objects of their kind strayed from their stated motion in the *other* clips is declared.
 Prints a Markdown table.
 
-    python benchmarks/warnings.py ../shared/data/citr
-    python benchmarks/warnings.py ../shared/data/citr --png docs/images/warnings.png
+    python benchmarks/early_warning.py ../shared/data/citr
+    python benchmarks/early_warning.py ../shared/data/citr --png docs/images/early_warning.png
 """
 
 from __future__ import annotations
