@@ -31,8 +31,13 @@ lint: setup ## ruff and mypy --strict
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
 
-bench: setup ## time all contacts of a frame, ours and every installed peer; make bench ARGS=--quick takes a minute
+QUICK := $(findstring --quick,$(ARGS))
+
+bench: setup ## time full detection beside every installed peer, the event list, the node; ARGS=--quick takes 3 minutes
 	@$(BIN)/python benchmarks/run.py $(ARGS)
+	@$(BIN)/python benchmarks/event_list.py $(if $(QUICK),--seconds 1)
+	@$(BIN)/python benchmarks/through_node.py $(if $(QUICK),--duration 10)
+	@$(BIN)/python benchmarks/memory.py $(QUICK)
 
 bench-peers: ## install the systems that bench compares with
 	@sh benchmarks/install_peers.sh

@@ -393,7 +393,7 @@ class Monitor:
             if given.ndim != 1:
                 raise InputError(f"states: expected one dimension, got shape {given.shape}")
             if len(given) > len(self._buffer):
-                self._buffer = np.empty(2 * len(given), records.STATE)
+                self._buffer = np.empty(len(given), records.STATE)
             states = self._buffer[: len(given)]
             states[:] = given  # message bytes need not be aligned
             return states
