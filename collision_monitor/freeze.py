@@ -45,6 +45,7 @@ def freeze(monitor: Monitor) -> Snapshot:
         "possible": m._uncertain.entries.copy(),
         "pairs": m._pairs.copy(),
         "pair_events": m._pair_events.copy(),
+        "outside": m._outside.copy(),
     }
     if last is not None:
         arrays |= {"contacts": last.contacts, "predictions": last.predictions}  # made anew in every step
@@ -61,6 +62,7 @@ def freeze(monitor: Monitor) -> Snapshot:
         "now_ns": m._now_ns,
         "jump_ns": m._jump_ns,
         "renewed": sorted(m._renewed),
+        "deferred": m._deferred,
         "orphans": list(m._orphans),
         "free": list(m._free),
         "free_shapes": free_shapes,
@@ -72,7 +74,7 @@ def freeze(monitor: Monitor) -> Snapshot:
 
 def thaw(profile: Profile | str, snapshot: Snapshot) -> Monitor:
     """The monitor again. Raises InputError where the snapshot is damaged, or of a program that keeps other things."""
-    m = Monitor(profile)
+    m = Monitor(profile, timed=False)
     try:
         facts = snapshot.facts[MONITOR]
         used = snapshot.array("bodies.used", m._bodies.used)
@@ -83,6 +85,7 @@ def thaw(profile: Profile | str, snapshot: Snapshot) -> Monitor:
         m._uncertain.active = facts["uncertain"]
         m.refused = {reason: facts["refused"][reason.value] for reason in Refusal}
         m.last_refusal = facts["last_refusal"]
+        m._deferred = int(facts["deferred"])
         m._origin_ns, m._now_ns, m._jump_ns = facts["origin_ns"], facts["now_ns"], facts["jump_ns"]
         m._orphans = [(key, since) for key, since in facts["orphans"]]
         if facts["last"] is not None:
@@ -142,6 +145,7 @@ def _thaw_bodies(m: Monitor, snapshot: Snapshot, facts: dict[str, Any], top: int
     m._names = {object_id: facts["names"][str(object_id)] for object_id in m._slots}
     for object_id, others in facts["allowed"].items():
         m._allow(int(object_id), frozenset(others))
+    m._outside = snapshot.array("outside", np.zeros(0, np.bool_))[:top]
     m._free, m._renewed = list(facts["free"]), set(facts["renewed"])
     if sorted([*m._free, *used.tolist()]) != list(range(top)) or not m._renewed <= set(used.tolist()):
         raise InputError("snapshot: expected every slot of a body to be either used or free, got others")

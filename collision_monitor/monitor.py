@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from collision_monitor import records
+from collision_monitor import filters, records
 from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.broad_phase.hashed_grid import make_hashed_grid, regridded, remove_boxes
+from collision_monitor.budget import EXAMINE, REFINE, PairBudget, StepClock, TimeBudget
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import CollisionMonitorError, InputError, Refusal, UnsupportedError
 from collision_monitor.geometry.pieces import is_planar
@@ -26,13 +27,13 @@ from collision_monitor.geometry.shape_table import CIRCLE, SPHERE, ShapeTableBui
 from collision_monitor.geometry.shapes import HalfSpace, Shape
 from collision_monitor.narrow_phase.models import monitored_model
 from collision_monitor.plan import ScenePlan, scene_plan
-from collision_monitor.prediction import active_pairs, answers, candidates, tracking
+from collision_monitor.prediction import active_pairs, answers, candidates, coarse, tracking
 from collision_monitor.prediction.event_list import EventList, keep_first
 from collision_monitor.prediction.motion import Bodies, enlarge, make_bodies, make_parts
 from collision_monitor.prediction.spread import worst_stddevs
-from collision_monitor.prediction.time_of_impact import IMPACT, Scratch, make_scratch
+from collision_monitor.prediction.time_of_impact import BOUND_ONLY, IMPACT, Scratch, make_scratch
 from collision_monitor.prediction.uncertain_predictions import Scene, UncertainPredictions
-from collision_monitor.profiles import Profile
+from collision_monitor.profiles import NO_BUDGET, NO_LIMIT, Profile
 from collision_monitor.records import Model
 
 NANOSECOND = 1e-9
@@ -42,6 +43,23 @@ MOST_QUERIES = 0.125
 
 FEWEST_PAIRS_FOR_THREADS = 500
 """Handing work to a thread costs as much as predicting some 100 pairs."""
+
+PREDICTED_BY = frozenset(
+    {
+        "horizon",
+        "contact_margin",
+        "impact_tolerance",
+        "impact_iterations",
+        "position_tolerance",
+        "orientation_tolerance",
+        "velocity_tolerance",
+        "angular_velocity_tolerance",
+        "uncertainty",
+        "confidence",
+        "min_probability",
+    }
+)
+"""The settings that predictions rest on: where one changes, all are made anew."""
 
 _VERDICTS = {
     tracking.UNKNOWN_ID: (Refusal.UNKNOWN_ID, "expected the id of an object that was described, got {id}"),
@@ -98,6 +116,7 @@ class StepResult:
     """The answers of one step: `contacts` (records.CONTACT) by ids, `predictions` (records.PREDICTION) soonest first.
 
     accepted is False where the whole step was refused for its stamp; the answers are then those of the last time.
+    cut: pairs that were looked at until the budget ran out; None: all were.
     """
 
     stamp_ns: int
@@ -106,17 +125,20 @@ class StepResult:
     predictions: NDArray[np.void]
     status: StepStatus
     accepted: bool = True
+    cut: int | None = None
 
 
 class Monitor:
     """Keeps objects, follows their states, and tells contacts and predicted collisions at every step.
 
     The answers are a function of the profile, the descriptions and the states in the order in which they were given:
-    no clock, no random numbers, the same bytes on every run.
+    no clock, no random numbers, the same bytes on every run. A profile with `budget_ms` adds the clock, which decides
+    how many pairs a step looks at, and nothing else: with the same `pairs_per_step` instead (`StepResult.cut`), and
+    timed=False, the answers are the same again.
     """
 
-    def __init__(self, profile: str | Profile = "balanced") -> None:
-        self.profile = Profile.named(profile) if isinstance(profile, str) else profile
+    def __init__(self, profile: str | Profile = "balanced", *, timed: bool = True) -> None:
+        self._profile = Profile.named(profile) if isinstance(profile, str) else profile
         self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
         self.last_refusal = ""
         self.digest = 0
@@ -139,8 +161,13 @@ class Monitor:
         self._buffer = np.empty(64, records.STATE)
         self._events = EventList()
         self._uncertain = UncertainPredictions(64)
-        self._scratch = [make_scratch() for _ in range(self.profile.threads)]
-        self._pool = ThreadPoolExecutor(self.profile.threads) if self.profile.threads > 1 else None
+        self._scratch: list[Scratch] = []
+        self._pool: ThreadPoolExecutor | None = None
+        self._use_threads()
+        self.clock = StepClock()
+        self._timed = timed
+        self._deferred = 0  # pairs that were left in the last step
+        self._outside: NDArray[np.bool_] = np.zeros(0, np.bool_)  # bodies outside of the region, which rest
         self._pairs = np.zeros(0, active_pairs.PAIR)
         self._pair_events = np.zeros(0, IMPACT)
         self._orphans: list[tuple[int, float]] = []  # contacts (key, since) that ended because an object was removed
@@ -148,6 +175,35 @@ class Monitor:
         self._ids_slots = np.zeros(0, np.int32)
         self._candidates = np.zeros((1024, 2), np.int32)
         self._last: StepResult | None = None
+
+    # ------------------------------------------------------------------ settings
+
+    @property
+    def profile(self) -> Profile:
+        """What the next step goes by. May be set at any time, to a Profile or to the name of one (`Profile.switched`).
+
+        Nothing is forgotten: contacts persist, and what the change concerns is predicted anew in the next step.
+        """
+        return self._profile
+
+    @profile.setter
+    def profile(self, profile: str | Profile) -> None:
+        new = self._profile.switched(profile) if isinstance(profile, str) else profile
+        changed = self._profile.differences(new).keys()
+        self._profile = new
+        if changed & PREDICTED_BY:
+            self._renewed.update(np.flatnonzero(self._bodies.used[: self._top]).tolist())
+        if "horizon" in changed:
+            self._bodies.slack[:] = 0.0  # it is counted in horizons
+        if "threads" in changed:
+            self._use_threads()
+
+    def _use_threads(self) -> None:
+        if self._pool is not None:
+            self._pool.shutdown()
+        threads = self._profile.threads
+        self._scratch = [make_scratch() for _ in range(threads)]
+        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     # ------------------------------------------------------------------ objects
 
@@ -363,24 +419,40 @@ class Monitor:
             raise InputError(f"stamp_ns: expected an integer number of nanoseconds, got {stamp_ns!r}")
         states = self._states(ids, poses, twists)
         covariances = _covariances(covariance, states)
-        if not self._accept_time(int(stamp_ns)):
+        with self.clock:
+            return self._take_step(int(stamp_ns), states, covariances)
+
+    def _take_step(self, stamp_ns: int, states: NDArray[np.void], covariances: NDArray[np.float64]) -> StepResult:
+        if not self._accept_time(stamp_ns):
             return self._repeat()
         assert self._origin_ns is not None
         now = (self._now_ns - self._origin_ns) * NANOSECOND
-        self._take(states, covariances, (int(stamp_ns) - self._origin_ns) * NANOSECOND)
+        self._take(states, covariances, (stamp_ns - self._origin_ns) * NANOSECOND)
         self._step += 1
+        self._apply_region(now)
         work = dict.fromkeys(
             ("objects_moved", "candidate_pairs", "narrow_phase_tests", "impact_queries", "events_due", "deferred"), 0
         )
-        new = self._predict_moved(now, work)
-        contacts = self._examine_active(new, now, work)
+        budget = self._budget()
+        new = self._predict_moved(now, work, bounds_only=budget is not None)
+        contacts = self._examine_active(new, now, work, budget)
         predictions, unresolved = self._predictions(now)
         unresolved += int(np.count_nonzero(contacts["status"] == records.ContactStatus.UNRESOLVED))
         status = self._status(now, contacts, predictions, unresolved, work)
         for part in (contacts, predictions):
             self.digest = int(answers.chain_digest(np.uint64(self.digest), part.view(np.uint64)))
-        self._last = StepResult(self._now_ns, self._step, contacts, predictions, status)
+        self._deferred = work["deferred"]
+        cut = budget.done if budget is not None and self._deferred else None
+        self._last = StepResult(self._now_ns, self._step, contacts, predictions, status, cut=cut)
         return self._last
+
+    def _budget(self) -> PairBudget | None:
+        """What this step may do; None: everything, and nothing was left before."""
+        p = self._profile
+        has_budget = p.budget_ms < NO_BUDGET
+        if has_budget and self._timed:
+            return TimeBudget(self.clock, 1e-3 * p.budget_ms, p.pairs_per_step)
+        return PairBudget(p.pairs_per_step) if has_budget or p.pairs_per_step < NO_LIMIT or self._deferred else None
 
     def _states(self, ids: ArrayLike, poses: Any, twists: Any) -> NDArray[np.void]:
         try:
@@ -471,21 +543,41 @@ class Monitor:
                 told["row"] = row.item()[:-2]
                 self.refuse(reason, text.format(**told), len(rows))
 
+    def _apply_region(self, now: float) -> None:
+        """Let bodies rest that are outside of the region: in no grid, no event and no pair; and start who came in."""
+        p, top, bodies = self._profile, self._top, self._bodies
+        bounded = filters.is_bounded(p.region_min, p.region_max)
+        if not bounded and not len(self._outside):
+            return
+        was = np.zeros(top, np.bool_)
+        was[: len(self._outside)] = self._outside
+        outside = np.zeros(top, np.bool_)
+        if bounded:
+            outside = bodies.used[:top] & ~filters.bodies_in(bodies, top, now, p.region_min, p.region_max)
+        self._renewed.update(np.flatnonzero(was & ~outside & bodies.used[:top]).tolist())
+        remove_boxes(self._grid, np.flatnonzero(outside).astype(np.int32))
+        bodies.motion["version"][:top][outside & ~was] += 1
+        self._end_pairs(np.flatnonzero(outside[self._pairs["i"]] | outside[self._pairs["j"]]).tolist())
+        self._outside = outside if bounded else outside[:0]
+
     def _slots_of(self, ids: NDArray[np.uint32]) -> NDArray[np.int32]:
         """Slot of each id, -1 where unknown; messages usually name the same objects as the last one did."""
         if not np.array_equal(ids, self._ids):
-            known = np.fromiter(self._slots, np.uint32, len(self._slots))
-            slot_of = np.fromiter(self._slots.values(), np.int32, len(self._slots))
-            order = np.argsort(known)
-            known, slot_of = known[order], slot_of[order]
-            at = np.searchsorted(known, ids)
-            at[at == len(known)] = 0
-            found = known[at] == ids if len(known) else np.zeros(len(ids), bool)
-            self._ids_slots = np.where(found, slot_of[at] if len(known) else -1, -1).astype(np.int32)
+            self._ids_slots = self._find_slots(ids)
             self._ids = ids.copy()
         return self._ids_slots
 
-    def _predict_moved(self, now: float, work: dict[str, int]) -> NDArray[np.void]:
+    def _find_slots(self, ids: NDArray[np.uint32]) -> NDArray[np.int32]:
+        known = np.fromiter(self._slots, np.uint32, len(self._slots))
+        slot_of = np.fromiter(self._slots.values(), np.int32, len(self._slots))
+        order = np.argsort(known)
+        known, slot_of = known[order], slot_of[order]
+        at = np.searchsorted(known, ids)
+        at[at == len(known)] = 0
+        found = known[at] == ids if len(known) else np.zeros(len(ids), bool)
+        return np.where(found, slot_of[at] if len(known) else -1, -1).astype(np.int32)
+
+    def _predict_moved(self, now: float, work: dict[str, int], *, bounds_only: bool) -> NDArray[np.void]:
         """Start the motion of bodies anew whose predictions no longer hold; their first impacts (IMPACT)."""
         p, bodies = self.profile, self._bodies
         moved, ending = self._moved(now)
@@ -493,6 +585,8 @@ class Monitor:
             renewed = np.array([i for i in self._renewed if bodies.seen[i]], np.int32)
             moved, ending = np.union1d(moved, renewed).astype(np.int32), np.setdiff1d(ending, renewed)
             self._renewed.difference_update(renewed.tolist())
+        if len(self._outside):
+            moved, ending = moved[~self._outside[moved]], ending[~self._outside[ending]]
         work["objects_moved"] = len(moved)
         which = np.concatenate([moved, ending])
         if len(which) == 0:
@@ -509,13 +603,23 @@ class Monitor:
         pairs = self._partners(which, now)
         pairs = pairs[: candidates.keep_checked(bodies, self._allowed_keys, pairs)]
         work["candidate_pairs"] = len(pairs)
-        if self._uncertain.active:
+        if self._uncertain.counts(p):
             self._uncertain.add_pairs(pairs, bodies, now)
-        events, queries = self._first_impacts(pairs, now)
+        events, queries = self._bounds(pairs, now) if bounds_only else self._first_impacts(pairs, now)
         work["impact_queries"] += queries
         events = events[: keep_first(events, now, bodies.motion, self._events.events, self._pairs)]
         bodies.motion["covered"][which] = bodies.motion["cover"][which]
         return events
+
+    def _bounds(self, pairs: NDArray[np.int32], now: float) -> tuple[NDArray[np.void], int]:
+        """As `_first_impacts`, but only what the bounding spheres say, where that is faster."""
+        p = self._profile
+        events = np.empty(len(pairs) + 1, IMPACT)
+        n, queries = coarse.bound_pairs(
+            self._shapes.table, self._parts, self._bodies, pairs, now, p.contact_margin,
+            p.impact_tolerance, p.impact_iterations, events, self._scratch[0],
+        )  # fmt: skip
+        return events[:n], queries
 
     def _partners(self, which: NDArray[np.int32], now: float) -> NDArray[np.int32]:
         """Pairs (P, 2) of the bodies in `which` with all whose swept boxes meet theirs."""
@@ -563,9 +667,11 @@ class Monitor:
         )  # fmt: skip
         return moved[:n], ending[:m]
 
-    def _examine_active(self, new: NDArray[np.void], now: float, work: dict[str, int]) -> NDArray[np.void]:
+    def _examine_active(
+        self, new: NDArray[np.void], now: float, work: dict[str, int], budget: PairBudget | None
+    ) -> NDArray[np.void]:
         """Look at the pairs that are due or touch; the contacts (records.CONTACT). New events go into the list."""
-        p, bodies = self.profile, self._bodies
+        bodies = self._bodies
         is_due = new["lower"] <= now
         due = np.concatenate([self._events.take_due(bodies.motion, now), new[is_due]])
         work["events_due"] = len(due)
@@ -574,16 +680,19 @@ class Monitor:
         events = np.empty(room, IMPACT)
         order = np.argsort(due["key"], kind="stable")
         n = active_pairs.unite(bodies, self._pairs, self._pair_events, due, order, pairs, events)
-        results = np.empty((n + 1, active_pairs.RESULT))
-        later = np.empty(n, IMPACT)
-        n, n_later, tests, queries = active_pairs.examine(
-            self._shapes.table, self._parts, bodies, pairs[:n], events[:n], now, p.contact_margin,
-            p.stale_acceleration, p.impact_tolerance, p.impact_iterations, results, later, self._scratch[0],
-        )  # fmt: skip
-        work["narrow_phase_tests"] += tests
-        work["impact_queries"] += queries
-        self._pairs, self._pair_events = pairs[:n], events[:n]
-        self._events.add(np.concatenate([new[~is_due], later[:n_later]]), bodies.motion)
+        pending = new[~is_due]
+        if budget is None:
+            self._pairs, self._pair_events, results, later = self._examine(pairs[:n], events[:n], now, work)
+            self._events.add(np.concatenate([pending, later]), bodies.motion)
+        else:
+            self._events.add(pending, bodies.motion)
+            self._pairs, self._pair_events, results, later = self._examine_urgent(
+                pairs[:n], events[:n], now, work, budget
+            )
+            which, refined = self._refine(now, work, budget)
+            budget.stop()
+            self._events.replace(which, np.concatenate([later, refined]), bodies.motion)
+        n = len(self._pairs)
         contacts = np.empty(n, records.CONTACT)
         n = answers.write_contacts(
             self._pairs, results, bodies, self._parts.index, now,
@@ -592,6 +701,80 @@ class Monitor:
             contacts.view(np.uint8).reshape(-1, 136),
         )  # fmt: skip
         return self._with_orphans(contacts[:n], now)
+
+    def _examine(
+        self, pairs: NDArray[np.void], events: NDArray[np.void], now: float, work: dict[str, int]
+    ) -> tuple[NDArray[np.void], NDArray[np.void], NDArray[np.float64], NDArray[np.void]]:
+        """Look at these pairs; those that stay active, their events and results, and events for later."""
+        p = self._profile
+        results = np.empty((len(pairs) + 1, active_pairs.RESULT))
+        later = np.empty(len(pairs), IMPACT)
+        n, n_later, tests, queries = active_pairs.examine(
+            self._shapes.table, self._parts, self._bodies, pairs, events, now, p.contact_margin,
+            p.stale_acceleration, p.impact_tolerance, p.impact_iterations, results, later, self._scratch[0],
+        )  # fmt: skip
+        work["narrow_phase_tests"] += tests
+        work["impact_queries"] += queries
+        return pairs[:n], events[:n], results[:n], later[:n_later]
+
+    def _examine_urgent(
+        self,
+        pairs: NDArray[np.void],
+        events: NDArray[np.void],
+        now: float,
+        work: dict[str, int],
+        budget: PairBudget,
+    ) -> tuple[NDArray[np.void], NDArray[np.void], NDArray[np.float64], NDArray[np.void]]:
+        """As `_examine`, the most urgent first, as long as the budget lasts; of the others, what their bounds say."""
+        p = self._profile
+        order, at = coarse.urgency(self._bodies, pairs, events, self._step)
+        parts = [self._examine(pairs[order[:at]], events[order[:at]], now, work)]
+        while at < len(order) and (count := budget.next(len(order) - at, EXAMINE)):
+            chunk = order[at : at + count]
+            parts.append(self._examine(pairs[chunk], events[chunk], now, work))
+            at += count
+        for kept, its_events, *_ in parts:
+            its_events["lower"][kept["touching"] == 1] = now  # since when nobody has looked at it
+        left, left_events = pairs[order[at:]], events[order[at:]]
+        results = np.empty((len(left) + 1, active_pairs.RESULT))
+        later = np.empty(len(left), IMPACT)
+        n, n_later = coarse.leave(
+            self._bodies, left, left_events, now, p.contact_margin, p.stale_acceleration, results, later
+        )
+        parts.append((left[:n], left_events[:n], results[:n], later[:n_later]))
+        work["deferred"] += len(left)
+        pairs, events, results, later = (np.concatenate(column) for column in zip(*parts, strict=True))
+        by_key = np.argsort(pairs["key"], kind="stable")
+        return pairs[by_key], events[by_key], results[by_key], later
+
+    def _refine(
+        self, now: float, work: dict[str, int], budget: PairBudget
+    ) -> tuple[NDArray[np.int64], NDArray[np.void]]:
+        """Seek the first impacts of pending pairs of which only a bound is known, soonest first, as the budget lasts.
+
+        Returns the places in the event list of those that were done, and the events in place of them.
+        """
+        pending = self._events.events
+        todo = np.flatnonzero(pending["method"] == BOUND_ONLY)
+        found = [np.zeros(0, IMPACT)]
+        at = 0
+        while at < len(todo) and (count := budget.next(len(todo) - at, REFINE)):
+            events, queries = self._impacts_of(pending[todo[at : at + count]], now)
+            found.append(events)
+            work["impact_queries"] += queries
+            at += count
+        work["deferred"] += len(todo) - at
+        return todo[:at], np.concatenate(found)
+
+    def _impacts_of(self, bounds: NDArray[np.void], now: float) -> tuple[NDArray[np.void], int]:
+        """As `_first_impacts`, of the pairs of these events, from `now` on."""
+        p = self._profile
+        events = np.empty(len(bounds) + 1, IMPACT)
+        n, queries = coarse.refine(
+            self._shapes.table, self._parts, self._bodies, bounds, now, p.contact_margin,
+            p.impact_tolerance, p.impact_iterations, events, self._scratch[0],
+        )  # fmt: skip
+        return events[:n], queries
 
     def _with_orphans(self, contacts: NDArray[np.void], now: float) -> NDArray[np.void]:
         """Add the END of contacts whose object is gone."""
@@ -625,11 +808,24 @@ class Monitor:
             slots,
         )  # fmt: skip
         predictions = predictions[:n]
-        if self._uncertain.active and p.horizon > 0.0:
+        if self._uncertain.counts(p) and p.horizon > 0.0:
             touching = self._pairs["key"][self._pairs["touching"] == 1]
             scene = Scene(self._shapes.table, self._parts, self._bodies, now, p, self._planar)
             predictions = self._uncertain.complete(predictions, slots[:n], touching, scene)
+        if p.min_closing_speed > 0.0 or p.ignore_separating:
+            predictions = self._filtered(predictions, now)
+            unresolved = np.count_nonzero(predictions["status"] == records.PredictionStatus.UNRESOLVED)
         return predictions, int(unresolved)
+
+    def _filtered(self, predictions: NDArray[np.void], now: float) -> NDArray[np.void]:
+        p = self._profile
+        kept = np.ones(len(predictions), np.bool_)
+        if p.min_closing_speed > 0.0:
+            kept &= filters.closes_fast(predictions, p.min_closing_speed)
+        if p.ignore_separating:
+            i, j = (self._find_slots(predictions[name]) for name in ("id_a", "id_b"))
+            kept &= filters.approaches(self._bodies, i, j, now)
+        return predictions[kept]
 
     def _status(
         self,

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -17,13 +19,15 @@ from collision_monitor.codec import (
     Removal,
     Status,
     decode_descriptions,
+    decode_parameter_event,
     decode_states,
     encode_contacts,
+    encode_parameter_event,
     encode_predictions,
     encode_status,
 )
 from collision_monitor.description import ObjectDescription
-from collision_monitor.errors import CollisionMonitorError, InputError, MessageError, Refusal
+from collision_monitor.errors import CollisionMonitorError, InputError, MessageError, ProfileError, Refusal
 from collision_monitor.freeze import freeze, thaw
 from collision_monitor.monitor import Monitor, StepResult
 from collision_monitor.profiles import Profile
@@ -35,30 +39,54 @@ Records = NDArray[np.void]
 _PIPELINE: Final = "pipeline"
 """Whose facts these are, in a snapshot."""
 
+_PARAMETER: Final = {"name": "profile"}
+_FIELD: Final = {parameter: field for field, parameter in _PARAMETER.items()}
+"""How parameters and fields of a profile are called where the two differ."""
+
+_AS_THEY_WERE: Final[Mapping[str, Any]] = MappingProxyType({})
+
+LIMIT: Final = "pairs_per_step"
+"""The setting by which a replay does as much as the clock allowed."""
+
 LARGEST_WRAP: Final = 1 << 16
 """A sequence number that falls is the counter's wrap at 2^32 if it lost at most this many messages, else a restart."""
 
 
 @dataclass(frozen=True, eq=False)
 class Outputs:
-    """The answers of one step: complete CDR messages, and what they were made of."""
+    """The answers of one step: complete CDR messages, and what they were made of.
+
+    limit: where it is not None, the settings (ParameterEvent) without which a replay would not stop where the clock
+    stopped this step, to be recorded before the states.
+    """
 
     contacts: bytes
     predictions: bytes
     result: StepResult
     digest: int
+    limit: bytes | None = None
 
 
 class Pipeline:
     """Feeds a Monitor with message bytes. No method raises for what a message holds: it is refused and counted.
 
-    objects: what is monitored, as it was described last, by id.
+    objects: what is monitored, as it was described last, by id. timed: whether a profile's budget counts; in a replay
+    the recorded settings say how far each step came. kept: settings that no recorded change alters.
     """
 
-    def __init__(self, profile: Profile | str = "balanced", frame_id: str = "world") -> None:
-        self.monitor = Monitor(profile)
+    def __init__(
+        self,
+        profile: Profile | str = "balanced",
+        frame_id: str = "world",
+        *,
+        timed: bool = True,
+        kept: Collection[str] = (),
+    ) -> None:
+        self.monitor = Monitor(profile, timed=timed)
         self.frame_id = frame_id
         self.messages_lost = 0
+        self._kept = frozenset(kept)
+        self._limit = self.monitor.profile.pairs_per_step  # as a replay knows it
         self.objects: dict[int, ObjectDescription] = {}
         self._sequence: int | None = None
         self._static: set[int] = set()
@@ -95,6 +123,10 @@ class Pipeline:
 
     def on_states(self, data: bytes) -> Outputs | None:
         """An ObjectStateArray: one step. None: the message was refused as a whole and there is no new answer."""
+        with self.monitor.clock:
+            return self._step(data)
+
+    def _step(self, data: bytes) -> Outputs | None:
         try:
             message = decode_states(data)
         except MessageError as error:
@@ -115,6 +147,22 @@ class Pipeline:
         if not result.accepted:
             return None
         return self._outputs(result)
+
+    def on_settings(self, data: bytes) -> None:
+        """A ParameterEvent: settings that hold from here on, as `change_settings` gave it."""
+        try:
+            changed = decode_parameter_event(data).changed
+            changes = {_FIELD.get(name, name): value for name, value in changed.items() if name not in self._kept}
+            self.monitor.profile = self.monitor.profile.replace(**changes)
+        except (MessageError, ProfileError) as error:
+            self.monitor.refuse(Refusal.MALFORMED, str(error))
+
+    def change_settings(self, profile: Profile, stamp_ns: int, node: str = "") -> bytes:
+        """Go by this profile from here on. Returns what changes, as the ParameterEvent that a replay needs here."""
+        changes = self.monitor.profile.differences(profile)
+        self._limit = changes.get(LIMIT, self._limit)
+        self.monitor.profile = profile
+        return encode_parameter_event(stamp_ns, node, {_PARAMETER.get(name, name): changes[name] for name in changes})
 
     # -- out
 
@@ -148,8 +196,11 @@ class Pipeline:
 
     def metadata(self, node: str = "") -> dict[str, str]:
         """What a session needs to be replayed and compared: profile, frame, versions, determinism key."""
-        profile = json.dumps(self.monitor.profile.to_dict(), sort_keys=True)
-        return {**provenance(), "profile": profile, "frame_id": self.frame_id, "node": node}
+        return {**provenance(), "profile": self.settings(), "frame_id": self.frame_id, "node": node}
+
+    def settings(self) -> str:
+        """The profile in force, as a session's metadata has it."""
+        return json.dumps(self.monitor.profile.to_dict(), sort_keys=True)
 
     # -- snapshots
 
@@ -162,24 +213,26 @@ class Pipeline:
             "static": sorted(self._static),
             "names": {str(object_id): name for object_id, name in self._names.items()},
             "removed": sorted(self._removed),
+            "profile": {**self.monitor.profile.to_dict(), LIMIT: self._limit},
         }
         return snapshot
 
     @classmethod
-    def restored(cls, snapshot: Snapshot, profile: Profile | str, frame_id: str) -> Pipeline:
-        """Goes on from there with the same answers; `objects` holds only what is described from now on.
+    def restored(cls, snapshot: Snapshot, frame_id: str, settings: Mapping[str, Any] = _AS_THEY_WERE) -> Pipeline:
+        """Goes on from there, without a clock, with the same answers; `objects` holds what is described from now on.
 
-        Raises InputError where the snapshot cannot be used.
+        settings: in place of those that were in force, for good. Raises InputError where the snapshot cannot be used.
         """
-        pipeline = cls(profile, frame_id)
-        pipeline.monitor = thaw(profile, snapshot)
         try:
             facts = snapshot.facts[_PIPELINE]
+            profile = Profile.from_dict({**facts["profile"], **settings})
+            pipeline = cls(profile, frame_id, timed=False, kept=settings)
+            pipeline.monitor = thaw(profile, snapshot)
             pipeline.messages_lost, pipeline._sequence = facts["messages_lost"], facts["sequence"]
             pipeline._static, pipeline._removed = set(facts["static"]), set(facts["removed"])
             pipeline._names = {int(object_id): name for object_id, name in facts["names"].items()}
         except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise InputError(f"snapshot: expected the state of a pipeline of this version, got: {error!r}") from None
+            raise InputError(f"snapshot: expected the state of a monitor of this version, got: {error!r}") from None
         return pipeline
 
     # -- parts
@@ -235,10 +288,18 @@ class Pipeline:
             ),
             result=result,
             digest=self.monitor.digest,
+            limit=self._limit_of(result),
         )
         while self._removed:
             del self._names[self._removed.pop()]
         return outputs
+
+    def _limit_of(self, result: StepResult) -> bytes | None:
+        needed = self.monitor.profile.pairs_per_step if result.cut is None else result.cut
+        if needed == self._limit:
+            return None
+        self._limit = needed
+        return encode_parameter_event(result.stamp_ns, "", {LIMIT: needed})
 
     def _mentioned(self, answers: Records) -> tuple[NDArray[np.uint32], list[str]]:
         """The ids in `answers`, ascending, and their names."""

@@ -8,89 +8,88 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+import yaml
 
 from collision_monitor.errors import ProfileError
+from collision_monitor.settings import EVERYWHERE, Setting, number, settings_of, switch, vector
 
+NO_BUDGET: Final = 1e6
+"""ms, a quarter of an hour: a step has as long as it takes, and no clock is looked at."""
 
-def _setting(default: float | int, minimum: float | int, maximum: float | int, unit: str, description: str) -> Any:
-    metadata = {"minimum": minimum, "maximum": maximum, "unit": unit, "description": description}
-    return field(default=default, metadata=metadata)
+NO_LIMIT: Final = 1_000_000_000
+"""Pairs in a step: more than fit into memory."""
 
-
-_KINDS: dict[type, str] = {int: "a whole number", float: "a number"}
-
-
-def _in(unit: str) -> str:
-    return "" if unit == "1" else f" {unit}"
-
-
-@dataclass(frozen=True)
-class Setting:
-    """One field of a profile, as parameter declarations and help texts need it."""
-
-    name: str
-    type: type
-    default: float | int
-    minimum: float | int
-    maximum: float | int
-    unit: str
-    description: str
+BASED_ON: Final = "based_on"
+"""In the file of a custom profile: the profile that it starts from."""
 
 
 @dataclass(frozen=True)
 class Profile:
-    """How far the monitor looks and how exact it is. Raises ProfileError for a value out of range."""
+    """How far the monitor looks and how exact it is. Raises ProfileError for values that are, or go together, wrong."""
 
     name: str = "balanced"
-    horizon: float = _setting(2.0, 0.0, 1e6, "s", "How far ahead collisions are predicted; 0: contacts only.")
-    contact_margin: float = _setting(0.0, 0.0, 1e6, "m", "Pairs up to this far apart count as touching.")
-    impact_tolerance: float = _setting(1e-4, 1e-12, 1.0, "m", "Gap at which a predicted impact is settled.")
-    impact_iterations: int = _setting(
+    horizon: float = number(2.0, 0.0, 1e6, "s", "How far ahead collisions are predicted; 0: contacts only.")
+    contact_margin: float = number(0.0, 0.0, 1e6, "m", "Pairs up to this far apart count as touching.")
+    impact_tolerance: float = number(1e-4, 1e-12, 1.0, "m", "Gap at which a predicted impact is settled.")
+    impact_iterations: int = number(
         64, 1, 100000, "1", "Most distance computations for one predicted impact; past it the pair is UNRESOLVED."
     )
-    position_tolerance: float = _setting(
+    position_tolerance: float = number(
         1e-3, 0.0, 1e3, "m", "An object this close to its predicted position needs no new prediction."
     )
-    orientation_tolerance: float = _setting(1e-3, 0.0, math.pi, "rad", "The same for its predicted orientation.")
-    velocity_tolerance: float = _setting(1e-3, 0.0, 1e3, "m/s", "The same for its linear velocity.")
-    angular_velocity_tolerance: float = _setting(1e-3, 0.0, 1e3, "rad/s", "The same for its angular velocity.")
-    stale_after: float = _setting(0.5, 0.0, 1e6, "s", "Age of an object's last state from which answers are flagged.")
-    stale_acceleration: float = _setting(
+    orientation_tolerance: float = number(1e-3, 0.0, math.pi, "rad", "The same for its predicted orientation.")
+    velocity_tolerance: float = number(1e-3, 0.0, 1e3, "m/s", "The same for its linear velocity.")
+    angular_velocity_tolerance: float = number(1e-3, 0.0, 1e3, "rad/s", "The same for its angular velocity.")
+    stale_after: float = number(0.5, 0.0, 1e6, "s", "Age of an object's last state from which answers are flagged.")
+    stale_acceleration: float = number(
         1.0, 0.0, 1e4, "m/s^2", "How hard an object may accelerate while it is not heard of: widens its bounds."
     )
-    uncertainty_samples: int = _setting(
+    uncertainty: bool = switch(True, "Whether it is told when and how likely pairs meet, where states declare it.")
+    uncertainty_samples: int = number(
         256, 16, 4096, "1", "Samples of what is uncertain, for each pair that may meet, where states declare it."
     )
-    confidence: float = _setting(0.95, 0.5, 0.9999, "1", "At which the earliest and latest times are stated.")
-    min_probability: float = _setting(
+    confidence: float = number(0.95, 0.5, 0.9999, "1", "At which the earliest and latest times are stated.")
+    min_probability: float = number(
         0.01, 1e-6, 1.0, "1", "From which on pairs are told that would meet only because of what is uncertain."
     )
-    max_time_step: float = _setting(
-        10.0, 1e-3, 1e9, "s", "A stamp that jumps by more is refused unless the next agrees."
+    max_time_step: float = number(10.0, 1e-3, 1e9, "s", "A stamp that jumps by more is refused unless the next agrees.")
+    threads: int = number(1, 1, 64, "1", "Threads of the kernels; the answers are the same bytes for any number.")
+    budget_ms: float = number(
+        NO_BUDGET, 0.05, NO_BUDGET, "ms", "Time for a step: the most urgent pairs first, the others are UNRESOLVED."
     )
-    threads: int = _setting(1, 1, 64, "1", "Threads of the kernels; the answers are the same bytes for any number.")
+    pairs_per_step: int = number(
+        NO_LIMIT, 1, NO_LIMIT, "1", "Pairs for a step, the same way: answers that depend on no clock."
+    )
+    region_min: tuple[float, float, float] = vector(
+        (-EVERYWHERE, -EVERYWHERE, -EVERYWHERE), EVERYWHERE, "m", "Objects wholly outside of this box are left out."
+    )
+    region_max: tuple[float, float, float] = vector(
+        (EVERYWHERE, EVERYWHERE, EVERYWHERE), EVERYWHERE, "m", "The other corner of that box."
+    )
+    min_closing_speed: float = number(0.0, 0.0, 1e6, "m/s", "Predictions that close slower than this are left out.")
+    ignore_separating: bool = switch(False, "Predictions of pairs whose origins move apart now are left out.")
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise ProfileError(f"profile, name: expected a text, got {self.name!r}")
         for setting in self.fields():
-            value = getattr(self, setting.name)
-            wanted = (int,) if setting.type is int else (int, float)
-            if isinstance(value, bool) or not isinstance(value, wanted):
-                raise ProfileError(f"{setting.name}: expected {_KINDS[setting.type]}{_in(setting.unit)}, got {value!r}")
-            if not setting.minimum <= value <= setting.maximum:
-                wanted_range = f"{setting.minimum:g} to {setting.maximum:g}{_in(setting.unit)}"
-                raise ProfileError(f"{setting.name}: expected {wanted_range}, got {value:g}")
-            object.__setattr__(self, setting.name, setting.type(value))
+            object.__setattr__(self, setting.name, setting.checked(getattr(self, setting.name)))
+        for axis, low, high in zip("xyz", self.region_min, self.region_max, strict=True):
+            if not low <= high:
+                raise ProfileError(
+                    f"region_min, region_max: expected a region with min <= max, got {low:g} > {high:g} along {axis}"
+                )
 
     @classmethod
-    def fields(cls) -> list[Setting]:
+    @cache
+    def fields(cls) -> tuple[Setting, ...]:
         """The settings in order, without the profile's name."""
-        return [
-            Setting(name=f.name, type=type(f.default), default=f.default, **f.metadata)  # type: ignore[arg-type]
-            for f in dataclasses.fields(cls)
-            if f.metadata
-        ]
+        return tuple(settings_of(cls))
 
     @staticmethod
     def names() -> list[str]:
@@ -99,14 +98,41 @@ class Profile:
 
     @classmethod
     def named(cls, name: str) -> Profile:
-        """A profile by its name. Raises ProfileError."""
-        if name not in _NAMED:
-            raise ProfileError(f"profile: expected one of {', '.join(cls.names())}, got {name!r}")
-        return cls(name=name, **_NAMED[name])
+        """A profile by its name, or from the YAML file of that path. Raises ProfileError."""
+        return cls().switched(name)
+
+    def switched(self, name: str) -> Profile:
+        """The profile of that name, or of the YAML file of that path, on top of this one.
+
+        Settings that it does not name stay as they are. Raises ProfileError.
+        """
+        if name in _NAMED:
+            return self.replace(name=name, **_NAMED[name])
+        if Path(name).suffix in (".yaml", ".yml"):
+            return self._from_file(Path(name))
+        raise ProfileError(f"profile: expected one of {', '.join(self.names())}, or a .yaml file, got {name!r}")
+
+    def _from_file(self, path: Path) -> Profile:
+        try:
+            content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise ProfileError(f"profile: expected a file that can be read, got {path}: {error.strerror}") from None
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            raise ProfileError(f"profile {path}: expected YAML, got: {' '.join(str(error).split())}") from None
+        if not isinstance(content, dict) or not content:
+            raise ProfileError(f"profile {path}: expected settings, as `horizon: 3.0`, got {content!r}")
+        base = content.pop(BASED_ON, "balanced")
+        if base not in _NAMED:
+            raise ProfileError(f"profile {path}, {BASED_ON}: expected one of {', '.join(self.names())}, got {base!r}")
+        try:
+            return self.switched(base).replace(**{"name": path.stem, **content})
+        except (ProfileError, TypeError) as error:
+            raise ProfileError(f"{path}: {error}") from None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON and YAML."""
-        return dataclasses.asdict(self)
+        values = dataclasses.asdict(self)
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Profile:
@@ -121,22 +147,34 @@ class Profile:
         """A copy with some settings changed. Raises ProfileError."""
         return self.from_dict({**self.to_dict(), **changes})
 
+    def differences(self, other: Profile) -> dict[str, Any]:
+        """The fields in which `other` is not the same, with its values; the name is one of them."""
+        mine, theirs = self.to_dict(), other.to_dict()
+        return {name: value for name, value in theirs.items() if value != mine[name]}
 
-_EXACT_MOTION = {
-    "position_tolerance": 1e-9,
-    "orientation_tolerance": 1e-9,
-    "velocity_tolerance": 1e-9,
-    "angular_velocity_tolerance": 1e-9,
-}
-_NAMED: dict[str, dict[str, Any]] = {
-    "balanced": {},
+
+_TOLERANCES: Final = ("position_tolerance", "orientation_tolerance", "velocity_tolerance", "angular_velocity_tolerance")
+_NAMED: Final[dict[str, dict[str, Any]]] = {
+    "balanced": {
+        "impact_tolerance": 1e-4,
+        "impact_iterations": 64,
+        "uncertainty_samples": 256,
+        **dict.fromkeys(_TOLERANCES, 1e-3),
+    },
     "fast": {
         "impact_tolerance": 1e-3,
+        "impact_iterations": 64,
         "uncertainty_samples": 64,
         "position_tolerance": 1e-2,
         "orientation_tolerance": 1e-2,
         "velocity_tolerance": 2e-2,
         "angular_velocity_tolerance": 2e-2,
     },
-    "exact": {"impact_tolerance": 1e-6, "impact_iterations": 256, "uncertainty_samples": 1024, **_EXACT_MOTION},
+    "exact": {
+        "impact_tolerance": 1e-6,
+        "impact_iterations": 256,
+        "uncertainty_samples": 1024,
+        **dict.fromkeys(_TOLERANCES, 1e-9),
+    },
 }
+"""Each names the same settings, so that switching from one to another leaves nothing of the first."""

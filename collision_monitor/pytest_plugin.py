@@ -38,14 +38,12 @@ class RecordedSession:
     """A session under test."""
 
     def __init__(self, path: Path, replay: bool | str = False) -> None:
-        from collision_monitor.profiles import Profile
         from collision_monitor.session import Session
-        from collision_monitor.session.history import read_history
+        from collision_monitor.session.history import AS_RECORDED, read_history
 
         self.path = path
-        recorded = Session(path)
-        profile = Profile.named(replay) if isinstance(replay, str) else recorded.profile if replay else None
-        self.history: History = read_history(recorded, profile)
+        again = replay if isinstance(replay, str) else AS_RECORDED if replay else None
+        self.history: History = read_history(Session(path), again)
 
     def contacts(self, a: str | int = "*", b: str | int = "*") -> list[Collision]:
         """The collisions between objects of such names, with wildcards, or ids. Raises InputError for unknown ones."""

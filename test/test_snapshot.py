@@ -102,10 +102,9 @@ def test_from_every_moment_the_bytes_are_the_same(planar: bool, monkeypatch: pyt
         frozen.append(pipeline.snapshot().encode())
         answers.append(take(pipeline, *message))
     assert sum(len(a[1] or b"") > 300 for a in answers if len(a) == 3) > 30, "there are contacts"
-    profiles = [pipeline.monitor.profile.replace(threads=n) for n in (1, 2)]
     for k, data in enumerate(frozen):
         end = len(messages) if k % 16 == 0 else k + 4
-        thawed = Pipeline.restored(Snapshot.decode(data), profiles[k % 2], "world")
+        thawed = Pipeline.restored(Snapshot.decode(data), "world", {"threads": 1 + k % 2})
         for message, expected in zip(messages[k:end], answers[k:end], strict=True):
             assert take(thawed, *message) == expected
         if end == len(messages):
@@ -123,7 +122,7 @@ def test_what_goes_on_is_not_seen_in_a_snapshot_and_it_serves_twice() -> None:
     expected = [take(pipeline, *message) for message in messages[5:]]
     assert snapshot.encode() == before
     for _ in range(2):
-        thawed = Pipeline.restored(snapshot, "balanced", "world")
+        thawed = Pipeline.restored(snapshot, "world")
         assert [take(thawed, *message) for message in messages[5:]] == expected
 
 
@@ -178,7 +177,7 @@ def test_a_snapshot_that_does_not_fit_is_refused(change: str) -> None:
     for message in inputs(solids(np.random.default_rng(3)), [], steps=5, seed=1):
         take(pipeline, *message)
     with pytest.raises(InputError, match="snapshot"):
-        Pipeline.restored(broken(change, pipeline.snapshot()), "balanced", "world")
+        Pipeline.restored(broken(change, pipeline.snapshot()), "world")
 
 
 @pytest.mark.parametrize("data", [b"", b"PK\x03\x04" + bytes(100), b"\x93NUMPY" + bytes(50), b"facts"])

@@ -82,16 +82,12 @@ def _sides(args: argparse.Namespace) -> list[tuple[Path, str | None]]:
 
 
 def _history(path: Path, with_profile: str | None) -> History:
-    from collision_monitor.profiles import Profile
     from collision_monitor.session import Session
     from collision_monitor.session.history import read_history
 
     session = Session(path)
-    profile = None
-    if with_profile is not None:
-        profile = Profile.named(with_profile) if with_profile else session.profile
     with session_bar(path.name, session) as show:
-        return read_history(session, profile, show)
+        return read_history(session, with_profile, show)
 
 
 # -- text

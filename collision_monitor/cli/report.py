@@ -30,7 +30,6 @@ def add_parser(subparsers: Any) -> None:
 
 def report_command(args: argparse.Namespace) -> int:
     """Return the exit code. Raises SessionError, ProfileError."""
-    from collision_monitor.profiles import Profile
     from collision_monitor.report import check_outputs, write_report
     from collision_monitor.session import Session
     from collision_monitor.session.history import read_history
@@ -40,9 +39,8 @@ def report_command(args: argparse.Namespace) -> int:
     if output.exists() and output.samefile(args.session):
         raise SessionError(f"{output}: expected another file than the session itself")
     check_outputs([output], args.force)  # before what takes long
-    profile = None if args.replay is None else Profile.named(args.replay) if args.replay else session.profile
     with session_bar("report", session) as show:
-        history = read_history(session, profile, show)
+        history = read_history(session, args.replay, show)
     for file in write_report(history, output, pictures=args.png, overwrite=args.force):
         print(file)
     return 0

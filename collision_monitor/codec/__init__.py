@@ -18,6 +18,7 @@ from collision_monitor.codec.descriptions import (
     decode_descriptions,
     encode_descriptions,
 )
+from collision_monitor.codec.parameters import ParameterEvent, decode_parameter_event, encode_parameter_event
 from collision_monitor.codec.states import States, decode_states, encode_states
 from collision_monitor.codec.status import Status, decode_status, encode_status
 
@@ -25,17 +26,20 @@ __all__ = [
     "Change",
     "Contacts",
     "Descriptions",
+    "ParameterEvent",
     "Predictions",
     "Removal",
     "States",
     "Status",
     "decode_contacts",
     "decode_descriptions",
+    "decode_parameter_event",
     "decode_predictions",
     "decode_states",
     "decode_status",
     "encode_contacts",
     "encode_descriptions",
+    "encode_parameter_event",
     "encode_predictions",
     "encode_states",
     "encode_status",

@@ -26,7 +26,8 @@ Ids = NDArray[np.uint32]
 _NANOSECONDS = 1_000_000_000
 _U4 = struct.Struct("<I")
 _SCALARS = {
-    name: struct.Struct("<" + code) for name, code in {"u1": "B", "i4": "i", "u4": "I", "u8": "Q", "f8": "d"}.items()
+    name: struct.Struct("<" + code)
+    for name, code in {"u1": "B", "i4": "i", "u4": "I", "i8": "q", "u8": "Q", "f8": "d"}.items()
 }
 
 
@@ -66,7 +67,7 @@ class Reader:
         return start
 
     def scalar(self, kind: str, what: str) -> Any:
-        """One number: u1, i4, u4, u8 or f8."""
+        """One number: u1, i4, u4, i8, u8 or f8."""
         codec = _SCALARS[kind]
         return codec.unpack_from(self._data, self._take(codec.size, codec.size, what))[0]
 
@@ -169,7 +170,7 @@ class Writer:
         self._size += padding + len(data)
 
     def scalar(self, kind: str, value: float, what: str) -> None:
-        """One number: u1, i4, u4, u8 or f8."""
+        """One number: u1, i4, u4, i8, u8 or f8."""
         codec = _SCALARS[kind]
         try:
             self.raw(codec.pack(value), codec.size)

@@ -41,7 +41,7 @@ END: Final = int(Phase.END)
 
 
 @device
-def _changed(bodies, event):
+def has_changed(bodies, event):
     """Does the event rest on a motion that no longer holds?"""
     return bodies.motion[event.i].version != event.version_i or bodies.motion[event.j].version != event.version_j
 
@@ -59,7 +59,7 @@ def unite(bodies, pairs, events, due, order, new_pairs, new_events):
             i, j = pairs[k].i, pairs[k].j
             key = (np.uint64(bodies.motion[i].id) << np.uint64(32)) | np.uint64(bodies.motion[j].id)
             gone = not (bodies.used[i] and bodies.used[j]) or key != pairs[k].key
-            changed = _changed(bodies, events[k])
+            changed = has_changed(bodies, events[k])
             if gone or pairs[k].leaving == 1 or (changed and pairs[k].touching == 0):
                 k += 1
                 continue
@@ -178,7 +178,7 @@ def examine(
         stays = touching
         if not touching:
             predicted = bodies.motion[i].time == now or bodies.motion[j].time == now
-            if not (predicted and _changed(bodies, event)):
+            if not (predicted and has_changed(bodies, event)):
                 end = min(bodies.motion[i].cover, bodies.motion[j].cover)
                 queries += body_impact(table, parts, bodies, i, j, now, end, margin, tolerance, budget, scratch, event)
                 if event.status != CLEAR:

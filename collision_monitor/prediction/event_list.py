@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.prediction.time_of_impact import HIT, IMPACT, UNRESOLVED
+from collision_monitor.prediction.time_of_impact import BOUND_ONLY, HIT, IMPACT, UNRESOLVED
 
 Events = NDArray[np.void]
 
@@ -130,6 +130,8 @@ def keep_first(new, now, motion, pending, pairs):
                 lower = pending[k].lower
                 pending[k] = new[at]
                 pending[k].lower = lower
+            elif pending[k].status == UNRESOLVED and new[at].method == BOUND_ONLY:
+                pending[k].method = BOUND_ONLY  # the later one is not sought yet, and may settle it
     for k in range(pairs.size):
         if pairs[k].leaving == 0:
             at = place[_place(pairs[k].key, new, place)]
@@ -171,6 +173,11 @@ class EventList:
         passed, n = take_due(self.events, motion, now, due)
         self.events = self.events[passed:]
         return due[:n]
+
+    def replace(self, which: NDArray[np.int64], new: Events, motion: NDArray[np.void]) -> None:
+        """`add`, in place of the events at the indices `which`."""
+        self.events = np.delete(self.events, which)
+        self.add(new, motion)
 
     def add(self, new: Events, motion: NDArray[np.void]) -> None:
         """Merge `new` in, in any order, and drop what no longer holds."""

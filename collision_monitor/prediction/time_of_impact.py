@@ -33,6 +33,8 @@ CLEAR: Final = 2
 CLOSED_FORM: Final = int(Method.CLOSED_FORM)
 CONSERVATIVE_ADVANCEMENT: Final = int(Method.CONSERVATIVE_ADVANCEMENT)
 
+BOUND_ONLY: Final = int(Method.BOUND)
+
 IMPACT = np.dtype(
     [
         ("lower", np.float64),  # s after the monitor's origin, like all times here
@@ -392,7 +394,12 @@ def _sphere_impact(A, B, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, be
             sure = inf
     event.status = HIT if sure < inf else UNRESOLVED
     event.upper = begin + sure if sure < inf else inf
-    t = first if sure == inf else sure
+    meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, first if sure == inf else sure, event)
+
+
+@inlined
+def meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, t, event):
+    """Where and how the bounding spheres of A and B meet, t seconds after begin."""
     dx, dy, dz = px + vx * t, py + vy * t, pz + vz * t
     length = sqrt(dx * dx + dy * dy + dz * dz)
     if length > 0.0:

@@ -126,7 +126,11 @@ class UncertainPredictions:
 
     def sigmas(self, profile: Any) -> float:
         """By how many standard deviations swept boxes are widened; 0 while nobody is uncertain."""
-        return reported_sigmas(profile.min_probability, profile.confidence) if self.active else 0.0
+        return reported_sigmas(profile.min_probability, profile.confidence) if self.counts(profile) else 0.0
+
+    def counts(self, profile: Any) -> bool:
+        """Whether any state has declared an uncertainty, and the profile wants to know."""
+        return self.active and bool(profile.uncertainty)
 
     def add_pairs(self, pairs: Pairs, bodies: Bodies, now: float) -> None:
         """Pairs (P, 2) whose swept boxes meet, found in this step; what no longer holds is dropped."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from html import escape
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from collision_monitor._version import VERSION
 from collision_monitor.errors import SessionError
@@ -19,6 +19,9 @@ from collision_monitor.session.history import Collision, History
 
 ROWS: Final = 200
 """Collisions in the table."""
+
+SWITCHES: Final = 10
+"""Changes of settings that are told."""
 
 NOTHING_ELSE: Final = "default-src 'none'; style-src 'unsafe-inline'"
 """Content security policy: whatever a name may hold, the page runs no script and asks for nothing."""
@@ -132,7 +135,7 @@ def _verdict(history: History, facts: Facts) -> str:
     source = "today's answers to the recorded inputs" if history.replayed else "as recorded"
     extent = (
         f"in {history.duration:.1f} s, {_plural(len(history.times), 'step')}, {_plural(moving, 'moving object')}, "
-        f"profile {escape(history.profile.name)}, {source}"
+        f"profile {escape(history.profile.name)}{_switched(history)}, {source}"
     )
     doubts = ""
     if found.doubts:
@@ -141,6 +144,14 @@ def _verdict(history: History, facts: Facts) -> str:
         f'<div class="verdict {found.kind}"><strong>{found.answer}</strong> {extent}\n'
         f"{_list(found.findings, 'findings')}\n{doubts}</div>"
     )
+
+
+def _switched(history: History) -> str:
+    """What became of the profile while it ran."""
+    names = [str(changed["profile"]) for _, changed in history.settings if "profile" in changed]
+    if names:
+        return f", then {escape(', then '.join(names[:SWITCHES]))}{' and more' if len(names) > SWITCHES else ''}"
+    return ", with settings that changed" if history.settings else ""
 
 
 def _list(sentences: list[str], name: str) -> str:
@@ -239,8 +250,13 @@ def _collisions(history: History, facts: Facts) -> str:
 
 def _provenance(history: History) -> str:
     settings = {key: value for key, value in history.profile.to_dict().items() if key != "name"}
+    changes = [f"at {time:.3f} s: {_settings_text(changed)}" for time, changed in history.settings]
+    if len(changes) > SWITCHES:
+        changes[SWITCHES:] = [f"{len(changes) - SWITCHES} more left out"]
     facts = {key: value for key, value in sorted(history.metadata.items()) if key != "profile"}
-    facts["profile"] = f"{history.profile.name}: " + ", ".join(f"{key} {value:g}" for key, value in settings.items())
+    facts["profile"] = f"{history.profile.name}: {_settings_text(settings)}"
+    if changes:
+        facts["settings changed"] = "; ".join(changes)
     if history.status is not None:
         facts["digest at the last status"] = f"{history.status.digest:016x}, step {history.status.step}"
     facts["first step"] = f"{history.begin_ns} ns"
@@ -250,3 +266,8 @@ def _provenance(history: History) -> str:
         for key, value in facts.items()
     )
     return f'<h2>Provenance</h2>\n<table class="facts">\n{rows}\n</table>'
+
+
+def _settings_text(settings: dict[str, Any]) -> str:
+    texts = {key: f"{value:g}" if isinstance(value, float) else str(value) for key, value in settings.items()}
+    return ", ".join(f"{key} {text}" for key, text in texts.items())

@@ -19,8 +19,10 @@ from visualization_msgs.msg import MarkerArray
 from collision_monitor import codec, warm_up
 from collision_monitor.errors import CollisionMonitorError, Refusal, SessionError
 from collision_monitor.pipeline import Outputs, Pipeline
+from collision_monitor.profiles import Profile
 from collision_monitor.records import Phase
 from collision_monitor.ros import qos
+from collision_monitor.ros.live_settings import LiveSettings
 from collision_monitor.ros.markers import MarkerView
 from collision_monitor.ros.parameters import read_monitor_parameters
 from collision_monitor.ros.process import StopRequest
@@ -77,7 +79,9 @@ class MonitorNode(Node):
         self._markers_out = self.create_publisher(MarkerArray, "~/markers", qos.MARKERS)
         self._shapes_topic = self.resolve_topic_name("~/objects/shapes")
         self._states_topic = self.resolve_topic_name("~/objects/states")
+        self._settings_topic = self.resolve_topic_name("~/settings")  # only recorded: ROS has /parameter_events
         self._recorder = self._start_recording()
+        self._live_settings = LiveSettings(self, self.settings.profile, self._on_settings)
         # Shapes first: where both wait, the executor takes them in this order.
         self.create_subscription(ObjectDescriptionArray, self._shapes_topic, self._on_shapes, qos.SHAPES, raw=True)
         self.create_subscription(ObjectStateArray, self._states_topic, self._on_states, qos.STATES, raw=True)
@@ -109,6 +113,7 @@ class MonitorNode(Node):
         types = {
             self._shapes_topic: "ObjectDescriptionArray",
             self._states_topic: "ObjectStateArray",
+            self._settings_topic: "ParameterEvent",
             self._contacts_out.topic_name: "ContactArray",
             self._predictions_out.topic_name: "PredictedCollisionArray",
             self._status_out.topic_name: "MonitorStatus",
@@ -137,13 +142,19 @@ class MonitorNode(Node):
         if time.monotonic_ns() - self._last_status >= STATUS_PERIOD:
             self._publish_status()  # so that the sender learns when its shapes are known
 
+    def _on_settings(self, profile: Profile) -> None:
+        """Between two steps, like all callbacks."""
+        now = self._now()
+        data = self._pipeline.change_settings(profile, now, self.get_fully_qualified_name())
+        self._record(self._settings_topic, data, now, now, settings=self._pipeline.settings())
+        self._times.longest_latency = profile.max_time_step
+        self.get_logger().info(f"settings changed, profile {profile.name}")
+
     def _on_states(self, data: bytes) -> None:
         began = time.monotonic_ns()
         received = self._now()
-        outputs = self._pipeline.on_states(data)
-        if outputs is not None:
-            self._predictions_out.publish(outputs.predictions)  # first: a warning is worth more the earlier it comes
-            self._contacts_out.publish(outputs.contacts)
+        with self._pipeline.monitor.clock:
+            outputs = self._publish_step(data)
         ended = time.monotonic_ns()
         if outputs is None:
             self._record(self._states_topic, data, received, received)
@@ -151,6 +162,8 @@ class MonitorNode(Node):
         stamp = outputs.result.stamp_ns
         self._times.add(began, ended, self._now() - stamp)
         self._last_step = ended
+        if outputs.limit is not None:
+            self._record(self._settings_topic, outputs.limit, received, received)
         self._record(self._states_topic, data, received, stamp)
         begins = self._is_event_wanted and bool((outputs.result.contacts["phase"] == Phase.BEGIN).any())
         self._record(self._contacts_out.topic_name, outputs.contacts, received, stamp, event=begins)
@@ -160,6 +173,13 @@ class MonitorNode(Node):
         self._publish_markers(data, outputs, ended)
         if self._recorder is not None and self._recorder.snapshot_due:
             self._recorder.write_snapshot(self._pipeline.snapshot())
+
+    def _publish_step(self, states: bytes) -> Outputs | None:
+        outputs = self._pipeline.on_states(states)
+        if outputs is not None:
+            self._predictions_out.publish(outputs.predictions)  # first: a warning is worth more the earlier it comes
+            self._contacts_out.publish(outputs.contacts)
+        return outputs
 
     def _on_watchdog(self) -> None:
         self._tell_of_recording()
@@ -178,7 +198,7 @@ class MonitorNode(Node):
 
     def _is_silent(self, now: int) -> bool:
         """Whether states came once and come no more, by the steady clock."""
-        return self._last_step is not None and now - self._last_step >= self.settings.profile.stale_after * 1e9
+        return self._last_step is not None and now - self._last_step >= self._pipeline.monitor.profile.stale_after * 1e9
 
     # -- answers
 

@@ -1,7 +1,7 @@
-"""ROS parameters that are checked when a node starts and read-only from then on.
+"""The parameters of our nodes: checked when a node starts, and where one may change later, then again.
 
-The monitor's are generated from the profile's settings. They are read-only because a session has one profile from its
-first to its last message, so that it can be replayed: to change a setting, start the node with another value.
+The monitor's are generated from the profile's settings, and those may change while it runs; what a node is made with
+(frame, recording, executor) is read-only.
 """
 
 from __future__ import annotations
@@ -9,14 +9,15 @@ from __future__ import annotations
 import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
 from collision_monitor.errors import InputError, ProfileError, SessionError
-from collision_monitor.profiles import Profile, Setting
+from collision_monitor.profiles import Profile
 from collision_monitor.session import ONE_FILE, Splitting
+from collision_monitor.settings import Setting
 
 T = TypeVar("T", str, int, float, str | int | float)
 
@@ -51,20 +52,24 @@ class ParameterReader:
         result: T = value
         return result
 
-    def declare(self, name: str, value: str | int | float, descriptor: ParameterDescriptor) -> None:
+    def declare(self, name: str, value: Any, descriptor: ParameterDescriptor) -> None:
         """Show the value to `ros2 param`, with its description and range."""
         if self._node.has_parameter(name):
             self._node.undeclare_parameter(name)
-        descriptor.read_only = True
         self._node.declare_parameter(name, value, descriptor, ignore_override=True)
 
     def read(self, name: str, default: T, description: str) -> T:
         """`value` and `declare` in one."""
         value = self.value(name, default)
-        self.declare(name, value, ParameterDescriptor(description=description))
+        self.declare(name, value, ParameterDescriptor(description=description, read_only=True))
         return value
 
+    def given(self, name: str) -> Any:
+        """What was given, whatever it is; None: nothing."""
+        return self._given.get(name)
 
+
+PROFILE = "profile"
 EXECUTORS = ("single", "events")
 RECORD_MODES = ("always", "on_event")
 _RECORD = ("record", "record_mode", "record_before", "record_after", "record_split_size", "record_split_duration")
@@ -84,11 +89,13 @@ class MonitorParameters:
 def read_monitor_parameters(node: Node) -> MonitorParameters:
     """Raises InputError, ProfileError for a setting out of range."""
     settings = Profile.fields()
-    reader = ParameterReader(node, ["profile", *(s.name for s in settings), "frame_id", *_RECORD, "executor"])
-    profile = Profile.named(
-        reader.read("profile", "balanced", f"Where the settings start from: {', '.join(Profile.names())}.")
-    )
-    profile = profile.replace(**{s.name: reader.value(s.name, getattr(profile, s.name)) for s in settings})
+    reader = ParameterReader(node, [PROFILE, *(s.name for s in settings), "frame_id", *_RECORD, "executor"])
+    name = reader.value(PROFILE, "balanced")
+    profile = Profile.named(name)
+    given = {s.name: plain(reader.given(s.name), s) for s in settings if reader.given(s.name) is not None}
+    profile = profile.replace(**given)
+    choices = f"Where the settings start from: {', '.join(Profile.names())}, or the path of a .yaml file."
+    reader.declare(PROFILE, name, ParameterDescriptor(description=choices))
     for setting in settings:
         reader.declare(setting.name, getattr(profile, setting.name), _descriptor(setting))
 
@@ -118,13 +125,20 @@ def _read_splitting(reader: ParameterReader) -> Splitting:
         raise InputError(f"parameters record_split_* and record_*: {error}") from None
 
 
+def plain(value: Any, setting: Setting) -> Any:
+    """A parameter's value as a setting takes it: arrays as tuples."""
+    return tuple(value) if setting.type is tuple and not isinstance(value, str | int | float) else value
+
+
 def _descriptor(setting: Setting) -> ParameterDescriptor:
     unit = "" if setting.unit == "1" else f" [{setting.unit}]"
     descriptor = ParameterDescriptor(description=f"{setting.description}{unit}")
-    if setting.type is int:
+    if setting.choices:
+        descriptor.additional_constraints = f"one of {', '.join(setting.choices)}"
+    elif setting.type is int:
         low, high = int(setting.minimum), int(setting.maximum)
         descriptor.integer_range = [IntegerRange(from_value=low, to_value=high, step=1)]
-    else:
+    elif setting.type is float:
         least, most = float(setting.minimum), float(setting.maximum)
         descriptor.floating_point_range = [FloatingPointRange(from_value=least, to_value=most, step=0.0)]
     return descriptor

@@ -18,7 +18,7 @@ class StepTimes:
 
     def __init__(self, longest_latency: float) -> None:
         """`longest_latency` (s): beyond it the stamps come from another clock, not from a slow network."""
-        self._longest_latency = longest_latency
+        self.longest_latency = longest_latency
         self._durations = np.zeros(WINDOW)
         self._steps = 0
         self._ends: deque[int] = deque()
@@ -31,7 +31,7 @@ class StepTimes:
         self._ends.append(ended)
         self._forget(ended)
         seconds = latency * 1e-9
-        agree = -CLOCK_TOLERANCE <= seconds <= self._longest_latency
+        agree = -CLOCK_TOLERANCE <= seconds <= self.longest_latency
         self._latency = max(seconds, 0.0) if agree else float("nan")
 
     def summary(self, now: int) -> dict[str, float]:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, Final
 from xml.etree import ElementTree
 
-from collision_monitor.profiles import Profile
 from collision_monitor.session.expectations import Outcome, evaluate, parse_expectations
 from collision_monitor.session.history import read_history
 from collision_monitor.session.many import ALL_CORES, Engine, for_each
@@ -38,14 +37,9 @@ class Checked:
 def check_session(path: Path, expectations: Any, with_profile: str | None = None) -> Checked:
     """One session against what `read_expectations` gives. Raises SessionError, ProfileError.
 
-    with_profile: not what was answered then, but what today's program answers with that profile, or with the recorded
-    one where it is empty.
+    with_profile: not what was answered then, but what today's program answers with that profile, or AS_RECORDED.
     """
-    session = Session(path)
-    profile = None
-    if with_profile is not None:
-        profile = Profile.named(with_profile) if with_profile else session.profile
-    history = read_history(session, profile)
+    history = read_history(Session(path), with_profile)
     return Checked(str(path), evaluate(parse_expectations(expectations), history, lambda: replay_verdict(path)))
 
 

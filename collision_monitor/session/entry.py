@@ -15,7 +15,8 @@ _OVERHEAD: Final = 128
 class Entry(NamedTuple):
     """event: a collision begins in it. objects: all that are described once it was taken in, where it changed them.
 
-    snapshot: then it is no message but the monitor as it is before message `sequence`.
+    snapshot: then it is no message but the monitor as it is before message `sequence`. settings: the profile (JSON)
+    once it was taken in, where it changed it.
     """
 
     topic: str
@@ -26,6 +27,7 @@ class Entry(NamedTuple):
     event: bool = False
     objects: Sequence[ObjectDescription] | None = None
     snapshot: Snapshot | None = None
+    settings: str | None = None
 
     @property
     def cost(self) -> int:

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +20,14 @@ from collision_monitor.codec import (
     Status,
     decode_contacts,
     decode_descriptions,
+    decode_parameter_event,
     decode_predictions,
     decode_states,
     decode_status,
 )
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import InputError, MessageError, SessionError
-from collision_monitor.pipeline import Outputs, Pipeline
+from collision_monitor.pipeline import LIMIT, Outputs, Pipeline
 from collision_monitor.profiles import Profile
 from collision_monitor.records import ContactStatus, Phase
 from collision_monitor.session.reader import Recorded, Session
@@ -45,6 +46,9 @@ BLOCK: Final = 1 << 16
 
 ANY: Final = "any"
 """In place of names: every pair."""
+
+AS_RECORDED: Final = ""
+"""In place of a profile's name: the one that was recorded, and as it was changed."""
 
 
 @dataclass(frozen=True)
@@ -74,8 +78,9 @@ class History:
     times (n,): s of each step from the first, never falling: where the clock was set back (restarts: how often) they
     go on from where they were. contacts, predictions: of all steps, records.CONTACT and records.PREDICTION, and the
     step (index) of each row. states: of all messages, records.STATE, and the time (s). objects: as they were described
-    last; names: all that they had, and the ids of each. durations: s that steps took, as far as they were reported or
-    measured. status: the last one, or the replay's. problems: why some of it may be unknown.
+    last; names: all that they had, and the ids of each. profile: of the start; settings: what changed of it, and the
+    time (s) of the first step that went by it. durations: s that steps took, as far as they were reported or measured.
+    status: the last one, or the replay's. problems: why some of it may be unknown.
     """
 
     name: str
@@ -94,6 +99,7 @@ class History:
     durations: Floats = field(default_factory=lambda: np.zeros(0))
     objects: dict[int, ObjectDescription] = field(default_factory=dict)
     names: dict[str, set[int]] = field(default_factory=dict)
+    settings: list[tuple[float, dict[str, Any]]] = field(default_factory=list)
     status: Status | None = None
     problems: list[str] = field(default_factory=list)
     collisions: list[Collision] = field(default_factory=list)
@@ -143,11 +149,12 @@ class History:
 
 
 def read_history(
-    session: Session, replay_with: Profile | None = None, progress: Callable[[], None] = lambda: None
+    session: Session, replay_with: Profile | str | None = None, progress: Callable[[], None] = lambda: None
 ) -> History:
     """Read a session whole; with a profile: not what was answered then, but what this program answers to the inputs.
 
-    progress: called after every message. Raises SessionError for a session without inputs.
+    replay_with: a profile or its name, from the first step to the last; AS_RECORDED: the recorded one, and where it was
+    changed. progress: called after every message. Raises SessionError for a session without inputs, ProfileError.
     """
     gathered = _Gathered(session, replay_with)
     for message in session.messages():
@@ -159,11 +166,15 @@ def read_history(
 class _Gathered:
     """Lists that grow with the messages."""
 
-    def __init__(self, session: Session, replay_with: Profile | None) -> None:
-        profile = session.profile if replay_with is None else replay_with
+    def __init__(self, session: Session, replay_with: Profile | str | None) -> None:
+        self._changes = replay_with is None or replay_with == AS_RECORDED
+        profile = session.profile if self._changes else replay_with
+        assert profile is not None
+        profile = Profile.named(profile) if isinstance(profile, str) else profile
         self._session = session
         self._history = History(session.path.name, profile, session.metadata, replay_with is not None)
-        self._pipeline = None if replay_with is None else Pipeline(replay_with, frame_id=session.frame_id)
+        self._pipeline = None if replay_with is None else Pipeline(profile, frame_id=session.frame_id, timed=False)
+        self._settings: list[tuple[int, dict[str, Any]]] = []  # changed before the step of this index
         self._count = 0
         self._steps: list[int] = []  # stamps in ns
         self._step_of: dict[int, int] = {}
@@ -195,6 +206,12 @@ class _Gathered:
                     if not isinstance(each, Removal):
                         self._history.objects[each.object_id] = each
                         self._history.names.setdefault(each.name, set()).add(each.object_id)
+            case "ParameterEvent" if self._changes:
+                if self._pipeline is not None:
+                    self._pipeline.on_settings(message.data)
+                changed = decode_parameter_event(message.data).changed
+                if changed.keys() != {LIMIT}:  # that is how far a step came, and no one's choice
+                    self._settings.append((len(self._steps), changed))
             case "ObjectStateArray":
                 if self._pipeline is not None:
                     begin = time.perf_counter()
@@ -249,6 +266,7 @@ class _Gathered:
         h.states, stamps_of = self._states.joined()
         h.state_time = np.asarray((stamps_of - h.begin_ns) * NANOSECOND, np.float64)
         h.durations = np.array(self._durations)
+        h.settings = [(float(h.times[k]), changed) for k, changed in self._settings if k < len(stamps)]
         if self._pipeline is not None:
             h.status = self._status_of_replay(self._pipeline)
         if not len(stamps):

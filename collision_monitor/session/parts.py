@@ -1,7 +1,8 @@
 """The files of a recording: one, or a folder with as many as splitting and events make of it.
 
-Each file can be read alone: its metadata says where in the recording it stands, and the objects that were described
-before are in its first message again. Where snapshots come, it begins with one and can be replayed alone, too.
+Each file can be read alone: its metadata says where in the recording it stands and which profile was in force, and the
+objects that were described before are in its first message again. Where snapshots come, it begins with one and can be
+replayed alone, too.
 """
 
 from __future__ import annotations
@@ -135,8 +136,7 @@ class Parts:
                 written += self._put(kept)
                 kept = []
                 self._finish()
-                if each.objects is not None:
-                    self._objects = each.objects
+                self._note(each)
         return written + self._put(kept)
 
     def flush(self) -> None:
@@ -171,8 +171,7 @@ class Parts:
             if self._file is None:
                 self._open(entry)
             run.append(entry)
-            if entry.objects is not None:
-                self._objects = entry.objects
+            self._note(entry)
         return written + self._put_run(run)
 
     def _put_run(self, run: Sequence[Entry]) -> int:
@@ -190,6 +189,13 @@ class Parts:
         time, size = self._next_snapshot
         if entry.log_time >= time and self._file.size >= size:
             self._write_snapshot(self._file, entry, snapshot)
+
+    def _note(self, entry: Entry) -> None:
+        """What is in force after the message, for the start of the next file."""
+        if entry.objects is not None:
+            self._objects = entry.objects
+        if entry.settings is not None:
+            self._metadata["profile"] = entry.settings
 
     def _write_snapshot(self, file: SessionFile, entry: Entry, snapshot: Snapshot) -> None:
         data = snapshot.encode()

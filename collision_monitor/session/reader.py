@@ -129,6 +129,8 @@ class Session:
                     if self.foreign:
                         each = each._replace(sequence=count)
                         count += 1
+                        if each.type == "ParameterEvent":  # of any node, and in no order that says when it took effect
+                            each = each._replace(type=full_name(each.type))
                 yield each
             prefix = f"{part.records.path.name}: " if len(self._parts) > 1 else ""
             self.damage += [prefix + text for text in part.damage]

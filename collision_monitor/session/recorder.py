@@ -110,11 +110,13 @@ class Recorder:
         *,
         event: bool = False,
         objects: Sequence[ObjectDescription] | None = None,
+        settings: str | None = None,
     ) -> None:
         """Put one message on the queue. Messages are recorded in the order of these calls; times in ns.
 
         event: a collision begins in it. objects: of a message that changes the objects, all that are described then;
-        they are repeated at the start of each further file.
+        they are repeated at the start of each further file. settings: of a message that changes settings, the profile
+        from then on, as `Pipeline.settings` says it.
         A log time before the last one is raised to it. A message that finds the queue full is dropped and counted; its
         sequence number stays unused, so that a replay knows. Raises KeyError for a topic that was not named.
         """
@@ -125,7 +127,9 @@ class Recorder:
             self._last_log_time = max(self._last_log_time, log_time)
             if self._last_snapshot is None:
                 self._last_snapshot = self._last_log_time
-            entry = Entry(topic, data, self._last_log_time, max(0, publish_time), sequence, event, objects)
+            entry = Entry(
+                topic, data, self._last_log_time, max(0, publish_time), sequence, event, objects, settings=settings
+            )
             cost = entry.cost
             while self._patient and self._state is Recording.ON and self._waiting + cost > self._queue_bytes:
                 self._wake.notify()

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
+from typing import Any
 
 import numpy as np
 
@@ -84,13 +85,12 @@ def replay(
 
     Raises SessionError where the session holds no inputs or cannot be read, InputError where it has no such time.
     """
-    profile = session.profile if threads is None else session.profile.replace(threads=threads)
-    run = _Replay(profile, session.frame_id)
+    run = _Replay(session.profile, session.frame_id, {} if threads is None else {"threads": threads})
     report = run.report
     report.tolerance = tolerance
     report.foreign = session.metadata.get("determinism_key") != provenance()["determinism_key"]
     if session.foreign:
-        report.notes.append(f"the recording has no settings in it: replayed with the profile {profile.name}")
+        report.notes.append(f"the recording has no settings in it: replayed with the profile {session.profile.name}")
     elif report.foreign:
         report.notes.append(f"recorded by another program: {_provenance_differences(session)}")
     place = run.find_start(session, start) if start else None
@@ -136,10 +136,10 @@ class _Mode(Enum):
 class _Replay:
     """The pipeline, and the answers that it gave and the session has not shown yet."""
 
-    def __init__(self, profile: Profile, frame_id: str) -> None:
-        self._profile = profile
+    def __init__(self, profile: Profile, frame_id: str, settings: Mapping[str, Any]) -> None:
         self._frame_id = frame_id
-        self.pipeline = Pipeline(profile, frame_id=frame_id)
+        self._settings = settings
+        self.pipeline = Pipeline(profile.replace(**settings), frame_id, timed=False, kept=settings)
         self.report = Report(digest=self.pipeline.monitor.digest)
         self._mode = _Mode.EXACT
         self._next = 0  # sequence number of the message that comes next
@@ -170,7 +170,7 @@ class _Replay:
             return
         try:
             snapshot = Snapshot.decode(recorded.data)
-            self.pipeline = Pipeline.restored(snapshot, self._profile, self._frame_id)
+            self.pipeline = Pipeline.restored(snapshot, self._frame_id, self._settings)
         except InputError as error:
             if self.report.begin and not self.report.messages:
                 raise SessionError(f"replay it from the start, for the {error}") from None
@@ -222,6 +222,9 @@ class _Replay:
             case "ObjectDescriptionArray":
                 self.expect_nothing_more()
                 self.pipeline.on_shapes(message.data)
+            case "ParameterEvent":
+                self.expect_nothing_more()
+                self.pipeline.on_settings(message.data)
             case "ObjectStateArray":
                 self.expect_nothing_more()
                 self._states = message.data

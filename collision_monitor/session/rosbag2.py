@@ -20,14 +20,15 @@ _QOS: Final = {  # type: depth, reliability, durability; as the node offers and 
     "ContactArray": (10, "reliable", "volatile"),
     "PredictedCollisionArray": (10, "reliable", "volatile"),
     "MonitorStatus": (1, "reliable", "transient_local"),
+    "ParameterEvent": (1000, "reliable", "volatile"),
 }
 TYPES: Final = tuple(_QOS)
-"""The messages of `collision_monitor_msgs` that a session holds."""
+"""The messages that a session holds."""
 
 
 def full_name(name: str) -> str:
     """`ContactArray` -> `collision_monitor_msgs/msg/ContactArray`."""
-    return f"collision_monitor_msgs/msg/{name}"
+    return f"{'rcl_interfaces' if name == 'ParameterEvent' else 'collision_monitor_msgs'}/msg/{name}"
 
 
 def qos_profiles(name: str) -> list[dict[str, Any]]:

@@ -17,6 +17,8 @@ from collision_monitor.description import ObjectDescription
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Sphere
 from collision_monitor.ros import main, qos
+from collision_monitor.session import Session
+from collision_monitor.session.replay import Verdict, replay
 from collision_monitor_msgs.msg import Contact, MonitorStatus
 
 BALL = ((Sphere(0.5), Pose()),)
@@ -184,7 +186,7 @@ def signals():
         (["-p", "horizon:=-1.0"], "horizon: expected 0 to 1e+06 s, got -1"),
         (["-p", "horizn:=1.0"], "did you mean 'horizon'?"),
         (["-p", "threads:=1.5"], "threads: expected a whole number, got 1.5"),
-        (["-p", "profile:=hasty"], "expected one of balanced, exact, fast, got 'hasty'"),
+        (["-p", "profile:=hasty"], "expected one of balanced, exact, fast, or a .yaml file, got 'hasty'"),
         (["-p", "executor:=none"], "expected single or events, got 'none'"),
         (["-p", "frame_id:=''"], "expected the name of a frame, got an empty text"),
     ],
@@ -195,8 +197,8 @@ def test_impossible_parameters_are_refused_in_one_line(ros_domain_id, signals, c
     assert words in line
 
 
-def test_parameters_can_be_read_and_not_changed(start, team):
-    start("run", "--ros-args", "-p", "horizon:=1")
+def test_settings_change_while_it_runs_and_the_session_replays(start, team, tmp_path):
+    monitor = start("run", "--record", "run.mcap", "--ros-args", "-p", "horizon:=1")
     team.meet()
 
     def call(kind, name, request):
@@ -206,12 +208,42 @@ def test_parameters_can_be_read_and_not_changed(start, team):
         team.until(future.done)
         return future.result()
 
-    values = call(GetParameters, "get_parameters", GetParameters.Request(names=["horizon", "profile"])).values
-    assert (values[0].double_value, values[1].string_value) == (1.0, "balanced")
-    change = SetParameters.Request(parameters=[Parameter("horizon", value=3.0).to_parameter_msg()])
-    (result,) = call(SetParameters, "set_parameters", change).results
-    assert not result.successful
-    assert "read-only" in result.reason
+    def change(name, value):
+        request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+        (result,) = call(SetParameters, "set_parameters", request).results
+        return "" if result.successful else result.reason
+
+    def values(*names):
+        found = call(GetParameters, "get_parameters", GetParameters.Request(names=names)).values
+        return [value.string_value or value.double_value for value in found]
+
+    team.describe(*map(ball, (1, 2, 3, 4)))
+    team.status(lambda s: s.objects == 4)
+    first, _ = team.ask(*APPROACHING, *OVERLAPPING)
+    assert change("horizon", 3) == "", "a whole number is taken where a decimal one is meant"
+    assert change("profile", "fast") == ""
+    contacts, predictions = team.ask(*APPROACHING, *OVERLAPPING)
+    assert [contact.phase for contact in (*first.contacts, *contacts.contacts)] == [Contact.BEGIN, Contact.PERSIST]
+    assert predictions.horizon == 3.0
+    assert 0.02 < predictions.predictions[0].upper - predictions.predictions[0].lower < 0.2
+    assert values("profile", "horizon", "position_tolerance") == ["fast", 3.0, 0.01]
+
+    (tmp_path / "site.yaml").write_text("based_on: exact\nhorizon: 4.0\n")
+    assert change("profile", "site.yaml") == ""
+    assert values("horizon", "position_tolerance") == [4.0, 1e-9]
+    assert "expected one of balanced, exact, fast" in change("profile", "hasty")
+    assert "out of range" in change("horizon", -1.0)
+    assert "read-only" in change("frame_id", "map")
+    assert "read-only" in change("record", "other.mcap")
+    assert values("profile", "horizon", "frame_id") == ["site.yaml", 4.0, "world"]
+    _, predictions = team.ask(*APPROACHING)
+    assert predictions.horizon == 4.0
+    assert predictions.predictions[0].upper - predictions.predictions[0].lower < 1e-4
+
+    assert monitor.stop() == 0
+    assert "Traceback" not in monitor.words
+    report = replay(Session(tmp_path / "run.mcap"))
+    assert (report.verdict, report.steps, report.notes) == (Verdict.IDENTICAL, 3, [])
 
 
 @pytest.mark.parametrize("executor", ["single", "events"])

@@ -71,9 +71,12 @@ def test_a_recording_that_cannot_be_is_named(read, given, text):
 
 def test_the_descriptors_say_unit_and_range(read):
     _, describe = read()
+    assert describe("frame_id").read_only
     for setting in Profile.fields():
         descriptor = describe(setting.name)
         assert setting.description in descriptor.description
-        assert descriptor.read_only
-        (limits,) = (*descriptor.floating_point_range, *descriptor.integer_range)
-        assert (limits.from_value, limits.to_value) == (setting.minimum, setting.maximum)
+        assert not descriptor.read_only
+        limits = [(each.from_value, each.to_value) for each in descriptor.floating_point_range]
+        limits += [(each.from_value, each.to_value) for each in descriptor.integer_range]
+        assert limits == ([(setting.minimum, setting.maximum)] if setting.type in (int, float) else [])
+        assert all(word in descriptor.additional_constraints for word in setting.choices)

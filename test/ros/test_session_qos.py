@@ -6,6 +6,8 @@ import pytest
 
 qos = pytest.importorskip("collision_monitor.ros.qos")
 
+from rclpy.qos import qos_profile_parameter_events  # noqa: E402
+
 from collision_monitor.session.rosbag2 import TYPES, qos_profiles  # noqa: E402
 
 NODE = {
@@ -14,6 +16,7 @@ NODE = {
     "ContactArray": qos.ANSWERS,
     "PredictedCollisionArray": qos.ANSWERS,
     "MonitorStatus": qos.STATUS,
+    "ParameterEvent": qos_profile_parameter_events,
 }
 
 

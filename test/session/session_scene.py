@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from collision_monitor.description import ObjectDescription
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Capsule, Sphere
 from collision_monitor.pipeline import Pipeline
+from collision_monitor.profiles import Profile
 from collision_monitor.session import Recorder
 
 NODE = "/object_monitor"
@@ -25,6 +26,7 @@ TYPES = {
     f"{NODE}/status": "MonitorStatus",
 }
 SHAPES, STATES, CONTACTS, PREDICTIONS, STATUS = TYPES
+SETTINGS = f"{NODE}/settings"
 START = 1_700_000_000_000_000_000
 STEP = 10_000_000
 
@@ -57,15 +59,27 @@ def inputs(steps: int) -> Iterator[tuple[str, bytes]]:
 
 
 def record(
-    path: Path, steps: int = 50, *, close: bool = True, pipeline: Pipeline | None = None, **options: Any
+    path: Path,
+    steps: int = 50,
+    *,
+    close: bool = True,
+    pipeline: Pipeline | None = None,
+    switches: Mapping[int, Profile] | None = None,
+    **options: Any,
 ) -> Recorder:
-    """The scene, recorded as the node records it; options: of the recorder."""
+    """The scene, recorded as the node records it; switches: profiles, and before which input each is switched to;
+    options: of the recorder."""
     pipeline = pipeline or Pipeline("balanced")
-    recorder = Recorder(path, TYPES, pipeline.metadata(node=NODE), **options)
+    switches = switches or {}
+    types = {**TYPES, SETTINGS: "ParameterEvent"} if switches else TYPES
+    recorder = Recorder(path, types, pipeline.metadata(node=NODE), **options)
     now = START
     recorder.write(STATUS, pipeline.status(), now, now)
-    for topic, data in inputs(steps):
+    for k, (topic, data) in enumerate(inputs(steps)):
         now += STEP
+        if k in switches:
+            change = pipeline.change_settings(switches[k], now, NODE)
+            recorder.write(SETTINGS, change, now, now, settings=pipeline.settings())
         if topic == SHAPES:
             pipeline.on_shapes(data)
             recorder.write(topic, data, now, now, objects=tuple(pipeline.objects.values()))

@@ -19,7 +19,7 @@ def test_rosbags_parses_every_definition(name: str) -> None:
 
     types = get_types_from_msg(definitions.definition(full_name(name)), full_name(name))
     assert full_name(name) in types
-    assert {"std_msgs/msg/Header", "builtin_interfaces/msg/Time"} <= set(types)
+    assert "builtin_interfaces/msg/Time" in types
 
 
 @pytest.mark.parametrize("name", TYPES)
@@ -47,9 +47,9 @@ def test_every_nested_type_comes_once() -> None:
 
 @pytest.mark.parametrize("name", TYPES)
 def test_the_hash_is_that_of_the_installed_type(name: str) -> None:
-    path = Path(sys.prefix) / "share" / "collision_monitor_msgs" / "msg" / f"{name}.json"
+    path = Path(sys.prefix) / "share" / f"{full_name(name)}.json"
     if not path.is_file():
-        pytest.skip("collision_monitor_msgs is not installed in this environment")
+        pytest.skip(f"{full_name(name)} is not installed in this environment")
     hashes = {each["type_name"]: each["hash_string"] for each in json.loads(path.read_text())["type_hashes"]}
     assert definitions.type_hash(full_name(name)) == hashes[full_name(name)]
     assert definitions.type_hash(full_name(name)).startswith("RIHS01_")

@@ -40,7 +40,13 @@ def test_the_examples_of_two_shapes_run() -> None:
 
 @pytest.mark.parametrize("setting", Profile.fields(), ids=lambda setting: setting.name)
 def test_the_parameter_table_has_every_setting_with_its_default(setting: Profile) -> None:
-    assert f"| `{setting.name}` | {setting.default:g} |" in README
+    default = setting.default
+    text = {
+        tuple: lambda: ", ".join(f"{x:g}" for x in default),
+        bool: lambda: str(default).lower(),
+        str: lambda: f"`{default}`",
+    }.get(setting.type, lambda: f"{default:g}")()
+    assert f"| `{setting.name}` | {text} |" in README
 
 
 def test_every_linked_file_exists() -> None:

@@ -73,7 +73,7 @@ def import_bag(
         else:
             converter = _converter(bag, mapping)
             frame_id, inputs = mapping.frame, _mapped_inputs(bag, mapping, converter, result)
-        pipeline = Pipeline(profile, frame_id=frame_id)
+        pipeline = Pipeline(profile, frame_id=frame_id, timed=False)
         _write(inputs, target, pipeline, result, overwrite, progress)
     if mapping is not None:
         result.states, result.skipped = dict(converter.states), result.skipped | dict(converter.skipped)

@@ -1,0 +1,41 @@
+"""What is not told: objects outside of a region, slow encounters, and pairs that move apart.
+
+Each leaves out what it says and changes nothing else: the answers are those without it, less these.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.prediction.motion import Bodies
+from collision_monitor.records import Method
+from collision_monitor.settings import EVERYWHERE, Vector
+
+
+def is_bounded(low: Vector, high: Vector) -> bool:
+    """Whether a region leaves anything out."""
+    return min(high) < EVERYWHERE or max(low) > -EVERYWHERE
+
+
+def bodies_in(bodies: Bodies, top: int, now: float, low: Vector, high: Vector) -> NDArray[np.bool_]:
+    """Which of the first `top` bodies reach into the box from low to high (m), by their bounding spheres at `now`."""
+    age = np.where(bodies.static[:top], 0.0, now - bodies.time[:top])
+    centre = bodies.position[:top] + bodies.linear[:top] * age[:, None]
+    outside = np.maximum(np.maximum(np.asarray(low) - centre, centre - np.asarray(high)), 0.0)
+    return np.asarray((outside**2).sum(axis=1) <= bodies.motion["radius"][:top] ** 2)
+
+
+def closes_fast(predictions: NDArray[np.void], least: float) -> NDArray[np.bool_]:
+    """Which predictions close at `least` m/s; those whose speed is not known may."""
+    return np.asarray(~(predictions["closing_speed"] < least) | (predictions["method"] == Method.BOUND))
+
+
+def approaches(bodies: Bodies, i: NDArray[np.int32], j: NDArray[np.int32], now: float) -> NDArray[np.bool_]:
+    """Whether the origins of bodies i and j (n,) come nearer at `now`, or stay as they are."""
+    position, velocity = np.zeros((len(i), 3)), np.zeros((len(i), 3))
+    for slots, sign in ((i, -1.0), (j, 1.0)):
+        age = np.where(bodies.static[slots], 0.0, now - bodies.time[slots])
+        position += sign * (bodies.position[slots] + bodies.linear[slots] * age[:, None])
+        velocity += sign * bodies.linear[slots]
+    return np.asarray((position * velocity).sum(axis=1) <= 0.0)

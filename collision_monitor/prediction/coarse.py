@@ -1,0 +1,187 @@
+"""What the bounding spheres alone say of pairs that there is no time to look at: little, at once, and never too late.
+
+(Slides "Time-critical collision detection": from coarse to fine, and the answer so far whenever time is up. Hubbard,
+Approximating polyhedra with spheres for time-critical collision detection, 1996.)
+"""
+
+from __future__ import annotations
+
+from math import inf, isfinite, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor._jit import device, kernel
+from collision_monitor.prediction.active_pairs import (
+    BOUND,
+    CLOSING,
+    SHAPE_I,
+    SHAPE_J,
+    STATUS,
+    UNRESOLVED,
+    has_changed,
+)
+from collision_monitor.prediction.motion import Bodies, relative_position
+from collision_monitor.prediction.time_of_impact import (
+    BOUND_ONLY,
+    CLEAR,
+    body_impact,
+    meeting_of_spheres,
+    sphere_interval,
+)
+
+
+@device
+def is_cheap(bodies, i, j):
+    """Is the pair settled as fast as its bound? Two spheres, or one with a half-space, which has no bounding sphere."""
+    spheres = bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0
+    return spheres or not (isfinite(bodies.motion[i].radius) and isfinite(bodies.motion[j].radius))
+
+
+@device
+def bound_impact(bodies, i, j, begin, end, margin, event):
+    """Since when the pair's bounding spheres meet in [begin, end], into the IMPACT record `event`, UNRESOLVED.
+
+    event.status = CLEAR where they do not, and the bodies cannot.
+    """
+    if bodies.motion[i].id > bodies.motion[j].id:
+        i, j = j, i
+    A, B = bodies.motion[i], bodies.motion[j]
+    event.status = CLEAR
+    tube_1 = A.tube_1 + B.tube_1
+    tube_0 = A.tube_0 + B.tube_0 + A.tube_1 * (begin - A.tube_time) + B.tube_1 * (begin - B.tube_time)
+    px, py, pz = relative_position(A, B, begin)
+    vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
+    reach = A.radius + B.radius + margin + tube_0
+    first, last = sphere_interval(px, py, pz, vx, vy, vz, reach, tube_1, end - begin, 1.0)
+    if first > last:
+        return
+    event.i, event.j = i, j
+    event.key = (np.uint64(A.id) << np.uint64(32)) | np.uint64(B.id)
+    event.version_i, event.version_j = A.version, B.version
+    event.shape_i, event.shape_j = bodies.first_shape[i], bodies.first_shape[j]
+    event.lower, event.upper = begin + first, inf
+    event.status, event.method = UNRESOLVED, BOUND_ONLY
+    meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, first, event)
+
+
+@kernel
+def bound_pairs(table, parts, bodies, pairs, now, margin, tolerance, budget, events, scratch):
+    """As `candidates.predict_pairs`, but of all pairs that are not cheap only the bound."""
+    n = queries = 0
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        begin = max(now, min(bodies.motion[i].covered, bodies.motion[j].covered))
+        end = min(bodies.motion[i].cover, bodies.motion[j].cover)
+        if begin > now and begin >= end:
+            continue
+        if is_cheap(bodies, i, j):
+            queries += body_impact(
+                table, parts, bodies, i, j, begin, end, margin, tolerance, budget, scratch, events[n]
+            )
+        else:
+            bound_impact(bodies, i, j, begin, end, margin, events[n])
+        if events[n].status != CLEAR:
+            n += 1
+    return n, queries
+
+
+@kernel
+def refine(table, parts, bodies, bounds, now, margin, tolerance, budget, events, scratch):
+    """First impacts from `now` on of the pairs of `bounds` (IMPACT), into events; as `candidates.predict_pairs`."""
+    n = queries = 0
+    for k in range(bounds.size):
+        i, j = bounds[k].i, bounds[k].j
+        end = min(bodies.motion[i].cover, bodies.motion[j].cover)
+        queries += body_impact(table, parts, bodies, i, j, now, end, margin, tolerance, budget, scratch, events[n])
+        if events[n].status != CLEAR:
+            n += 1
+    return n, queries
+
+
+@device
+def _relative_now(bodies, i, j, now):
+    """Position of j relative to i by their last states (m), and how old those are (s)."""
+    age_i = 0.0 if bodies.static[i] else now - bodies.time[i]
+    age_j = 0.0 if bodies.static[j] else now - bodies.time[j]
+    px = bodies.position[j, 0] - bodies.position[i, 0] + (bodies.linear[j, 0] * age_j - bodies.linear[i, 0] * age_i)
+    py = bodies.position[j, 1] - bodies.position[i, 1] + (bodies.linear[j, 1] * age_j - bodies.linear[i, 1] * age_i)
+    pz = bodies.position[j, 2] - bodies.position[i, 2] + (bodies.linear[j, 2] * age_j - bodies.linear[i, 2] * age_i)
+    return px, py, pz, age_i, age_j
+
+
+@kernel
+def leave(bodies, pairs, events, now, margin, stale_acceleration, results, later):
+    """As `active_pairs.examine`, for pairs that nobody looks at in this step.
+
+    Who touched goes on touching, UNRESOLVED, with the distance of the centres and a bound that holds whatever it is.
+    Who did not is UNRESOLVED from now on. Where the bounding spheres are apart, neither. Returns (active, later).
+    """
+    n = n_later = 0
+    for k in range(pairs.size):
+        pair, event = pairs[k], events[k]
+        i, j = pair.i, pair.j
+        px, py, pz, age_i, age_j = _relative_now(bodies, i, j, now)
+        widen = 0.5 * stale_acceleration * (age_i * age_i + age_j * age_j)
+        reach = bodies.motion[i].radius + bodies.motion[j].radius + widen
+        distance = sqrt(px * px + py * py + pz * pz)
+        touching = pair.touched == 1 and distance <= (reach + margin) * (1.0 + 1e-14)
+        stays = touching
+        predicted = bodies.motion[i].time == now or bodies.motion[j].time == now
+        if not touching and not (predicted and has_changed(bodies, event)):
+            since = event.lower
+            end = min(bodies.motion[i].cover, bodies.motion[j].cover)
+            bound_impact(bodies, i, j, now, end, margin, event)
+            if event.status != CLEAR:
+                if event.lower > now:
+                    later[n_later] = event
+                    n_later += 1
+                else:
+                    event.lower = min(since, now)  # who waits longest is looked at first
+                    stays = True
+        if stays or pair.touched == 1:
+            pairs[n] = pair
+            events[n] = event
+            pairs[n].touching = 1 if touching else 0
+            pairs[n].leaving = 0 if stays else 1
+            if touching:
+                _write_bound(bodies, i, j, px, py, pz, distance, reach, age_i, results[n])
+            n += 1
+    return n, n_later
+
+
+@device
+def _write_bound(bodies, i, j, px, py, pz, distance, reach, age_i, result):
+    """A contact of which only the bounding spheres are known: the true distance is within reach of the centres'."""
+    result[:] = 0.0
+    result[0] = distance
+    result[1] = 1.0
+    if distance > 0.0:
+        result[1], result[2], result[3] = px / distance, py / distance, pz / distance
+    for c in range(3):
+        result[4 + c] = bodies.position[i, c] + bodies.linear[i, c] * age_i
+    result[7], result[8], result[9] = result[4] + px, result[5] + py, result[6] + pz
+    result[BOUND] = reach
+    for c in range(3):
+        result[CLOSING] -= (bodies.linear[j, c] - bodies.linear[i, c]) * result[1 + c]
+    result[SHAPE_I], result[SHAPE_J] = bodies.first_shape[i], bodies.first_shape[j]
+    result[STATUS] = UNRESOLVED
+
+
+def urgency(
+    bodies: Bodies, pairs: NDArray[np.void], events: NDArray[np.void], step: int
+) -> tuple[NDArray[np.int64], int]:
+    """The order in which to look at active pairs, and how many are cheap, which come first and cost nothing.
+
+    The rest by turns: those that did not touch, since their certified time ran out, and those that did, since they were
+    looked at last. Ties change from step to step, so that nobody waits forever.
+    """
+    i, j = pairs["i"], pairs["j"]
+    radius, spin = bodies.motion["radius"], bodies.spin_radius
+    cheap = ~(np.isfinite(radius[i]) & np.isfinite(radius[j])) | ((spin[i] == 0.0) & (spin[j] == 0.0))
+    ties = ((pairs["key"] ^ np.uint64(step)) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(32)
+    by_age = np.lexsort((ties, events["lower"]))
+    touched = pairs["touched"][by_age] == 1
+    turn = np.empty(len(pairs), np.int64)
+    turn[by_age] = np.where(touched, np.cumsum(touched), np.cumsum(~touched))
+    return np.lexsort((pairs["touched"], turn, ~cheap)), int(np.count_nonzero(cheap))

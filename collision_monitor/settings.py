@@ -1,0 +1,100 @@
+"""What a setting may be: its kind, range, unit and meaning, and the check of a value.
+
+ROS parameters, custom profiles and recorded changes are all checked here, so that each refusal says the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any, Final
+
+from collision_monitor.errors import ProfileError
+from collision_monitor.tolerances import LARGEST_INPUT
+
+Vector = tuple[float, float, float]
+Value = bool | int | float | str | Vector
+
+EVERYWHERE: Final = LARGEST_INPUT
+"""m: a region that reaches this far has no end there."""
+
+_KINDS: dict[type, str] = {bool: "true or false", int: "a whole number", float: "a number", tuple: "three numbers"}
+
+
+def number(default: float | int, minimum: float | int, maximum: float | int, unit: str, description: str) -> Any:
+    """A field of a profile: a number, whole where the default is."""
+    metadata = {"minimum": minimum, "maximum": maximum, "unit": unit, "description": description}
+    return field(default=default, metadata=metadata)
+
+
+def vector(default: Vector, largest: float, unit: str, description: str) -> Any:
+    """A field of a profile: x, y and z, each from -largest to largest."""
+    metadata = {"minimum": -largest, "maximum": largest, "unit": unit, "description": description}
+    return field(default=default, metadata=metadata)
+
+
+def switch(default: bool, description: str) -> Any:
+    """A field of a profile: on or off."""
+    return field(default=default, metadata={"description": description})
+
+
+def choice(choices: Iterable[str], description: str) -> Any:
+    """A field of a profile: one of some words, the first by default."""
+    words = tuple(choices)
+    return field(default=words[0], metadata={"choices": words, "description": description})
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One field of a profile, as parameter declarations and help texts need it; minimum and maximum: of numbers."""
+
+    name: str
+    type: type
+    default: Value
+    description: str
+    minimum: float | int = -math.inf
+    maximum: float | int = math.inf
+    unit: str = "1"
+    choices: tuple[str, ...] = ()
+
+    def checked(self, value: Any) -> Value:
+        """The value in the setting's own type. Raises ProfileError, naming setting, value and what was expected."""
+        if self.choices:
+            if value not in self.choices:
+                raise ProfileError(f"{self.name}: expected one of {', '.join(self.choices)}, got {value!r}")
+            return str(value)
+        if self.type is tuple:
+            return self._checked_vector(value)
+        whole = isinstance(value, int) and not isinstance(value, bool)
+        fits = {bool: isinstance(value, bool), int: whole, float: whole or isinstance(value, float)}[self.type]
+        if not fits:
+            raise ProfileError(f"{self.name}: expected {_KINDS[self.type]}{self._in_unit}, got {value!r}")
+        self._check_range(value)
+        return self.type(value)  # type: ignore[no-any-return]
+
+    def _checked_vector(self, value: Any) -> Vector:
+        given = list(value) if isinstance(value, Sequence) and not isinstance(value, str) else []
+        if len(given) != 3 or not all(isinstance(x, int | float) and not isinstance(x, bool) for x in given):
+            raise ProfileError(f"{self.name}: expected {_KINDS[tuple]}{self._in_unit}, got {value!r}")
+        for x in given:
+            self._check_range(x)
+        return (float(given[0]), float(given[1]), float(given[2]))
+
+    def _check_range(self, value: float) -> None:
+        if not self.minimum <= value <= self.maximum:
+            wanted = f"{self.minimum:g} to {self.maximum:g}{self._in_unit}"
+            raise ProfileError(f"{self.name}: expected {wanted}, got {value:g}")
+
+    @property
+    def _in_unit(self) -> str:
+        return "" if self.unit == "1" else f" {self.unit}"
+
+
+def settings_of(kind: type) -> list[Setting]:
+    """The settings among the fields of a dataclass, in order."""
+    return [
+        Setting(name=f.name, type=type(f.default), default=f.default, **f.metadata)
+        for f in fields(kind)
+        if f.metadata and f.default is not MISSING
+    ]
