@@ -6,6 +6,7 @@
     description     ObjectDescription                      an object with its shapes, group and bounds
     contact         contact, Contact                       two shapes at two poses: distance, normal, points, bound
     features        contact_features                       what touches what: "vertex 3 of A on face 7 of B"
+    decomposition   convex_decomposition                   a concave mesh as convex parts, with their error
     impact          time_of_impact, Impact                 two shapes in motion: when they meet, as an interval
     impact_batch    time_of_impact_batch, Impacts          the same for many motions of two shapes
     feature_impact  vertex_face_impact, edge_edge_impact   the same for vertices, faces and edges in linear motion
@@ -41,6 +42,8 @@ _HOME = {
     "contact": "narrow_phase.contact",
     "Contact": "narrow_phase.contact",
     "contact_features": "narrow_phase.features",
+    "convex_decomposition": "narrow_phase.convex_decomposition",
+    "Decomposition": "narrow_phase.convex_decomposition",
     "time_of_impact": "prediction.impact",
     "Impact": "prediction.impact",
     "time_of_impact_batch": "prediction.impact_batch",
@@ -88,6 +91,8 @@ if TYPE_CHECKING:
     from collision_monitor.monitor import StepStatus as StepStatus
     from collision_monitor.narrow_phase.contact import Contact as Contact
     from collision_monitor.narrow_phase.contact import contact as contact
+    from collision_monitor.narrow_phase.convex_decomposition import Decomposition as Decomposition
+    from collision_monitor.narrow_phase.convex_decomposition import convex_decomposition as convex_decomposition
     from collision_monitor.narrow_phase.features import contact_features as contact_features
     from collision_monitor.prediction.feature_impact import FeatureImpact as FeatureImpact
     from collision_monitor.prediction.feature_impact import edge_edge_impact as edge_edge_impact

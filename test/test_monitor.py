@@ -350,8 +350,6 @@ class TestRefusals:
             monitor.add(4, HalfSpace((0, 0, 1)))
         with pytest.raises(UnsupportedError, match="scene in the plane"):
             monitor.add(4, Circle(1))
-        with pytest.raises(UnsupportedError, match="convex_decomposition is not offered"):
-            monitor.add(4, Sphere(1), model=records.Model.CONVEX_DECOMPOSITION)
         assert monitor.ids == [1, 2, 3] and len(monitor._shapes) == 3
         assert touching(monitor.step(SECOND // 10, [1, 2], still(0, 0.9))) == {(1, 2)}
 

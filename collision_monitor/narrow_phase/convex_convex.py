@@ -75,6 +75,7 @@ def convex_contact(
     )  # fmt: skip
     if count == 0:
         return False
+    curved = ka == CYLINDER or ka == CONE or kb == CYLINDER or kb == CONE
     if lower > 0.0:
         # the length of a point of B - A, a true upper bound where the simplex is too thin for `upper` to be one
         wx = wy = wz = 0.0
@@ -88,8 +89,13 @@ def convex_contact(
             qx += w * work[at + 3]
             qy += w * work[at + 4]
             qz += w * work[at + 5]
-        distance = max(sqrt(wx * wx + wy * wy + wz * wz), lower)
+        length = sqrt(wx * wx + wy * wy + wz * wz)
+        distance = max(length, lower)
         bound = distance - lower
+        if curved and length > 0.0:
+            # on round surfaces the direction that proves the bound is not quite that between the points: B's would be
+            # off its surface by 1e-5 of the distance
+            x, y, z = wx / length, wy / length, wz / length
     elif axes_are_parallel(ka, kb, work):
         depth, x, y, z, qx, qy, qz = parallel_axes_depth(
             ka, table.size[a, 0], table.size[a, 1], kb, table.size[b, 0], table.size[b, 1], work, size
@@ -97,7 +103,6 @@ def convex_contact(
         distance = -depth
         bound = TOUCHING * size
     else:
-        curved = ka == CYLINDER or ka == CONE or kb == CYLINDER or kb == CONE
         upper, lower, x, y, z, qx, qy, qz = epa(
             ka, table.size[a, 0], table.size[a, 1], table.size[a, 2], table.vertex_start[a], table.vertex_count[a],
             kb, table.size[b, 0], table.size[b, 1], table.size[b, 2], table.vertex_start[b], table.vertex_count[b],

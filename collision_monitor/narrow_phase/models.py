@@ -35,6 +35,7 @@ from collision_monitor.geometry.shapes import (
     Sphere,
     Triangle,
 )
+from collision_monitor.narrow_phase.convex_decomposition import convex_decomposition
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.records import Model
 
@@ -50,7 +51,7 @@ Larger: as the cube slower. Smaller: the stated excess is up to 2/SAMPLES of the
 
 KDOPS: Final = {Model.KDOP6: 6, Model.KDOP14: 14, Model.KDOP18: 18, Model.KDOP26: 26}
 
-SUPPORTED: Final = tuple(m.name.lower() for m in Model if m is not Model.CONVEX_DECOMPOSITION)
+SUPPORTED: Final = tuple(m.name.lower() for m in Model)
 """The models that there are, by name."""
 
 
@@ -68,15 +69,13 @@ class Modelled(NamedTuple):
 
 
 def parse_model(model: Model | str | int) -> Model:
-    """The model of a name such as "obb". Raises InputError for a name that there is not, UnsupportedError."""
+    """The model of a name such as "obb". Raises InputError for a name that there is not."""
     if isinstance(model, str):
         chosen = Model.__members__.get(model.upper())
     else:
         chosen = Model(model) if model in list(Model) else None
     if chosen is None:
         raise InputError(f"model: expected one of {', '.join(SUPPORTED)}, got {model!r}")
-    if chosen.name.lower() not in SUPPORTED:
-        raise UnsupportedError(f"model {chosen.name.lower()} is not offered; supported are {', '.join(SUPPORTED)}")
     return chosen
 
 
@@ -99,6 +98,8 @@ def containing_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | 
             raise UnsupportedError(
                 f"{type(shape).__name__}: model {chosen.name.lower()} is not offered; supported are auto, exact"
             )
+    if chosen is Model.CONVEX_DECOMPOSITION:
+        return _decomposed(shapes, convex)
     piece, pose = _enclose(pieces, chosen)
     return Modelled([(piece, pose)], [0], chosen, _excess(shapes, pieces, piece, pose), convex)
 
@@ -124,6 +125,22 @@ def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model) -> Model
         excess=max(part.excess for part in parts),
         convex=False,
     )
+
+
+def _decomposed(shapes: Sequence[tuple[Shape, Pose]], convex: bool) -> Modelled:
+    """Convex parts in place of concave meshes; the other shapes as they are."""
+    pieces, index, excess = [], [], 0.0
+    for k, (shape, pose) in enumerate(shapes):
+        parts = convex_pieces(shape)
+        if isinstance(shape, Mesh) and len(parts) > 1:
+            found = convex_decomposition(shape)
+            excess = max(excess, found.surface_error)
+            # about its own centre a part has a small bounding sphere and keeps its digits
+            centres = [part.points.mean(axis=0) for part in found.parts]
+            parts = tuple((ConvexHull(p.points - c), Pose(c)) for p, c in zip(found.parts, centres, strict=True))
+        pieces += [(part, pose @ offset) for part, offset in parts]
+        index += [k] * len(parts)
+    return Modelled(pieces, index, Model.CONVEX_DECOMPOSITION, excess, convex)
 
 
 def _enclose(pieces: Pieces, model: Model) -> tuple[Shape, Pose]:

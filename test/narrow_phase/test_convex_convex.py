@@ -103,6 +103,24 @@ def test_curved_shapes_against_prisms(make_a, make_b):
         assert abs(projected_gap(a, b, p, R_A, R_B, c.normal) - c.distance) <= c.bound + 1e-9
 
 
+def test_witness_points_are_on_both_round_surfaces():
+    rng = np.random.default_rng(19)
+    apart = 0
+    for _ in range(150):
+        a, b = Cylinder(*rng.uniform(0.2, 1, 2)), Cone(*rng.uniform(0.2, 1, 2))
+        R_A, R_B, p = rotation(rng), rotation(rng), rng.normal(size=3)
+        c = contact(a, b, p, R_A, R_B)
+        if c.distance > 0:
+            x, y, z = c.point_a @ R_A
+            assert max(np.hypot(x, y) - a.radius, abs(z) - a.length / 2) == pytest.approx(0, abs=1e-9)
+            x, y, z = (c.point_b - p) @ R_B
+            slant = np.hypot(b.radius, b.length)
+            side = (np.hypot(x, y) * b.length + (z - b.length / 2) * b.radius) / slant
+            assert max(side, -z - b.length / 2) == pytest.approx(0, abs=1e-9)
+            apart += 1
+    assert apart > 50
+
+
 def test_cylinders_and_cones_that_are_known():
     can = Cylinder(0.5, 2)
     assert contact(can, can, (1.5, 0, 0.3)).distance == pytest.approx(0.5, abs=1e-9)
