@@ -1,10 +1,11 @@
-"""Draws the pictures of docs/geometry.md with the package's own functions.
+"""Draws the pictures of docs/geometry.md and docs/narrow_phase.md with the package's own functions.
 
     python docs/draw_geometry.py
 """
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patches import Circle, Polygon
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull as Qhull
 from scipy.spatial import HalfspaceIntersection
 
+from collision_monitor import Box, Mesh, Pose, contact
 from collision_monitor.geometry.bounding_spheres import (
     minimal_sphere,
     sphere_from_centroid,
@@ -25,6 +28,8 @@ from collision_monitor.geometry.bounding_spheres import (
 from collision_monitor.geometry.bounding_volumes import aabb, convex_hull, kdop
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume, obb_pca
 from collision_monitor.geometry.polygon_polygon import project, sat_2d
+from collision_monitor.geometry.sphere_tree import distance_intervals, sphere_tree
+from collision_monitor.geometry.triangulation import triangulate
 
 Array = NDArray[np.float64]
 IMAGES = Path(__file__).parent / "images"
@@ -149,6 +154,82 @@ def save(figure: Any, name: str) -> None:
     plt.close(figure)
 
 
+def prism(polygon: Array, height: float) -> tuple[Array, NDArray[np.int64]]:
+    """A closed mesh: a counter-clockwise polygon (n, 2), and the same `height` metres above."""
+    n = len(polygon)
+    vertices = np.vstack([np.column_stack([polygon, np.full(n, z)]) for z in (0.0, height)])
+    k, after = np.arange(n), (np.arange(n) + 1) % n
+    sides = np.concatenate([np.stack([k, after, after + n], 1), np.stack([k, after + n, k + n], 1)])
+    floor = triangulate(polygon)
+    return vertices, np.concatenate([sides, floor[:, ::-1], floor + n]).astype(np.int64)
+
+
+U_PROFILE = np.array([(0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)], float)
+
+
+def sphere_trees() -> None:
+    """The levels of a tree seen from above, and the interval of a distance after each of them."""
+    vertices, faces = prism(U_PROFILE, 0.75)
+    tree = sphere_tree(vertices, faces, depth=6)
+    figure, axes = plt.subplots(1, 5, figsize=(12, 2.9), constrained_layout=True, width_ratios=[1, 1, 1, 1, 1.3])
+    for axis, k in zip(axes, (0, 2, 3, 4), strict=False):
+        level = tree[k]
+        for x, y, radius in np.unique(np.column_stack([level.center[:, :2], level.radius]).round(9), axis=0):
+            axis.add_patch(Circle((x, y), radius, fill=False, ec=A, lw=0.6))
+        balls = np.column_stack([level.inner_center[:, :2], level.inner_radius])[level.inner_radius > 0.0]
+        for x, y, radius in np.unique(balls.round(9), axis=0):
+            axis.add_patch(Circle((x, y), radius, fc=GAP, alpha=0.25, lw=0))
+        axis.add_patch(Polygon(U_PROFILE, fill=False, ec=POINTS, lw=1.4))
+        axis.set_title(f"level {k}: {len(level.radius)} spheres")
+        axis.set_xlim(-0.9, 3.9)
+        axis.set_ylim(-0.9, 3.9)
+        axis.set_aspect("equal")
+        axis.set_axis_off()
+    pose = Pose((4.5, 1.0, 0.2), (0.0, 0.0, np.sin(0.3), np.cos(0.3)))
+    intervals = np.array(list(distance_intervals(tree, Pose(), tree, pose)))
+    true = contact(Mesh(vertices, faces), Pose(), Mesh(vertices, faces), pose).signed_distance
+    levels = np.arange(len(intervals))
+    axes[4].fill_between(levels, *intervals.T, color=A, alpha=0.18)
+    axes[4].plot(levels, intervals, "o-", color=A, ms=3, lw=1)
+    axes[4].axhline(true, color=B, lw=1, ls="--")
+    axes[4].set(xlabel="level", title=f"distance of two of them: {true:.3f} m")
+    axes[4].spines[["top", "right"]].set_visible(False)
+    save(figure, "sphere_tree")
+
+
+def contact_patches() -> None:
+    """Two boxes flush with each other, from above, and a wedge on an edge: the points of their contacts."""
+    figure, plots = plt.subplots(1, 3, figsize=(10, 3.4), constrained_layout=True)
+    low, high = Box((2.4, 1.6, 1.0)), Box((1.8, 1.2, 1.0))
+    for plot, turn, tilt, title in (
+        (plots[0], 0.0, 0.0, "face on face"),
+        (plots[1], 0.6, 0.0, "face on face, turned"),
+        (plots[2], 0.6, np.pi / 4, "edge on face"),
+    ):
+        stand = 0.5 + (0.5 if tilt == 0.0 else 0.5 * (np.cos(tilt) + 1.2 * np.sin(tilt)))
+        tilted = Pose((0.0, 0.0, 0.0), (np.sin(tilt / 2), 0.0, 0.0, np.cos(tilt / 2)))
+        pose = Pose((0.5, 0.4, stand - 0.01), (0.0, 0.0, np.sin(turn / 2), np.cos(turn / 2))) @ tilted
+        found = contact(low, Pose(), high, pose)
+        corners = np.array(list(product((-0.5, 0.5), repeat=3)))
+        for box, where, color in ((low, Pose(), A), (high, pose, B)):
+            seen = (corners * box.size) @ where.rotation.T + where.position
+            outline = around(convex_hull(seen).vertices[:, :2])
+            outline = outline[Qhull(outline).vertices]
+            plot.add_patch(Polygon(outline, fc=color, alpha=0.15))
+            plot.add_patch(Polygon(outline, fill=False, ec=color, lw=1.2))
+        patch = around(found.points_a[:, :2])
+        plot.add_patch(Polygon(patch, closed=True, fc=GAP, alpha=0.35, ec=GAP, lw=1.5))
+        plot.plot(*found.points_a[:, :2].T, "o", color=GAP, ms=6)
+        plot.plot(*found.point_a[:2], "+", color=POINTS, ms=9)
+        plot.set_title(f"{title}: {len(found.points_a)} points")
+        plot.autoscale_view()
+        plot.set_aspect("equal")
+        plot.set_axis_off()
+    save(figure, "contact_patches")
+
+
 if __name__ == "__main__":
     bounding_volumes()
     separating_axes()
+    sphere_trees()
+    contact_patches()

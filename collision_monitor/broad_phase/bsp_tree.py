@@ -86,30 +86,32 @@ def _plane(corners: Array, thickness: float) -> tuple[Array, float] | None:
 def _best_plane(polygons: list[Array], thickness: float) -> tuple[Array, float]:
     some = [polygons[k] for k in np.unique(np.linspace(0, len(polygons) - 1, CANDIDATES).astype(int))]
     planes = [plane for corners in some if (plane := _plane(corners, thickness)) is not None]
-    every = np.concatenate(polygons)
-    first = np.cumsum([0] + [len(corners) for corners in polygons[:-1]])
     cost = []
     for normal, offset in planes:
-        height = every @ normal - offset
-        before = np.maximum.reduceat(height, first) > thickness
-        behind = np.minimum.reduceat(height, first) < -thickness
-        cost.append((4 * (before & behind).sum() + abs(int(before.sum()) - int(behind.sum()))).item())
+        before, behind = _sides(polygons, normal, offset, thickness)
+        cost.append(4 * int((before & behind).sum()) + abs(int(before.sum()) - int(behind.sum())))
     return planes[int(np.argmin(cost))]
 
 
 def _divided(polygons: list[Array], normal: Array, offset: float, thickness: float) -> tuple[list[Array], list[Array]]:
     """What is in front of a plane and behind it; polygons in it are done with, those across it are cut."""
-    front: list[Array] = []
-    back: list[Array] = []
-    for corners in polygons:
+    before, behind = _sides(polygons, normal, offset, thickness)
+    front = [polygons[k] for k in np.flatnonzero(before & ~behind)]
+    back = [polygons[k] for k in np.flatnonzero(behind & ~before)]
+    for corners in (polygons[k] for k in np.flatnonzero(before & behind)):
         height = corners @ normal - offset
-        before, behind = height > thickness, height < -thickness
-        for part, here, there in ((front, before, behind), (back, behind, before)):
-            if here.any():
-                piece = corners if not there.any() else _cut(corners, height, here, there)
-                if _plane(piece, thickness) is not None:
-                    part.append(piece)
+        here, there = height > thickness, height < -thickness
+        for part, piece in ((front, _cut(corners, height, here, there)), (back, _cut(corners, height, there, here))):
+            if _plane(piece, thickness) is not None:
+                part.append(piece)
     return front, back
+
+
+def _sides(polygons: list[Array], normal: Array, offset: float, thickness: float) -> tuple[Booleans, Booleans]:
+    """Which polygons have a part in front of a plane, and which behind it."""
+    height = np.concatenate(polygons) @ normal - offset
+    first = np.cumsum([0] + [len(corners) for corners in polygons[:-1]])
+    return np.maximum.reduceat(height, first) > thickness, np.minimum.reduceat(height, first) < -thickness
 
 
 def _cut(corners: Array, height: Array, here: Booleans, there: Booleans) -> Array:
