@@ -13,7 +13,7 @@ FEWEST: Final = 8
 """Pairs between two looks at the clock, at least: some 50 µs."""
 
 LEARNING: Final = 0.2
-"""Weight of the latest measurement in the running means."""
+"""Weight of the latest measurement in the running means; that of a pair's cost rises at once and falls slowly."""
 
 SPREAD: Final = 4.0
 """Mean deviations that the end of a step may take longer than usual."""
@@ -96,6 +96,7 @@ class TimeBudget(PairBudget):
             if self.done == 0:
                 self._clock.cost[work] *= 1.0 - LEARNING  # or one bad estimate would stop all steps to come
             self._limit = min(self._limit, max(self.done, 1))  # the step is over
+            self._clock.stopped = self._clock.stopped or now
             return super().next(left, work)
         count = super().next(min(left, max(FEWEST, fit // 2)), work)
         self._out = (count, work, now)
@@ -103,13 +104,14 @@ class TimeBudget(PairBudget):
 
     def stop(self) -> None:
         """What comes now is the end of the step."""
-        self._clock.stopped = self._measure()
+        self._clock.stopped = self._clock.stopped or self._measure()
 
     def _measure(self) -> float:
         now = perf_counter()
         count, work, since = self._out
         if count:
             cost = self._clock.cost
-            cost[work] += LEARNING * (min((now - since) / count, OUTLIER * cost[work]) - cost[work])
+            measured = min((now - since) / count, OUTLIER * cost[work])
+            cost[work] += (LEARNING if measured < cost[work] else 1.0) * (measured - cost[work])
         self._out = (0, 0, 0.0)
         return now

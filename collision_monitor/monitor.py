@@ -35,6 +35,7 @@ from collision_monitor.prediction.time_of_impact import BOUND_ONLY, IMPACT, Scra
 from collision_monitor.prediction.uncertain_predictions import Scene, UncertainPredictions
 from collision_monitor.profiles import NO_BUDGET, NO_LIMIT, Profile
 from collision_monitor.records import Model
+from collision_monitor.rows import joined
 
 NANOSECOND = 1e-9
 
@@ -655,7 +656,7 @@ class Monitor:
             return part(pairs, self._scratch[0])
         # the kernels hold no lock; the parts are put together in order, so the answer is the same for any number
         parts = list(self._pool.map(part, np.array_split(pairs, len(self._scratch)), self._scratch))
-        return np.concatenate([events for events, _ in parts]), sum(queries for _, queries in parts)
+        return joined([events for events, _ in parts]), sum(queries for _, queries in parts)
 
     def _moved(self, now: float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Slots of the bodies that left their predicted motion, and of others that are not predicted far enough."""
@@ -673,17 +674,17 @@ class Monitor:
         """Look at the pairs that are due or touch; the contacts (records.CONTACT). New events go into the list."""
         bodies = self._bodies
         is_due = new["lower"] <= now
-        due = np.concatenate([self._events.take_due(bodies.motion, now), new[is_due]])
+        due = joined([self._events.take_due(bodies.motion, now), new.compress(is_due)])
         work["events_due"] = len(due)
         room = len(self._pairs) + len(due)
         pairs = np.empty(room, active_pairs.PAIR)
         events = np.empty(room, IMPACT)
         order = np.argsort(due["key"], kind="stable")
         n = active_pairs.unite(bodies, self._pairs, self._pair_events, due, order, pairs, events)
-        pending = new[~is_due]
+        pending = new.compress(~is_due)
         if budget is None:
             self._pairs, self._pair_events, results, later = self._examine(pairs[:n], events[:n], now, work)
-            self._events.add(np.concatenate([pending, later]), bodies.motion)
+            self._events.add(joined([pending, later]), bodies.motion)
         else:
             self._events.add(pending, bodies.motion)
             self._pairs, self._pair_events, results, later = self._examine_urgent(
@@ -691,7 +692,7 @@ class Monitor:
             )
             which, refined = self._refine(now, work, budget)
             budget.stop()
-            self._events.replace(which, np.concatenate([later, refined]), bodies.motion)
+            self._events.replace(which, joined([later, refined]), bodies.motion)
         n = len(self._pairs)
         contacts = np.empty(n, records.CONTACT)
         n = answers.write_contacts(
@@ -728,14 +729,14 @@ class Monitor:
         """As `_examine`, the most urgent first, as long as the budget lasts; of the others, what their bounds say."""
         p = self._profile
         order, at = coarse.urgency(self._bodies, pairs, events, self._step)
-        parts = [self._examine(pairs[order[:at]], events[order[:at]], now, work)]
+        parts = [self._examine(pairs.take(order[:at]), events.take(order[:at]), now, work)]
         while at < len(order) and (count := budget.next(len(order) - at, EXAMINE)):
             chunk = order[at : at + count]
-            parts.append(self._examine(pairs[chunk], events[chunk], now, work))
+            parts.append(self._examine(pairs.take(chunk), events.take(chunk), now, work))
             at += count
         for kept, its_events, *_ in parts:
             its_events["lower"][kept["touching"] == 1] = now  # since when nobody has looked at it
-        left, left_events = pairs[order[at:]], events[order[at:]]
+        left, left_events = pairs.take(order[at:]), events.take(order[at:])
         results = np.empty((len(left) + 1, active_pairs.RESULT))
         later = np.empty(len(left), IMPACT)
         n, n_later = coarse.leave(
@@ -743,9 +744,10 @@ class Monitor:
         )
         parts.append((left[:n], left_events[:n], results[:n], later[:n_later]))
         work["deferred"] += len(left)
-        pairs, events, results, later = (np.concatenate(column) for column in zip(*parts, strict=True))
+        all_pairs, all_events, all_results, laters = zip(*parts, strict=True)
+        pairs, events, results = joined(all_pairs), joined(all_events), np.concatenate(all_results)
         by_key = np.argsort(pairs["key"], kind="stable")
-        return pairs[by_key], events[by_key], results[by_key], later
+        return pairs.take(by_key), events.take(by_key), results.take(by_key, axis=0), joined(laters)
 
     def _refine(
         self, now: float, work: dict[str, int], budget: PairBudget
@@ -759,12 +761,12 @@ class Monitor:
         found = [np.zeros(0, IMPACT)]
         at = 0
         while at < len(todo) and (count := budget.next(len(todo) - at, REFINE)):
-            events, queries = self._impacts_of(pending[todo[at : at + count]], now)
+            events, queries = self._impacts_of(pending.take(todo[at : at + count]), now)
             found.append(events)
             work["impact_queries"] += queries
             at += count
         work["deferred"] += len(todo) - at
-        return todo[:at], np.concatenate(found)
+        return todo[:at], joined(found)
 
     def _impacts_of(self, bounds: NDArray[np.void], now: float) -> tuple[NDArray[np.void], int]:
         """As `_first_impacts`, of the pairs of these events, from `now` on."""

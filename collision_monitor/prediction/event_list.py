@@ -176,7 +176,9 @@ class EventList:
 
     def replace(self, which: NDArray[np.int64], new: Events, motion: NDArray[np.void]) -> None:
         """`add`, in place of the events at the indices `which`."""
-        self.events = np.delete(self.events, which)
+        kept = np.ones(len(self.events), np.bool_)
+        kept[which] = False
+        self.events = self.events.compress(kept)
         self.add(new, motion)
 
     def add(self, new: Events, motion: NDArray[np.void]) -> None:

@@ -1,0 +1,141 @@
+"""Steps that may take a third of what they would: how many end in time, and what is said of what was left.
+
+    python benchmarks/overload.py                      # 1,500 bodies that all change their course in every step
+    python benchmarks/overload.py --overload 10 --steps 20000
+
+First the median time of a step without a budget is measured, then --steps steps run with 1/--overload of that.
+At every --every th step plain recomputation tells the truth: how many collisions are neither told as contacts nor
+predicted (must be 0), how many intervals do not hold (must be 0), and how large a part is UNRESOLVED.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import json
+import os
+import sys
+import time
+from typing import Any
+
+import numpy as np
+from event_list import RATE, Boxes
+from numpy.typing import NDArray
+
+from collision_monitor import Box, ConvexHull, Monitor, StepResult, records
+from collision_monitor.plain import PlainMonitor
+from collision_monitor.profiles import Profile
+
+WARM = 50
+
+
+def by_pair(rows: NDArray[np.void]) -> dict[tuple[int, int], Any]:
+    """The rows by their pair of ids."""
+    return {(int(row["id_a"]), int(row["id_b"])): row for row in rows}
+
+
+def wrong(mine: StepResult, truth: StepResult, horizon: float) -> tuple[int, int]:
+    """Collisions of which nothing is told, and answers that do not hold."""
+    told, touching = (by_pair(r.contacts[r.contacts["phase"] != records.Phase.END]) for r in (mine, truth))
+    stated, true = by_pair(mine.predictions), by_pair(truth.predictions)
+    certain = {k for k, e in true.items() if e["status"] == records.PredictionStatus.HIT and e["upper"] < horizon}
+    missed = (touching.keys() | certain) - told.keys() - stated.keys()
+    off = [k for k in told.keys() & touching.keys() if _is_off(told[k], touching[k])]
+    off += [k for k in stated.keys() & true.keys() if _is_apart(stated[k], true[k])]
+    return len(missed), len(off)
+
+
+def _is_off(contact: Any, truth: Any) -> bool:
+    return bool(abs(contact["signed_distance"] - truth["signed_distance"]) > contact["error_bound"] + 1e-9)
+
+
+def _is_apart(prediction: Any, truth: Any) -> bool:
+    return bool(prediction["lower"] > truth["upper"] or prediction["upper"] < truth["lower"])
+
+
+def describe(monitor: Monitor, boxes: Boxes) -> None:
+    """Half of them are boxes, half convex hulls as large with 32 corners."""
+    rng = np.random.default_rng(7)
+    for i, size in enumerate(boxes.size):
+        corners = rng.normal(size=(32, 3))
+        corners *= size / 2 / np.linalg.norm(corners, axis=1, keepdims=True)
+        monitor.add(i, ConvexHull(corners) if i % 2 else Box(size))
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Measure."""
+    boxes = Boxes(args.objects, args.seed)
+    free, plain = Monitor(), PlainMonitor()
+    for monitor in (free, plain):
+        describe(monitor, boxes)
+    full = []
+    for step in range(2 * WARM):
+        states = boxes.states(0.0)
+        began = time.perf_counter()
+        free.step(round(step * 1e9 / RATE), states)
+        full.append(time.perf_counter() - began)
+        boxes.move(1 / RATE, args.turning)
+        boxes.walls()
+    full_ms = 1e3 * float(np.median(full[WARM:]))
+    budget = full_ms / args.overload if args.budget_ms is None else args.budget_ms
+    monitor = Monitor(Profile(budget_ms=budget))
+    describe(monitor, boxes)
+    gc.collect()
+    gc.freeze()
+    spent, deferred, missed, off, unresolved = np.empty(args.steps), 0, 0, 0, 0.0
+    for step in range(-WARM, args.steps):
+        states, stamp = boxes.states(0.0), round((step + 3 * WARM) * 1e9 / RATE)
+        began = time.perf_counter()
+        answer = monitor.step(stamp, states)
+        took = 1e3 * (time.perf_counter() - began)
+        if step >= 0:
+            spent[step] = took
+            deferred += answer.status.deferred
+            if step % args.every == 0:
+                one, two = wrong(answer, plain.step(stamp, states), monitor.profile.horizon)
+                missed, off = missed + one, off + two
+                unresolved += answer.status.unresolved / (answer.status.contacts + answer.status.predictions)
+        boxes.move(1 / RATE, args.turning)
+        boxes.walls()
+    compared = -(-args.steps // args.every)
+    return {
+        "objects": args.objects,
+        "full_ms": full_ms,
+        "budget_ms": budget,
+        "steps": args.steps,
+        "median_ms": float(np.median(spent)),
+        "p99_9_ms": float(np.percentile(spent, 99.9)),
+        "worst_ms": float(spent.max()),
+        "in_time": float((spent <= 1.1 * budget).mean()),
+        "deferred_per_step": deferred / args.steps,
+        "unresolved_part": unresolved / compared,
+        "compared_steps": compared,
+        "missed": missed,
+        "bounds_that_do_not_hold": off,
+        "load": os.getloadavg()[0],
+    }
+
+
+def main() -> int:
+    """Exit code 3 where a collision is missed or a bound does not hold."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--objects", type=int, default=1500)
+    parser.add_argument("--steps", type=int, default=5000)
+    parser.add_argument("--overload", type=float, default=3.0, help="times that the work is more than the budget")
+    parser.add_argument("--budget-ms", type=float, help="in place of --overload")
+    parser.add_argument("--turning", type=float, default=1.0, help="part of the boxes that change course in a step")
+    parser.add_argument("--every", type=int, default=100, help="compare with plain recomputation at every such step")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--json", action="store_true", help="one JSON line")
+    args = parser.parse_args()
+    row = run(args)
+    if args.json:
+        print(json.dumps(row))
+    else:
+        for name, value in row.items():
+            print(f"{name:24} {value:.4f}" if isinstance(value, float) else f"{name:24} {value}")
+    return 3 if row["missed"] or row["bounds_that_do_not_hold"] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
