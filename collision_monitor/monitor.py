@@ -25,7 +25,7 @@ from collision_monitor.geometry.plane import flat_pose, flat_states
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shape_table import CIRCLE, SPHERE, ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Shape
-from collision_monitor.narrow_phase.models import monitored_model
+from collision_monitor.narrow_phase.models import monitored_model, parse_model, shape_class
 from collision_monitor.plan import ScenePlan, scene_plan
 from collision_monitor.prediction import active_pairs, answers, candidates, coarse, tracking
 from collision_monitor.prediction.event_list import EventList, keep_first
@@ -251,7 +251,7 @@ class Monitor:
             raise UnsupportedError(f"object {d.object_id}: a HalfSpace has no end and can only be static")
         planar = self._is_planar(d)
         pose = flat_pose(d.pose) if planar and d.pose is not None else d.pose
-        modelled = monitored_model(d.shapes, d.model)
+        modelled = monitored_model(d.shapes, self._model_of(d))
         slots: list[int] = []
         try:
             for shape, offset in modelled.pieces:
@@ -293,6 +293,13 @@ class Monitor:
         self._end_pairs([k for k in self._pairs_of(i) if not self._is_checked(self._pairs[k])])
         self._renewed.add(i)
         self._ids = np.zeros(0, np.uint32)
+
+    def _model_of(self, d: ObjectDescription) -> Model:
+        """The description's own, or else the profile's for shapes of its class."""
+        kind = shape_class(d.shapes)
+        if d.model is not Model.AUTO or kind is None:
+            return d.model
+        return parse_model(getattr(self._profile, f"model_{kind}"))
 
     def _is_planar(self, d: ObjectDescription) -> bool:
         """Whether the object is one of the plane. Raises UnsupportedError where it meets objects of space."""

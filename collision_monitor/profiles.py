@@ -16,13 +16,16 @@ from typing import Any, Final
 import yaml
 
 from collision_monitor.errors import ProfileError
-from collision_monitor.settings import EVERYWHERE, Setting, number, settings_of, switch, vector
+from collision_monitor.records import Model
+from collision_monitor.settings import EVERYWHERE, Setting, choice, number, settings_of, switch, vector
 
 NO_BUDGET: Final = 1e6
 """ms, a quarter of an hour: a step has as long as it takes, and no clock is looked at."""
 
 NO_LIMIT: Final = 1_000_000_000
 """Pairs in a step: more than fit into memory."""
+
+_MODELS: Final = [model.name.lower() for model in Model if model is not Model.EXACT]
 
 BASED_ON: Final = "based_on"
 """In the file of a custom profile: the profile that it starts from."""
@@ -65,6 +68,10 @@ class Profile:
     pairs_per_step: int = number(
         NO_LIMIT, 1, NO_LIMIT, "1", "Pairs for a step, the same way: answers that depend on no clock."
     )
+    model_primitive: str = choice(_MODELS, "For boxes, capsules, cylinders and cones, as they are described.")
+    model_hull: str = choice(_MODELS, "The same for convex hulls.")
+    model_mesh: str = choice(_MODELS, "The same for meshes; auto: the convex hull of concave ones.")
+    model_compound: str = choice(_MODELS, "The same for objects of several shapes.")
     region_min: tuple[float, float, float] = vector(
         (-EVERYWHERE, -EVERYWHERE, -EVERYWHERE), EVERYWHERE, "m", "Objects wholly outside of this box are left out."
     )

@@ -10,10 +10,12 @@ import pytest
 
 from collision_monitor import records
 from collision_monitor.errors import ProfileError
-from collision_monitor.geometry.shapes import Sphere
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, Sphere
 from collision_monitor.monitor import Monitor, StepResult
 from collision_monitor.plain import PlainMonitor, disagreements
 from collision_monitor.profiles import Profile
+from collision_monitor.records import Model
 from collision_monitor.world import make_scene
 
 SECOND = 1_000_000_000
@@ -36,6 +38,10 @@ OTHER: dict[str, Any] = {
     "threads": 2,
     "budget_ms": 1000.0,
     "pairs_per_step": 5,
+    "model_primitive": "obb",
+    "model_hull": "sphere",
+    "model_mesh": "kdop14",
+    "model_compound": "aabb",
     "region_min": (-3.0, -3.0, -3.0),
     "region_max": (3.0, 20.0, 3.0),
     "min_closing_speed": 0.5,
@@ -147,6 +153,36 @@ def test_uncertainty_can_be_switched_off_and_on() -> None:
         predictions = monitor.step(step, states).predictions
         found.append(len(predictions) - len(plain))
     assert found == [1, 0, 1]
+
+
+def test_the_model_of_a_class_stands_for_what_chooses_none() -> None:
+    profile = Profile(model_primitive="sphere", model_hull="obb", model_mesh="kdop14", model_compound="aabb")
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    box = Box((1, 2, 3))
+    shapes: list[tuple[Any, Model]] = [
+        (box, Model.SPHERE),
+        (ConvexHull(corners), Model.OBB),
+        (Mesh(corners, faces), Model.KDOP14),
+        ([(box, Pose()), (Sphere(0.2), Pose((2, 0, 0)))], Model.AABB),
+        (Sphere(0.5), Model.EXACT),
+    ]
+    monitor = Monitor(profile)
+    for object_id, (shape, _) in enumerate(shapes):
+        monitor.add(object_id, shape)
+        monitor.add(10 + object_id, shape, model=Model.KDOP26)
+    monitor.add(20, HalfSpace((0, 0, 1), 0.0), static=True, pose=Pose())
+    poses = np.zeros((10, 7))
+    poses[:, 6] = 1.0  # all in one place: everything touches
+    ids = [*range(5), *range(10, 15)]
+    models: dict[int, int] = {}
+    for contact in monitor.step(0, ids, poses).contacts:
+        models |= {int(contact[f"id_{side}"]): int(contact[f"model_{side}"]) for side in "ab"}
+    assert [models[k] for k in range(5)] == [model for _, model in shapes]
+    assert {models[10 + k] for k in range(5)} == {Model.KDOP26}, "its own choice wins"
+    assert models[20] == Model.EXACT
+    with pytest.raises(ProfileError, match=r"model_mesh: expected one of auto, sphere, .*, got 'exact'"):
+        Profile(model_mesh="exact")
 
 
 class TestCustomProfiles:

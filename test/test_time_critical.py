@@ -152,7 +152,8 @@ def test_a_cut_step_replays_with_the_pairs_it_came_to() -> None:
         states = scene.states()
         states["linear"] += random.uniform(-0.3, 0.3, states["linear"].shape)
         data = encode_states(step * SECOND // 50, "world", step + 1, states)
-        live.monitor.clock._end = 0.050 - random.uniform(0.5e-3, 20e-3) if step % 3 else 0.0
+        room = 0.0 if step == 13 else random.uniform(0.5e-3, 10e-3) if step % 3 else 50e-3
+        live.monitor.clock._end = 50e-3 - room
         live.monitor.clock._deviation = 0.0
         outputs = live.on_states(data)
         assert outputs is not None
@@ -164,10 +165,10 @@ def test_a_cut_step_replays_with_the_pairs_it_came_to() -> None:
         assert again.status() == live.status()
         cuts.append(outputs.result.cut)
         scene.step()
-        if step == 13:  # behind a step that was cut
-            assert outputs.result.cut
+        if step == 13:
+            assert outputs.result.cut == 1
             again = Pipeline.restored(live.snapshot(), "world")
-    assert None in cuts and len(set(cuts)) > 3
+    assert any(cut and cut > 1 for cut in cuts) and None in cuts
 
 
 class TestBudgets:

@@ -79,6 +79,18 @@ def parse_model(model: Model | str | int) -> Model:
     return chosen
 
 
+def shape_class(shapes: Sequence[tuple[Shape, Pose]]) -> str | None:
+    """primitive, hull, mesh or compound, for which a profile has a model each; None for what has no coarser one."""
+    if any(is_planar(shape) or isinstance(shape, HalfSpace) for shape, _ in shapes):
+        return None
+    if len(shapes) > 1:
+        return "compound"
+    shape, _ = shapes[0]
+    if isinstance(shape, Sphere):
+        return None
+    return "mesh" if isinstance(shape, Mesh) else "hull" if isinstance(shape, ConvexHull) else "primitive"
+
+
 def containing_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | int) -> Modelled:
     """The model of an object of these shapes. AUTO is EXACT.
 
