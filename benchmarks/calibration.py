@@ -57,7 +57,7 @@ class Scene:
 class Row:
     """What became of a scene. told: the monitor predicted the pair; too_early: of the impacts, before `earliest`.
 
-    late: of the futures, without an impact until `latest`; NaN: none was stated. us: what the uncertainty cost.
+    late: of the futures, without an impact until `latest`; NaN: none was stated. us: of CPU, what the uncertainty cost.
     """
 
     kinds: str
@@ -93,7 +93,7 @@ def random_scene(rng: np.random.Generator, turning: bool) -> Scene:
 
 
 def predicted(scene: Scene, profile: Profile) -> tuple[np.void | None, bool, float]:
-    """The monitor's prediction of the pair, None: not told; whether they touch at once; and µs that it cost."""
+    """The monitor's prediction of the pair, None: not told; whether they touch at once; and µs of CPU that it cost."""
     monitors = [cm.Monitor(profile) for _ in range(2)]
     seconds = []
     result = None
@@ -110,9 +110,9 @@ def predicted(scene: Scene, profile: Profile) -> tuple[np.void | None, bool, flo
         result = monitor.step(0, rows)
         took = []
         for k in range(20):
-            begin = time.perf_counter()
+            begin = time.process_time()
             monitor.step(k + 1, rows)
-            took.append(time.perf_counter() - begin)
+            took.append(time.process_time() - begin)
         seconds.append(np.median(took))
     assert result is not None
     told = result.predictions[0] if len(result.predictions) else None
@@ -159,7 +159,7 @@ def table(rows: list[Row], confidence: float) -> list[str]:
     }
     lines = [
         f"| scenes | | probability off by, worst | RMS | before `earliest`, worst (stated {1 - confidence:.2f}) | mean "
-        f"| after `latest`, worst (stated {1 - confidence:.2f}) | µs, median | worst |",
+        f"| after `latest`, worst (stated {1 - confidence:.2f}) | µs of CPU, median | worst |",
         "|---|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]
     for name, group in groups.items():

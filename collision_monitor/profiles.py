@@ -54,7 +54,7 @@ class Profile:
     )
     uncertainty: bool = switch(True, "Whether it is told when and how likely pairs meet, where states declare it.")
     uncertainty_samples: int = number(
-        256, 16, 4096, "1", "Samples of what is uncertain, for each pair that may meet, where states declare it."
+        512, 16, 4096, "1", "Samples of what is uncertain, for each pair that may meet, where states declare it."
     )
     confidence: float = number(0.95, 0.5, 0.9999, "1", "At which the earliest and latest times are stated.")
     min_probability: float = number(
@@ -165,13 +165,13 @@ _NAMED: Final[dict[str, dict[str, Any]]] = {
     "balanced": {
         "impact_tolerance": 1e-4,
         "impact_iterations": 64,
-        "uncertainty_samples": 256,
+        "uncertainty_samples": 512,
         **dict.fromkeys(_TOLERANCES, 1e-3),
     },
     "fast": {
         "impact_tolerance": 1e-3,
         "impact_iterations": 64,
-        "uncertainty_samples": 64,
+        "uncertainty_samples": 128,
         "position_tolerance": 1e-2,
         "orientation_tolerance": 1e-2,
         "velocity_tolerance": 2e-2,

@@ -70,14 +70,14 @@ def renew(entries, pairs, bodies, spread, now, renewed):
     return n
 
 
-@lru_cache(maxsize=8)
-def reported_sigmas(least_probability: float, confidence: float) -> float:
-    """How many standard deviations off a body may be for a pair that stays apart to be left out.
+@lru_cache(maxsize=16)
+def sigmas_for(probability: float) -> float:
+    """How many standard deviations off bodies may be that meet with less than this probability.
 
-    For flat faces: to meet, one of the errors of the two positions and the two velocities must exceed it. Four times
-    what one does that is less than the least probability that is reported, and than what the confidence leaves.
+    For flat faces: to meet, one of the errors of the two positions and the two velocities must exceed it, and four
+    times the probability that one does is less than what is asked for.
     """
-    return NormalDist().inv_cdf(1.0 - 0.25 * min(least_probability, 1.0 - confidence))
+    return NormalDist().inv_cdf(1.0 - 0.25 * min(probability, 0.9))
 
 
 class Scene(NamedTuple):
@@ -126,7 +126,7 @@ class UncertainPredictions:
 
     def sigmas(self, profile: Any) -> float:
         """By how many standard deviations swept boxes are widened; 0 while nobody is uncertain."""
-        return reported_sigmas(profile.min_probability, profile.confidence) if self.counts(profile) else 0.0
+        return sigmas_for(profile.min_probability) if self.counts(profile) else 0.0
 
     def counts(self, profile: Any) -> bool:
         """Whether any state has declared an uncertainty, and the profile wants to know."""
@@ -167,7 +167,8 @@ class UncertainPredictions:
         impact_probabilities(
             scene.table, scene.parts, scene.bodies, self.spread, slots, stated, scene.now, p.horizon, p.contact_margin,
             p.stale_acceleration, p.impact_tolerance, p.impact_iterations, p.confidence,
-            reported_sigmas(p.min_probability, p.confidence), scene.planar, *samples, self._room, answers,
+            sigmas_for(p.min_probability), sigmas_for(p.min_probability * (1.0 - p.confidence)), scene.planar, *samples,
+            self._room, answers,
         )  # fmt: skip
         return answers
 

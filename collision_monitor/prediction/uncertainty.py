@@ -33,7 +33,7 @@ PROBABILITY: Final = 3
 NODES: Final = 9
 """Times between now and the horizon at which the gap is compared with its uncertainty."""
 
-SAMPLE_TOLERANCE: Final = 0.02
+SAMPLE_TOLERANCE: Final = 0.05
 """Within how many standard deviations of the gap a sample's impact is settled: its probability is off by 0.004."""
 
 OUTWARD: Final = 1.0
@@ -82,19 +82,20 @@ def _carry_on(bodies, i, now, q, m):
 
 
 @device
-def _first_contact(table, parts, bodies, i, j, end, margin, tube_0, tube_1, tolerance, budget, room):
-    """First time in [0, end] at which bodies i and j, moving as in room.motion, are within margin + tube_0 + tube_1 t.
+def _first_contact(table, parts, bodies, i, j, begin, end, margin, tube_0, tube_1, tolerance, budget, room):
+    """First time in [begin, end] at which bodies i and j are within margin + tube_0 + tube_1 t (m); infinite: never.
 
-    In metres; infinite: never.
+    They move as in room.motion.
     """
     A, B = room.motion[0], room.motion[1]
-    first, last = 0.0, end
+    first, last = begin, end
     reach = A.radius + B.radius + margin + tube_0
     if reach < inf:
         vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
         first, last = sphere_interval(B.x - A.x, B.y - A.y, B.z - A.z, vx, vy, vz, reach, tube_1, end, 1.0)
         if bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0:  # single spheres
             return first
+        first = max(first, begin)
         if first > last:
             return inf
     best = inf
@@ -347,12 +348,13 @@ def _shift(room, z, t, px, py, pz, vx, vy, vz):
 @kernel
 def impact_probabilities(
     table, parts, bodies, spread, pairs, stated, now, horizon, margin, stale_acceleration, tolerance, budget,
-    confidence, sigmas, planar, points, weights, room, answers,
+    confidence, sigmas, safe_sigmas, planar, points, weights, room, answers,
 ):  # fmt: skip
     """Times and probabilities of impact of pairs (P, 2) of body slots from `now` on into answers (P, 4).
 
     stated: the pairs meet as they are stated to move; else those that do not within `sigmas` standard deviations are
-    left out. NaN: left out, or neither body has declared any uncertainty. points (S, 12), weights (S,): normal_samples.
+    left out. Hardly any impact comes before bodies that are `safe_sigmas` of them larger meet.
+    NaN: left out, or neither body has declared any uncertainty. points (S, 12), weights (S,): normal_samples.
     """
     times = np.empty(weights.size)
     A, B = room.motion[0], room.motion[1]
@@ -368,11 +370,15 @@ def impact_probabilities(
         now_j, growth_j = surface_spread(spread, j, r_j, age_j, horizon, stale_acceleration)
         tube_0, tube_1 = now_i + now_j, growth_i + growth_j
         coarse = max(tolerance, SAMPLE_TOLERANCE * tube_0)
-        safe = _first_contact(
-            table, parts, bodies, i, j, horizon, margin, sigmas * tube_0, sigmas * tube_1, coarse, budget, room
-        )
-        if safe == inf and not stated:
-            continue
+        if not stated:
+            wide_0, wide_1 = sigmas * tube_0, sigmas * tube_1
+            near = _first_contact(
+                table, parts, bodies, i, j, 0.0, horizon, margin, wide_0, wide_1, coarse, budget, room
+            )
+            if near == inf:
+                continue
+        wide_0, wide_1 = safe_sigmas * tube_0, safe_sigmas * tube_1
+        safe = _first_contact(table, parts, bodies, i, j, 0.0, horizon, margin, wide_0, wide_1, coarse, budget, room)
         t = _lay_along(table, parts, bodies, i, j, stated, margin, horizon, tube_0, tube_1, room)
         room.joint[:] = 0.0
         if not bodies.static[i]:
@@ -388,7 +394,8 @@ def impact_probabilities(
                 room.rotation[1, r, c] = B.rotation[r, c]
         level = 0.0 if planar else 1.0
         coarse = max(tolerance, SAMPLE_TOLERANCE * room.joint[0, 0])
-        bias = 0.0 if r_i == 0.0 and r_j == 0.0 else -0.5 * coarse
+        begin = safe if safe < inf else 0.0
+        bias = 0.0 if r_i == 0.0 and r_j == 0.0 else -0.75 * coarse
         px, py, pz = B.x, B.y, B.z
         vx, vy, vz = B.vx, B.vy, B.vz
         for n in range(weights.size):
@@ -398,5 +405,7 @@ def impact_probabilities(
                 _turn(A, room.rotation[0], level * turn_i * z[6], level * turn_i * z[7], turn_i * z[8])
             if turn_j > 0.0:
                 _turn(B, room.rotation[1], level * turn_j * z[9], level * turn_j * z[10], turn_j * z[11])
-            times[n] = _first_contact(table, parts, bodies, i, j, horizon, margin, bias, 0.0, coarse, budget, room)
+            times[n] = _first_contact(
+                table, parts, bodies, i, j, begin, horizon, margin, bias, 0.0, coarse, budget, room
+            )
         _summarise(times, weights, np.argsort(times), confidence, safe, answers[k])
