@@ -475,7 +475,7 @@ class Monitor:
             if len(given) > len(self._buffer):
                 self._buffer = np.empty(len(given), records.STATE)
             states = self._buffer[: len(given)]
-            states[:] = given  # message bytes need not be aligned
+            states.view(np.uint8)[:] = np.ascontiguousarray(given).view(np.uint8)  # message bytes need not be aligned
             return states
         if given.ndim != 1 or not np.issubdtype(given.dtype, np.integer):
             raise InputError(f"ids: expected one dimension of integers, got {given.dtype} of shape {given.shape}")
@@ -798,7 +798,7 @@ class Monitor:
             row["phase"], row["point_count"] = records.Phase.END, 1
             row["model_a"] = row["model_b"] = Model.EXACT
         self._orphans.clear()
-        both = np.concatenate([contacts, ended])
+        both = joined([contacts, ended])
         begins = both["phase"] != records.Phase.END  # the END of what was comes before the BEGIN of what is
         return both[np.lexsort((begins, both["id_b"], both["id_a"]))]
 
