@@ -12,6 +12,7 @@ moment; lost is the time between the last message in the file and the signal.
 from __future__ import annotations
 
 import argparse
+import gc
 import json
 import os
 import random
@@ -41,6 +42,11 @@ TYPES = {
 }
 SHAPES, STATES, CONTACTS, PREDICTIONS = TYPES
 OBJECTS = 200
+BLOCKS = {False: 60, True: 8}
+"""Pairs of blocks, one with a recorder and one without; quick or not."""
+QUIET = 0.25
+"""Cores that other processes may take while a pair of blocks counts as quiet: a step that has to share its core says
+nothing of the recorder."""
 RATE = 20_000
 """Messages/s that the recorder takes while steps are timed."""
 
@@ -112,12 +118,15 @@ def step_cost(folder: Path, blocks: int, block: float) -> dict[str, float]:
     step = 0
     for step in range(200):
         pipeline.on_states(scene.states(step))
+    gc.collect()
+    gc.freeze()  # as the node does
     durations: dict[bool, list[float]] = {False: [], True: []}
+    others: list[float] = []
     writing, written = 0.0, 0
     recorder = Recorder(folder / "steps.mcap", TYPES, pipeline.metadata(), patient=False)
     for k in range(2 * blocks):
         recording = bool(k % 2) ^ bool(k // 2 % 2)  # off on on off …: drift meets both alike
-        begin, first, in_block = time.perf_counter(), written, []
+        begin, first, in_block, busy = time.perf_counter(), written, [], _busy_elsewhere()
         while (now := time.perf_counter()) - begin < block:
             step += 1
             states = scene.states(step)
@@ -137,20 +146,33 @@ def step_cost(folder: Path, blocks: int, block: float) -> dict[str, float]:
                 writing += time.perf_counter() - before
             time.sleep(0.0005)
         durations[recording].append(float(np.mean(in_block)))
+        others.append((_busy_elsewhere() - busy) / (time.perf_counter() - begin))
         while recording and recorder.status()["recorded_messages"] < written:
             time.sleep(0.05)  # what waits for the disk belongs to this block
     recorder.close()
     assert recorder.status()["recording_dropped"] == 0
     ratios = np.array(durations[True]) / np.array(durations[False])
+    quiet = ratios[np.max(np.reshape(others, (-1, 2)), axis=1) < QUIET]
     return {
         "step_ms": 1e3 * float(np.median(durations[False])),
         "step_ms_recording": 1e3 * float(np.median(durations[True])),
         "ratio": float(np.median(ratios)),
         "ratio_10_percent": float(np.quantile(ratios, 0.1)),
         "ratio_90_percent": float(np.quantile(ratios, 0.9)),
+        "quiet_blocks": len(quiet),
+        "ratio_quiet": float(np.median(quiet)) if len(quiet) else float("nan"),
+        "others_cores": float(np.median(others)),
         "write_us": 1e6 * writing / written,
         "messages_per_s": written / (blocks * block),
     }
+
+
+def _busy_elsewhere() -> float:
+    """s of processor time that all other processes of this machine have taken."""
+    with open("/proc/stat", encoding="ascii") as file:
+        ticks = [int(each) for each in file.readline().split()[1:9]]
+    idle, stolen = ticks[3] + ticks[4], ticks[7]
+    return (sum(ticks) - idle - stolen) / os.sysconf("SC_CLK_TCK") - time.process_time()
 
 
 def killed(folder: Path, times: int) -> dict[str, object]:
@@ -202,7 +224,7 @@ def main() -> None:
         folder = Path(name)
         results: dict[str, dict[str, object]] = {
             "sustained": {**sustained(folder, 3 if args.quick else 20)},
-            "step": {**step_cost(folder, 8 if args.quick else 40, 0.5 if args.quick else 1.0)},
+            "step": {**step_cost(folder, BLOCKS[args.quick], 0.5)},
             "killed": killed(folder, 3 if args.quick else 20),
             "replay": {**replay_speed(folder, 500 if args.quick else 3000)},
         }
@@ -214,7 +236,9 @@ def main() -> None:
     print(
         f"step       {step['step_ms']:.3f} ms of {OBJECTS} boxes; {step['step_ms_recording']:.3f} ms beside "
         f"{step['messages_per_s']:,.0f} messages/s: ratio {step['ratio']:.3f} "
-        f"({step['ratio_10_percent']:.3f} to {step['ratio_90_percent']:.3f}); {step['write_us']:.1f} µs for each write"
+        f"({step['ratio_10_percent']:.3f} to {step['ratio_90_percent']:.3f}), {step['ratio_quiet']:.3f} in the "
+        f"{step['quiet_blocks']} of {BLOCKS[args.quick]} pairs when others took under {QUIET} cores "
+        f"(else {step['others_cores']:.1f}); {step['write_us']:.1f} µs for each write"
     )
     lost = kill["lost_s"]
     assert isinstance(lost, list)

@@ -194,9 +194,10 @@ class McapWriter:
         begin, end = (int(log_times[0]), int(log_times[-1])) if len(log_times) else (0, 0)
         times = struct.pack("<QQ", begin, end)
         head = struct.pack("<QI", chunk.size, zlib.crc32(records))
-        record = _record(_CHUNK, times, head, _text(_COMPRESSION), struct.pack("<Q", len(packed)), packed)
+        fields = b"".join((times, head, _text(_COMPRESSION), struct.pack("<Q", len(packed))))
         start = self._at
-        self._put(record)
+        self._put(_HEAD.pack(_CHUNK, len(fields) + len(packed)) + fields)
+        self._put(packed)  # not joined with what comes before it: that would be a copy
         after = self._at
         if len(channels):
             self.begin = self.begin if any(self.counts.values()) else begin
@@ -212,7 +213,7 @@ class McapWriter:
             _record(
                 _CHUNK_INDEX,
                 times,
-                struct.pack("<QQ", start, len(record)),
+                struct.pack("<QQ", start, after - start),
                 _number_map(indexes),
                 struct.pack("<Q", self._at - after),
                 _text(_COMPRESSION),

@@ -17,7 +17,7 @@ from collision_monitor.codec import encode_descriptions
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import SessionError
 from collision_monitor.session.definitions import definition
-from collision_monitor.session.entry import Entry
+from collision_monitor.session.entry import Entry, are_messages_alone
 from collision_monitor.session.event_window import EventWindow
 from collision_monitor.session.rosbag2 import Extent, file_metadata, full_name
 from collision_monitor.session.session_file import SessionFile
@@ -157,6 +157,8 @@ class Parts:
 
     def _put(self, entries: Sequence[Entry]) -> int:
         """Into as few calls as there are files and snapshots between them."""
+        if self._file is not None and not self._splits and are_messages_alone(entries):
+            return self._put_run(entries)
         run: list[Entry] = []
         written = 0
         for entry in entries:
