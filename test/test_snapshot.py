@@ -72,6 +72,7 @@ def inputs(shapes: list[Shape], walls: list[ObjectDescription], steps: int, seed
         states["position"] = 2.0 * np.sin(start + turned)
         states["linear"] = 2.0 * velocity * np.cos(start + turned)
         states["angular"][:, 2] = 0.5
+        states["position_stddev"][::3] = 0.02 if k > 10 else 0.0
         if k % 7 == 3:
             yield "shapes", encode_descriptions(stamp, "", [Removal(1 + k % 20), described(1 + (k + 5) % 20)])
         if k % 9 == 4:
