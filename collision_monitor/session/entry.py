@@ -13,9 +13,6 @@ _OVERHEAD: Final = 128
 """Bytes that a waiting message costs beside its data, so that empty ones are bounded too."""
 
 
-_MARKS: Final = (itemgetter(6), itemgetter(7), itemgetter(8))  # objects, snapshot, settings
-
-
 class Entry(NamedTuple):
     """event: a collision begins in it. objects: all that are described once it was taken in, where it changed them.
 
@@ -37,6 +34,9 @@ class Entry(NamedTuple):
     def cost(self) -> int:
         """Bytes of memory, about."""
         return len(self.data) + _OVERHEAD + (self.snapshot.nbytes if self.snapshot else 0)
+
+
+_MARKS: Final = tuple(itemgetter(Entry._fields.index(name)) for name in ("objects", "snapshot", "settings"))
 
 
 def are_messages_alone(entries: Sequence[Entry]) -> bool:
