@@ -195,10 +195,27 @@ def killed(folder: Path, times: int) -> dict[str, object]:
     return {"lost_s": sorted(lost), "messages_recovered": recovered, "with_holes": holes}
 
 
+def snapshot_cost(repeat: int = 50) -> dict[str, float]:
+    """What a snapshot of 200 objects takes: a step waits for the copy, the recorder's thread packs it."""
+    scene, pipeline = Crossing(), Pipeline("balanced")
+    pipeline.on_shapes(scene.shapes())
+    copying, packing, size = [], [], 0
+    for step in range(repeat):
+        pipeline.on_states(scene.states(step))
+        begin = time.perf_counter()
+        snapshot = pipeline.snapshot()
+        copied = time.perf_counter()
+        size = len(snapshot.encode())
+        copying.append(copied - begin)
+        packing.append(time.perf_counter() - copied)
+    return {"copy_us": 1e6 * float(np.median(copying)), "pack_ms": 1e3 * float(np.median(packing)), "kB": size / 1e3}
+
+
 def replay_speed(folder: Path, steps: int) -> dict[str, float]:
     """Times real time: 200 objects at 50 Hz, one thread."""
     scene, pipeline = Crossing(), Pipeline("balanced")
-    with Recorder(folder / "replay.mcap", TYPES, pipeline.metadata(), patient=True) as recorder:
+    path = folder / "replay.mcap"
+    with Recorder(path, TYPES, pipeline.metadata(), patient=True, snapshots=True) as recorder:
         shapes = scene.shapes()
         pipeline.on_shapes(shapes)
         recorder.write(SHAPES, shapes, 0, 0)
@@ -209,8 +226,24 @@ def replay_speed(folder: Path, steps: int) -> dict[str, float]:
             recorder.write(STATES, states, now, now)
             recorder.write(CONTACTS, outputs.contacts, now, now)
             recorder.write(PREDICTIONS, outputs.predictions, now, now)
-    report = replay(Session(folder / "replay.mcap"))
-    return {"verdict": report.verdict.name.lower(), "times_real_time": report.speed, "steps": report.steps}
+            if recorder.snapshot_due:
+                recorder.write_snapshot(pipeline.snapshot())
+    cpu = time.process_time()
+    report = replay(Session(path))
+    cpu = time.process_time() - cpu
+    begin = time.perf_counter()
+    late = replay(Session(path), start=report.recorded_duration - 1.0)
+    return {
+        "verdict": report.verdict.name.lower(),
+        "times_real_time": report.speed,
+        "times_real_time_by_processor": report.recorded_duration / cpu,
+        "steps": report.steps,
+        "file_MB": path.stat().st_size / 1e6,
+        "snapshots": len(Session(path).timeline().snapshots),
+        "last_second_s": time.perf_counter() - begin,
+        "last_second_verdict": late.verdict.name.lower(),
+        "last_second_same_digest": late.digest == report.digest,
+    }
 
 
 def main() -> None:
@@ -226,12 +259,13 @@ def main() -> None:
             "sustained": {**sustained(folder, 3 if args.quick else 20)},
             "step": {**step_cost(folder, BLOCKS[args.quick], 0.5)},
             "killed": killed(folder, 3 if args.quick else 20),
+            "snapshot": {**snapshot_cost()},
             "replay": {**replay_speed(folder, 500 if args.quick else 3000)},
         }
     if args.json:
         print(json.dumps(results, indent=2))
         return
-    s, step, kill, again = results["sustained"], results["step"], results["killed"], results["replay"]
+    s, step, kill, again, state = (results[name] for name in ("sustained", "step", "killed", "replay", "snapshot"))
     print(f"sustained  {s['messages_per_s']:9,.0f} messages/s of 1 kB, {s['MB_per_s']:.0f} MB/s, none dropped")
     print(
         f"step       {step['step_ms']:.3f} ms of {OBJECTS} boxes; {step['step_ms_recording']:.3f} ms beside "
@@ -246,7 +280,16 @@ def main() -> None:
         f"killed     {len(lost)} times: lost {np.median(lost):.3f} s in the median, {lost[-1]:.3f} s at most; "
         f"{kill['with_holes']} files with holes"
     )
-    print(f"replay     {again['times_real_time']:.0f} × real time, {OBJECTS} boxes at 50 Hz: {again['verdict']}")
+    print(
+        f"snapshot   copied in {state['copy_us']:.0f} µs, packed by the recorder in {state['pack_ms']:.1f} ms, "
+        f"{state['kB']:.0f} kB"
+    )
+    print(
+        f"replay     {again['times_real_time']:.0f} × real time, {OBJECTS} boxes at 50 Hz, "
+        f"{again['times_real_time_by_processor']:.0f} × by processor time: {again['verdict']}; its last second, "
+        f"from one of {again['snapshots']} snapshots in {again['file_MB']:.0f} MB: {again['last_second_s']:.2f} s, "
+        f"{again['last_second_verdict']}"
+    )
 
 
 if __name__ == "__main__":
