@@ -462,3 +462,20 @@ def test_the_same_inputs_give_the_same_bytes() -> None:
     assert len(digests) == 1
     monitor.step(step * SECOND // 50 + 1, swarm.states())
     assert monitor.digest not in {d[0] for d in digests}
+
+
+def test_the_predictions_of_bodies_that_start_together_do_not_end_together() -> None:
+    """All are described at once; what has to be predicted further is then spread over the steps, from the start."""
+    rng = np.random.default_rng(5)
+    monitor, n, rate = Monitor(), 400, 50
+    for object_id in range(n):
+        monitor.add(object_id, Sphere(0.2))
+    poses, twists = np.zeros((n, 7)), np.zeros((n, 6))
+    poses[:, :3], poses[:, 6] = rng.uniform(0, 20, (n, 3)), 1.0
+    twists[:, :3] = rng.uniform(-1, 1, (n, 3))
+    looked_up = []
+    for step in range(6 * rate):
+        looked_up.append(monitor.step(step * SECOND // rate, np.arange(n), poses, twists).status.candidate_pairs)
+        poses[:, :3] += twists[:, :3] / rate
+    assert looked_up[0] > 200
+    assert max(looked_up[1:]) < looked_up[0] / 10

@@ -28,7 +28,7 @@ STATE_NUMBERS: Final = 20
 
 FIRST_SLACK: Final = 0.5
 SHORTEST_SLACK: Final = 0.0625
-LONGEST_SLACK: Final = 2.0
+LONGEST_SLACK: Final = 1.0
 """How far beyond the horizon a body is predicted, in horizons: at first, at least, and at most."""
 
 WIDER: Final = 1.1
@@ -153,7 +153,8 @@ def find_moved(bodies, spread, sigmas, count, now, horizon, stale_acceleration, 
             angle = angle_between(bodies.quaternion, i, turned[0], turned[1], turned[2], turned[3])
             apart += r * (angle + off * age)
         if not (apart <= m.tube_0 and drift <= m.tube_1):
-            bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
+            if bodies.slack[i] > 0.0:  # else it is new
+                bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
             moved[n] = i
             n += 1
         elif sigmas > 0.0 and not _is_covered(bodies, spread, sigmas, i, now, horizon, stale_acceleration):
@@ -193,16 +194,19 @@ def _cover_spread(bodies, spread, sigmas, i, now, most_0, most_1, stale_accelera
 def _cover(bodies, i, now, horizon):
     """Predict body i over the horizon and some slack; the rest of the step knows from `covered` what is new of it.
 
-    Cover times are spread over (1/2, 1] of the slack by the body's slot and time, so that they do not end together.
+    Cover times are spread by the body's slot and time, so that they do not end together: over (1/2, 1] of the slack, and
+    at first over all of it, for most bodies begin in the same step.
     """
     m = bodies.motion[i]
     if bodies.static[i]:
         m.cover = np.inf
         return
+    share = (i * GOLDEN_RATIO + now * PLASTIC_RATIO / horizon) % 1.0
     if bodies.slack[i] == 0.0:
         bodies.slack[i] = FIRST_SLACK * horizon
-    share = (i * GOLDEN_RATIO + now * PLASTIC_RATIO / horizon) % 1.0
-    m.cover = now + horizon + bodies.slack[i] * (0.5 + 0.5 * share)
+    else:
+        share = 0.5 + 0.5 * share
+    m.cover = now + horizon + bodies.slack[i] * share
 
 
 @device
