@@ -194,8 +194,8 @@ def _cover_spread(bodies, spread, sigmas, i, now, most_0, most_1, stale_accelera
 def _cover(bodies, i, now, horizon):
     """Predict body i over the horizon and some slack; the rest of the step knows from `covered` what is new of it.
 
-    Cover times are spread by the body's slot and time, so that they do not end together: over (1/2, 1] of the slack, and
-    at first over all of it, for most bodies begin in the same step.
+    Cover times are spread by the body's slot and time, so that they do not end together: over (1/2, 1] of the slack,
+    and at first over all of it, for most bodies begin in the same step.
     """
     m = bodies.motion[i]
     if bodies.static[i]:
