@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import subprocess
+import time
 import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -186,11 +187,16 @@ def _has_kernels(source: bytes) -> bool:
 
 
 def _warm_up(ros: machine.RosInstall | None, log: IO[str]) -> None:
+    remove_old_kernels()
     if (ROOT / "collision_monitor" / "warm_up.py").exists():
         _call(log, ros, PYTHON, "-m", "collision_monitor.warm_up")
-    caches = sorted((VENV / "var" / "cache" / "collision_monitor").glob("*"), key=lambda path: path.stat().st_mtime)
-    for outdated in caches[:-3]:  # one for each state of the sources; going back and forth a little stays quick
-        shutil.rmtree(outdated, ignore_errors=True)
+
+
+def remove_old_kernels() -> None:
+    """Of sources that are no more there is a folder for each state of each module: drop those of a month ago."""
+    for folder in (VENV / "var" / "cache" / "collision_monitor").glob("*"):
+        if folder.stat().st_mtime < time.time() - 30 * 86400:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 STAGES = (

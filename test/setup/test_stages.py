@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import subprocess
+import time
 from pathlib import Path
 
 import machine
@@ -122,6 +123,16 @@ def test_exported_variables_of_other_pythons_are_left_out(monkeypatch: pytest.Mo
     install = machine.RosInstall("jazzy", (Path("/opt/ros/jazzy"),), (3, 12))
     assert stages.environment_variables(install)["PYTHONPATH"] == "/somewhere/else"
     assert stages.environment_variables(install)["AMENT_PREFIX_PATH"] == f"{stages.VENV}:/opt/ros/jazzy"
+
+
+def test_compiled_kernels_stay_for_a_month(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stages, "VENV", tmp_path)
+    cache = tmp_path / "var" / "cache" / "collision_monitor"
+    for days in range(40):
+        (cache / str(days) / "prediction").mkdir(parents=True)
+        os.utime(cache / str(days), (time.time() - 86400 * (days + 0.5),) * 2)
+    stages.remove_old_kernels()
+    assert sorted(int(each.name) for each in cache.iterdir()) == list(range(30))
 
 
 def test_a_second_run_only_checks() -> None:
