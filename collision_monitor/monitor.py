@@ -817,10 +817,11 @@ class Monitor:
             slots,
         )  # fmt: skip
         predictions = predictions[:n]
-        if self._uncertain.counts(p) and p.horizon > 0.0:
+        if self._uncertain.active and p.horizon > 0.0:
             touching = self._pairs["key"][self._pairs["touching"] == 1]
             scene = Scene(self._shapes.table, self._parts, self._bodies, now, p, self._planar)
             predictions = self._uncertain.complete(predictions, slots[:n], touching, scene)
+            unresolved = np.count_nonzero(predictions["status"] == records.PredictionStatus.UNRESOLVED)
         if p.min_closing_speed > 0.0 or p.ignore_separating:
             predictions = self._filtered(predictions, now)
             unresolved = np.count_nonzero(predictions["status"] == records.PredictionStatus.UNRESOLVED)

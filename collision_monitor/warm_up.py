@@ -39,12 +39,13 @@ def main() -> None:
 
 
 def _step_uncertain(monitor: Monitor, poses: NDArray[np.float64]) -> None:
-    """The same with states that declare an uncertainty, and then with covariances."""
+    """The same with states that declare an uncertainty, with covariances, and with a bound on an acceleration."""
     states = np.zeros(len(poses), STATE)
     states["id"] = np.arange(2, OBJECTS)
     states["position"], states["quaternion"] = poses[:, :3], poses[:, 3:]
     states["position_stddev"] = states["orientation_stddev"] = 0.1
     monitor.step(3_010_000_000, states)
+    monitor.add(2, Sphere(0.5), max_linear_acceleration=1.0)
     monitor.step(3_020_000_000, states, covariance=np.zeros((len(poses), 12)))
 
 

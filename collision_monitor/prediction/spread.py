@@ -62,7 +62,7 @@ def worst_stddevs(covariance: NDArray[np.float64]) -> tuple[NDArray[np.float64],
 def take_spread(spread, slots, numbers, covariance, planar):
     """Store the uncertainties of states. slots (M,) int32, -1: of none; numbers (M, 21): the rows of records.STATE.
 
-    covariance (M, 12), or (0, 12): the standard deviations tell all. planar: there is none along z.
+    covariance (M, 12), or (0, 12); where it is all 0 the standard deviations tell. planar: there is none along z.
     """
     for k in range(slots.size):
         i = slots[k]
@@ -74,7 +74,10 @@ def take_spread(spread, slots, numbers, covariance, planar):
         for c in range(12):
             spread.covariance[i, c] = covariance[k, c] if covariance.shape[0] > 0 else 0.0
         for part in range(2):
-            if covariance.shape[0] == 0:
+            told = False
+            for c in range(6 * part, 6 * part + 6):
+                told |= spread.covariance[i, c] != 0.0
+            if not told:
                 for c in _DIAGONAL:
                     spread.covariance[i, 6 * part + c] = spread.stddev[i, 2 * part] ** 2
             if planar:
@@ -84,9 +87,10 @@ def take_spread(spread, slots, numbers, covariance, planar):
 
 @device
 def is_uncertain(spread, i):
-    """Has body i declared any uncertainty?"""
-    s = spread.stddev
-    return s[i, 0] > 0.0 or s[i, 1] > 0.0 or s[i, 2] > 0.0 or s[i, 3] > 0.0
+    """Has body i declared any uncertainty, or how hard it may accelerate?"""
+    s, a = spread.stddev, spread.acceleration
+    declared = s[i, 0] > 0.0 or s[i, 1] > 0.0 or s[i, 2] > 0.0 or s[i, 3] > 0.0
+    return declared or a[i, 0] > 0.0 or a[i, 1] > 0.0
 
 
 @device

@@ -38,6 +38,10 @@ GOLDEN_RATIO: Final = 0.6180339887498949
 PLASTIC_RATIO: Final = 0.7548776662466927
 """Multiples of these, modulo 1, fill the unit interval evenly."""
 
+_POSITION_STDDEV: Final = 16
+_ORIENTATION_STDDEV: Final = 17
+"""Where these are among the numbers of a records.STATE; those of their rates of change stand two behind."""
+
 _TWIST_UNKNOWN: Final = int(StateFlag.TWIST_UNKNOWN)
 _DISCONTINUITY: Final = int(StateFlag.DISCONTINUITY)
 
@@ -47,7 +51,8 @@ def take_states(bodies, slots, numbers, flags, time, verdicts):
     """Store states as the bodies' last ones.
 
     slots (M,) int32, -1: unknown id; numbers (M, 21) float64: the rows of records.STATE; flags (M,) uint32;
-    time: of all states, in seconds. verdicts (M,) uint8: ACCEPTED or why not.
+    time: of all states, in seconds. Where the twist is estimated, its standard deviations are written into numbers.
+    verdicts (M,) uint8: ACCEPTED or why not.
     Returns (how many were accepted, whether any of them is uncertain).
     """
     accepted = 0
@@ -81,6 +86,10 @@ def take_states(bodies, slots, numbers, flags, time, verdicts):
                 bodies.angular[i, c] = numbers[k, 10 + c]
         elif bodies.seen[i] and (flags[k] & _DISCONTINUITY) == 0:
             _estimate_twist(bodies, i, numbers, k, x, y, z, w, time - bodies.time[i])
+            for c in (_POSITION_STDDEV, _ORIENTATION_STDDEV):
+                if numbers[k, c] > 0.0 and not numbers[k, c + 2] > 0.0:
+                    # of a difference of two poses, if the last one was as uncertain as this one
+                    numbers[k, c + 2] = sqrt(2.0) * numbers[k, c] / (time - bodies.time[i])
         else:
             bodies.linear[i] = 0.0
             bodies.angular[i] = 0.0

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
 from collision_monitor.description import ObjectDescription
+from collision_monitor.prediction.acceleration_bounds import widen_intervals
 from collision_monitor.prediction.motion import Bodies, enlarge
 from collision_monitor.prediction.normal_samples import normal_samples
 from collision_monitor.prediction.spread import is_uncertain, make_spread, take_spread
@@ -24,6 +25,7 @@ from collision_monitor.prediction.uncertainty import PROBABILITY, impact_probabi
 from collision_monitor.records import PREDICTION, Method, PredictionStatus
 
 ANSWERS: Final = ("earliest", "most_likely", "latest", "probability")
+INTERVAL: Final = ("lower", "upper", "status")
 
 ENTRY = np.dtype(
     [
@@ -96,7 +98,7 @@ class UncertainPredictions:
 
     def __init__(self, capacity: int) -> None:
         self.active = False
-        """Whether any state has declared an uncertainty."""
+        """Whether any state has declared an uncertainty, or any object how hard it may accelerate."""
         self.spread = make_spread(capacity)
         self.entries: Records = np.empty(0, ENTRY)
         """The pairs, by key."""
@@ -112,12 +114,13 @@ class UncertainPredictions:
         """Take in what the object in slot i has declared of its accelerations."""
         bounds = (0.0, 0.0) if d.static else (d.max_linear_acceleration, d.max_angular_acceleration)
         self.spread.acceleration[i] = bounds
+        self.active |= any(bounds)
 
     def forget(self, i: int) -> None:
         """The body in slot i is gone."""
         for array in self.spread:
             array[i] = 0.0
-        self.active = bool(self.spread.stddev.any())
+        self.active = bool(self.spread.stddev.any() or self.spread.acceleration.any())
 
     def take(self, slots: Pairs, numbers: Any, covariance: NDArray[np.float64], planar: bool) -> None:
         """Take in the uncertainties of states that were accepted; arguments as of `take_spread`."""
@@ -129,7 +132,7 @@ class UncertainPredictions:
         return sigmas_for(profile.min_probability) if self.counts(profile) else 0.0
 
     def counts(self, profile: Any) -> bool:
-        """Whether any state has declared an uncertainty, and the profile wants to know."""
+        """Whether anything is uncertain, and the profile wants to know."""
         return self.active and bool(profile.uncertainty)
 
     def add_pairs(self, pairs: Pairs, bodies: Bodies, now: float) -> None:
@@ -147,18 +150,34 @@ class UncertainPredictions:
         predictions (n,): of stated motions, with the body slots (n, 2); touching: keys of the pairs that touch now.
         Returns them soonest first.
         """
+        self._widen(predictions, slots, scene)
+        if not self.counts(scene.profile):
+            return _sorted(predictions)
         for name, column in zip(ANSWERS, self._judge(slots, True, scene).T, strict=True):
             predictions[name] = column
         self.add_pairs(np.empty((0, 2), np.int32), scene.bodies, scene.now)
         known = (predictions["id_a"].astype(np.uint64) << np.uint64(32)) | predictions["id_b"]
         entries = self.entries[~np.isin(self.entries["key"], np.concatenate([known, touching]))]
         if len(entries) == 0:
-            return predictions
+            return _sorted(predictions)
         slots = np.stack([entries["i"], entries["j"]], axis=1)
         answers = self._judge(slots, False, scene)
         kept = answers[:, PROBABILITY] >= scene.profile.min_probability
         both = np.concatenate([predictions, _possible(entries["key"][kept], slots[kept], answers[kept], scene)])
-        return both[np.lexsort((both["id_b"], both["id_a"], both["lower"]))]
+        return _sorted(both)
+
+    def _widen(self, predictions: Records, slots: Pairs, scene: Scene) -> None:
+        """Widen the intervals of bodies that have declared how hard they may accelerate."""
+        if not self.spread.acceleration.any():
+            return
+        p = scene.profile
+        ends = [np.ascontiguousarray(predictions[name]) for name in INTERVAL]
+        widen_intervals(
+            scene.table, scene.parts, scene.bodies, self.spread, slots, scene.now, p.horizon, p.contact_margin,
+            p.impact_tolerance, p.impact_iterations, self._room, *ends,
+        )  # fmt: skip
+        for name, column in zip(INTERVAL, ends, strict=True):
+            predictions[name] = column
 
     def _judge(self, slots: Pairs, stated: bool, scene: Scene) -> NDArray[np.float64]:
         p = scene.profile
@@ -171,6 +190,10 @@ class UncertainPredictions:
             self._room, answers,
         )  # fmt: skip
         return answers
+
+
+def _sorted(predictions: Records) -> Records:
+    return predictions[np.lexsort((predictions["id_b"], predictions["id_a"], predictions["lower"]))]
 
 
 def _possible(keys: NDArray[np.uint64], slots: Pairs, answers: NDArray[np.float64], scene: Scene) -> Records:

@@ -66,7 +66,7 @@ def make_room() -> Room:
 
 
 @device
-def _carry_on(bodies, i, now, q, m):
+def carry_on(bodies, i, now, q, m):
     """Body i's last state carried on to `now` as the motion m (MOTION), whose time 0 is now; returns its age (s)."""
     age = 0.0 if bodies.static[i] else now - bodies.time[i]
     m.x = bodies.position[i, 0] + bodies.linear[i, 0] * age
@@ -363,8 +363,8 @@ def impact_probabilities(
         answers[k, :] = nan
         if not (is_uncertain(spread, i) or is_uncertain(spread, j)):
             continue
-        age_i = _carry_on(bodies, i, now, room.quaternion, A)
-        age_j = _carry_on(bodies, j, now, room.quaternion, B)
+        age_i = carry_on(bodies, i, now, room.quaternion, A)
+        age_j = carry_on(bodies, j, now, room.quaternion, B)
         r_i, r_j = bodies.spin_radius[i], bodies.spin_radius[j]
         now_i, growth_i = surface_spread(spread, i, r_i, age_i, horizon, stale_acceleration)
         now_j, growth_j = surface_spread(spread, j, r_j, age_j, horizon, stale_acceleration)

@@ -1,0 +1,102 @@
+"""The interval of an impact where a body may accelerate: by how much it is earlier, and until when it is still certain.
+
+A body that accelerates by at most a (m/s^2), and changes its turning by at most alpha (rad/s^2), has no point farther
+from where it is stated to be than (a + alpha r) t^2 / 2, t seconds after its last state. Before the first time at which
+the stated gap is as small as the two bodies' deviations together there is no contact; where they are stated to overlap
+by more than that, there is.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Final
+
+from collision_monitor._jit import device, kernel
+from collision_monitor.prediction.time_of_impact import CLEAR, UNRESOLVED, contact_at, shape_impact
+from collision_monitor.prediction.uncertainty import carry_on
+
+SEGMENTS: Final = 8
+"""In each of them the deviation is bounded by its chord: too wide by 1 / 256 of that at the end, at most."""
+
+NODES: Final = 16
+"""Times after the stated impact at which it is asked whether contact is certain."""
+
+
+@device
+def _first_possible(table, parts, bodies, i, j, until, margin, off, tolerance, budget, room):
+    """A time in [0, until] before which the bodies cannot touch; off: coefficients of their deviation in t (m)."""
+    A, B = room.motion[0], room.motion[1]
+    first = until
+    for segment in range(SEGMENTS):
+        begin, end = until * segment / SEGMENTS, until * (segment + 1) / SEGMENTS
+        wide = off[0] + begin * (off[1] + begin * off[2])
+        growth = off[1] + (begin + end) * off[2]
+        a = bodies.first_shape[i]
+        while a >= 0:
+            b = bodies.first_shape[j]
+            while b >= 0:
+                status, t, _, _ = shape_impact(
+                    table, parts, A, B, a, b, begin, min(end, first), margin, wide, growth, tolerance, budget,
+                    room.scratch,
+                )  # fmt: skip
+                if status != CLEAR:
+                    first = min(first, t)
+                b = parts.next[b]
+            a = parts.next[a]
+        if first < end:
+            break
+    return first
+
+
+@device
+def _first_certain(table, parts, bodies, i, j, begin, end, margin, off, room):
+    """A time in [begin, end] at which the bodies touch whatever they do; infinite: none is known."""
+    A, B = room.motion[0], room.motion[1]
+    for node in range(NODES + 1):
+        t = begin + (end - begin) * node / NODES
+        wide = off[0] + t * (off[1] + t * off[2])
+        a = bodies.first_shape[i]
+        while a >= 0:
+            b = bodies.first_shape[j]
+            while b >= 0:
+                distance = contact_at(table, parts, A, B, a, b, t, room.scratch)
+                if distance + room.scratch.out[10] - margin + wide <= 0.0:
+                    return t
+                b = parts.next[b]
+            a = parts.next[a]
+    return inf
+
+
+@device
+def _bound(bodies, spread, i):
+    """How hard any point of body i may leave its stated motion (m/s^2)."""
+    turning = spread.acceleration[i, 1]
+    return spread.acceleration[i, 0] + (turning * bodies.spin_radius[i] if turning > 0.0 else 0.0)
+
+
+@kernel
+def widen_intervals(
+    table, parts, bodies, spread, pairs, now, horizon, margin, tolerance, budget, room, lower, upper, status
+):  # fmt: skip
+    """Widen [lower, upper] (P,) of the predictions of pairs (P, 2) of body slots by what they declared they may do.
+
+    Where that may avoid contact, the upper end becomes infinite and the status UNRESOLVED.
+    """
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        a_i, a_j = _bound(bodies, spread, i), _bound(bodies, spread, j)
+        if not a_i + a_j > 0.0:
+            continue
+        age_i = carry_on(bodies, i, now, room.quaternion, room.motion[0])
+        age_j = carry_on(bodies, j, now, room.quaternion, room.motion[1])
+        off = (
+            0.5 * (a_i * age_i * age_i + a_j * age_j * age_j),
+            a_i * age_i + a_j * age_j,
+            0.5 * (a_i + a_j),
+        )
+        lower[k] = _first_possible(table, parts, bodies, i, j, lower[k], margin, off, tolerance, budget, room)
+        if upper[k] < inf:
+            end = max(horizon, upper[k])
+            upper[k] = _first_certain(table, parts, bodies, i, j, upper[k], end, margin, off, room)
+        if not upper[k] < inf:
+            status[k] = UNRESOLVED
