@@ -68,7 +68,9 @@ class Row:
     ttc_error_s: Errors
     """Over the predictions that both have."""
     outside_bound: int
-    """Predictions whose interval does not meet the true one."""
+    """Predictions whose interval does not meet the true one; of models: distances that are off by more than stated."""
+    distance_error_part: float = np.nan
+    """Of models: the worst distance error as part of the size of the smaller of the two."""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; what there is none of is null."""

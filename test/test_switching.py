@@ -116,6 +116,19 @@ def test_predictions_are_as_exact_as_the_new_profile() -> None:
     assert before > 1e3 * after
 
 
+def test_without_a_horizon_contacts_are_found() -> None:
+    scene = make_scene("clutter")
+    full, contacts_only = Monitor(), Monitor(Profile(horizon=0.0))
+    for description in scene.descriptions:
+        full.describe(description)
+        contacts_only.describe(description)
+    for step in range(20):
+        states = scene.step()
+        mine, expected = (each.step(step * SECOND // 50, states) for each in (contacts_only, full))
+        assert np.array_equal(mine.contacts.view(np.uint8), expected.contacts.view(np.uint8))
+        assert len(mine.contacts) > 5
+
+
 def test_a_horizon_that_shrinks_takes_back_what_is_beyond_it() -> None:
     monitor = Monitor()
     monitor.add(1, Sphere(0.5))

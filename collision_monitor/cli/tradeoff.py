@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     from collision_monitor.description import ObjectDescription
     from collision_monitor.tradeoff import Row, Step
 
-SCENES: Final = ("fleet", "clutter", "particles", "crossing")
+MESHES: Final = "arm"
+"""The scene whose shapes matter, not its profile: its rows are models."""
+
+SCENES: Final = ("fleet", "clutter", "swarm", "particles", "crossing", MESHES)
 """What is measured where no scene is named."""
 
 DESCRIPTION = """\
@@ -30,6 +33,7 @@ examples:
   collision-monitor tradeoff --scene fleet
   collision-monitor tradeoff --scene fleet --scene clutter --png tradeoff.png
   collision-monitor tradeoff run.mcap --profile fast --profile exact --json
+  collision-monitor tradeoff --scene arm --model obb --model convex_hull     models against the meshes themselves
 
 A pair counts as an alarm at each step at which it is told, as a contact or as a prediction. A false alarm is one that
 the exact answers do not have at that step: mostly a near miss, within the tolerance that the profile declares.
@@ -54,6 +58,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--seconds", type=positive, default=5.0, metavar="S", help="of each scene (default: 5)")
     parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="of the random numbers (default: 1)")
     parser.add_argument("--profile", action="append", metavar="NAME", help="may be given again (default: all)")
+    parser.add_argument(
+        "--model", action="append", metavar="NAME",
+        help="compare models of the shapes with the shapes as they are, in place of profiles; may be given again",
+    )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="write the rows there too")
     parser.add_argument("--png", type=Path, metavar="FILE", help="draw time against error, a panel for each scene")
@@ -64,6 +72,7 @@ def run(args: argparse.Namespace) -> int:
     """Measure and print. Raises InputError, ProfileError, SessionError."""
     from collision_monitor.profiles import Profile
     from collision_monitor.tradeoff import recorded, tradeoff
+    from collision_monitor.tradeoff_models import MODELS, SAMPLES, model_tradeoff
 
     if args.session is not None and args.scene:
         raise InputError("tradeoff: expected a session or scenes, got both")
@@ -73,6 +82,11 @@ def run(args: argparse.Namespace) -> int:
     inputs = [recorded(args.session)] if args.session else [_played(name, args) for name in args.scene or SCENES]
     rows = []
     for name, descriptions, steps in inputs:
+        if args.model or name == MESHES:
+            models = args.model or MODELS
+            with progress_bar(name, len(models) * len(steps) + min(SAMPLES, len(steps))) as progress:
+                rows += model_tradeoff(name, descriptions, steps, models, progress)
+            continue
         with progress_bar(name, 2 * len(steps) * len(profiles)) as progress:
             rows += tradeoff(name, descriptions, steps, profiles, progress)
     if args.json:
@@ -110,8 +124,8 @@ def _print_table(rows: Sequence[Row]) -> None:
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for k, heading in enumerate(("scene", "profile", "ms/step", "µs/pair", "alarms", "false", "missed")):
-        table.add_column(heading, justify="left" if k < 2 else "right", no_wrap=True)
+    for k, heading in enumerate(("scene", "profile", "model", "ms/step", "µs/pair", "alarms", "false", "missed")):
+        table.add_column(heading, justify="left" if k < 3 else "right", no_wrap=True)
     for heading in ("distance\nerror m", "TTC error s\nmedian", "\np99", "\nworst"):
         table.add_column(heading, justify="right", no_wrap=True)
     scene = ""
@@ -123,8 +137,8 @@ def _print_table(rows: Sequence[Row]) -> None:
         error = row.ttc_error_s
         numbers = (row.distance_error_m, error.median, error.p99, error.worst)
         table.add_row(
-            shown, row.profile, f"{row.step_ms:.3f}", f"{row.pair_us:.2f}", str(row.alarms), str(row.false_alarms),
-            str(row.misses), *map(_number, numbers),
+            shown, row.profile, row.model, f"{row.step_ms:.3f}", f"{row.pair_us:.2f}", str(row.alarms),
+            str(row.false_alarms), str(row.misses), *map(_number, numbers),
         )  # fmt: skip
     Console(width=None if sys.stdout.isatty() else 120).print(table)
 
@@ -151,6 +165,9 @@ def _draw(rows: Sequence[Row], path: Path) -> None:
     scenes = list(dict.fromkeys(row.scene for row in rows))
     figure, panels = plt.subplots(1, len(scenes), figsize=(4.0 * len(scenes), 3.6), squeeze=False, layout="constrained")
     for panel, scene in zip(panels[0], scenes, strict=True):
+        if any(row.scene == scene and row.model != "exact" for row in rows):
+            _draw_models(panel, scene, [row for row in rows if row.scene == scene])
+            continue
         shown = [row for row in rows if row.scene == scene and row.ttc_error_s.p99 > 0.0]
         panel.set(title=scene, xlabel="p99 error of the time to collision (s)", ylabel="ms per step")
         if not shown:
@@ -163,3 +180,12 @@ def _draw(rows: Sequence[Row], path: Path) -> None:
         panel.grid(alpha=0.3)
     figure.savefig(path, dpi=120)
     plt.close(figure)
+
+
+def _draw_models(panel: Any, scene: str, rows: Sequence[Row]) -> None:
+    """Time against the error of the distance, both over some orders of magnitude."""
+    panel.set(title=scene, xlabel="worst error of the distance (m)", ylabel="ms per step", yscale="log")
+    for row in rows:
+        panel.scatter(row.distance_error_m, row.step_ms, s=60, label=row.model)
+    panel.legend(loc="center right")
+    panel.grid(alpha=0.3)

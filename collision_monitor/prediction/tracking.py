@@ -210,7 +210,8 @@ def _cover(bodies, i, now, horizon):
     if bodies.static[i]:
         m.cover = np.inf
         return
-    share = (i * GOLDEN_RATIO + now * PLASTIC_RATIO / horizon) % 1.0
+    periods = now / horizon if horizon > 0.0 else 0.0  # 0: only what touches now is asked for
+    share = (i * GOLDEN_RATIO + periods * PLASTIC_RATIO) % 1.0
     if bodies.slack[i] == 0.0:
         bodies.slack[i] = FIRST_SLACK * horizon
     else:

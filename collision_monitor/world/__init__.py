@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from collision_monitor.errors import InputError
+from collision_monitor.world.arm import Arm
 from collision_monitor.world.clutter import Clutter
 from collision_monitor.world.crossing import Crossing
 from collision_monitor.world.fleet import Fleet
 from collision_monitor.world.scene import Scene
+from collision_monitor.world.swarm import Swarm
 from collision_monitor.world.trajectory import Trajectory
 
 __all__ = ["Scene", "describe", "make_scene", "scene_names"]
@@ -44,6 +46,14 @@ _SCENES = {
     "crossing": _Entry(
         lambda objects, seed, rate, path: Crossing(objects, rate),
         "nine pairs whose times of contact are known beforehand, every 8 s anew",
+    ),
+    "swarm": _Entry(
+        lambda objects, seed, rate, path: Swarm(objects, seed, rate),
+        "drones that circle through each other's space, nobody straight ahead",
+    ),
+    "arm": _Entry(
+        lambda objects, seed, rate, path: Arm(objects, rate),
+        "a robot arm over a table with bottles, all of concave meshes",
     ),
     "trajectory": _Entry(
         lambda objects, seed, rate, path: Trajectory(objects, rate, path),

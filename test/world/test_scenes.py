@@ -9,7 +9,7 @@ from collision_monitor.records import STATE
 from collision_monitor.world import describe, make_scene, scene_names
 
 SIMULATED = [name for name in scene_names() if name != "trajectory"]
-RANDOM = [name for name in SIMULATED if name != "crossing"]
+RANDOM = [name for name in SIMULATED if name not in ("crossing", "arm")]
 
 
 @pytest.mark.parametrize("name", scene_names())
@@ -92,11 +92,11 @@ def test_a_step_is_one_period_of_the_rate_unless_said_otherwise():
     assert not scene.finished
 
 
-@pytest.mark.parametrize("name", SIMULATED)
+@pytest.mark.parametrize("name", [name for name in SIMULATED if name != "arm"])  # whose twists always change
 def test_twists_are_the_rates_of_change_of_the_poses(name):
     """Central differences over 1 ms, of every object that does not change its course in between."""
     dt, compared, all_ = 1e-3, 0, 0
-    scene = make_scene(name) if name == "crossing" else make_scene(name, objects=200)
+    scene = make_scene(name) if name not in RANDOM else make_scene(name, objects=200)
     for _ in range(10):
         scene.step(0.37)
         before, now, after = scene.step(dt), scene.step(dt), scene.step(dt)

@@ -1,0 +1,142 @@
+"""What coarser shapes save and cost: a scene of meshes through a monitor with each model, against their triangles."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from math import nan
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.description import ObjectDescription
+from collision_monitor.errors import InputError
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Box
+from collision_monitor.monitor import Monitor, StepResult
+from collision_monitor.narrow_phase.contact import contact
+from collision_monitor.narrow_phase.models import containing_model, parse_model
+from collision_monitor.profiles import Profile
+from collision_monitor.records import Model, Phase
+from collision_monitor.tradeoff import Errors, Row, Step
+
+NEAR: Final = 0.3
+"""m: pairs up to this far apart are compared."""
+
+SAMPLES: Final = 12
+"""Steps, evenly spread, at which they are: triangles against triangles take most of a second for a pair."""
+
+MODELS: Final = (Model.SPHERE, Model.OBB, Model.KDOP26, Model.CONVEX_HULL)
+
+Pair = tuple[int, int]
+
+
+def model_tradeoff(
+    scene: str,
+    descriptions: Iterable[ObjectDescription],
+    steps: Sequence[Step],
+    models: Sequence[Model | str] = MODELS,
+    progress: Callable[[int], None] = lambda done: None,
+) -> list[Row]:
+    """A row for `exact`, by `contact` of the shapes as they are, then one for each model. Raises InputError.
+
+    Told are the pairs up to NEAR apart. An alarm is a pair that is said to touch; a miss, one that touches and is not.
+    progress is told how many steps were just done, of len(steps) * len(models) + min(SAMPLES, len(steps)) in all.
+    """
+    if not steps:
+        raise InputError(f"scene {scene}: expected at least one step, there is none")
+    described = list(descriptions)
+    sampled = np.unique(np.linspace(0, len(steps) - 1, SAMPLES).astype(int)).tolist()
+    profile = Profile(contact_margin=NEAR)
+    played = {parse_model(each): _play(parse_model(each), described, steps, profile, progress) for each in models}
+    pairs = [set[Pair]().union(*(_told(answers[k]) for answers, _ in played.values())) for k in sampled]
+    truths, seconds = [], []
+    for k, wanted in zip(sampled, pairs, strict=True):
+        began = time.perf_counter()
+        truths.append(_exact(described, steps[k][1], wanted))
+        seconds.append(time.perf_counter() - began)
+        progress(1)
+    base: dict[str, Any] = {"scene": scene, "profile": profile.name, "objects": len(described)}
+    base["ttc_error_s"] = Errors.of([])
+    exact = Row(
+        **base, model="exact", steps=len(sampled), step_ms=float(np.median(seconds)) * 1e3,
+        step_ms_p99=float(np.percentile(seconds, 99)) * 1e3, pair_us=1e6 * sum(seconds) / max(sum(map(len, pairs)), 1),
+        alarms=sum(int(d <= 0.0) for truth in truths for d in truth.values()), false_alarms=0, misses=0,
+        distance_error_m=0.0, outside_bound=0, distance_error_part=0.0,
+    )  # fmt: skip
+    sizes = {each.object_id: _size(each) for each in described}
+    return [exact, *(_row(base, model, *found, sampled, truths, sizes) for model, found in played.items())]
+
+
+def _play(
+    model: Model,
+    described: list[ObjectDescription],
+    steps: Sequence[Step],
+    profile: Profile,
+    progress: Callable[[int], None],
+) -> tuple[list[StepResult], NDArray[np.float64]]:
+    monitor = Monitor(profile)
+    for description in described:
+        monitor.describe(replace(description, model=model))
+    answers, seconds = [], np.empty(len(steps))
+    for k, (stamp, states) in enumerate(steps):
+        began = time.perf_counter()
+        answers.append(monitor.step(stamp, states))
+        seconds[k] = time.perf_counter() - began
+        progress(1)
+    return answers, seconds
+
+
+def _told(answer: StepResult) -> dict[Pair, Any]:
+    rows = answer.contacts[answer.contacts["phase"] != Phase.END]
+    deepest = rows[rows["point_index"] == 0]
+    return {(int(row["id_a"]), int(row["id_b"])): row for row in deepest}
+
+
+def _exact(described: list[ObjectDescription], states: NDArray[np.void], pairs: set[Pair]) -> dict[Pair, float]:
+    """Signed distances (m) of the shapes themselves."""
+    shapes = {each.object_id: each.shapes for each in described}
+    poses = {each.object_id: each.pose for each in described if each.pose is not None}
+    poses |= {int(row["id"]): Pose(row["position"], row["quaternion"]) for row in states}
+    return {(a, b): contact(shapes[a], poses[a], shapes[b], poses[b]).signed_distance for a, b in sorted(pairs)}
+
+
+def _size(description: ObjectDescription) -> float:
+    """Diameter (m) of its smallest box."""
+    piece, _ = containing_model(description.shapes, Model.AABB).pieces[0]
+    assert isinstance(piece, Box)
+    return float(np.linalg.norm(piece.size))
+
+
+def _row(
+    base: dict[str, Any],
+    model: Model,
+    answers: list[StepResult],
+    seconds: NDArray[np.float64],
+    sampled: list[int],
+    truths: list[dict[Pair, float]],
+    sizes: dict[int, float],
+) -> Row:
+    alarms = false_alarms = misses = outside = 0
+    errors, parts = [0.0], [0.0]
+    for k, truth in zip(sampled, truths, strict=True):
+        told = _told(answers[k])
+        touching = {pair for pair, row in told.items() if row["signed_distance"] <= 0.0}
+        really = {pair for pair, distance in truth.items() if distance <= 0.0}
+        alarms, false_alarms = alarms + len(touching), false_alarms + len(touching - really)
+        misses += len(really - touching)
+        for pair in told.keys() - really:  # where they overlap, the depths of a mesh and its model are not comparable
+            off = abs(float(told[pair]["signed_distance"]) - truth[pair])
+            outside += bool(off > told[pair]["error_bound"] + 1e-9)
+            errors.append(off)
+            parts.append(off / min(sizes[each] for each in pair))
+    warm = seconds[1:] if len(seconds) > 1 else seconds
+    looked_at = sum(a.status.narrow_phase_tests + a.status.impact_queries for a in answers[1:] or answers)
+    return Row(
+        **base, model=model.name.lower(), steps=len(answers), step_ms=float(np.median(warm)) * 1e3,
+        step_ms_p99=float(np.percentile(warm, 99)) * 1e3,
+        pair_us=1e6 * float(warm.sum()) / looked_at if looked_at else nan, alarms=alarms, false_alarms=false_alarms,
+        misses=misses, distance_error_m=max(errors), outside_bound=outside, distance_error_part=max(parts),
+    )  # fmt: skip

@@ -1,0 +1,116 @@
+"""A robot arm that reaches about over a table with bottles on it: everything a mesh, and concave.
+
+Each link turns about the end of the one before; their meshes are surfaces of revolution, made here.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from collision_monitor.description import ObjectDescription
+from collision_monitor.errors import InputError
+from collision_monitor.geometry.pose import Pose, from_rotation_vector, multiply, rotation_matrix
+from collision_monitor.geometry.shapes import Mesh
+from collision_monitor.world.scene import Array, Scene, States, positive_rate, state_array
+
+SEGMENTS: Final = 32
+"""Of each circle: 700 triangles for a link."""
+
+LENGTHS: Final = (0.35, 0.55, 0.5, 0.25)
+"""m, of the links from the base to the hand."""
+
+AXES: Final = np.array([[0, 0, 1], [0, 1, 0], [0, 1, 0], [0, 1, 0]], float)
+"""About which each link turns, in the frame of the one before."""
+
+MIDDLE: Final = np.array([0.0, 0.85, 1.35, 0.6])
+SWING: Final = np.array([2.2, 0.25, 0.35, 0.5])
+FREQUENCY: Final = np.array([0.11, 0.17, 0.23, 0.31])
+"""rad and Hz: joint k is at MIDDLE + SWING sin(2 pi FREQUENCY t)."""
+
+BOTTLES: Final = 7
+ROUND_THE_BASE: Final = 0.85
+"""m from the base, where the bottles stand."""
+
+
+def lathe(profile: list[tuple[float, float]], segments: int = SEGMENTS) -> Mesh:
+    """The closed surface that a line of (radius, z) from axis to axis makes when it turns about z."""
+    angle = 2 * np.pi * np.arange(segments) / segments
+    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(segments)], axis=1)
+    rings = [radius * ring + (0.0, 0.0, z) for radius, z in profile[1:-1]]
+    vertices = np.concatenate([[(0.0, 0.0, profile[0][1])], *rings, [(0.0, 0.0, profile[-1][1])]])
+    a, faces = np.arange(segments), []
+    b = np.roll(a, -1)
+    last = len(vertices) - 1
+    faces.append(np.stack([np.zeros(segments, int), 1 + b, 1 + a], axis=1))
+    for k in range(len(rings) - 1):
+        low, high = 1 + k * segments, 1 + (k + 1) * segments
+        faces.append(np.stack([low + a, low + b, high + b], axis=1))
+        faces.append(np.stack([low + a, high + b, high + a], axis=1))
+    top = 1 + (len(rings) - 1) * segments
+    faces.append(np.stack([top + a, top + b, np.full(segments, last)], axis=1))
+    return Mesh(vertices, np.concatenate(faces))
+
+
+def _link(length: float, radius: float) -> Mesh:
+    """Two round joints and a waist between them, about its middle."""
+    half, waist = length / 2, 0.85 * radius
+    end = [(radius * np.cos(a), half + radius * np.sin(a)) for a in np.linspace(0.0, np.pi / 2, 6)[:-1]]
+    outline = [(radius, half - 0.5 * radius), (waist, 0.5 * half), (waist, 0.0)]
+    upper = [*outline[::-1], *end, (0.0, half + radius)]
+    lower = [(r, -z) for r, z in upper[:0:-1]]
+    return lathe([(float(r), float(z)) for r, z in (*lower, *upper)])
+
+
+def _bottle() -> Mesh:
+    return lathe([(0, 0), (0.04, 0), (0.04, 0.16), (0.036, 0.18), (0.02, 0.2), (0.018, 0.26), (0, 0.26)])
+
+
+class Arm(Scene):
+    """Ids 1..4 are the links from the base on, then the table and the bottles, which stand."""
+
+    def __init__(self, objects: int | None, rate: float | None) -> None:
+        if objects is not None:
+            raise InputError(f"objects: the scene 'arm' has a fixed set, leave it out (got {objects!r})")
+        self.name = "arm"
+        self.rate = positive_rate(rate, 50.0)
+        self._ids = np.arange(1, len(LENGTHS) + 1, dtype=np.uint32)
+        radii = np.linspace(0.08, 0.05, len(LENGTHS))
+        self.descriptions = [
+            ObjectDescription(
+                int(i), _link(length, float(radius)), f"link_{i}", allowed=tuple({max(1, i - 1), min(4, i + 1)} - {i})
+            )
+            for i, length, radius in zip(self._ids.tolist(), LENGTHS, radii, strict=True)
+        ]
+        table = lathe([(0, -0.04), (1.1, -0.04), (1.1, 0), (0, 0)])
+        self._add(table, "table", (0.0, 0.0, -0.09), allowed=(1,))
+        for k in range(BOTTLES):
+            angle = 2 * np.pi * k / BOTTLES
+            at = (ROUND_THE_BASE * float(np.cos(angle)), ROUND_THE_BASE * float(np.sin(angle)), -0.09)
+            self._add(_bottle(), f"bottle_{k + 1}", at)
+
+    def _add(self, mesh: Mesh, name: str, position: tuple[float, float, float], allowed: tuple[int, ...] = ()) -> None:
+        object_id = len(self.descriptions) + 1
+        self.descriptions.append(
+            ObjectDescription(object_id, mesh, name, static=True, pose=Pose(position), allowed=allowed)
+        )
+
+    def _advance(self, dt: float) -> None:
+        """The joints are functions of the time."""
+
+    def states(self) -> States:
+        """See Scene. Forward kinematics, joint by joint; the twist is the one of this moment."""
+        states = state_array(self._ids)
+        phase = 2 * np.pi * FREQUENCY * self.time
+        angles, rates = MIDDLE + SWING * np.sin(phase), 2 * np.pi * FREQUENCY * SWING * np.cos(phase)
+        q: Array = np.array([0.0, 0.0, 0.0, 1.0])
+        joint, velocity, omega = np.zeros(3), np.zeros(3), np.zeros(3)
+        for k, length in enumerate(LENGTHS):
+            omega = omega + rotation_matrix(q) @ AXES[k] * rates[k]
+            q = multiply(q, from_rotation_vector(AXES[k] * angles[k]))
+            along = rotation_matrix(q)[:, 2] * length
+            states["position"][k], states["quaternion"][k] = joint + along / 2, q / np.linalg.norm(q)
+            states["linear"][k], states["angular"][k] = velocity + np.cross(omega, along / 2), omega
+            joint, velocity = joint + along, velocity + np.cross(omega, along)
+        return states

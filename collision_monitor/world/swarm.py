@@ -1,0 +1,53 @@
+"""Drones that circle through each other's space, each on a loop of its own: nobody ever keeps a constant twist."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from collision_monitor.description import ObjectDescription
+from collision_monitor.geometry.shapes import Cylinder
+from collision_monitor.world.scene import Array, Scene, States, object_count, positive_rate, state_array
+
+SPACING: Final = 3.0
+"""m: one drone for each cube of this side, at any number of drones."""
+LOOP: Final = (1.0, 4.0)
+"""m, radii of the loops, least and greatest."""
+SPEED: Final = (1.0, 4.0)
+"""m/s along them."""
+RADIUS, HEIGHT = 0.3, 0.15
+"""m, of a drone with its rotors."""
+
+
+class Swarm(Scene):
+    """Ids 1..n. A loop is a circle, tilted, about a point of the volume; a drone stays level and looks ahead."""
+
+    def __init__(self, objects: int | None, seed: int, rate: float | None) -> None:
+        self.name = "swarm"
+        self.rate = positive_rate(rate, 50.0)
+        count = object_count(objects, 150, 1, 100_000, self.name)
+        random = np.random.default_rng(seed)
+        self._ids = np.arange(1, count + 1, dtype=np.uint32)
+        self._centre: Array = random.uniform(0.0, SPACING * count ** (1.0 / 3.0), (count, 3))
+        self._radius = random.uniform(*LOOP, count)
+        self._rate = random.uniform(*SPEED, count) / self._radius * random.choice((-1.0, 1.0), count)  # rad/s
+        self._phase = random.uniform(0.0, 2.0 * np.pi, count)
+        self._tilt = random.uniform(-0.5, 0.5, count)  # of the height against the way along x
+        self.descriptions = [ObjectDescription(int(i), Cylinder(RADIUS, HEIGHT), f"drone_{i}") for i in self._ids]
+
+    def _advance(self, dt: float) -> None:
+        """The places are functions of the time."""
+
+    def states(self) -> States:
+        """See Scene."""
+        angle = self._phase + self._rate * self.time
+        cosine, sine = np.cos(angle), np.sin(angle)
+        states = state_array(self._ids)
+        out = np.stack([cosine, sine, self._tilt * cosine], axis=1)
+        along = np.stack([-sine, cosine, -self._tilt * sine], axis=1)
+        states["position"] = self._centre + self._radius[:, None] * out
+        states["linear"] = (self._radius * self._rate)[:, None] * along
+        states["quaternion"][:, 2:] = np.stack([np.sin(angle / 2), np.cos(angle / 2)], axis=1)
+        states["angular"][:, 2] = self._rate
+        return states
