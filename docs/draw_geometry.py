@@ -180,7 +180,7 @@ def sphere_trees() -> None:
         for x, y, radius in np.unique(balls.round(9), axis=0):
             axis.add_patch(Circle((x, y), radius, fc=GAP, alpha=0.25, lw=0))
         axis.add_patch(Polygon(U_PROFILE, fill=False, ec=POINTS, lw=1.4))
-        axis.set_title(f"level {k}: {len(level.radius)} spheres")
+        axis.set_title(f"level {k}: {len(level.radius):,} " + ("sphere" if k == 0 else "spheres"))
         axis.set_xlim(-0.9, 3.9)
         axis.set_ylim(-0.9, 3.9)
         axis.set_aspect("equal")

@@ -209,9 +209,8 @@ class ShapeTableBuilder:
         # rounded up: the sphere must hold the shape whatever the rounding above was
         table.radius[slot] = np.nextafter(radius * (1 + 1e-15) + margin, inf)
         table.vertex_start[slot], table.vertex_count[slot] = start, count
-        pose = Pose() if pose is None else pose
-        table.local_position[slot] = pose.position
-        table.local_rotation[slot] = pose.rotation
+        table.local_position[slot] = 0.0 if pose is None else pose.position
+        table.local_rotation[slot] = np.eye(3) if pose is None else pose.rotation
         table.kind[slot] = kind
         return slot
 

@@ -15,7 +15,7 @@ from collision_monitor.narrow_phase.answer import MAX_VERTICES, SIMPLEX, write
 from collision_monitor.narrow_phase.epa import epa
 from collision_monitor.narrow_phase.gjk import WEIGHTS, gjk
 from collision_monitor.narrow_phase.parallel_axes import axes_are_parallel, parallel_axes_depth
-from collision_monitor.narrow_phase.support import core_radius
+from collision_monitor.narrow_phase.support import core_radius, support_difference
 from collision_monitor.tolerances import EPA_CURVED, EPA_CURVED_POINTS, EPA_POLYTOPE, SAT_ROUND_OFF, TOUCHING
 
 
@@ -93,9 +93,17 @@ def convex_contact(
         distance = max(length, lower)
         bound = distance - lower
         if curved and length > 0.0:
-            # on round surfaces the direction that proves the bound is not quite that between the points: B's would be
-            # off its surface by 1e-5 of the distance
-            x, y, z = wx / length, wy / length, wz / length
+            # On round surfaces the direction that proves the bound is not quite that between the points. Taken as the
+            # normal, it puts B's point beside its surface; the other one leaves a gap along it that is too short.
+            beside = sqrt((wx - length * x) ** 2 + (wy - length * y) ** 2 + (wz - length * z) ** 2)
+            nx, ny, nz = wx / length, wy / length, wz / length
+            dx, dy, dz = support_difference(
+                ka, table.size[a, 0], table.size[a, 1], table.size[a, 2], table.vertex_start[a], table.vertex_count[a],
+                kb, table.size[b, 0], table.size[b, 1], table.size[b, 2], table.vertex_start[b], table.vertex_count[b],
+                table.vertices, work, -nx, -ny, -nz, SIMPLEX + 32,
+            )  # fmt: skip
+            if distance - (nx * dx + ny * dy + nz * dz) < beside:
+                x, y, z = nx, ny, nz
     elif axes_are_parallel(ka, kb, work):
         depth, x, y, z, qx, qy, qz = parallel_axes_depth(
             ka, table.size[a, 0], table.size[a, 1], kb, table.size[b, 0], table.size[b, 1], work, size

@@ -5,7 +5,7 @@ Pairs are brought into one order (by kind, then by slot) first, so that swapping
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from collision_monitor.narrow_phase.polygon_polygon import planar_contact
 from collision_monitor.narrow_phase.sphere_box import sphere_box_contact, sphere_box_separation
 from collision_monitor.narrow_phase.sphere_cone import sphere_cone_contact
 from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact, sphere_sphere_separation
-from collision_monitor.tolerances import FACE_PREFERENCE
+from collision_monitor.tolerances import FACE_PREFERENCE, FEATURE_TIE
 
 
 @inlined
@@ -209,8 +209,13 @@ def _boxes(
             return False
         if out[0] + ma + mb - gap > FACE_PREFERENCE * size:
             return True
-        # the SAT axis is the direction of the distance too, and has no noise however near the boxes are
     nx, ny, nz = axis_direction(axis, sign, RA, RB)
+    if gap > 0.0:
+        # where corners are nearest the gap can be as long as the distance to 1e-9, and they beside the axis by 1e-5
+        ax, ay, az = out[2] * nz - out[3] * ny, out[3] * nx - out[1] * nz, out[1] * ny - out[2] * nx
+        if gap * sqrt(ax * ax + ay * ay + az * az) > FEATURE_TIE * size:
+            return True
+        # the SAT axis is the direction of the distance too, and has no noise however near the boxes are
     touching_features(ha, hb, RA, RB, px, py, pz, gap, nx, ny, nz, out, work)
     if ma > 0.0 or mb > 0.0:
         out[0] -= ma + mb

@@ -99,8 +99,10 @@ def containing_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | 
     chosen = parse_model(model)
     pieces, index = [], []
     for k, (shape, pose) in enumerate(shapes):
+        # the pieces' poses remember their rotations: those of a mesh that is not placed are used again
+        placed = pose.position.any() or pose.quaternion[3] != 1.0
         for piece, offset in convex_pieces(shape):
-            pieces.append((piece, pose @ offset))
+            pieces.append((piece, pose @ offset if placed else offset))
             index.append(k)
     convex = len(pieces) == 1
     if chosen in (Model.AUTO, Model.EXACT):

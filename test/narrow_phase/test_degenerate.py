@@ -1,0 +1,150 @@
+"""Shapes and poses at the edge of what there is: nearly parallel, without thickness, folded, doubled, mirrored."""
+
+from __future__ import annotations
+
+from itertools import combinations_with_replacement, product
+
+import numpy as np
+import pytest
+from minkowski import rotation
+from pairs import EYE, contact, points_of, projected_gap, size
+
+import collision_monitor as cm
+from collision_monitor.geometry.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Mesh, Sphere
+
+CUBE = points_of(Box((1, 1, 1)))
+ANGLES = [0.0, *(10.0**-k for k in (3, 5, 7, 8, 9, 10, 12, 14, 16))]
+
+
+def as_hull(box):
+    return ConvexHull(points_of(box))
+
+
+def about(axis, angle):
+    x, y, z = axis / np.linalg.norm(axis)
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+def test_edges_that_are_nearly_parallel(angle):
+    """Boxes and hulls, crossed by an angle from 1e-3 down to below the last bit: as if parallel, to what it moves."""
+    rng = np.random.default_rng(1)
+    long, bar = Box((4, 0.3, 0.2)), Box((3, 0.2, 0.4))
+    for _ in range(4):
+        axis, p = rng.normal(size=3), rng.normal(size=3) * [0.5, 0.4, 0.4]
+        R = about(axis, angle)
+        for a, b in ((long, bar), (as_hull(long), bar), (as_hull(long), as_hull(bar))):
+            turned, straight = contact(a, b, p, EYE, R), contact(a, b, p)
+            assert abs(turned.distance - straight.distance) <= 2.2 * angle + 1e-9
+            gap = projected_gap(a, b, p, EYE, R, turned.normal)
+            assert abs(gap - turned.distance) <= turned.bound + 1e-14
+        # in any direction of the definition the gap is no wider than what SAT has found
+        for direction in rng.normal(size=(5, 3)):
+            n = direction / np.linalg.norm(direction)
+            assert projected_gap(long, bar, p, EYE, R, n) <= contact(long, bar, p, EYE, R).distance + 1e-9
+
+
+@pytest.mark.parametrize("thin", [1e-2, 1e-4, 1e-6, 1e-9])
+@pytest.mark.parametrize("kind", ["needle", "pancake"])
+def test_needles_and_pancakes(kind, thin):
+    rng = np.random.default_rng(2)
+    scale = [1, thin, thin] if kind == "needle" else [1, 1, thin]
+    apart = 0
+    for _ in range(15):
+        a, b = (ConvexHull(rng.normal(size=(12, 3)) * scale) for _ in "ab")
+        R_A, R_B, p = rotation(rng), rotation(rng), rng.normal(size=3) * 0.7
+        c = contact(a, b, p, R_A, R_B)
+        # what the answer says, by the definitions: its gap is there, and its points are in the hulls
+        assert abs(projected_gap(a, b, p, R_A, R_B, c.normal) - c.distance) <= c.bound + 1e-12
+        swapped = contact(b, a, -p, R_B, R_A)
+        assert abs(swapped.distance - c.distance) <= c.bound + swapped.bound + 1e-12
+        if c.distance > 0:
+            apart += 1
+            for shape, point, R in ((a, c.point_a, R_A), (b, c.point_b - p, R_B)):
+                # in the hull: no direction in which it is farther than all corners
+                directions = np.vstack([rng.normal(size=(200, 3)), c.normal, -c.normal, R.T])
+                assert ((directions @ point) <= (directions @ R @ shape.points.T).max(axis=1) + 1e-9).all()
+        else:
+            # out of the way of something thin it is not far: along the thin axis of one of them
+            normals = [R[:, 2] for R in (R_A, R_B)] + [np.cross(R_A[:, 0], R_B[:, 0])]
+            ways = [projected_gap(a, b, p, R_A, R_B, s * n / np.linalg.norm(n)) for n in normals for s in (1, -1)]
+            assert c.distance >= max(ways) - c.bound - 1e-12
+    assert apart > 2
+
+
+def test_points_that_are_doubled_or_in_a_face_change_nothing():
+    middles = np.array([c for c in product((-0.5, 0.0, 0.5), repeat=3) if any(c)])
+    rng = np.random.default_rng(3)
+    crowded = ConvexHull(rng.permutation(np.vstack([CUBE, CUBE, middles, middles])))
+    for _ in range(30):
+        R_A, R_B, p = rotation(rng), rotation(rng), rng.normal(size=3)
+        expected = contact(Box((1, 1, 1)), Box((1, 1, 1)), p, R_A, R_B)
+        c = contact(crowded, crowded, p, R_A, R_B)
+        assert c.distance == pytest.approx(expected.distance, abs=expected.bound + 1e-12)
+
+
+KINDS = [Sphere(0.5), Box((1, 1, 1)), Capsule(0.3, 0.8), Cylinder(0.5, 1), Cone(0.5, 1), ConvexHull(CUBE)]
+
+
+@pytest.mark.parametrize(("a", "b"), list(combinations_with_replacement(KINDS, 2)), ids=lambda s: type(s).__name__)
+def test_in_the_same_place(a, b):
+    """Identical poses: deep inside of each other, with an answer that parts them."""
+    for R in (EYE, rotation(np.random.default_rng(4))):
+        c = contact(a, b, (0, 0, 0), R, R)
+        assert -(size(a) + size(b)) <= c.distance < -0.1
+        assert abs(projected_gap(a, b, np.zeros(3), R, R, c.normal) - c.distance) <= c.bound + 1e-12
+
+
+@pytest.mark.parametrize("flip", [(-1, 1, 1), (1, -1, 1), (-1, -1, -1)])
+def test_mirrored_shapes_have_mirrored_answers(flip):
+    rng, flip = np.random.default_rng(5), np.array(flip, float)
+    for _ in range(20):
+        a, b, p = rng.normal(size=(8, 3)), rng.normal(size=(9, 3)), rng.normal(size=3) * 2
+        c = contact(ConvexHull(a), ConvexHull(b), p)
+        m = contact(ConvexHull(a * flip), ConvexHull(b * flip), p * flip)
+        assert m.distance == pytest.approx(c.distance, abs=c.bound + m.bound)
+        if c.distance > 1e-3:
+            np.testing.assert_allclose(m.normal, c.normal * flip, atol=1e-9)
+            np.testing.assert_allclose(m.point_b, c.point_b * flip, atol=1e-9)
+
+
+@pytest.mark.parametrize("p", [(1, 1, 1), (1, 1, 0.25), (1, 0.25, 0.125)], ids=["corner", "edge", "face"])
+@pytest.mark.parametrize("turn", [0, 1, 2])
+def test_touching_exactly(p, turn):
+    p = np.roll(p, turn)
+    for a in (Box((1, 1, 1)), ConvexHull(CUBE)):
+        for b in (Box((1, 1, 1)), ConvexHull(CUBE)):
+            c = contact(a, b, p)
+            assert abs(c.distance) <= c.bound <= 1e-8
+            assert (np.abs(c.point_a) <= 0.5 + 1e-9).all() and (np.abs(c.point_b - p) <= 0.5 + 1e-9).all()
+
+
+def two_cubes(shift):
+    """Two cubes as one mesh that shares the corners where they coincide: with an edge of four faces, or a corner."""
+    corners = np.vstack([CUBE, CUBE + shift])
+    quads = np.array([[1, 3, 7, 5], [0, 4, 6, 2], [2, 6, 7, 3], [0, 1, 5, 4], [4, 5, 7, 6], [0, 2, 3, 1]])
+    order = np.array([0, 4, 2, 6, 1, 5, 3, 7])  # of a box's points: x first
+    faces = order[quads][:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    vertices, index = np.unique(corners, axis=0, return_inverse=True)
+    return Mesh(vertices, index.ravel()[np.vstack([faces, faces + 8])])
+
+
+@pytest.mark.parametrize("shift", [(1, 1, 0), (1, 1, 1), (3, 0, 0)], ids=["edge", "corner", "apart"])
+def test_meshes_that_are_no_manifold_are_their_solids(shift):
+    mesh = two_cubes(np.array(shift, float))
+    boxes = [(Box((1, 1, 1)), cm.Pose()), (Box((1, 1, 1)), cm.Pose(shift))]
+    ball, rng = Sphere(0.2), np.random.default_rng(6)
+    seen = set()
+    for _ in range(30):
+        Y = cm.Pose(rng.uniform(-1, 2.5, 3))
+        c, expected = cm.contact(mesh, cm.Pose(), ball, Y), cm.contact(boxes, cm.Pose(), ball, Y)
+        seen.add(expected.overlaps)
+        assert c.overlaps == expected.overlaps
+        if not expected.overlaps:
+            assert c.signed_distance == pytest.approx(expected.signed_distance, abs=1e-12)
+    assert seen == {True, False}
+    # without one face it is a surface, in which nothing is inside
+    sheet = Mesh(mesh.vertices, mesh.faces[1:])
+    assert not cm.contact(sheet, cm.Pose(), Sphere(0.1), cm.Pose()).overlaps
+    assert cm.contact(mesh, cm.Pose(), Sphere(0.1), cm.Pose()).overlaps
