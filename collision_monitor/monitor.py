@@ -226,7 +226,15 @@ class Monitor:
     @property
     def plan(self) -> ScenePlan:
         """Which tests and grid cells the objects described now require; `print` it."""
-        return scene_plan(self._shapes.table, self._bodies, self._parts.next, self._grid)
+        return scene_plan(
+            self._shapes.table,
+            self._bodies,
+            self._parts.next,
+            self._grid,
+            planar=self._planar,
+            uncertain=self._uncertain.counts(self._profile),
+            outside=int(np.count_nonzero(self._outside)),
+        )
 
     def _slot(self, object_id: int) -> int:
         if object_id not in self._slots:

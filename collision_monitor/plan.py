@@ -75,6 +75,16 @@ class ScenePlan:
     """Objects in the grid by cell width (m): swept boxes, so both size and speed count."""
     groups: int
     """How many pairs of (group, mask) there are; with one, nothing is told apart by group."""
+    never_meet: int
+    """Pairs of objects, not both static, whose groups ignore each other."""
+    planar: bool
+    """The scene is one of the x-y plane."""
+    modelled: int
+    """Objects for which a larger model stands, meshes among them."""
+    uncertain: bool
+    """States declare how uncertain they are, and it is wanted to know."""
+    outside: int
+    """Objects outside of the region of interest."""
 
     def __str__(self) -> str:
         lines = [f"objects   {self.moving} moving, {self.static} static"]
@@ -95,13 +105,27 @@ class ScenePlan:
             ("box_box" not in used, "SAT: no two boxes can meet"),
             (not used & {"convex_convex", "cylinder_cylinder"}, "GJK and EPA: no pair needs them"),
             (self.turning == 0, "rotation: a sphere looks the same turned"),
+            (self.planar, "the third dimension: all are shapes of the plane"),
+            (self.modelled == 0, "models: every object is tested as it is"),
+            (not self.uncertain, "uncertainty: no state declares it, or it is switched off"),
             (self.static > 1, f"{self.static * (self.static - 1) // 2} pairs of static objects: never visited"),
             (self.groups <= 1, "groups and masks: all are the same"),
+            (self.never_meet > 0, f"{self.never_meet} pairs of groups that never meet: found and dropped"),
+            (self.outside > 0, f"{self.outside} objects outside of the region: at rest"),
         )
         return [reason for applies, reason in reasons if applies]
 
 
-def scene_plan(table: Any, bodies: Bodies, next_part: NDArray[np.int32], grid: HashedGrid) -> ScenePlan:
+def scene_plan(
+    table: Any,
+    bodies: Bodies,
+    next_part: NDArray[np.int32],
+    grid: HashedGrid,
+    *,
+    planar: bool,
+    uncertain: bool,
+    outside: int,
+) -> ScenePlan:
     """The plan for what is described now. next_part (S,): the next shape slot of the same object, -1 after the last."""
     used = np.flatnonzero(bodies.used)
     static = bodies.static[used]
@@ -118,7 +142,11 @@ def scene_plan(table: Any, bodies: Bodies, next_part: NDArray[np.int32], grid: H
     pairs += [(min(a, b), max(a, b)) for a in moving for b in fixed_kinds]
     counts = {kind: (kinds[False] + kinds[True]).count(kind) for kind in sorted(moving | fixed_kinds)}
     moving_bodies = used[~static]
-    filters = np.unique(np.stack([bodies.group[used], bodies.mask[used]], axis=1), axis=0)
+    of_groups = [
+        np.unique(np.stack([bodies.group[each], bodies.mask[each]], axis=1), axis=0, return_counts=True)
+        for each in (used, used[static])
+    ]
+    filters = of_groups[0][0]
     return ScenePlan(
         shapes={KIND_NAMES[kind]: count for kind, count in counts.items()},
         moving=len(moving_bodies),
@@ -127,7 +155,21 @@ def scene_plan(table: Any, bodies: Bodies, next_part: NDArray[np.int32], grid: H
         tests={(KIND_NAMES[a], KIND_NAMES[b]): pair_test(a, b) for a, b in sorted(set(pairs))},
         cells={2.0 ** (k - LEVEL_OFFSET): int(grid.level_count[k]) for k in range(LEVELS) if grid.level_count[k]},
         groups=len(filters),
+        never_meet=_ignoring(*of_groups[0]) - _ignoring(*of_groups[1]),
+        planar=planar,
+        modelled=int(np.count_nonzero(bodies.excess[used])),
+        uncertain=uncertain,
+        outside=outside,
     )
+
+
+def _ignoring(filters: NDArray[np.uint32], counts: NDArray[np.int64]) -> int:
+    """How many pairs ignore each other, of objects of which counts (n,) have the (group, mask) of filters (n, 2)."""
+    group, mask = filters.T
+    meets = (group[:, None] & mask) != 0
+    ignoring = ~(meets & meets.T)
+    pairs = counts[:, None] * counts - np.diag(counts)
+    return int((pairs * ignoring).sum()) // 2
 
 
 def pair_test(kind_a: int, kind_b: int) -> str:

@@ -1,0 +1,188 @@
+"""What the scene plan leaves out, and what it would cost to do it nevertheless: each item forced on, same states.
+
+    python benchmarks/scene_plan.py                  # 300 objects for each item
+    python benchmarks/scene_plan.py --objects 1000 --steps 200
+
+Both monitors see the same scene; the answers that the second gives beyond those of the first are about pairs that
+nobody asked for, and the others are the same (test/test_plan.py).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.description import ObjectDescription
+from collision_monitor.geometry.shapes import Circle, Sphere
+from collision_monitor.monitor import Monitor
+from collision_monitor.profiles import Profile
+from collision_monitor.world import make_scene
+from collision_monitor.world.scene import state_array
+
+States = NDArray[np.void]
+Rows = NDArray[np.void]
+
+
+def _all(rows: Rows, _states: States) -> NDArray[np.bool_]:
+    return np.ones(len(rows), bool)
+
+
+def _same(states: States) -> States:
+    return states
+
+
+class Item(NamedTuple):
+    """off: as the plan has it; on: the same with the item forced on. asked_for: which rows of `on` off has too."""
+
+    off: Monitor
+    on: Monitor
+    states: Iterator[tuple[int, States]]
+    states_on: Callable[[States], States] = _same
+    asked_for: Callable[[Rows, States], NDArray[np.bool_]] = _all
+
+
+def _monitor(descriptions: list[ObjectDescription], profile: Profile | None = None) -> Monitor:
+    monitor = Monitor(profile or Profile())
+    for description in descriptions:
+        monitor.describe(description)
+    return monitor
+
+
+def _played(scene: Any) -> Iterator[tuple[int, States]]:
+    while True:
+        yield round(scene.time * 1e9), scene.states()
+        scene.step()
+
+
+def rotation(objects: int) -> Item:
+    """Spheres are followed and predicted as bodies that look different turned."""
+    scene = make_scene("particles", objects=objects)
+    item = Item(_monitor(scene.descriptions), _monitor(scene.descriptions), _played(scene))
+    bodies = item.on._bodies
+    bodies.spin_radius[: item.on._top] = bodies.motion["radius"][: item.on._top]
+    return item
+
+
+def space(objects: int) -> Item:
+    """Discs of a plane as spheres of space."""
+    scene = make_scene("clutter", objects=objects)
+    ids = [d.object_id for d in scene.descriptions]
+    random = np.random.default_rng(1)
+    radii = random.uniform(0.1, 0.4, len(ids)).tolist()
+    scene.position[:, :2] *= np.sqrt(objects / scene.size**2)  # type: ignore[attr-defined]
+    scene.size = np.sqrt(objects)  # type: ignore[attr-defined]
+
+    def flat() -> Iterator[tuple[int, States]]:
+        for stamp, states in _played(scene):
+            for name in ("position", "linear"):
+                states[name][:, 2] = 0.0
+            states["quaternion"], states["angular"] = (0, 0, 0, 1), 0.0
+            yield stamp, states
+
+    discs = [ObjectDescription(i, Circle(radius)) for i, radius in zip(ids, radii, strict=True)]
+    balls = [ObjectDescription(i, Sphere(radius)) for i, radius in zip(ids, radii, strict=True)]
+    return Item(_monitor(discs), _monitor(balls), flat())
+
+
+def uncertainty(objects: int) -> Item:
+    """Every state declares standard deviations, of a nanometre."""
+    scene = make_scene("clutter", objects=objects)
+
+    def declared(states: States) -> States:
+        states = states.copy()
+        states["position_stddev"] = 1e-9
+        return states
+
+    return Item(_monitor(scene.descriptions), _monitor(scene.descriptions), _played(scene), declared)
+
+
+def static_pairs(objects: int) -> Item:
+    """What stands is told as moving with no speed, so that its pairs among each other are visited."""
+    scene = make_scene("fleet", objects=objects)
+    static = [d for d in scene.descriptions if d.static]
+    moving = [replace(d, static=False, pose=None) if d.static else d for d in scene.descriptions]
+    standing = state_array(np.array([d.object_id for d in static], np.uint32))
+    standing["position"] = [d.pose.position for d in static if d.pose is not None]
+    standing["quaternion"] = [d.pose.quaternion for d in static if d.pose is not None]
+
+    def with_standing(states: States) -> States:
+        return np.concatenate([states, standing])
+
+    def not_both(rows: Rows, _states: States) -> NDArray[np.bool_]:
+        return ~(np.isin(rows["id_a"], standing["id"]) & np.isin(rows["id_b"], standing["id"]))
+
+    return Item(_monitor(scene.descriptions), _monitor(moving), _played(scene), with_standing, not_both)
+
+
+def groups(objects: int) -> Item:
+    """Four groups that never meet, all in one group."""
+    scene = make_scene("clutter", objects=objects)
+    bits = [1 << (d.object_id % 4) for d in scene.descriptions]
+    apart = [replace(d, group=bit, mask=bit) for d, bit in zip(scene.descriptions, bits, strict=True)]
+
+    def alike(rows: Rows, _states: States) -> NDArray[np.bool_]:
+        return np.asarray(rows["id_a"] % 4 == rows["id_b"] % 4)
+
+    return Item(_monitor(apart), _monitor(scene.descriptions), _played(scene), _same, alike)
+
+
+def region(objects: int) -> Item:
+    """An eighth of the volume is of interest, all of it is watched."""
+    scene = make_scene("clutter", objects=objects)
+    high = 0.5 * float(scene.size)  # type: ignore[attr-defined]
+    inside = Profile(region_min=(-9.0, -9.0, -9.0), region_max=(high, high, high))
+    off, on = _monitor(scene.descriptions, inside), _monitor(scene.descriptions)
+    radius = off._bodies.motion["radius"][:objects]
+
+    def both_inside(rows: Rows, states: States) -> NDArray[np.bool_]:
+        nearest = np.clip(states["position"], -9.0, high)
+        ids = states["id"][np.linalg.norm(states["position"] - nearest, axis=1) <= radius]
+        return np.isin(rows["id_a"], ids) & np.isin(rows["id_b"], ids)
+
+    return Item(off, on, _played(scene), _same, both_inside)
+
+
+ITEMS: Final[dict[str, Callable[[int], Item]]] = {
+    "rotation": rotation,
+    "3-D": space,
+    "uncertainty": uncertainty,
+    "static pairs": static_pairs,
+    "groups that never meet": groups,
+    "objects outside the region": region,
+}
+
+
+def main() -> None:
+    """Print a line for each item."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--objects", type=int, default=300)
+    parser.add_argument("--steps", type=int, default=150)
+    parser.add_argument("--json", action="store_true")
+    args = parser.parse_args()
+    rows = []
+    for name, make in ITEMS.items():
+        item = make(args.objects)
+        spent: tuple[list[float], list[float]] = ([], [])
+        for _, (stamp, states) in zip(range(args.steps), item.states, strict=False):
+            for monitor, given, times in ((item.off, states, spent[0]), (item.on, item.states_on(states), spent[1])):
+                began = time.thread_time()
+                monitor.step(stamp, given)
+                times.append(1e3 * (time.thread_time() - began))
+        off, on = (float(np.mean(each[10:])) for each in spent)
+        rows.append({"item": name, "off_ms": off, "on_ms": on, "times": on / off})
+        if not args.json:
+            print(f"{name:28} left out {off:7.3f} ms   forced on {on:7.3f} ms   {on / off:5.2f} times", flush=True)
+    if args.json:
+        print(json.dumps({"objects": args.objects, "load": os.getloadavg()[0], "rows": rows}))
+
+
+if __name__ == "__main__":
+    main()
