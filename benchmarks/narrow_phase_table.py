@@ -1,6 +1,6 @@
 """How right and how fast every shape pair is: the table of docs/narrow_phase.md.
 
-    nice python benchmarks/narrow_phase_table.py                  # 100,000 random pairs of each, about 7 minutes
+    nice python benchmarks/narrow_phase_table.py                  # 100,000 random pairs of each, about 6 minutes
     nice python benchmarks/narrow_phase_table.py --pairs 1000     # a quick look
 
 Each answer is checked against definitions written here in NumPy, none of which the kernels use:
