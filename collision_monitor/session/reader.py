@@ -203,6 +203,7 @@ class _Part:
         schemas: dict[int, str] = {}
         inputs: dict[int, str] = {}
         ours = False
+        unnamed = 0
         for record in self.records:
             if isinstance(record, Metadata) and record.name == METADATA:
                 return dict(record.metadata)
@@ -212,6 +213,7 @@ class _Part:
                 schemas[record.id] = record.name
             elif isinstance(record, Channel):
                 topics[record.id] = record.topic
+                unnamed += record.schema_id not in schemas
                 inputs[record.id] = _NAMES.get(schemas.get(record.schema_id, ""), "")
             elif isinstance(record, Message) and not ours and inputs.get(record.channel_id) in _INPUTS:
                 try:
@@ -221,6 +223,8 @@ class _Part:
                 self.foreign = True
                 return {"frame_id": frame_id or "world"}
         found = f"topics {', '.join(sorted(topics.values()))}" if topics else "no topics"
+        if unnamed:
+            found += f", {unnamed} of them without the schema that says what type their messages are"
         if self.records.damage:
             found += f" and damage ({self.records.damage[0]})"
         raise SessionError(

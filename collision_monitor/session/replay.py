@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from collision_monitor.provenance import provenance
 from collision_monitor.session.compare import Difference, compare_answers, compare_status, compare_within
 from collision_monitor.session.reader import Place, Recorded, RecordedSnapshot, Session
 from collision_monitor.snapshot import Snapshot
+
+_HALF: Final = 1 << 31
+"""Of the sequence numbers: what is farther ahead than this lies behind."""
 
 
 class Verdict(IntEnum):
@@ -98,6 +101,7 @@ def replay(
     topics: set[str] = set()
     inputs = 0
     begin: int | None = None
+    latest = earlier = 0
     started = time.perf_counter()
     for each in session.entries(place):
         if isinstance(each, RecordedSnapshot):
@@ -108,14 +112,18 @@ def replay(
         if not run.take(each):
             continue
         begin = each.log_time if begin is None else begin
+        earlier += each.log_time < latest
+        latest = max(latest, each.log_time)
         report.messages += 1
-        report.recorded_duration = (each.log_time - begin) * 1e-9
+        report.recorded_duration = (latest - begin) * 1e-9
         report.replay_duration = time.perf_counter() - started
         if progress is not None:
             progress(report)
     if not inputs and not report.hole:
         found = ", ".join(sorted(topics)) or "no messages at all"
         raise SessionError(f"{session.path}: expected object states and shapes, found {found}")
+    if earlier:
+        report.notes.append(f"{earlier} messages are older than one before them: taken in the order of the file")
     report.notes += session.damage
     if not (report.hole or report.late or session.damage):
         run.expect_nothing_more()
@@ -166,7 +174,7 @@ class _Replay:
     def meet(self, recorded: RecordedSnapshot) -> None:
         """A snapshot: of no use where the state is known already."""
         missing = (recorded.sequence - self._next) & 0xFFFFFFFF
-        if self._mode is _Mode.EXACT and not missing:
+        if self._mode is _Mode.EXACT and not 0 < missing < _HALF:
             return
         try:
             snapshot = Snapshot.decode(recorded.data)
@@ -202,7 +210,13 @@ class _Replay:
             )
         elif missing and self._mode is not _Mode.STOPPED:
             done = "replayed and compared" if self._mode is _Mode.EXACT else "replayed"
-            self._note_gap(missing, f"{done} up to there")
+            if missing < _HALF:
+                self._note_gap(missing, f"{done} up to there")
+            else:
+                self.report.notes.append(
+                    f"the messages are not in the order of their recording: message {message.sequence} follows message "
+                    f"{self._next - 1}, after step {self.report.steps}: {done} up to there"
+                )
             self._mode, self.report.hole = _Mode.STOPPED, True
         self._next = (message.sequence + 1) & 0xFFFFFFFF
         if self._mode is not _Mode.STOPPED:

@@ -151,6 +151,12 @@ def test_a_foreign_recording_is_told_by_its_topics(tmp_path: Path) -> None:
         Session(tmp_path / "a.mcap")
 
 
+def test_topics_without_a_schema_are_told(tmp_path: Path) -> None:
+    write(tmp_path / "a.mcap", metadata=None, schema="")
+    with pytest.raises(SessionError, match="/camera/image, 1 of them without the schema that says what type"):
+        Session(tmp_path / "a.mcap")
+
+
 def test_a_foreign_encoding_is_named(tmp_path: Path) -> None:
     write(
         tmp_path / "a.mcap",

@@ -102,6 +102,27 @@ def test_a_missing_answer_is_a_difference(recorded: Path, tmp_path: Path, topic:
     assert (report.first_difference.field, report.first_difference.recorded) == ("presence", "nothing")
 
 
+def test_messages_out_of_order_are_told(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    messages = list(Session(recorded).messages())
+    session = Session(recorded)
+    turned = [*messages[:60], *messages[62:64], *messages[60:62], *messages[64:]]
+    monkeypatch.setattr(session, "entries", lambda place=None: iter(turned))
+    report = replay(session)
+    assert (report.verdict, report.hole, report.first_difference) == (Verdict.NOT_COMPARABLE, True, None)
+    assert report.notes[0].startswith("2 messages are missing after step 1")
+    backwards = [*messages[:60], *messages[40:]]
+    monkeypatch.setattr(session, "entries", lambda place=None: iter(backwards))
+    report = replay(session)
+    assert report.verdict is Verdict.NOT_COMPARABLE
+    assert "not in the order of their recording: message 40 follows message 59" in report.notes[0]
+    assert report.recorded_duration == (messages[59].log_time - messages[0].log_time) * 1e-9
+    late = [message._replace(log_time=message.log_time - 10**9 * (message.sequence == 50)) for message in messages]
+    monkeypatch.setattr(session, "entries", lambda place=None: iter(late))
+    report = replay(session)
+    assert report.notes == ["1 messages are older than one before them: taken in the order of the file"]
+    assert report.recorded_duration == (messages[-1].log_time - messages[0].log_time) * 1e-9
+
+
 def test_an_answer_too_many_is_a_difference(recorded: Path, tmp_path: Path) -> None:
     session = Session(recorded)
     with Recorder(tmp_path / "a.mcap", TYPES, session.metadata) as recorder:
