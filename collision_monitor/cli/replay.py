@@ -151,7 +151,9 @@ def _progress_bar(session: Session) -> Iterator[Callable[[Report], None] | None]
             nonlocal shown
             if report.replay_duration - shown >= 0.1:
                 shown = report.replay_duration
-                text = f"{report.recorded_duration:.1f} s, step {report.steps}, {report.speed:.0f} × real time"
+                position = report.begin + report.recorded_duration
+                text = f"{position:.1f} s, step {report.steps}, {report.speed:.0f} × real time, "
+                text += f"{report.differing} steps differ" if report.differing else "no difference"
                 bar.update(task, completed=session.position, text=text)
 
         yield show
