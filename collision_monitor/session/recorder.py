@@ -26,7 +26,7 @@ FLUSH_PERIOD: Final = 0.25
 QUEUE_BYTES: Final = 256 << 20
 """Most bytes that wait for the disk; beyond, messages are dropped and counted."""
 
-_WAKE_BYTES: Final = 4 << 20
+_WAKE_BYTES: Final = 8 << 20
 """Waiting bytes that wake the thread before the next flush is due."""
 
 
