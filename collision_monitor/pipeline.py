@@ -205,7 +205,7 @@ class Pipeline:
     # -- snapshots
 
     def snapshot(self) -> Snapshot:
-        """All that later answers depend on, copied: 0.1 ms for 200 objects."""
+        """All that later answers depend on, copied: 0.3 ms for 200 objects."""
         snapshot = freeze(self.monitor)
         snapshot.facts[_PIPELINE] = {
             "messages_lost": self.messages_lost,

@@ -39,7 +39,7 @@ _OURS: Final = "collision_monitor"
 _SNAPSHOT: Final = re.compile(re.escape(SNAPSHOT) + r"(\d{1,10})\.npz")
 _TIMES: Final = struct.Struct("<QQ")
 _LOG_TIME: Final = 6
-"""Where a message has it; chunks and attachments begin with their times."""
+"""Where a message has it, and the index of a channel its first one; chunks and attachments begin with their times."""
 
 
 class Recorded(NamedTuple):
@@ -137,15 +137,17 @@ class Session:
 
     def timeline(self) -> Timeline:
         """When it begins and ends and where its snapshots are, without unpacking any message."""
-        begin = end = 0
+        times: list[int] = []  # of first and last messages; a chunk without any has 0 for both
         snapshots: list[Place] = []
         for number, part in enumerate(self._parts):
             for at, opcode, data in part.records.glance():
-                if opcode in (Opcode.CHUNK, Opcode.MESSAGE) and len(data) >= 22:
-                    first, last = _TIMES.unpack_from(data, 0 if opcode == Opcode.CHUNK else _LOG_TIME)
-                    begin, end = begin or first, max(end, last if opcode == Opcode.CHUNK else first)
+                if opcode == Opcode.CHUNK and len(data) >= _TIMES.size:
+                    times += _TIMES.unpack_from(data) if any(_TIMES.unpack_from(data)) else ()
+                elif opcode in (Opcode.MESSAGE, Opcode.MESSAGE_INDEX) and len(data) >= _LOG_TIME + _TIMES.size:
+                    times += _TIMES.unpack_from(data, _LOG_TIME)[:1]
                 elif opcode == Opcode.ATTACHMENT and (found := _SNAPSHOT.search(data.decode("latin-1"))):
                     snapshots.append(Place(number, at, int(found[1]), *_TIMES.unpack_from(data)[:1]))
+        begin, end = min(times, default=0), max(times, default=0)
         return Timeline(begin, end, tuple(snapshots))
 
     def _profile(self) -> Profile:

@@ -96,6 +96,15 @@ def test_the_mcap_library_finds_them_in_the_index(path: Path) -> None:
     assert Snapshot.decode(found[0].data).facts["monitor"]["step"] > 0
 
 
+@pytest.mark.parametrize("times", [[0, 0, 0], [0, 5], [7, 9, 12], []])
+def test_a_timeline_may_begin_at_zero(tmp_path: Path, times: list[int]) -> None:
+    with recorder.Recorder(tmp_path / "a.mcap", {"/x": "ContactArray"}, {"profile": "{}", "frame_id": ""}) as writing:
+        for time in times:
+            writing.write("/x", b"", time, time)
+    timeline = Session(tmp_path / "a.mcap").timeline()
+    assert (timeline.begin, timeline.end) == (min(times, default=0), max(times, default=0))
+
+
 def test_quiet_sessions_have_few_snapshots(tmp_path: Path, often: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts, "SNAPSHOT_SHARE", 0.05)
     record(tmp_path / "run.mcap", snapshots=True)
