@@ -163,8 +163,13 @@ def _draw(rows: Sequence[Row], path: Path) -> None:
     import matplotlib.pyplot as plt
 
     scenes = list(dict.fromkeys(row.scene for row in rows))
-    figure, panels = plt.subplots(1, len(scenes), figsize=(4.0 * len(scenes), 3.6), squeeze=False, layout="constrained")
-    for panel, scene in zip(panels[0], scenes, strict=True):
+    columns = min(len(scenes), 3)
+    lines = -(-len(scenes) // columns)
+    size = (4.0 * columns, 3.6 * lines)
+    figure, panels = plt.subplots(lines, columns, figsize=size, squeeze=False, layout="constrained")
+    for panel in panels.flat[len(scenes) :]:
+        panel.remove()
+    for panel, scene in zip(panels.flat, scenes, strict=False):
         if any(row.scene == scene and row.model != "exact" for row in rows):
             _draw_models(panel, scene, [row for row in rows if row.scene == scene])
             continue
@@ -185,7 +190,8 @@ def _draw(rows: Sequence[Row], path: Path) -> None:
 def _draw_models(panel: Any, scene: str, rows: Sequence[Row]) -> None:
     """Time against the error of the distance, both over some orders of magnitude."""
     panel.set(title=scene, xlabel="worst error of the distance (m)", ylabel="ms per step", yscale="log")
+    panel.set_xscale("symlog", linthresh=1e-3)  # the shapes as they are have none
     for row in rows:
         panel.scatter(row.distance_error_m, row.step_ms, s=60, label=row.model)
-    panel.legend(loc="center right")
+    panel.legend(loc="upper right")
     panel.grid(alpha=0.3)
