@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
-from collision_monitor.geometry.shape_table import ShapeTableBuilder
+from collision_monitor.geometry.shape_table import ShapeTable, ShapeTableBuilder
 from collision_monitor.geometry.shapes import ConvexHull, HalfSpace, Mesh, Shape
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
@@ -34,6 +35,32 @@ FIRST_BATCH: Final = 64
 """Pairs of pieces that are looked at first; each further batch is twice as large."""
 
 
+class _Patch(NamedTuple):
+    """What the patch of a contact is found from: the pieces, about A's origin, and all pairs that were looked at."""
+
+    table: ShapeTable
+    position: Array
+    rotation: Array
+    looked_at: list[tuple[NDArray[np.int32], Array]]  # pairs (m, 2) of pieces and their contacts (m, 15)
+    best: Array  # the contact (15,) of the nearest or deepest
+    pair: NDArray[np.int32]
+
+    def points(self, witness: Array) -> Array:
+        """The corners (k, 3) on A, of all pairs that touch in the same plane: a floor of triangles is one face."""
+        radius = self.table.radius[self.pair]
+        tie = FEATURE_TIE * float(radius[np.isfinite(radius)].sum())
+        patches = []
+        for pairs, rows in self.looked_at:
+            level = (rows[:, 0] <= self.best[0] + tie) & (rows[:, 1:4] @ self.best[1:4] >= 1.0 - FEATURE_TIE)
+            count, points = manifold_batch(self.table, self.position, self.rotation, pairs[level], rows[level])
+            patches += [points[i, : count[i]] + self.position[pairs[level][i, 0]] for i in range(len(count))]
+        patch = patches[0] if len(patches) == 1 else outline(np.concatenate(patches), self.best[1:4], tie)
+        if len(patch) == 1:
+            return witness[None]
+        # where A's origin is in the world
+        return np.asarray(patch + (witness - self.best[4:7] - self.position[self.pair[0]]))
+
+
 @dataclass(frozen=True, eq=False)
 class Contact:
     """How two shapes stand to each other, in the world frame, lengths in m.
@@ -41,8 +68,7 @@ class Contact:
     signed_distance: negative where they overlap; -inf for two half-spaces that do not face each other, which no
     translation parts (the points are then one that both have). error_bound: the true value is within it. normal: unit,
     from A to B. point_a, point_b: the nearest points, or where they overlap the deepest ones; point_b - point_a is
-    signed_distance * normal. points_a, points_b (k, 3): the corners of the patch where a face or an edge of polytopes
-    lies on the other's, at most four, else those two points alone. model_a, model_b: what answered for the shapes.
+    signed_distance * normal. model_a, model_b: what answered for the shapes.
     """
 
     signed_distance: float
@@ -50,15 +76,27 @@ class Contact:
     normal: Array
     point_a: Array
     point_b: Array
-    points_a: Array
-    points_b: Array
     model_a: Model
     model_b: Model
+    _patch: _Patch | None = field(repr=False)  # None: the two points alone
 
     @property
     def overlaps(self) -> bool:
         """Whether they overlap or touch; where |signed_distance| <= error_bound, nobody can tell."""
         return self.signed_distance <= 0.0
+
+    @cached_property
+    def points_a(self) -> Array:
+        """The corners (k, 3) of the patch where a face or an edge of polytopes lies on the other's, at most four.
+
+        Else `point_a` alone. Found when first asked for.
+        """
+        return self.point_a[None] if self._patch is None else self._patch.points(self.point_a)
+
+    @cached_property
+    def points_b(self) -> Array:
+        """The same points on B: a signed distance along the normal from those on A."""
+        return self.point_b[None] if self._patch is None else self.points_a + self.signed_distance * self.normal
 
 
 class _Side(NamedTuple):
@@ -88,13 +126,14 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
         _check_in_plane(a)
         _check_in_plane(b)
     offset = b.pose.position - a.pose.position
+    patch: _Patch | None
     row, patch = _deepest(a, b, offset)
     distance, bound = float(row[0]), float(row[10])
     enclosed = distance > 0.0 and (_holds(a, b, offset) or _holds(b, a, -offset))
     if enclosed:
         # no faces meet, but one is inside of the other, at least this deep
         distance, row[1:4] = -distance, -row[1:4]
-        patch = row[None, 4:7]
+        patch = None
     convex = len(a.position) == len(b.position) == 1
     unbounded = distance == -np.inf  # a fact about the two, with no length to be wrong about
     if distance <= 0.0 and not convex and not unbounded:
@@ -102,18 +141,16 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
     excess = a.modelled.excess + b.modelled.excess
     if distance <= 0.0 and excess > 0.0 and not (a.modelled.convex and b.modelled.convex):
         bound -= distance  # the models may overlap deeply where the concave objects do not meet at all
-    point, points = a.pose.position + row[4:7], a.pose.position + patch
-    across = np.zeros(3) if unbounded else distance * row[1:4]
+    point = a.pose.position + row[4:7]
     return Contact(
         signed_distance=distance,
         error_bound=bound + excess,
         normal=row[1:4],
         point_a=point,
-        point_b=point + across,
-        points_a=points,
-        points_b=points + across,
+        point_b=point.copy() if unbounded else point + distance * row[1:4],
         model_a=a.modelled.model,
         model_b=b.modelled.model,
+        _patch=None if unbounded else patch,
     )
 
 
@@ -137,11 +174,10 @@ def _check_in_plane(side: _Side) -> None:
         raise PoseError(f"expected a turn about z for a shape of the plane, got the quaternion {side.pose.quaternion}")
 
 
-def _deepest(a: _Side, b: _Side, offset: Array) -> tuple[Array, Array]:
-    """The contact (15,) of the nearest or deepest pair of pieces, about A's origin (see answer.py), and its patch on A.
+def _deepest(a: _Side, b: _Side, offset: Array) -> tuple[Array, _Patch]:
+    """The contact (15,) of the nearest or deepest pair of pieces, about A's origin (see answer.py), and its patch.
 
-    Pairs are looked at in the order of their bounding spheres' distances, until no other can be nearer. The patch
-    (k, 3) is that of all pairs that touch in the same plane: a floor of triangles is one.
+    Pairs are looked at in the order of their bounding spheres' distances, until no other can be nearer.
     """
     n, m = len(a.position), len(b.position)
     builder = ShapeTableBuilder(slots=n + m)
@@ -169,15 +205,9 @@ def _deepest(a: _Side, b: _Side, offset: Array) -> tuple[Array, Array]:
         if best is None or rows[k, 0] < best[0]:
             best, pair = rows[k].copy(), pairs[k]
         begin, size = begin + size, 2 * size
-    tie = FEATURE_TIE * float(radius[pair][np.isfinite(radius[pair])].sum())
-    patches = []
-    for pairs, rows in looked_at:
-        level = (rows[:, 0] <= best[0] + tie) & (rows[:, 1:4] @ best[1:4] >= 1.0 - FEATURE_TIE)
-        count, points = manifold_batch(builder.table, position, rotation, pairs[level], rows[level])
-        patches += [points[i, : count[i]] + position[pairs[level][i, 0]] for i in range(len(count))]
+    patch = _Patch(builder.table, position, rotation, looked_at, best.copy(), pair)
     best[4:7] += position[pair[0]]
-    patch = patches[0] if len(patches) == 1 else outline(np.concatenate(patches), best[1:4], tie)
-    return best, patch if len(patch) > 1 else best[None, 4:7]
+    return best, patch
 
 
 def _holds(outer: _Side, inner: _Side, offset: Array) -> bool:
