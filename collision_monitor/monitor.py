@@ -623,7 +623,7 @@ class Monitor:
             self._uncertain.add_pairs(pairs, bodies, now)
         events, queries = self._bounds(pairs, now) if bounds_only else self._first_impacts(pairs, now)
         work["impact_queries"] += queries
-        events = events[: keep_first(events, now, bodies.motion, self._events.events, self._pairs)]
+        events = events[: keep_first(events, bodies.motion, self._events.events, self._pairs)]
         bodies.motion["covered"][which] = bodies.motion["cover"][which]
         return events
 

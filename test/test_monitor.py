@@ -140,6 +140,21 @@ def test_a_motion_that_is_kept_is_continued_not_started_anew(shapes: tuple[Shape
     assert queries < 60
 
 
+@pytest.mark.parametrize("shape", [Sphere(0.5), Box((1, 1, 1))])
+def test_a_pair_is_told_once_after_a_pause_longer_than_what_was_predicted(shape: Shape) -> None:
+    """They go on as they said, and are heard of again when they touch and all that was predicted of them is over."""
+    monitor, speed = Monitor(), 0.4
+    monitor.add(0, shape)
+    monitor.add(1, shape)
+    twists = np.zeros((2, 6))
+    twists[:, 0] = speed, -speed
+    phases = []
+    for t in (0.0, 3.4, 3.5):
+        result = monitor.step(int(t * SECOND), [0, 1], still(speed * t, 2.0 - speed * t), twists)
+        phases.append(result.contacts["phase"].tolist())
+    assert phases == [[], [records.Phase.BEGIN], [records.Phase.PERSIST]]
+
+
 def test_disagreements_are_noticed() -> None:
     result = Monitor().step(0, [], np.zeros((0, 7)))
     one = Monitor()

@@ -7,6 +7,8 @@ Source: lecture slides "List of collisions": ordered on time, only the first has
 
 from __future__ import annotations
 
+from math import inf
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -103,7 +105,7 @@ def _place(key, new, place):
 
 
 @kernel
-def keep_first(new, now, motion, pending, pairs):
+def keep_first(new, motion, pending, pairs):
     """Move those of `new` to the front that are the first impact of their pair; returns how many.
 
     Where a pair was predicted further, it may have an earlier impact: in `pending`, or in the active pairs, which are
@@ -111,7 +113,7 @@ def keep_first(new, now, motion, pending, pairs):
     """
     later = 0
     for k in range(new.size):
-        later += _begins_later(new[k], now, motion)
+        later += _was_predicted(new[k], motion)
     if later == 0:
         return new.size
     size = 4
@@ -119,7 +121,7 @@ def keep_first(new, now, motion, pending, pairs):
         size *= 2
     place = np.full(size, -1, np.int32)
     for k in range(new.size):
-        if _begins_later(new[k], now, motion):
+        if _was_predicted(new[k], motion):
             place[_place(new[k].key, new, place)] = k
     keep = np.ones(new.size, np.bool_)
     for k in range(pending.size):
@@ -146,9 +148,9 @@ def keep_first(new, now, motion, pending, pairs):
 
 
 @inlined
-def _begins_later(event, now, motion):
-    """Was its pair predicted until after `now` before this step?"""
-    return min(motion[event.i].covered, motion[event.j].covered) > now
+def _was_predicted(event, motion):
+    """Was its pair predicted before this step, by motions that still hold?"""
+    return min(motion[event.i].covered, motion[event.j].covered) > -inf
 
 
 class EventList:

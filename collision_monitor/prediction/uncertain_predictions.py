@@ -45,9 +45,9 @@ Judge = Callable[[Pairs, bool], NDArray[np.float64]]
 
 @kernel
 def renew(entries, pairs, bodies, spread, now, renewed):
-    """The entries that still hold, then those of the pairs (P, 2) in which a body is uncertain, into renewed.
+    """The entries that still hold, then those of the pairs (P, 2) in which a body may be uncertain, into renewed.
 
-    Returns how many.
+    A body whose box allows for uncertainty is not looked at anew when it declares some again. Returns how many.
     """
     n = 0
     motion = bodies.motion
@@ -59,7 +59,8 @@ def renew(entries, pairs, bodies, spread, now, renewed):
             n += 1
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
-        if not (is_uncertain(spread, i) or is_uncertain(spread, j)):
+        widened = motion[i].spread_0 + motion[i].spread_1 + motion[j].spread_0 + motion[j].spread_1 > 0.0
+        if not (widened or is_uncertain(spread, i) or is_uncertain(spread, j)):
             continue
         if motion[i].id > motion[j].id:
             i, j = j, i

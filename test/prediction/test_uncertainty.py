@@ -162,6 +162,21 @@ def test_a_declared_acceleration_widens_it() -> None:
     assert answers[1] > 0.1
 
 
+def test_who_declares_uncertainty_now_and_then_is_told_of() -> None:
+    """The other one comes near in a step in which nothing is declared; from the next one on something is again."""
+    monitor = cm.Monitor()
+    told = []
+    monitor.add(1, cm.Sphere(0.5))
+    monitor.add(2, cm.Sphere(0.5))
+    for step, sigma in enumerate((0.3, 0.3, np.nan, 0.3, np.nan, 0.3)):
+        t = 0.02 * step
+        first = state(1, (t, 0, 0), (1, 0, 0), sigma, 0.0)
+        second = state(2, (3 - t, 1.4, 0) if step >= 2 else (30, 30, 0), (-1 if step >= 2 else 0, 0, 0), 0.0, 0.0)
+        predictions = monitor.step(step * SECOND // 50, np.concatenate([first, second])).predictions
+        told.append([int(status) for status in predictions["status"]])
+    assert told == [[], [], [], [PredictionStatus.POSSIBLE], [], [PredictionStatus.POSSIBLE]]
+
+
 def test_covariances_that_cannot_be_are_refused() -> None:
     monitor = cm.Monitor()
     monitor.add(1, cm.Sphere(0.5))
