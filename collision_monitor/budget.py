@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import Final, Self
 
 FEWEST: Final = 8
-"""Pairs between two looks at the clock, at least: some 50 µs."""
+"""Pairs in a step, and between two looks at the clock, at least: some 50 µs."""
 
 LEARNING: Final = 0.2
 """Weight of the latest measurement in the running means; that of a pair's cost rises at once and falls slowly."""
@@ -80,7 +80,7 @@ class StepClock:
 
 
 class TimeBudget(PairBudget):
-    """As many pairs as fit into `seconds` from the step's begin on, but one in any case; not more than the limit."""
+    """As many pairs as fit into `seconds` from the step's begin on, but FEWEST in any case, so that work goes on."""
 
     def __init__(self, clock: StepClock, seconds: float, limit: int) -> None:
         super().__init__(limit)
@@ -95,7 +95,7 @@ class TimeBudget(PairBudget):
         if fit < min(left, FEWEST):
             if self.done == 0:
                 self._clock.cost[work] *= 1.0 - LEARNING  # or one bad estimate would stop all steps to come
-            self._limit = min(self._limit, max(self.done, 1))  # the step is over
+            self._limit = min(self._limit, max(self.done, FEWEST))  # the step is over
             self._clock.stopped = self._clock.stopped or now
             return super().next(left, work)
         count = super().next(min(left, max(FEWEST, fit // 2)), work)
