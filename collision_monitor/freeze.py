@@ -38,7 +38,7 @@ def freeze(monitor: Monitor) -> Snapshot:
         **{f"bodies.{name}": column[:top].copy() for name, column in m._bodies._asdict().items()},
         **{f"spread.{name}": column[:top].copy() for name, column in m._uncertain.spread._asdict().items()},
         **{f"parts.{name}": column[: len(shapes.kind)].copy() for name, column in m._parts._asdict().items()},
-        **{f"shapes.{name}": column.T.copy().T for name, column in shapes._asdict().items()},
+        **{f"shapes.{name}": column.copy() for name, column in shapes._asdict().items()},
         "shapes.vertices": shapes.vertices.T.copy(),
         "boxes": m._grid.box[:top].copy(),
         "events": m._events.events.copy(),
