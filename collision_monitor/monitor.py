@@ -827,7 +827,7 @@ class Monitor:
         predictions = predictions[:n]
         if self._uncertain.active and p.horizon > 0.0:
             touching = self._pairs["key"][self._pairs["touching"] == 1]
-            scene = Scene(self._shapes.table, self._parts, self._bodies, now, p, self._planar)
+            scene = Scene(self._shapes.table, self._parts, self._bodies, now, p, self._planar, self._pool)
             predictions = self._uncertain.complete(predictions, slots[:n], touching, scene)
             unresolved = np.count_nonzero(predictions["status"] == records.PredictionStatus.UNRESOLVED)
         if p.min_closing_speed > 0.0 or p.ignore_separating:

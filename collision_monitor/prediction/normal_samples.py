@@ -32,23 +32,32 @@ class NormalSamples(NamedTuple):
     weights: NDArray[np.float64]
 
 
-def generating_vector(count: int, dimensions: int) -> list[int]:
-    """Of the lattice {k z / count}: each component makes the worst-case error smallest, given those before it.
+PILOT: Final = 128
+"""About so many of the points, evenly taken, are a coarser lattice that is good by itself."""
 
-    The error is that of the Korobov space of smoothness 2 with weights 1 / j^2: later coordinates matter less.
+
+def generating_vector(count: int, dimensions: int) -> list[int]:
+    """Of the lattice {k z / count}: each component makes the worst-case errors smallest, given those before it.
+
+    That of all points, which counts three times, and that of the coarser lattice in them (after Cools, Kuo and Nuyens,
+    2006). They are those of the Korobov space of smoothness 2 with weights 1 / j^2: later coordinates matter less.
     """
     x = np.arange(count) / count
     kernel = 2.0 * math.pi**2 * (x * x - x + 1.0 / 6.0)
     k = np.arange(count)
+    stride = max(1, count // PILOT)
     candidates = [z for z in range(1, count // 2 + 1) if math.gcd(z, count) == 1]
     product = np.ones(count)
     vector = []
     for j in range(1, dimensions + 1):
-        weight = 1.0 / j**2
-        errors = [float(product @ kernel[k * z % count]) for z in candidates]
-        best = candidates[int(np.argmin(errors))] if j > 1 else 1  # the first ones are all the same
+        best, least = 1, math.inf  # at first they are all the same
+        for z in candidates if j > 1 else ():
+            with_z = product * (1.0 + kernel[k * z % count] / j**2)
+            error = (with_z.mean() - 1.0) ** 3 * (with_z[::stride].mean() - 1.0)
+            if error < least:
+                best, least = z, error
         vector.append(best)
-        product *= 1.0 + weight * kernel[k * best % count]
+        product *= 1.0 + kernel[k * best % count] / j**2
     return vector
 
 

@@ -6,7 +6,7 @@ motions of both bodies do. Nothing here runs before a state declares an uncertai
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from math import inf, nan
 from statistics import NormalDist
@@ -21,10 +21,13 @@ from collision_monitor.prediction.acceleration_bounds import widen_intervals
 from collision_monitor.prediction.motion import Bodies, enlarge
 from collision_monitor.prediction.normal_samples import normal_samples
 from collision_monitor.prediction.spread import is_uncertain, make_spread, take_spread
-from collision_monitor.prediction.uncertainty import PROBABILITY, impact_probabilities, make_room
+from collision_monitor.prediction.uncertainty import PROBABILITY, Room, impact_probabilities, make_room
 from collision_monitor.records import PREDICTION, Method, PredictionStatus
 
 ANSWERS: Final = ("earliest", "most_likely", "latest", "probability")
+FEWEST_PAIRS_FOR_THREADS: Final = 8
+"""Handing work to a thread costs as much as some of them."""
+
 INTERVAL: Final = ("lower", "upper", "status")
 
 ENTRY = np.dtype(
@@ -40,7 +43,6 @@ ENTRY = np.dtype(
 
 Records = NDArray[np.void]
 Pairs = NDArray[np.int32]
-Judge = Callable[[Pairs, bool], NDArray[np.float64]]
 
 
 @kernel
@@ -92,6 +94,7 @@ class Scene(NamedTuple):
     now: float
     profile: Any  # profiles.Profile
     planar: bool
+    pool: ThreadPoolExecutor | None
 
 
 class UncertainPredictions:
@@ -103,7 +106,7 @@ class UncertainPredictions:
         self.spread = make_spread(capacity)
         self.entries: Records = np.empty(0, ENTRY)
         """The pairs, by key."""
-        self._room = make_room()
+        self._rooms = [make_room()]  # one for each thread
 
     def enlarge(self, capacity: int) -> None:
         """Room for more bodies; the slots stay."""
@@ -175,22 +178,32 @@ class UncertainPredictions:
         ends = [np.ascontiguousarray(predictions[name]) for name in INTERVAL]
         widen_intervals(
             scene.table, scene.parts, scene.bodies, self.spread, slots, scene.now, p.horizon, p.contact_margin,
-            p.impact_tolerance, p.impact_iterations, self._room, *ends,
+            p.impact_tolerance, p.impact_iterations, self._rooms[0], *ends,
         )  # fmt: skip
         for name, column in zip(INTERVAL, ends, strict=True):
             predictions[name] = column
 
     def _judge(self, slots: Pairs, stated: bool, scene: Scene) -> NDArray[np.float64]:
+        """Answers (n, 4) for pairs of body slots (n, 2), on all threads; the same for any number of them."""
         p = scene.profile
-        answers = np.empty((len(slots), len(ANSWERS)))
         samples = normal_samples(p.uncertainty_samples)
-        impact_probabilities(
-            scene.table, scene.parts, scene.bodies, self.spread, slots, stated, scene.now, p.horizon, p.contact_margin,
-            p.stale_acceleration, p.impact_tolerance, p.impact_iterations, p.confidence,
-            sigmas_for(p.min_probability), sigmas_for(p.min_probability * (1.0 - p.confidence)), scene.planar, *samples,
-            self._room, answers,
-        )  # fmt: skip
-        return answers
+        sigmas, safe_sigmas = sigmas_for(p.min_probability), sigmas_for(p.min_probability * (1.0 - p.confidence))
+
+        def part(slots: Pairs, room: Room) -> NDArray[np.float64]:
+            answers = np.empty((len(slots), len(ANSWERS)))
+            impact_probabilities(
+                scene.table, scene.parts, scene.bodies, self.spread, slots, stated, scene.now, p.horizon,
+                p.contact_margin, p.stale_acceleration, p.impact_tolerance, p.impact_iterations, p.confidence, sigmas,
+                safe_sigmas, p.min_probability, scene.planar, *samples, room, answers,
+            )  # fmt: skip
+            return answers
+
+        if scene.pool is None or len(slots) < FEWEST_PAIRS_FOR_THREADS:
+            return part(slots, self._rooms[0])
+        while len(self._rooms) < p.threads:
+            self._rooms.append(make_room())
+        rooms = self._rooms[: p.threads]
+        return np.concatenate(list(scene.pool.map(part, np.array_split(slots, len(rooms)), rooms)))
 
 
 def _sorted(predictions: Records) -> Records:

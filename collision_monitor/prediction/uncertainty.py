@@ -15,6 +15,7 @@ import numpy as np
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.prediction.motion import MOTION, quaternion_to_matrix, turn_quaternion
+from collision_monitor.prediction.normal_samples import PILOT
 from collision_monitor.prediction.spread import FIFTH_ROOT, is_uncertain, surface_spread, unknown_acceleration
 from collision_monitor.prediction.time_of_impact import (
     CLEAR,
@@ -35,6 +36,10 @@ NODES: Final = 9
 
 SAMPLE_TOLERANCE: Final = 0.05
 """Within how many standard deviations of the gap a sample's impact is settled: its probability is off by 0.004."""
+
+PILOT_PART: Final = 0.2
+"""A pair that is stated to pass, and met with less than this part of the probability that is told in the coarse lattice
+of samples, is left out; and again after each further one."""
 
 OUTWARD: Final = 1.0
 """Standard errors of a quantile by which the earliest time is earlier and the latest later than the samples' own."""
@@ -348,12 +353,13 @@ def _shift(room, z, t, px, py, pz, vx, vy, vz):
 @kernel
 def impact_probabilities(
     table, parts, bodies, spread, pairs, stated, now, horizon, margin, stale_acceleration, tolerance, budget,
-    confidence, sigmas, safe_sigmas, planar, points, weights, room, answers,
+    confidence, sigmas, safe_sigmas, least_probability, planar, points, weights, room, answers,
 ):  # fmt: skip
     """Times and probabilities of impact of pairs (P, 2) of body slots from `now` on into answers (P, 4).
 
-    stated: the pairs meet as they are stated to move; else those that do not within `sigmas` standard deviations are
-    left out. Hardly any impact comes before bodies that are `safe_sigmas` of them larger meet.
+    stated: the pairs meet as they are stated to move; else those that do not within `sigmas` standard deviations, or
+    with much less than the least probability, are left out. Hardly any impact comes before bodies meet that are larger
+    by `safe_sigmas` standard deviations.
     NaN: left out, or neither body has declared any uncertainty. points (S, 12), weights (S,): normal_samples.
     """
     times = np.empty(weights.size)
@@ -398,14 +404,23 @@ def impact_probabilities(
         bias = 0.0 if r_i == 0.0 and r_j == 0.0 else -0.75 * coarse
         px, py, pz = B.x, B.y, B.z
         vx, vy, vz = B.vx, B.vy, B.vz
-        for n in range(weights.size):
-            z = points[n]
-            _shift(room, z, t, px, py, pz, vx, vy, vz)
-            if turn_i > 0.0:
-                _turn(A, room.rotation[0], level * turn_i * z[6], level * turn_i * z[7], turn_i * z[8])
-            if turn_j > 0.0:
-                _turn(B, room.rotation[1], level * turn_j * z[9], level * turn_j * z[10], turn_j * z[11])
-            times[n] = _first_contact(
-                table, parts, bodies, i, j, begin, horizon, margin, bias, 0.0, coarse, budget, room
-            )
-        _summarise(times, weights, np.argsort(times), confidence, safe, answers[k])
+        stride = max(1, weights.size // PILOT)
+        seen = 0.0
+        likely = True
+        for first in range(stride):
+            likely = stated or first == 0 or seen * stride >= PILOT_PART * least_probability * first
+            if not likely:
+                break
+            for n in range(first, weights.size, stride):
+                z = points[n]
+                _shift(room, z, t, px, py, pz, vx, vy, vz)
+                if turn_i > 0.0:
+                    _turn(A, room.rotation[0], level * turn_i * z[6], level * turn_i * z[7], turn_i * z[8])
+                if turn_j > 0.0:
+                    _turn(B, room.rotation[1], level * turn_j * z[9], level * turn_j * z[10], turn_j * z[11])
+                times[n] = _first_contact(
+                    table, parts, bodies, i, j, begin, horizon, margin, bias, 0.0, coarse, budget, room
+                )
+                seen += weights[n] if times[n] < inf else 0.0
+        if likely:
+            _summarise(times, weights, np.argsort(times), confidence, safe, answers[k])

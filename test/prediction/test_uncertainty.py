@@ -202,3 +202,19 @@ def test_the_samples_are_standard_normal() -> None:
     exact = NormalDist().cdf(edge)
     for direction in np.eye(DIMENSIONS):
         assert weights @ (points @ direction < edge) == pytest.approx(exact, abs=0.02)
+
+
+def test_the_answers_are_the_same_bytes_on_two_threads_and_when_replayed() -> None:
+    digests = []
+    for threads in (1, 2, 1):
+        monitor = cm.Monitor(Profile.named("fast").replace(threads=threads))
+        rng = np.random.default_rng(2)
+        for object_id in range(30):
+            monitor.add(object_id, cm.Box((0.5, 0.4, 0.3)) if object_id % 2 else cm.Capsule(0.1, 0.5))
+        rows = np.concatenate([state(k, rng.uniform(0, 4, 3), rng.normal(0, 1, 3), 0.05, 0.1) for k in range(30)])
+        for step in range(5):
+            told = monitor.step(step * SECOND // 20, rows).predictions
+            rows["position"] += 0.05 * rows["linear"]
+        digests.append(monitor.digest)
+    assert len(told) > 10
+    assert len(set(digests)) == 1
