@@ -120,7 +120,8 @@ def _pair(record: Any, names: dict[int, str]) -> str:
 
 
 def _doubt(impact: Any) -> str:
-    return "" if impact["status"] == PredictionStatus.HIT else " (unresolved)"
+    status = PredictionStatus(int(impact["status"]))
+    return "" if status == PredictionStatus.HIT else f" ({status.name.lower()})"
 
 
 def _time(seconds: float) -> str:
