@@ -9,10 +9,9 @@ from math import inf, sqrt
 from typing import Any
 
 import numpy as np
-from numba import get_num_threads, prange
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, inlined, kernel, parallel_kernel
+from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.geometry.shape_table import BOX, CAPSULE, CIRCLE, CONE, CYLINDER, HALF_SPACE, SPHERE
 from collision_monitor.narrow_phase.answer import CONTACT_SIZE, WORK_SIZE
 from collision_monitor.narrow_phase.box_box import axis_direction, box_box_separation, sat, touching_features
@@ -229,8 +228,8 @@ def _boxes(
 
 
 @device
-def _contacts(table: Any, position: Any, rotation: Any, pairs: Any, begin: int, end: int, out: Any, work: Any) -> None:
-    for k in range(begin, end):
+def _contacts(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
+    for k in range(len(pairs)):
         a, b = pairs[k, 0], pairs[k, 1]
         contact(
             table,
@@ -291,15 +290,7 @@ def _separations(table: Any, position: Any, rotation: Any, pairs: Any, out: Any,
 
 @kernel
 def _contact_serial(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
-    _contacts(table, position, rotation, pairs, 0, len(pairs), out, work)
-
-
-@parallel_kernel
-def _contact_parallel(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
-    blocks = len(work)
-    for block in prange(blocks):
-        begin, end = block * len(pairs) // blocks, (block + 1) * len(pairs) // blocks
-        _contacts(table, position, rotation, pairs, begin, end, out, work[block])
+    _contacts(table, position, rotation, pairs, out, work)
 
 
 @kernel
@@ -315,17 +306,11 @@ def _separation_serial(table: Any, position: Any, rotation: Any, pairs: Any, out
 
 
 def contact_batch(
-    table: Any, position: NDArray[np.float64], rotation: NDArray[np.float64], pairs: NDArray[np.int32], threads: int = 1
+    table: Any, position: NDArray[np.float64], rotation: NDArray[np.float64], pairs: NDArray[np.int32]
 ) -> NDArray[np.float64]:
-    """Contacts (M, 15) of the pairs (M, 2) of slots at position (K, 3) and rotation (K, 3, 3), world axes.
-
-    The bytes of the answer do not depend on `threads`.
-    """
+    """Contacts (M, 15) of the pairs (M, 2) of slots at position (K, 3) and rotation (K, 3, 3), world axes."""
     out = np.zeros((len(pairs), CONTACT_SIZE))
-    if threads == 1:
-        _contact_serial(table, position, rotation, pairs, out, np.zeros(WORK_SIZE))
-    else:
-        _contact_parallel(table, position, rotation, pairs, out, np.zeros((min(threads, get_num_threads()), WORK_SIZE)))
+    _contact_serial(table, position, rotation, pairs, out, np.zeros(WORK_SIZE))
     return out
 
 
