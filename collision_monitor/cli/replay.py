@@ -72,7 +72,7 @@ def replay_command(args: argparse.Namespace) -> int:
     if args.cut is not None and report.first_message is not None:
         from collision_monitor.session.cut import cut
 
-        count = cut(Session(paths[0]), report.first_message, args.cut, overwrite=args.force)
+        count = cut(Session(paths[0]), report.first_message, args.cut, tolerance=args.tolerance, overwrite=args.force)
         report.notes.append(f"{count} messages that show the first difference are in {args.cut}")
     print(json.dumps(_as_json(report, paths[0]), indent=2) if args.json else _as_text(report))
     return int(report.verdict)

@@ -17,9 +17,12 @@ from collision_monitor.session.rosbag2 import TYPES, full_name
 from collision_monitor.session.session_file import SessionFile
 
 
-def cut(session: Session, sequence: int, target: Path, *, overwrite: bool = False) -> int:
+def cut(
+    session: Session, sequence: int, target: Path, *, tolerance: float | None = None, overwrite: bool = False
+) -> int:
     """Copy what shows the difference in message `sequence` into a new session; returns how many messages that takes.
 
+    tolerance (m, s): that of the replay which found it.
     Raises SessionError where the target cannot be written or is the session itself, or where there are no settings.
     """
     if session.foreign:
@@ -36,7 +39,7 @@ def cut(session: Session, sequence: int, target: Path, *, overwrite: bool = Fals
         except OSError as error:
             raise SessionError(f"{target}: expected to be able to write there, got: {error.strerror}") from None
         # From the snapshot it may agree where from the start it does not: then what went wrong is older.
-        if start and replay(Session(target)).first_message == sequence:
+        if start and replay(Session(target), tolerance=tolerance).first_message == sequence:
             break
     return count
 

@@ -172,8 +172,10 @@ def test_a_window_begins_with_a_snapshot_and_holds_no_more_than_it_must() -> Non
     assert dropped == [*range(45), *range(61, 87)], "87 to 99 are held: 87 is the last snapshot before 89"
 
 
-def rewritten(source: Path, target: Path, without: range = range(0), spoil: int | None = None) -> None:
-    """The session without some messages, and with a contact changed in message `spoil`."""
+def rewritten(
+    source: Path, target: Path, without: range = range(0), spoil: int | None = None, by: float = 0.25
+) -> None:
+    """The session without some messages, and with the distances of message `spoil` changed."""
     session = Session(source)
     entries = list(session.entries())
     types = {each.topic: each.type for each in entries if isinstance(each, Recorded)}
@@ -183,15 +185,15 @@ def rewritten(source: Path, target: Path, without: range = range(0), spoil: int 
         if isinstance(each, RecordedSnapshot):
             file.write_snapshot(each.data, each.sequence, each.log_time)
         elif each.sequence not in without:
-            data = spoiled(each.data) if each.sequence == spoil else each.data
+            data = spoiled(each.data, by) if each.sequence == spoil else each.data
             file.write([Entry(each.topic, data, each.log_time, each.publish_time, each.sequence)])
     file.finish()
 
 
-def spoiled(data: bytes) -> bytes:
+def spoiled(data: bytes, by: float) -> bytes:
     contacts = decode_contacts(data)
     rows = contacts.contacts.copy()
-    rows["signed_distance"] += 0.25
+    rows["signed_distance"] += by
     return encode_contacts(contacts.stamp_ns, contacts.frame_id, contacts.step, rows, contacts.ids, contacts.names)
 
 
@@ -228,6 +230,18 @@ def test_a_difference_is_cut_out_from_the_last_snapshot_on(
     assert part.messages == late + 1 - places[3].sequence
     first = next(Session(tmp_path / "cut.mcap").messages())
     assert first.repeated and first.type == "ObjectDescriptionArray", "for readers that have no use for a snapshot"
+
+
+def test_what_is_within_the_tolerance_is_no_difference_to_cut_out(
+    path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place = Session(path).timeline().snapshots[3].sequence
+    contacts = [m.sequence for m in Session(path).messages() if m.topic == CONTACTS and m.sequence > place]
+    rewritten(path, tmp_path / "near.mcap", spoil=contacts[0], by=1e-9)
+    rewritten(tmp_path / "near.mcap", tmp_path / "bad.mcap", spoil=contacts[2])
+    command = ["replay", str(tmp_path / "bad.mcap"), "--tolerance", "1e-6", "--cut", str(tmp_path / "cut.mcap")]
+    assert main(command) == Verdict.DIVERGED
+    assert f"{contacts[2] + 1 - place} messages that show" in capsys.readouterr().out
 
 
 def test_a_damaged_snapshot_costs_only_itself(path: Path, tmp_path: Path) -> None:
