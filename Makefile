@@ -25,7 +25,7 @@ demo: setup ## watch the monitor at work, live
 
 test: lint ## set up, lint and run every test
 	@$(BIN)/python -m pytest -n auto --dist loadfile --ignore=test/ros --ignore=test/setup
-	@$(BIN)/python -m pytest test/ros test/setup
+	@$(BIN)/python -m pytest -n 2 --dist loadfile test/ros test/setup
 
 lint: setup ## ruff and mypy --strict
 	@$(BIN)/ruff check .

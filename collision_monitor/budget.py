@@ -6,6 +6,8 @@ The clock decides only how many pairs are looked at; which ones, and what is sai
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from time import perf_counter
 from typing import Final, Self
 
@@ -52,20 +54,27 @@ class StepClock:
     def __init__(self) -> None:
         self.cost = [1e-5, 1e-5]  # s for a pair, by kind of work
         self.began = self.stopped = 0.0
-        self._end = self._deviation = 0.0  # s
+        self._end = self._deviation = self._aside = 0.0  # s
         self._depth = 0
 
     def __enter__(self) -> Self:
         """Entered again within a step, it goes on."""
         if self._depth == 0:
-            self.began, self.stopped = perf_counter(), 0.0
+            self.began, self.stopped, self._aside = perf_counter(), 0.0, 0.0
         self._depth += 1
         return self
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """What is done meanwhile comes on top of the budget: no time is reserved for it."""
+        began = perf_counter()
+        yield
+        self._aside += perf_counter() - began
 
     def __exit__(self, *_: object) -> None:
         self._depth -= 1
         if self._depth == 0 and self.stopped:
-            took = perf_counter() - self.stopped
+            took = perf_counter() - self.stopped - self._aside
             if self._end:
                 took = min(took, OUTLIER * (self._end + self._deviation))
             else:

@@ -18,12 +18,18 @@ def is_bounded(low: Vector, high: Vector) -> bool:
     return min(high) < EVERYWHERE or max(low) > -EVERYWHERE
 
 
-def bodies_in(bodies: Bodies, top: int, now: float, low: Vector, high: Vector) -> NDArray[np.bool_]:
-    """Which of the first `top` bodies reach into the box from low to high (m), by their bounding spheres at `now`."""
+def bodies_in(
+    bodies: Bodies, top: int, now: float, low: Vector, high: Vector, stale_acceleration: float
+) -> NDArray[np.bool_]:
+    """Which of the first `top` bodies may reach into the box from low to high (m), by their bounding spheres at `now`.
+
+    Who is silent may have turned round meanwhile, by stale_acceleration (m/s^2).
+    """
     age = np.where(bodies.static[:top], 0.0, now - bodies.time[:top])
     centre = bodies.position[:top] + bodies.linear[:top] * age[:, None]
     outside = np.maximum(np.maximum(np.asarray(low) - centre, centre - np.asarray(high)), 0.0)
-    return np.asarray((outside**2).sum(axis=1) <= bodies.motion["radius"][:top] ** 2)
+    reach = bodies.motion["radius"][:top] + 0.5 * stale_acceleration * age**2
+    return np.asarray((outside**2).sum(axis=1) <= reach**2)
 
 
 def closes_fast(predictions: NDArray[np.void], least: float) -> NDArray[np.bool_]:

@@ -569,7 +569,8 @@ class Monitor:
         was[: len(self._outside)] = self._outside
         outside = np.zeros(top, np.bool_)
         if bounded:
-            outside = bodies.used[:top] & ~filters.bodies_in(bodies, top, now, p.region_min, p.region_max)
+            inside = filters.bodies_in(bodies, top, now, p.region_min, p.region_max, p.stale_acceleration)
+            outside = bodies.used[:top] & ~inside
         self._renewed.update(np.flatnonzero(was & ~outside & bodies.used[:top]).tolist())
         remove_boxes(self._grid, np.flatnonzero(outside).astype(np.int32))
         bodies.motion["version"][:top][outside & ~was] += 1
@@ -828,7 +829,8 @@ class Monitor:
         if self._uncertain.active and p.horizon > 0.0:
             touching = self._pairs["key"][self._pairs["touching"] == 1]
             scene = Scene(self._shapes.table, self._parts, self._bodies, now, p, self._planar, self._pool)
-            predictions = self._uncertain.complete(predictions, slots[:n], touching, scene)
+            with self.clock.aside():  # no budget cuts it: with its time kept free, nothing else would be done
+                predictions = self._uncertain.complete(predictions, slots[:n], touching, scene)
             unresolved = np.count_nonzero(predictions["status"] == records.PredictionStatus.UNRESOLVED)
         if p.min_closing_speed > 0.0 or p.ignore_separating:
             predictions = self._filtered(predictions, now)

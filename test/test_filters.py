@@ -152,3 +152,20 @@ def test_a_region_that_changes_takes_objects_in_and_out() -> None:
 def test_impossible_filters_are_named(settings: dict[str, Any], words: str) -> None:
     with pytest.raises(ProfileError, match=words):
         Profile(**settings)
+
+
+def test_who_fell_silent_on_the_way_out_may_have_stayed() -> None:
+    """Without a region the pair may touch for all that is known; so it may with one."""
+    answers = []
+    for profile in (Profile(), Profile(region_max=(1.0, 1e18, 1e18))):
+        monitor = Monitor(profile)
+        for object_id in (1, 2):
+            monitor.add(object_id, Sphere(0.3))
+        states = np.zeros(2, records.STATE)
+        states["id"], states["quaternion"][:, 3] = (1, 2), 1.0
+        states["position"][1], states["linear"][1] = (0.7, 0.0, 0.0), (1.0, 0.0, 0.0)
+        monitor.step(0, states)
+        answers.append([monitor.step(k * SECOND // 10, states[:1]) for k in range(1, 31)])
+    full, mine = ([len(step.contacts) + len(step.predictions) for step in steps] for steps in answers)
+    assert full == mine
+    assert max(full) == 1
