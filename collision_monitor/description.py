@@ -56,9 +56,10 @@ class ObjectDescription:
     def __post_init__(self) -> None:
         object_id = _uint32(self.object_id, "object id")
         what = f"object {object_id}"
+        given: Any = self.model  # or its name, as everywhere else
         try:
-            model = Model(self.model)
-        except ValueError:
+            model = Model[given.upper()] if isinstance(given, str) else Model(given)
+        except (ValueError, KeyError):
             choices = ", ".join(f"{m.name} ({m.value})" for m in Model)
             raise InputError(f"{what}, model: expected one of {choices}, got {self.model!r}") from None
         if self.static and self.pose is None:

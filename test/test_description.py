@@ -26,6 +26,7 @@ def test_what_the_message_may_leave_out_is_filled_in():
     made = ObjectDescription(7, Sphere(1), group=0, mask=0, max_linear_acceleration=math.nan, model=3)
     assert (made.name, made.group, made.mask, made.max_linear_acceleration) == ("object_7", 1, ALL_GROUPS, 0.0)
     assert made.model is Model.AABB
+    assert ObjectDescription(7, Sphere(1), model="aabb").model is Model.AABB  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -43,6 +44,7 @@ def test_what_the_message_may_leave_out_is_filled_in():
         ({"group": 2**32}, "group"),
         ({"mask": -1}, "mask"),
         ({"model": 99}, "KDOP26"),
+        ({"model": "cube"}, "OBB .*, got 'cube'"),
         ({"allowed": (1, -2)}, "allowed"),
         ({"max_linear_acceleration": -1.0}, "max_linear_acceleration"),
         ({"max_angular_acceleration": math.inf}, "max_angular_acceleration"),
