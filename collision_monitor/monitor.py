@@ -6,7 +6,7 @@ when -> the event list -> the pairs that are due -> contacts and predictions out
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -452,9 +452,8 @@ class Monitor:
         budget = self._budget()
         new = self._predict_moved(now, work, bounds_only=budget is not None)
         contacts = self._examine_active(new, now, work, budget)
-        predictions, unresolved = self._predictions(now)
-        unresolved += int(np.count_nonzero(contacts["status"] == records.ContactStatus.UNRESOLVED))
-        status = self._status(now, contacts, predictions, unresolved, work)
+        predictions = self._predictions(now)
+        status = self._status(now, contacts, predictions, work)
         for part in (contacts, predictions):
             self.digest = int(answers.chain_digest(np.uint64(self.digest), part.view(np.uint64)))
         self._deferred = work["deferred"]
@@ -622,21 +621,14 @@ class Monitor:
         work["candidate_pairs"] = len(pairs)
         if self._uncertain.counts(p):
             self._uncertain.add_pairs(pairs, bodies, now)
-        events, queries = self._bounds(pairs, now) if bounds_only else self._first_impacts(pairs, now)
+        if bounds_only:  # what the bounding spheres say, where that is faster
+            events, queries = self._impacts(coarse.bound_pairs, pairs, now, self._scratch[0])
+        else:
+            events, queries = self._first_impacts(pairs, now)
         work["impact_queries"] += queries
         events = events[: keep_first(events, bodies.motion, self._events.events, self._pairs)]
         bodies.motion["covered"][which] = bodies.motion["cover"][which]
         return events
-
-    def _bounds(self, pairs: NDArray[np.int32], now: float) -> tuple[NDArray[np.void], int]:
-        """As `_first_impacts`, but only what the bounding spheres say, where that is faster."""
-        p = self._profile
-        events = np.empty(len(pairs) + 1, IMPACT)
-        n, queries = coarse.bound_pairs(
-            self._shapes.table, self._parts, self._bodies, pairs, now, p.contact_margin,
-            p.impact_tolerance, p.impact_iterations, events, self._scratch[0],
-        )  # fmt: skip
-        return events[:n], queries
 
     def _partners(self, which: NDArray[np.int32], now: float) -> NDArray[np.int32]:
         """Pairs (P, 2) of the bodies in `which` with all whose swept boxes meet theirs."""
@@ -658,21 +650,27 @@ class Monitor:
 
     def _first_impacts(self, pairs: NDArray[np.int32], now: float) -> tuple[NDArray[np.void], int]:
         """First impacts (IMPACT) of pairs (P, 2) in their order, on all threads; and the distance queries made."""
-        p = self.profile
+        if self._pool is None or len(pairs) < FEWEST_PAIRS_FOR_THREADS:
+            return self._impacts(candidates.predict_pairs, pairs, now, self._scratch[0])
 
         def part(pairs: NDArray[np.int32], scratch: Scratch) -> tuple[NDArray[np.void], int]:
-            events = np.empty(len(pairs) + 1, IMPACT)
-            hits, queries = candidates.predict_pairs(
-                self._shapes.table, self._parts, self._bodies, pairs, now, p.contact_margin,
-                p.impact_tolerance, p.impact_iterations, events, scratch,
-            )  # fmt: skip
-            return events[:hits], queries
+            return self._impacts(candidates.predict_pairs, pairs, now, scratch)
 
-        if self._pool is None or len(pairs) < FEWEST_PAIRS_FOR_THREADS:
-            return part(pairs, self._scratch[0])
         # the kernels hold no lock; the parts are put together in order, so the answer is the same for any number
         parts = list(self._pool.map(part, np.array_split(pairs, len(self._scratch)), self._scratch))
         return joined([events for events, _ in parts]), sum(queries for _, queries in parts)
+
+    def _impacts(
+        self, find: Callable[..., tuple[int, int]], pairs: NDArray[Any], now: float, scratch: Scratch
+    ) -> tuple[NDArray[np.void], int]:
+        """What the kernel `find` says of the pairs: their impacts (IMPACT) in order, and the distance queries made."""
+        p = self._profile
+        events = np.empty(len(pairs) + 1, IMPACT)
+        n, queries = find(
+            self._shapes.table, self._parts, self._bodies, pairs, now, p.contact_margin,
+            p.impact_tolerance, p.impact_iterations, events, scratch,
+        )  # fmt: skip
+        return events[:n], queries
 
     def _moved(self, now: float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Slots of the bodies that left their predicted motion, and of others that are not predicted far enough."""
@@ -777,22 +775,13 @@ class Monitor:
         found = [np.zeros(0, IMPACT)]
         at = 0
         while at < len(todo) and (count := budget.next(len(todo) - at, REFINE)):
-            events, queries = self._impacts_of(pending.take(todo[at : at + count]), now)
+            bounds = pending.take(todo[at : at + count])
+            events, queries = self._impacts(coarse.refine, bounds, now, self._scratch[0])
             found.append(events)
             work["impact_queries"] += queries
             at += count
         work["deferred"] += len(todo) - at
         return todo[:at], joined(found)
-
-    def _impacts_of(self, bounds: NDArray[np.void], now: float) -> tuple[NDArray[np.void], int]:
-        """As `_first_impacts`, of the pairs of these events, from `now` on."""
-        p = self._profile
-        events = np.empty(len(bounds) + 1, IMPACT)
-        n, queries = coarse.refine(
-            self._shapes.table, self._parts, self._bodies, bounds, now, p.contact_margin,
-            p.impact_tolerance, p.impact_iterations, events, self._scratch[0],
-        )  # fmt: skip
-        return events[:n], queries
 
     def _with_orphans(self, contacts: NDArray[np.void], now: float) -> NDArray[np.void]:
         """Add the END of contacts whose object is gone."""
@@ -811,13 +800,13 @@ class Monitor:
         begins = both["phase"] != records.Phase.END  # the END of what was comes before the BEGIN of what is
         return both[np.lexsort((begins, both["id_b"], both["id_a"]))]
 
-    def _predictions(self, now: float) -> tuple[NDArray[np.void], int]:
+    def _predictions(self, now: float) -> NDArray[np.void]:
         p = self.profile
         pending = self._events.events
         within = int(np.searchsorted(pending["lower"], now + p.horizon, side="right"))
         predictions = np.empty(within + len(self._pairs), records.PREDICTION)
         slots = np.empty((len(predictions), 2), np.int32)
-        n, unresolved = answers.write_predictions(
+        n = answers.write_predictions(
             self._pairs, self._pair_events, pending[:within], self._bodies, self._parts.index, now, p.horizon,
             p.stale_after,
             predictions.view(np.float64).reshape(-1, 16),
@@ -831,11 +820,9 @@ class Monitor:
             scene = Scene(self._shapes.table, self._parts, self._bodies, now, p, self._planar, self._pool)
             with self.clock.aside():  # no budget cuts it: with its time kept free, nothing else would be done
                 predictions = self._uncertain.complete(predictions, slots[:n], touching, scene)
-            unresolved = np.count_nonzero(predictions["status"] == records.PredictionStatus.UNRESOLVED)
         if p.min_closing_speed > 0.0 or p.ignore_separating:
             predictions = self._filtered(predictions, now)
-            unresolved = np.count_nonzero(predictions["status"] == records.PredictionStatus.UNRESOLVED)
-        return predictions, int(unresolved)
+        return predictions
 
     def _filtered(self, predictions: NDArray[np.void], now: float) -> NDArray[np.void]:
         p = self._profile
@@ -852,10 +839,11 @@ class Monitor:
         now: float,
         contacts: NDArray[np.void],
         predictions: NDArray[np.void],
-        unresolved: int,
         work: dict[str, int],
     ) -> StepStatus:
         bodies, top = self._bodies, self._top
+        unresolved = np.count_nonzero(contacts["status"] == records.ContactStatus.UNRESOLVED)
+        unresolved += np.count_nonzero(predictions["status"] == records.PredictionStatus.UNRESOLVED)
         used, static, seen = bodies.used[:top], bodies.static[:top], bodies.seen[:top]
         stale = used & seen & ~static & (now - bodies.time[:top] > self.profile.stale_after)
         return StepStatus(
@@ -865,7 +853,7 @@ class Monitor:
             objects_stale=int(np.count_nonzero(stale)),
             contacts=int(np.count_nonzero(contacts["phase"] != records.Phase.END)),
             predictions=len(predictions),
-            unresolved=unresolved,
+            unresolved=int(unresolved),
             events_pending=len(self._events),
             **work,
         )

@@ -67,9 +67,9 @@ def write_predictions(
     """Predictions of the active pairs that do not touch, then of the pending events within the horizon.
 
     floats (n, 16), words (n, 32), octets (n, 128): one array of records.PREDICTION; slots (n, 2): of the bodies.
-    Returns (how many, unresolved).
+    Returns how many.
     """
-    n = unresolved = 0
+    n = 0
     for k in range(pairs.size + pending.size):
         if k < pairs.size:
             if pairs[k].touching == 1 or pairs[k].leaving == 1:
@@ -103,9 +103,8 @@ def write_predictions(
         stale_j = not bodies.static[j] and now - bodies.time[j] > stale_after
         octets[n, 124] = 1 if stale_i or stale_j else 0
         octets[n, 125:128] = 0
-        unresolved += status
         n += 1
-    return n, unresolved
+    return n
 
 
 @kernel

@@ -1,6 +1,6 @@
 """The monitor as a ROS 2 node: message bytes in, the pipeline, message bytes out, and all of it on record.
 
-ros2 run collision_monitor monitor --ros-args -p horizon:=1.0 -p record:=run.mcap
+    ros2 run collision_monitor monitor --ros-args -p horizon:=1.0 -p record:=run.mcap
 """
 
 from __future__ import annotations

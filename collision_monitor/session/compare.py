@@ -42,17 +42,26 @@ def compare_answers(kind: str, topic: str, step: int, recorded: bytes, replayed:
     """The first difference of two messages of type `kind`; None where all bytes are equal."""
     if recorded == replayed:
         return None
-    decode, rows = _DECODERS[kind]
-    ours = decode(replayed)
-    try:
-        theirs = decode(recorded)
-    except MessageError as error:
-        return Difference(step, topic, "the message", "bytes", str(error), f"{len(replayed)} bytes that can be read")
+    rows = _DECODERS[kind][1]
+    decoded = _decoded(kind, topic, step, recorded, replayed)
+    if isinstance(decoded, Difference):
+        return decoded
+    theirs, ours = decoded
     return (
         _row_difference(rows, topic, step, theirs, ours)
         or _field_difference(topic, step, theirs, ours, rows)
         or Difference(step, topic, "the message", "padding", f"{len(recorded)} bytes", f"{len(replayed)} bytes")
     )
+
+
+def _decoded(kind: str, topic: str, step: int, recorded: bytes, replayed: bytes) -> tuple[Any, Any] | Difference:
+    """Both messages; or that the recorded one cannot be read."""
+    decode, _ = _DECODERS[kind]
+    ours = decode(replayed)
+    try:
+        return decode(recorded), ours
+    except MessageError as error:
+        return Difference(step, topic, "the message", "bytes", str(error), f"{len(replayed)} bytes that can be read")
 
 
 _WITHIN: Final = {"contacts": ("signed_distance",), "predictions": ("lower", "upper")}
@@ -66,12 +75,11 @@ def compare_within(
 
     A contact that is no deeper, and a prediction no nearer to the horizon, may be there in one of them only.
     """
-    decode, rows = _DECODERS[kind]
-    ours = decode(replayed)
-    try:
-        theirs = decode(recorded)
-    except MessageError as error:
-        return Difference(step, topic, "the message", "bytes", str(error), f"{len(replayed)} bytes that can be read")
+    rows = _DECODERS[kind][1]
+    decoded = _decoded(kind, topic, step, recorded, replayed)
+    if isinstance(decoded, Difference):
+        return decoded
+    theirs, ours = decoded
     there, here = ({_ids(row): row for row in getattr(message, rows)} for message in (theirs, ours))
     horizon = getattr(theirs, "horizon", 0.0)
     for ids in sorted(there.keys() | here.keys()):
