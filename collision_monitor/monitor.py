@@ -30,6 +30,7 @@ from collision_monitor.plan import ScenePlan, scene_plan
 from collision_monitor.prediction import active_pairs, answers, candidates, coarse, tracking
 from collision_monitor.prediction.event_list import EventList, keep_first
 from collision_monitor.prediction.motion import Bodies, enlarge, make_bodies, make_parts
+from collision_monitor.prediction.patches import with_patches
 from collision_monitor.prediction.spread import worst_stddevs
 from collision_monitor.prediction.time_of_impact import BOUND_ONLY, IMPACT, Scratch, make_scratch
 from collision_monitor.prediction.uncertain_predictions import Scene, UncertainPredictions
@@ -115,6 +116,8 @@ class StepStatus:
 @dataclass(frozen=True, eq=False)
 class StepResult:
     """The answers of one step: `contacts` (records.CONTACT) by ids, `predictions` (records.PREDICTION) soonest first.
+
+    With a profile of several `contact_points`, a contact has `point_count` rows, and `point_index` counts them.
 
     accepted is False where the whole step was refused for its stamp; the answers are then those of the last time.
     cut: pairs that were looked at until the budget ran out; None: all were.
@@ -715,7 +718,13 @@ class Monitor:
             contacts.view(np.uint32).reshape(-1, 34),
             contacts.view(np.uint8).reshape(-1, 136),
         )  # fmt: skip
-        return self._with_orphans(contacts[:n], now)
+        contacts = contacts[:n]
+        if self._profile.contact_points > 1:
+            contacts = with_patches(
+                contacts, self._shapes.table, self._parts, bodies, self._pairs, results, now,
+                self._profile.contact_points,
+            )  # fmt: skip
+        return self._with_orphans(contacts, now)
 
     def _examine(
         self, pairs: NDArray[np.void], events: NDArray[np.void], now: float, work: dict[str, int]
@@ -851,7 +860,7 @@ class Monitor:
             objects_static=int(np.count_nonzero(used & static)),
             objects_unseen=int(np.count_nonzero(used & ~seen)),
             objects_stale=int(np.count_nonzero(stale)),
-            contacts=int(np.count_nonzero(contacts["phase"] != records.Phase.END)),
+            contacts=int(np.count_nonzero(self._pairs["touching"])),
             predictions=len(predictions),
             unresolved=int(unresolved),
             events_pending=len(self._events),

@@ -16,7 +16,7 @@ from typing import Any, Final
 import yaml
 
 from collision_monitor.errors import ProfileError
-from collision_monitor.records import Model
+from collision_monitor.records import MOST_POINTS, Model
 from collision_monitor.settings import EVERYWHERE, Setting, choice, number, settings_of, switch, vector
 
 NO_BUDGET: Final = 1e6
@@ -38,6 +38,9 @@ class Profile:
     name: str = "balanced"
     horizon: float = number(2.0, 0.0, 1e6, "s", "How far ahead collisions are predicted; 0: contacts only.")
     contact_margin: float = number(0.0, 0.0, 1e6, "m", "Pairs up to this far apart count as touching.")
+    contact_points: int = number(
+        1, 1, MOST_POINTS, "1", "Most points of a contact; past 1, a row for each corner of faces that touch."
+    )
     impact_tolerance: float = number(1e-4, 1e-12, 1.0, "m", "Gap at which a predicted impact is settled.")
     impact_iterations: int = number(
         64, 1, 100000, "1", "Most distance computations for one predicted impact; past it the pair is UNRESOLVED."

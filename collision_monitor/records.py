@@ -77,6 +77,10 @@ PREDICTION = np.dtype(
 )
 
 
+MOST_POINTS = 4
+"""Rows that one contact may have in a ContactArray: the corners that stand for a patch."""
+
+
 class StateFlag(IntFlag):
     """`ObjectState.flags`."""
 

@@ -22,6 +22,7 @@ SECOND = 1_000_000_000
 OTHER: dict[str, Any] = {
     "horizon": 3.5,
     "contact_margin": 0.05,
+    "contact_points": 4,
     "impact_tolerance": 1e-6,
     "impact_iterations": 200,
     "position_tolerance": 1e-2,

@@ -35,6 +35,8 @@ for step in range(30):
     first = first or time.perf_counter() - began
     poses[:, :3] += 0.01 * twists[:, :3]
     twists[rng.integers(0, 300, 3)] *= -1
+    if step == 5:
+        monitor.profile = monitor.profile.replace(contact_points=4)
     if step == 10:
         monitor.remove(7)
         monitor.add(2000, cm.Sphere(1))

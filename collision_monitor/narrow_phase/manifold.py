@@ -1,4 +1,4 @@
-"""Contact manifolds of polytopes: the patch in which a face or an edge lies on the other, as at most four points.
+"""Contact manifolds of polytopes and polygons: where a face or an edge lies on the other, as at most four points.
 
 The features that touch are the corners within FEATURE_TIE of the supporting planes across the contact's normal. Seen
 along it they are two convex polygons, and what these share is the patch; four of its corners stand for it.
@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, kernel
-from collision_monitor.geometry.shape_table import BOX, CONVEX_HULL, HALF_SPACE
+from collision_monitor.geometry.shape_table import BOX, CONVEX_HULL, HALF_SPACE, POLYGON
 from collision_monitor.narrow_phase.answer import work_array
+from collision_monitor.records import MOST_POINTS
 from collision_monitor.tolerances import EPSILON, FEATURE_TIE, SAT_ROUND_OFF, TOUCHING
-
-MOST_POINTS: Final = 4
 
 CORNERS: Final = 512
 """Corners of one feature that are looked at; a face with more is cut down to its first ones."""
@@ -47,7 +46,7 @@ def _basis(nx: float, ny: float, nz: float) -> Any:
 
 @device
 def _corner(table: Any, slot: int, k: int) -> Any:
-    """Corner k of a box or a hull in its own frame."""
+    """Corner k of a box, a hull or a polygon in its own frame."""
     if table.kind[slot] == BOX:
         return (
             copysign(table.size[slot, 0], (k & 1) - 0.5),
@@ -178,12 +177,12 @@ def _shared_line(work: Any, a: int, b: int, tie: float) -> int:
 
 
 @device
-def _four(work: Any, at: int, count: int, tie: float) -> int:
-    """Put the corners that stand for a polygon first, in its order: at most four. Of equals the first is taken.
+def _chosen(work: Any, at: int, count: int, tie: float, most: int) -> int:
+    """Put the corners that stand for a polygon first, in its order: at most `most` of 2 to 4. Of equals the first.
 
     The two farthest from each other, as found from the middle, and those farthest from their line on either side.
     """
-    if count <= MOST_POINTS:
+    if count <= most:
         return count
     mx = my = 0.0
     for k in range(count):
@@ -195,6 +194,15 @@ def _four(work: Any, at: int, count: int, tie: float) -> int:
     ux, uy = work[at + 2 * j] - ix, work[at + 2 * j + 1] - iy
     left = _farthest(work, at, count, ix, iy, ux, uy, tie)
     right = _farthest(work, at, count, ix, iy, -ux, -uy, tie)
+    if most == 2:
+        left = right = i
+    elif most == 3:
+        x = work[at + 2 * left] + work[at + 2 * right] - 2.0 * ix  # the nearer one is left out
+        y = work[at + 2 * left + 1] + work[at + 2 * right + 1] - 2.0 * iy
+        if ux * y - uy * x >= -tie * sqrt(ux * ux + uy * uy):
+            right = i
+        else:
+            left = i
     kept = 0
     for k in range(count):
         if k == i or k == j or k == left or k == right:
@@ -227,7 +235,8 @@ def manifold(
     for i in range(3):
         out[0, i] = row[4 + i]
     ka, kb = table.kind[a], table.kind[b]
-    flat_a, flat_b = ka == BOX or ka == CONVEX_HULL, kb == BOX or kb == CONVEX_HULL
+    flat_a = ka == BOX or ka == CONVEX_HULL or ka == POLYGON
+    flat_b = kb == BOX or kb == CONVEX_HULL or kb == POLYGON
     if not ((flat_a or ka == HALF_SPACE) and (flat_b or kb == HALF_SPACE) and (flat_a or flat_b)):
         return 1
     nx, ny, nz = row[1], row[2], row[3]
@@ -264,7 +273,7 @@ def manifold(
         count = _shared_line(work, _A, _B, tie)
     if count < 2:
         return 1
-    count = _four(work, at, _outline(work, at, count, tie), tie)
+    count = _chosen(work, at, _outline(work, at, count, tie), tie, MOST_POINTS)
     height = nx * row[4] + ny * row[5] + nz * row[6]
     for k in range(count):
         x, y = work[at + 2 * k], work[at + 2 * k + 1]
@@ -274,7 +283,7 @@ def manifold(
     return count
 
 
-@device
+@kernel
 def _manifolds(
     table: Any, position: Any, rotation: Any, pairs: Any, contacts: Any, count: Any, out: Any, work: Any
 ) -> None:
@@ -286,34 +295,30 @@ def _manifolds(
         )  # fmt: skip
 
 
-@kernel
-def _manifold_serial(
-    table: Any, position: Any, rotation: Any, pairs: Any, contacts: Any, count: Any, out: Any, work: Any
-) -> None:
-    _manifolds(table, position, rotation, pairs, contacts, count, out, work)
-
-
 @device
-def _basis_into(normal: Any, out: Any) -> None:
-    out[0, 0], out[0, 1], out[0, 2], out[1, 0], out[1, 1], out[1, 2] = _basis(normal[0], normal[1], normal[2])
+def reduce_points(points: Any, count: int, nx: float, ny: float, nz: float, tie: float, most: int, work: Any) -> int:
+    """Of the first `count` points (m, 3), all in one plane across n, put those that stand for their outline first.
 
-
-@kernel
-def _reduce(points: Any, normal: Any, tie: float, axes: Any, work: Any) -> int:
-    """Of points (m, 3) in one plane, those that stand for their outline come first; how many."""
-    _basis_into(normal, axes)
+    At most `most` of 2 to 4; how many.
+    """
+    ux, uy, uz, vx, vy, vz = _basis(nx, ny, nz)
     base_x, base_y, base_z = points[0, 0], points[0, 1], points[0, 2]
-    for k in range(len(points)):
+    for k in range(count):
         x, y, z = points[k, 0] - base_x, points[k, 1] - base_y, points[k, 2] - base_z
-        work[_A + 2 * k] = axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z
-        work[_A + 2 * k + 1] = axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z
-    count = _four(work, _A, _outline(work, _A, len(points), tie), tie)
+        work[_A + 2 * k] = ux * x + uy * y + uz * z
+        work[_A + 2 * k + 1] = vx * x + vy * y + vz * z
+    count = _chosen(work, _A, _outline(work, _A, count, tie), tie, most)
     for k in range(count):
         x, y = work[_A + 2 * k], work[_A + 2 * k + 1]
-        points[k, 0] = base_x + x * axes[0, 0] + y * axes[1, 0]
-        points[k, 1] = base_y + x * axes[0, 1] + y * axes[1, 1]
-        points[k, 2] = base_z + x * axes[0, 2] + y * axes[1, 2]
+        points[k, 0] = base_x + x * ux + y * vx
+        points[k, 1] = base_y + x * uy + y * vy
+        points[k, 2] = base_z + x * uz + y * vz
     return count
+
+
+@kernel
+def _reduce(points: Any, normal: Any, tie: float, work: Any) -> int:
+    return reduce_points(points, len(points), normal[0], normal[1], normal[2], tie, MOST_POINTS, work)
 
 
 def manifold_batch(
@@ -329,7 +334,7 @@ def manifold_batch(
     """
     count = np.zeros(len(pairs), np.int32)
     out = np.zeros((len(pairs), MOST_POINTS, 3))
-    _manifold_serial(table, position, rotation, pairs, contacts, count, out, work_array())
+    _manifolds(table, position, rotation, pairs, contacts, count, out, work_array())
     return count, out
 
 
@@ -339,4 +344,4 @@ def outline(points: NDArray[np.float64], normal: NDArray[np.float64], tie: float
         parts = np.array_split(points, len(points) // CORNERS + 1)
         points = np.concatenate([outline(part, normal, tie) for part in parts])
     points = np.array(points)
-    return points[: _reduce(points, np.array(normal), tie, np.zeros((2, 3)), work_array())]
+    return points[: _reduce(points, np.array(normal), tie, work_array())]

@@ -83,7 +83,7 @@ def unite(bodies, pairs, events, due, order, new_pairs, new_events):
 
 
 @device
-def _rotation_now(bodies, i, now, q, R):
+def rotation_now(bodies, i, now, q, R):
     """Rotation of body i at `now`, from its last state, into R; returns the time since that state."""
     age = 0.0 if bodies.static[i] else now - bodies.time[i]
     turn_quaternion(bodies.quaternion, i, bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2], age, q[0])
@@ -101,8 +101,8 @@ def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, sc
     """
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
-    age_i = _rotation_now(bodies, i, now, q, R_i)
-    age_j = _rotation_now(bodies, j, now, q, R_j)
+    age_i = rotation_now(bodies, i, now, q, R_i)
+    age_j = rotation_now(bodies, j, now, q, R_j)
     px = bodies.position[j, 0] - bodies.position[i, 0] + (bodies.linear[j, 0] * age_j - bodies.linear[i, 0] * age_i)
     py = bodies.position[j, 1] - bodies.position[i, 1] + (bodies.linear[j, 1] * age_j - bodies.linear[i, 1] * age_i)
     pz = bodies.position[j, 2] - bodies.position[i, 2] + (bodies.linear[j, 2] * age_j - bodies.linear[i, 2] * age_i)

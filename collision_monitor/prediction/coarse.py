@@ -100,7 +100,7 @@ def refine(table, parts, bodies, bounds, now, margin, tolerance, budget, events,
 
 
 @device
-def _relative_now(bodies, i, j, now):
+def relative_now(bodies, i, j, now):
     """Position of j relative to i by their last states (m), and how old those are (s)."""
     age_i = 0.0 if bodies.static[i] else now - bodies.time[i]
     age_j = 0.0 if bodies.static[j] else now - bodies.time[j]
@@ -121,7 +121,7 @@ def leave(bodies, pairs, events, now, margin, stale_acceleration, results, later
     for k in range(pairs.size):
         pair, event = pairs[k], events[k]
         i, j = pair.i, pair.j
-        px, py, pz, age_i, age_j = _relative_now(bodies, i, j, now)
+        px, py, pz, age_i, age_j = relative_now(bodies, i, j, now)
         widen = 0.5 * stale_acceleration * (age_i * age_i + age_j * age_j)
         reach = bodies.motion[i].radius + bodies.motion[j].radius + widen
         distance = sqrt(px * px + py * py + pz * pz)

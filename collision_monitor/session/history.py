@@ -76,11 +76,12 @@ class History:
     """A session, from its first step to its last.
 
     times (n,): s of each step from the first, never falling: where the clock was set back (restarts: how often) they
-    go on from where they were. contacts, predictions: of all steps, records.CONTACT and records.PREDICTION, and the
-    step (index) of each row. states: of all messages, records.STATE, and the time (s). objects: as they were described
-    last; names: all that they had, and the ids of each. profile: of the start; settings: what changed of it, and the
-    time (s) of the first step that went by it. durations: s that steps took, as far as they were reported or measured.
-    status: the last one, or the replay's. problems: why some of it may be unknown.
+    go on from where they were. contacts, predictions: of all steps, records.CONTACT (of several points the first) and
+    records.PREDICTION, and the step (index) of each row. states: of all messages, records.STATE, and the time (s).
+    objects: as they were described last; names: all that they had, and the ids of each. profile: of the start;
+    settings: what changed of it, and the time (s) of the first step that went by it. durations: s that steps took, as
+    far as they were reported or measured. status: the last one, or the replay's. problems: why some of it may be
+    unknown.
     """
 
     name: str
@@ -178,7 +179,7 @@ class _Gathered:
         self._count = 0
         self._steps: list[int] = []  # stamps in ns
         self._step_of: dict[int, int] = {}
-        self._contacts = _Rows(records.CONTACT)
+        self._contacts = _Rows(records.CONTACT)  # of a contact with several points the first row: they share the rest
         self._predictions = _Rows(records.PREDICTION)
         self._states = _Rows(records.STATE)
         self._next_step: list[int] = []  # of each message of states, the index of the step that comes after it
@@ -225,7 +226,7 @@ class _Gathered:
                     self._next_step.append(len(self._steps))
             case "ContactArray" if answers:
                 contacts = decode_contacts(message.data)
-                self._contacts.append(self._step(contacts.stamp_ns, contacts.step), contacts.contacts)
+                self._take_contacts(self._step(contacts.stamp_ns, contacts.step), contacts.contacts)
             case "PredictedCollisionArray" if answers:
                 predictions = decode_predictions(message.data)
                 step = self._step(predictions.stamp_ns, predictions.step)
@@ -238,8 +239,11 @@ class _Gathered:
     def _answer(self, outputs: Outputs) -> None:
         result = outputs.result
         step = self._step(result.stamp_ns, result.step)
-        self._contacts.append(step, result.contacts)
+        self._take_contacts(step, result.contacts)
         self._predictions.append(step, result.predictions)
+
+    def _take_contacts(self, step: int, rows: Records) -> None:
+        self._contacts.append(step, rows.compress(rows["point_index"] == 0))
 
     def _step(self, stamp_ns: int, number: int) -> int:
         """Index of the step with this number; contacts and predictions of one step share it."""

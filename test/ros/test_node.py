@@ -15,7 +15,7 @@ from collision_monitor import codec, records
 from collision_monitor.codec import Removal
 from collision_monitor.description import ObjectDescription
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Sphere
+from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.ros import main, qos
 from collision_monitor.session import Session
 from collision_monitor.session.replay import Verdict, replay
@@ -40,6 +40,8 @@ APPROACHING = (state(1, (0, 0, 0), (1, 0, 0)), state(2, (2, 0, 0)))
 """Two balls with 1 m between them, closing at 1 m/s: they touch in 1 s."""
 OVERLAPPING = (state(3, (0, 10, 0)), state(4, (0.9, 10, 0)))
 """Two balls, 0.1 m into each other."""
+LYING = (state(5, (20, 0, 0)), state(6, (20.5, 0.5, 0.95)))
+"""Two cubes of 1 m, one 5 cm deep in the other's upper face, a quarter of which it covers."""
 
 
 def test_a_known_contact_and_a_known_impact(start, team):
@@ -217,8 +219,9 @@ def test_settings_change_while_it_runs_and_the_session_replays(start, team, tmp_
         found = call(GetParameters, "get_parameters", GetParameters.Request(names=names)).values
         return [value.string_value or value.double_value for value in found]
 
-    team.describe(*map(ball, (1, 2, 3, 4)))
-    team.status(lambda s: s.objects == 4)
+    cubes = [ObjectDescription(k, ((Box((1, 1, 1)), Pose()),), name=f"cube {k}") for k in (5, 6)]
+    team.describe(*map(ball, (1, 2, 3, 4)), *cubes)
+    team.status(lambda s: s.objects == 6)
     first, _ = team.ask(*APPROACHING, *OVERLAPPING)
     assert change("horizon", 3) == "", "a whole number is taken where a decimal one is meant"
     assert change("profile", "fast") == ""
@@ -240,10 +243,21 @@ def test_settings_change_while_it_runs_and_the_session_replays(start, team, tmp_
     assert predictions.horizon == 4.0
     assert predictions.predictions[0].upper - predictions.predictions[0].lower < 1e-4
 
+    corners = []
+    for most in (1, 4):
+        assert change("contact_points", most) == ""
+        contacts, _ = team.ask(*LYING)
+        rows = [row for row in contacts.contacts if row.id_a == 5]
+        corners.append(sorted((round(p.x, 9), round(p.y, 9), round(p.z, 9)) for p in (row.point_a for row in rows)))
+        assert {row.point_count for row in rows} == {most}
+    assert corners[1] == [(20.0, 0.0, 0.5), (20.0, 0.5, 0.5), (20.5, 0.0, 0.5), (20.5, 0.5, 0.5)]
+    assert team.status(lambda s: s.step == 5).contacts == 2
+    assert "out of range" in change("contact_points", 5)
+
     assert monitor.stop() == 0
     assert "Traceback" not in monitor.words
     report = replay(Session(tmp_path / "run.mcap"))
-    assert (report.verdict, report.steps, report.notes) == (Verdict.IDENTICAL, 3, [])
+    assert (report.verdict, report.steps, report.notes) == (Verdict.IDENTICAL, 5, [])
 
 
 @pytest.mark.parametrize("executor", ["single", "events"])

@@ -10,7 +10,7 @@ import pytest
 from session_scene import NODE, SETTINGS, START, STEP, record
 
 from collision_monitor.cli.main import main
-from collision_monitor.codec import decode_parameter_event, decode_status, encode_parameter_event
+from collision_monitor.codec import decode_contacts, decode_parameter_event, decode_status, encode_parameter_event
 from collision_monitor.errors import MessageError
 from collision_monitor.pipeline import Pipeline
 from collision_monitor.profiles import Profile
@@ -18,8 +18,8 @@ from collision_monitor.session import Session, Splitting
 from collision_monitor.session.history import AS_RECORDED, read_history
 from collision_monitor.session.replay import Verdict, replay
 
-FAST = Profile.named("fast").replace(horizon=1.0, contact_margin=0.01)
-SWITCHES = {20: FAST, 35: Profile.named("exact").replace(threads=2)}
+FAST = Profile.named("fast").replace(horizon=1.0, contact_margin=0.01, contact_points=4)
+SWITCHES = {20: FAST, 35: Profile.named("exact").replace(threads=2, contact_points=2)}
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +80,16 @@ def test_a_history_follows_the_changes_unless_it_is_told_a_profile(switched: Pat
     other = read_history(Session(switched), "balanced")
     assert other.settings == []
     assert len(other.predictions) != len(recorded.predictions)
+
+
+def test_the_points_of_a_contact_are_one_collision(switched: Path) -> None:
+    one, four = (read_history(Session(switched), Profile(contact_points=most)) for most in (1, 4))
+    answers = [decode_contacts(m.data).contacts for m in Session(switched).messages() if m.type == "ContactArray"]
+    assert max(int(rows["point_count"].max()) for rows in answers if len(rows)) > 1
+    assert [(c.pair, c.begin, c.end, c.deepest) for c in four.collisions] == [
+        (c.pair, c.begin, c.end, c.deepest) for c in one.collisions
+    ]
+    assert len(four.contacts) == len(one.contacts)
 
 
 def test_reports_and_checks_read_it(switched: Path, tmp_path: Path) -> None:
