@@ -168,12 +168,14 @@ _NAMED: Final[dict[str, dict[str, Any]]] = {
     "balanced": {
         "impact_tolerance": 1e-4,
         "impact_iterations": 64,
+        "uncertainty": True,
         "uncertainty_samples": 512,
         **dict.fromkeys(_TOLERANCES, 1e-3),
     },
     "fast": {
         "impact_tolerance": 1e-3,
         "impact_iterations": 64,
+        "uncertainty": False,  # of all that a step may do, sampling takes by far the longest
         "uncertainty_samples": 128,
         "position_tolerance": 1e-2,
         "orientation_tolerance": 1e-2,
@@ -183,6 +185,7 @@ _NAMED: Final[dict[str, dict[str, Any]]] = {
     "exact": {
         "impact_tolerance": 1e-6,
         "impact_iterations": 256,
+        "uncertainty": True,
         "uncertainty_samples": 1024,
         **dict.fromkeys(_TOLERANCES, 1e-9),
     },

@@ -17,10 +17,10 @@ from collision_monitor.errors import InputError, MessageError
 from collision_monitor.monitor import Monitor, StepResult
 from collision_monitor.plain import PlainMonitor
 from collision_monitor.profiles import Profile
-from collision_monitor.records import Phase
+from collision_monitor.records import Phase, PredictionStatus
 
 REFERENCE = "exact"
-"""The profile whose plain recomputation is the truth."""
+"""The profile whose plain recomputation is the truth, without what is uncertain: that is no error of a profile."""
 
 Step = tuple[int, NDArray[np.void]]
 """A stamp (ns) and records.STATE."""
@@ -66,15 +66,47 @@ class Row:
     distance_error_m: float
     """Worst, over the contacts that both have."""
     ttc_error_s: Errors
-    """Over the predictions that both have."""
+    """Over the predictions that both have, and of which the truth is that they hit."""
+    compared: int
+    """Answers that both have and that state a bound: predictions, or of models distances."""
     outside_bound: int
-    """Predictions whose interval does not meet the true one; of models: distances that are off by more than stated."""
+    """Of these, intervals that the true time is not in; of models, distances that are off by more than stated."""
     distance_error_part: float = np.nan
     """Of models: the worst distance error as part of the size of the smaller of the two."""
+    noise: float = 0.0
+    """Of the scene's states (m, rad, m/s and rad/s), see `world.measured`."""
+
+    @property
+    def label(self) -> str:
+        """The scene, for people."""
+        return f"{self.scene} ± {self.noise:g}" if self.noise else self.scene
+
+    @property
+    def within_bound(self) -> float:
+        """Part of the compared answers whose bound holds; NaN where there was none."""
+        return 1.0 - self.outside_bound / self.compared if self.compared else np.nan
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; what there is none of is null."""
-        return _without_nan(asdict(self))
+        return _without_nan(asdict(self) | {"within_bound": self.within_bound})
+
+
+@dataclass(frozen=True)
+class Played:
+    """What a monitor answered at each step, and how long that took (s)."""
+
+    answers: list[StepResult]
+    seconds: NDArray[np.float64]
+
+    def cost(self) -> dict[str, Any]:
+        """Of a row; without the first step, which takes everything in."""
+        warm = self.seconds[1:] if len(self.seconds) > 1 else self.seconds
+        pairs = sum(a.status.narrow_phase_tests + a.status.impact_queries for a in self.answers[1:] or self.answers)
+        return {
+            "step_ms": 1e3 * float(np.median(warm)),
+            "step_ms_p99": 1e3 * float(np.percentile(warm, 99)),
+            "pair_us": 1e6 * float(warm.sum()) / pairs if pairs else np.nan,
+        }
 
 
 def _without_nan(values: dict[str, Any]) -> dict[str, Any]:
@@ -134,15 +166,16 @@ def tradeoff(
             progress(len(steps))
         else:
             exact = Profile.named(REFERENCE).replace(horizon=profile.horizon, contact_margin=profile.contact_margin)
-            truths[key] = _play(PlainMonitor(exact), described, steps, progress)[0]
-        answers, seconds = _play(Monitor(profile), described, steps, progress)
-        rows.append(_compare(scene, profile, len(described), answers, truths[key], seconds))
+            truths[key] = play(PlainMonitor(exact.replace(uncertainty=False)), described, steps, progress).answers
+        played = play(Monitor(profile), described, steps, progress)
+        rows.append(_compare(scene, profile, len(described), played, truths[key]))
     return rows
 
 
-def _play(
-    monitor: Monitor, described: list[ObjectDescription], steps: Sequence[Step], progress: Callable[[int], None]
-) -> tuple[list[StepResult], NDArray[np.float64]]:
+def play(
+    monitor: Monitor, described: Iterable[ObjectDescription], steps: Sequence[Step], progress: Callable[[int], None]
+) -> Played:
+    """Describe everything, then take all steps. progress: told of each."""
     for description in described:
         monitor.describe(description)
     answers, seconds = [], np.empty(len(steps))
@@ -151,27 +184,25 @@ def _play(
         answers.append(monitor.step(stamp, states))
         seconds[k] = time.perf_counter() - begin
         progress(1)
-    return answers, seconds
+    return Played(answers, seconds)
 
 
 def _by_pair(answers: NDArray[np.void]) -> dict[tuple[int, int], Any]:
     return {(int(answer["id_a"]), int(answer["id_b"])): answer for answer in answers}
 
 
-def _compare(
-    scene: str,
-    profile: Profile,
-    objects: int,
-    answers: list[StepResult],
-    truths: list[StepResult],
-    seconds: NDArray[np.float64],
-) -> Row:
-    alarms = false_alarms = misses = outside = 0
+def _stated(answer: StepResult) -> NDArray[np.void]:
+    """The predictions of stated motions: not those that only what is uncertain could bring about."""
+    return answer.predictions.compress(answer.predictions["status"] != PredictionStatus.POSSIBLE)
+
+
+def _compare(scene: str, profile: Profile, objects: int, played: Played, truths: list[StepResult]) -> Row:
+    alarms = false_alarms = misses = compared = outside = 0
     distances: list[float] = []
     times: list[float] = []
-    for mine, truth in zip(answers, truths, strict=True):
+    for mine, truth in zip(played.answers, truths, strict=True):
         touching, really = (_by_pair(r.contacts[r.contacts["phase"] != Phase.END]) for r in (mine, truth))
-        stated, true = _by_pair(mine.predictions), _by_pair(truth.predictions)
+        stated, true = _by_pair(_stated(mine)), _by_pair(truth.predictions)
         told = touching.keys() | stated.keys()
         alarms += len(told)
         false_alarms += len(told - really.keys() - true.keys())
@@ -182,23 +213,22 @@ def _compare(
             distances.append(float(touching[pair]["signed_distance"] - really[pair]["signed_distance"]))
         for pair in stated.keys() & true.keys():
             event = true[pair]
-            times.append(float(stated[pair]["lower"] - event["lower"]))
+            if event["status"] == PredictionStatus.HIT:
+                times.append(float(stated[pair]["lower"] - event["lower"]))
+            compared += 1
             outside += bool(stated[pair]["lower"] > event["upper"] or stated[pair]["upper"] < event["lower"])
-    warm = seconds[1:] if len(seconds) > 1 else seconds  # the first step takes everything in
-    pairs = sum(a.status.narrow_phase_tests + a.status.impact_queries for a in answers[1:] or answers)
     return Row(
         scene=scene,
         profile=profile.name,
         model="exact",
         objects=objects,
-        steps=len(answers),
-        step_ms=float(np.median(warm)) * 1e3,
-        step_ms_p99=float(np.percentile(warm, 99)) * 1e3,
-        pair_us=float(warm.sum()) * 1e6 / pairs if pairs else float("nan"),
+        steps=len(played.answers),
+        **played.cost(),
         alarms=alarms,
         false_alarms=false_alarms,
         misses=misses,
         distance_error_m=float(np.abs(distances).max()) if distances else float("nan"),
         ttc_error_s=Errors.of(times),
+        compared=compared,
         outside_bound=outside,
     )

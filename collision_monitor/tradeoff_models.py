@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from math import nan
 from typing import Any, Final
 
 import numpy as np
@@ -20,7 +19,7 @@ from collision_monitor.narrow_phase.contact import contact
 from collision_monitor.narrow_phase.models import containing_model, parse_model
 from collision_monitor.profiles import Profile
 from collision_monitor.records import Model, Phase
-from collision_monitor.tradeoff import Errors, Row, Step
+from collision_monitor.tradeoff import Errors, Played, Row, Step, play
 
 NEAR: Final = 0.3
 """m: pairs up to this far apart are compared."""
@@ -50,8 +49,11 @@ def model_tradeoff(
     described = list(descriptions)
     sampled = np.unique(np.linspace(0, len(steps) - 1, SAMPLES).astype(int)).tolist()
     profile = Profile(contact_margin=NEAR)
-    played = {parse_model(each): _play(parse_model(each), described, steps, profile, progress) for each in models}
-    pairs = [set[Pair]().union(*(_told(answers[k]) for answers, _ in played.values())) for k in sampled]
+    played = {
+        model: play(Monitor(profile), [replace(each, model=model) for each in described], steps, progress)
+        for model in map(parse_model, models)
+    }
+    pairs = [set[Pair]().union(*(_told(each.answers[k]) for each in played.values())) for k in sampled]
     truths, seconds = [], []
     for k, wanted in zip(sampled, pairs, strict=True):
         began = time.perf_counter()
@@ -64,29 +66,10 @@ def model_tradeoff(
         **base, model="exact", steps=len(sampled), step_ms=float(np.median(seconds)) * 1e3,
         step_ms_p99=float(np.percentile(seconds, 99)) * 1e3, pair_us=1e6 * sum(seconds) / max(sum(map(len, pairs)), 1),
         alarms=sum(int(d <= 0.0) for truth in truths for d in truth.values()), false_alarms=0, misses=0,
-        distance_error_m=0.0, outside_bound=0, distance_error_part=0.0,
+        distance_error_m=0.0, compared=sum(map(len, pairs)), outside_bound=0, distance_error_part=0.0,
     )  # fmt: skip
     sizes = {each.object_id: _size(each) for each in described}
-    return [exact, *(_row(base, model, *found, sampled, truths, sizes) for model, found in played.items())]
-
-
-def _play(
-    model: Model,
-    described: list[ObjectDescription],
-    steps: Sequence[Step],
-    profile: Profile,
-    progress: Callable[[int], None],
-) -> tuple[list[StepResult], NDArray[np.float64]]:
-    monitor = Monitor(profile)
-    for description in described:
-        monitor.describe(replace(description, model=model))
-    answers, seconds = [], np.empty(len(steps))
-    for k, (stamp, states) in enumerate(steps):
-        began = time.perf_counter()
-        answers.append(monitor.step(stamp, states))
-        seconds[k] = time.perf_counter() - began
-        progress(1)
-    return answers, seconds
+    return [exact, *(_row(base, model, found, sampled, truths, sizes) for model, found in played.items())]
 
 
 def _told(answer: StepResult) -> dict[Pair, Any]:
@@ -113,30 +96,27 @@ def _size(description: ObjectDescription) -> float:
 def _row(
     base: dict[str, Any],
     model: Model,
-    answers: list[StepResult],
-    seconds: NDArray[np.float64],
+    played: Played,
     sampled: list[int],
     truths: list[dict[Pair, float]],
     sizes: dict[int, float],
 ) -> Row:
-    alarms = false_alarms = misses = outside = 0
+    alarms = false_alarms = misses = compared = outside = 0
     errors, parts = [0.0], [0.0]
     for k, truth in zip(sampled, truths, strict=True):
-        told = _told(answers[k])
+        told = _told(played.answers[k])
         touching = {pair for pair, row in told.items() if row["signed_distance"] <= 0.0}
         really = {pair for pair, distance in truth.items() if distance <= 0.0}
         alarms, false_alarms = alarms + len(touching), false_alarms + len(touching - really)
         misses += len(really - touching)
         for pair in told.keys() - really:  # where they overlap, the depths of a mesh and its model are not comparable
             off = abs(float(told[pair]["signed_distance"]) - truth[pair])
+            compared += 1
             outside += bool(off > told[pair]["error_bound"] + 1e-9)
             errors.append(off)
             parts.append(off / min(sizes[each] for each in pair))
-    warm = seconds[1:] if len(seconds) > 1 else seconds
-    looked_at = sum(a.status.narrow_phase_tests + a.status.impact_queries for a in answers[1:] or answers)
     return Row(
-        **base, model=model.name.lower(), steps=len(answers), step_ms=float(np.median(warm)) * 1e3,
-        step_ms_p99=float(np.percentile(warm, 99)) * 1e3,
-        pair_us=1e6 * float(warm.sum()) / looked_at if looked_at else nan, alarms=alarms, false_alarms=false_alarms,
-        misses=misses, distance_error_m=max(errors), outside_bound=outside, distance_error_part=max(parts),
+        **base, model=model.name.lower(), steps=len(played.answers), **played.cost(), alarms=alarms,
+        false_alarms=false_alarms, misses=misses, distance_error_m=max(errors), compared=compared,
+        outside_bound=outside, distance_error_part=max(parts),
     )  # fmt: skip

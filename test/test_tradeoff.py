@@ -8,12 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from collision_monitor.cli.main import main
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.shapes import Sphere
+from collision_monitor.monitor import Monitor
+from collision_monitor.plain import PlainMonitor
 from collision_monitor.profiles import Profile
+from collision_monitor.records import PredictionStatus
 from collision_monitor.tradeoff import Step, tradeoff
 from collision_monitor.world.scene import state_array
 
@@ -47,6 +51,53 @@ def test_a_hit_is_seen_by_all_and_its_time_is_known_to_the_tolerance() -> None:
     tolerances = Profile.named("fast")
     allowed = 2 * (tolerances.position_tolerance + 2.0 * tolerances.velocity_tolerance) + tolerances.impact_tolerance
     assert exact.ttc_error_s.worst < fast.ttc_error_s.worst <= allowed
+
+
+def test_what_may_happen_by_what_is_uncertain_is_no_alarm() -> None:
+    """A near miss of states that declare 2 cm: `exact` tells the pair as POSSIBLE, which the truth knows nothing of."""
+    steps = passing(1.005)
+    for _, states in steps:
+        states["position_stddev"] = 0.02
+    monitor = Monitor("exact")
+    for description in TWO:
+        monitor.describe(description)
+    told = [prediction["status"] for stamp, states in steps for prediction in monitor.step(stamp, states).predictions]
+    assert told and set(told) == {PredictionStatus.POSSIBLE}
+    (row,) = tradeoff("pass", TWO, steps, ["exact"])
+    assert (row.alarms, row.misses, row.compared) == (0, 0, 0) and np.isnan(row.within_bound)
+
+
+def test_an_interval_beside_the_truth_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The truth of another course of the same objects: every interval is beside it."""
+    right = PlainMonitor.step
+    monkeypatch.setattr(PlainMonitor, "step", lambda self, stamp, states: right(self, stamp, _slower(states)))
+    (row,) = tradeoff("hit", TWO, passing(0.0, 5), ["exact"])
+    assert (row.compared, row.outside_bound, row.within_bound) == (5, 5, 0.0)
+
+
+def _slower(states: NDArray[np.void]) -> NDArray[np.void]:
+    states = states.copy()
+    states["linear"] *= 0.9
+    return states
+
+
+def test_the_fleet_as_a_localiser_sees_it_is_what_fast_is_for(capsys: pytest.CaptureFixture[str]) -> None:
+    """The states declare 5 mm: `exact` says how likely each pair meets, anew in each step; `fast` does neither."""
+    assert main(["tradeoff", "--scene", "fleet", "--seconds", "0.3", "--json"]) == 0
+    fast, _, exact = json.loads(capsys.readouterr().out)["rows"]
+    assert fast["scene"] == "fleet" and fast["noise"] == 0.005
+    assert fast["misses"] == fast["outside_bound"] == exact["misses"] == exact["outside_bound"] == 0
+    assert 5.0 * fast["step_ms"] < exact["step_ms"]
+
+
+def test_each_clip_of_recorded_tracks_is_a_scene(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    for clip, label in (("there", 1), ("back", 2)):
+        rows = [f"{label},{frame},p,{0.1 * frame},0,3,0" for frame in range(4)]
+        (tmp_path / f"{clip}_ped.csv").write_text("\n".join(["id,frame,label,x_est,y_est,vx_est,vy_est", *rows]))
+    arguments = ["--scene", "trajectory", "--path", str(tmp_path), "--profile", "fast", "--json"]
+    assert main(["tradeoff", *arguments]) == 0
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    assert [(row["scene"], row["steps"]) for row in rows] == [("back", 4), ("there", 4)]
 
 
 def test_progress_adds_up_and_empty_scenes_are_refused() -> None:
@@ -83,9 +134,12 @@ def test_a_session_can_be_measured(capsys: pytest.CaptureFixture[str]) -> None:
         (("--profile", "hasty"), "expected one of balanced, exact, fast"),
         ((str(GOLDEN), "--scene", "fleet"), "got both"),
         (("none.mcap",), "none.mcap"),
+        ((str(GOLDEN), "--noise", "0.1"), "measured as it was recorded"),
+        (("--scene", "fleet", "--noise", "2"), "noise: expected more than 0 and at most 1, got 2"),
+        (("--scene", "trajectory"), "give a clip's prefix"),
         (("--scene", "crossing", "--seconds", "0.1", "--csv", "/no/such/folder/rows.csv"), "can be written"),
     ],
-    ids=["scene", "profile", "both", "session", "output"],
+    ids=["scene", "profile", "both", "session", "noise", "much", "tracks", "output"],
 )
 def test_bad_input_is_one_line(arguments: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["tradeoff", *arguments]) == 1

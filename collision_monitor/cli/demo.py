@@ -43,6 +43,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--duration", type=positive, default=10.0, metavar="S", help="seconds (default: 10)")
     parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="of the random numbers (default: 1)")
     parser.add_argument("--path", metavar="FILE", help="recorded tracks, for the scene `trajectory`")
+    parser.add_argument("--noise", type=positive, metavar="S", help="of the states, see `world --help`")
     parser.add_argument("--output", type=Path, metavar="PATH", help="session file (default: sessions/SCENE-DATE.mcap)")
     parser.add_argument("--capture", type=Path, metavar="FILE", help="save the last picture of the table as SVG")
     parser.set_defaults(command=demo)
@@ -70,6 +71,8 @@ def _watch(args: argparse.Namespace, session: Path, stop: StopRequest) -> bool:
     scene = ["world", args.scene, "--duration", str(args.duration), "--seed", str(args.seed)]
     if args.path:
         scene += ["--path", args.path]
+    if args.noise is not None:
+        scene += ["--noise", str(args.noise)]
     if args.objects is not None:
         scene += ["--objects", str(args.objects)]
     with Child("run", "--record", str(session)) as monitor, ros_context([]):

@@ -5,13 +5,15 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from collision_monitor.cli.progress import progress_bar
-from collision_monitor.cli.quantities import positive, whole
+from collision_monitor.cli.quantities import not_negative, positive, whole
 from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,8 +23,15 @@ if TYPE_CHECKING:
 MESHES: Final = "arm"
 """The scene whose shapes matter, not its profile: its rows are models."""
 
+TRACKS: Final = "trajectory"
+
 SCENES: Final = ("fleet", "clutter", "swarm", "particles", "crossing", MESHES)
-"""What is measured where no scene is named."""
+"""What is measured where no scene is named; and TRACKS, where a path is given."""
+
+NOISE: Final = {"fleet": 0.005}
+"""Of the states of scenes, where none is given. Of these scenes the true states are measured too, without a name."""
+
+SECONDS: Final = 5.0
 
 DESCRIPTION = """\
 Run scenes, or a recorded session, through the profiles, and compare every answer with exact ones that are computed
@@ -33,10 +42,13 @@ examples:
   collision-monitor tradeoff --scene fleet
   collision-monitor tradeoff --scene fleet --scene clutter --png tradeoff.png
   collision-monitor tradeoff run.mcap --profile fast --profile exact --json
+  collision-monitor tradeoff --scene fleet --noise 0                         with true states in place of measured ones
+  collision-monitor tradeoff --path ../shared/data/citr                      recorded tracks too
   collision-monitor tradeoff --scene arm --model obb --model convex_hull     models against the meshes themselves
 
 A pair counts as an alarm at each step at which it is told, as a contact or as a prediction. A false alarm is one that
 the exact answers do not have at that step: mostly a near miss, within the tolerance that the profile declares.
+The states of the fleet are those of a localiser: off by 5 mm, 5 mrad, 5 mm/s and 5 mrad/s, and declared to be so.
 """
 
 
@@ -54,8 +66,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--scene", action="append", metavar="NAME", help=f"may be given again (default: {', '.join(SCENES)})"
     )
     parser.add_argument("--path", type=Path, metavar="FILE", help="recorded tracks, for the scene `trajectory`")
+    parser.add_argument(
+        "--noise", type=not_negative, metavar="S",
+        help="standard deviation of the states in m, rad, m/s and rad/s (default: 0.005 for the fleet, else 0)",
+    )  # fmt: skip
     parser.add_argument("--objects", type=whole(1), metavar="N", help="how many move (default: the scene's own number)")
-    parser.add_argument("--seconds", type=positive, default=5.0, metavar="S", help="of each scene (default: 5)")
+    parser.add_argument(
+        "--seconds", type=positive, metavar="S", help="of each scene (default: 5, all of recorded tracks)"
+    )
     parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="of the random numbers (default: 1)")
     parser.add_argument("--profile", action="append", metavar="NAME", help="may be given again (default: all)")
     parser.add_argument(
@@ -76,19 +94,24 @@ def run(args: argparse.Namespace) -> int:
 
     if args.session is not None and args.scene:
         raise InputError("tradeoff: expected a session or scenes, got both")
+    if args.session is not None and args.noise:
+        raise InputError(
+            f"tradeoff, --noise: a session is measured as it was recorded, leave it out (got {args.noise:g})"
+        )
     profiles = [Profile.named(name) for name in args.profile or Profile.names()]
     if not args.profile:
         profiles.sort(key=lambda profile: -profile.impact_tolerance)
-    inputs = [recorded(args.session)] if args.session else [_played(name, args) for name in args.scene or SCENES]
+    inputs: Iterable[Any] = [(*recorded(args.session), 0.0)] if args.session else _played(args)
     rows = []
-    for name, descriptions, steps in inputs:
+    for name, descriptions, steps, noise in inputs:
         if args.model or name == MESHES:
             models = args.model or MODELS
             with progress_bar(name, len(models) * len(steps) + min(SAMPLES, len(steps))) as progress:
-                rows += model_tradeoff(name, descriptions, steps, models, progress)
-            continue
-        with progress_bar(name, 2 * len(steps) * len(profiles)) as progress:
-            rows += tradeoff(name, descriptions, steps, profiles, progress)
+                found = model_tradeoff(name, descriptions, steps, models, progress)
+        else:
+            with progress_bar(name, 2 * len(steps) * len(profiles)) as progress:
+                found = tradeoff(name, descriptions, steps, profiles, progress)
+        rows += [replace(row, noise=noise) for row in found]
     if args.json:
         print(json.dumps({"rows": [row.to_dict() for row in rows]}))
     else:
@@ -103,19 +126,43 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _played(name: str, args: argparse.Namespace) -> tuple[str, list[ObjectDescription], list[Step]]:
-    from collision_monitor.world import make_scene
+def _scenes(args: argparse.Namespace) -> list[tuple[str, float]]:
+    """What to measure: names and the noise of the states."""
+    names = args.scene or [*SCENES, *([TRACKS] if args.path else [])]
+    if args.noise is not None:
+        return [(name, args.noise) for name in names]
+    chosen = [(name, NOISE.get(name, 0.0)) for name in names]
+    return chosen if args.scene else [*((name, 0.0) for name in NOISE), *chosen]
 
-    scene = make_scene(name, objects=args.objects, seed=args.seed, path=args.path)
-    steps = [(0, scene.states())]
-    while len(steps) < args.seconds * scene.rate and not scene.finished:
-        states = scene.step()
-        steps.append((round(scene.time * 1e9), states))
-    return name, scene.descriptions, steps
+
+def _played(args: argparse.Namespace) -> Iterator[tuple[str, list[ObjectDescription], list[Step], float]]:
+    """Name, objects, steps and noise of each scene; of recorded tracks, each clip is one."""
+    from collision_monitor.world import make_scene
+    from collision_monitor.world.trajectory import clip_paths
+
+    for name, noise in _scenes(args):
+        for path in clip_paths(args.path) if name == TRACKS and args.path else [args.path]:
+            scene = make_scene(name, objects=args.objects, seed=args.seed, path=path, noise=noise)
+            seconds = SECONDS if scene.duration is None else scene.duration + 1.0 / scene.rate
+            count = max(round((args.seconds or seconds) * scene.rate), 1)
+            steps = [(0, scene.states())]
+            while len(steps) < count and not scene.finished:
+                states = scene.step()
+                steps.append((round(scene.time * 1e9), states))
+            yield path.stem if name == TRACKS else name, scene.descriptions, steps, noise
 
 
 def _number(value: float) -> str:
     return "–" if value != value else f"{value:.2g}"
+
+
+def _percent(part: float) -> str:
+    return "–" if part != part else f"{math.floor(1e4 * part) / 100:g}"  # 100 only where all are
+
+
+def _modelled(rows: Sequence[Row]) -> set[str]:
+    """Labels of the scenes whose rows are models."""
+    return {row.label for row in rows if row.model != "exact"}
 
 
 def _print_table(rows: Sequence[Row]) -> None:
@@ -124,23 +171,24 @@ def _print_table(rows: Sequence[Row]) -> None:
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for k, heading in enumerate(("scene", "profile", "model", "ms/step", "µs/pair", "alarms", "false", "missed")):
-        table.add_column(heading, justify="left" if k < 3 else "right", no_wrap=True)
-    for heading in ("distance\nerror m", "TTC error s\nmedian", "\np99", "\nworst"):
+    for k, heading in enumerate(("scene", "profile\nor model", "ms/step", "µs/pair", "alarms", "false", "missed")):
+        table.add_column(heading, justify="left" if k < 2 else "right", no_wrap=k > 0)
+    for heading in ("distance\nerror m", "TTC error s\nmedian", "\np99", "\nworst", "in bound\n%"):
         table.add_column(heading, justify="right", no_wrap=True)
+    models = _modelled(rows)
     scene = ""
     for row in rows:
-        if scene and row.scene != scene:
+        if scene and row.label != scene:
             table.add_section()
-        shown = "" if row.scene == scene else row.scene
-        scene = row.scene
+        shown = "" if row.label == scene else row.label
+        scene = row.label
         error = row.ttc_error_s
         numbers = (row.distance_error_m, error.median, error.p99, error.worst)
         table.add_row(
-            shown, row.profile, row.model, f"{row.step_ms:.3f}", f"{row.pair_us:.2f}", str(row.alarms),
-            str(row.false_alarms), str(row.misses), *map(_number, numbers),
+            shown, row.model if scene in models else row.profile, f"{row.step_ms:.3f}", f"{row.pair_us:.2f}",
+            str(row.alarms), str(row.false_alarms), str(row.misses), *map(_number, numbers), _percent(row.within_bound),
         )  # fmt: skip
-    Console(width=None if sys.stdout.isatty() else 120).print(table)
+    Console(width=None if sys.stdout.isatty() else 140).print(table)
 
 
 def _flat(row: Row) -> dict[str, Any]:
@@ -162,7 +210,7 @@ def _draw(rows: Sequence[Row], path: Path) -> None:
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    scenes = list(dict.fromkeys(row.scene for row in rows))
+    scenes = list(dict.fromkeys(row.label for row in rows))
     columns = min(len(scenes), 3)
     lines = -(-len(scenes) // columns)
     size = (4.0 * columns, 3.6 * lines)
@@ -170,17 +218,21 @@ def _draw(rows: Sequence[Row], path: Path) -> None:
     for panel in panels.flat[len(scenes) :]:
         panel.remove()
     for panel, scene in zip(panels.flat, scenes, strict=False):
-        if any(row.scene == scene and row.model != "exact" for row in rows):
-            _draw_models(panel, scene, [row for row in rows if row.scene == scene])
+        if scene in _modelled(rows):
+            _draw_models(panel, scene, [row for row in rows if row.label == scene])
             continue
-        shown = [row for row in rows if row.scene == scene and row.ttc_error_s.p99 > 0.0]
+        shown = [row for row in rows if row.label == scene and row.ttc_error_s.p99 > 0.0]
         panel.set(title=scene, xlabel="p99 error of the time to collision (s)", ylabel="ms per step")
         if not shown:
             panel.text(0.5, 0.5, "nothing predicted", ha="center", transform=panel.transAxes)
             continue
         for row in shown:
             panel.scatter(row.ttc_error_s.p99, row.step_ms, s=60, label=row.profile)
-        panel.set(xscale="log", ylim=(0.0, 1.4 * max(row.step_ms for row in shown)))
+        times = [row.step_ms for row in shown]
+        if max(times) > 5.0 * min(times):
+            panel.set(xscale="log", yscale="log", ylim=(0.5 * min(times), 2.0 * max(times)))
+        else:
+            panel.set(xscale="log", ylim=(0.0, 1.4 * max(times)))
         panel.legend(loc="lower left")
         panel.grid(alpha=0.3)
     figure.savefig(path, dpi=120)

@@ -25,6 +25,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--duration", type=positive, metavar="S", help="stop after so many seconds (default: endless)")
     parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="of the random numbers (default: 1)")
     parser.add_argument("--path", type=Path, metavar="FILE", help="recorded tracks, for the scene that plays them")
+    parser.add_argument("--noise", type=positive, metavar="S", help="of the states, in m, rad, m/s and rad/s; declared")
     parser.add_argument("--monitor", default="object_monitor", metavar="NAME", help="the monitor node's name")
     parser.add_argument("--ros-args", nargs=argparse.REMAINDER, default=[], metavar="…", help="passed on to ROS")
     parser.set_defaults(command=play)
@@ -49,6 +50,7 @@ def play(args: argparse.Namespace) -> int:
         duration=args.duration,
         seed=args.seed,
         path=args.path,
+        noise=args.noise,
         monitor=args.monitor,
     )
     return world(["collision-monitor", "--ros-args", *found, *args.ros_args])

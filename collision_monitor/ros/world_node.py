@@ -1,6 +1,6 @@
 """Plays a scene as a robot team would be heard: shapes once, latched, then states at a steady rate.
 
-    ros2 run collision_monitor world --ros-args -p scene:=fleet -p objects:=200
+ros2 run collision_monitor world --ros-args -p scene:=fleet -p objects:=200
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from collision_monitor.ros.process import WAKE_UP, StopRequest
 from collision_monitor.world import make_scene, scene_names
 from collision_monitor_msgs.msg import MonitorStatus, ObjectDescriptionArray, ObjectStateArray
 
-PARAMETERS = ("scene", "objects", "rate", "duration", "seed", "path", "monitor", "frame_id")
+PARAMETERS = ("scene", "objects", "rate", "duration", "seed", "path", "noise", "monitor", "frame_id")
 
 LISTENER_PATIENCE = 4.0
 """s: on a busy machine DDS can lose its first announcement, and makes the next one 3 s later."""
@@ -57,7 +57,10 @@ class WorldNode(Node):
         rate = reader.read("rate", 0.0, "Messages per second [Hz]; 0: the scene's own rate.")
         seed = reader.read("seed", 1, "Of the scene's random numbers.")
         path = reader.read("path", "", "Recorded tracks, for the scene that plays them.")
-        self._scene = make_scene(name, objects=objects or None, seed=seed, rate=rate or None, path=path or None)
+        noise = reader.read("noise", 0.0, "Standard deviation of the states [m, rad, m/s, rad/s], declared in them.")
+        self._scene = make_scene(
+            name, objects=objects or None, seed=seed, rate=rate or None, path=path or None, noise=noise
+        )
         self._duration = reader.read("duration", 0.0, "After which it stops [s]; 0: the scene's own end, or endless.")
         if not (self._duration >= 0.0 and math.isfinite(self._duration)):
             raise InputError(f"duration: expected a finite number of seconds, at least 0, got {self._duration}")

@@ -11,6 +11,7 @@ from collision_monitor.world.arm import Arm
 from collision_monitor.world.clutter import Clutter
 from collision_monitor.world.crossing import Crossing
 from collision_monitor.world.fleet import Fleet
+from collision_monitor.world.measured import Measured
 from collision_monitor.world.scene import Scene
 from collision_monitor.world.swarm import Swarm
 from collision_monitor.world.trajectory import Trajectory
@@ -85,13 +86,16 @@ def make_scene(
     seed: int = 1,
     rate: float | None = None,
     path: str | Path | None = None,
+    noise: float = 0.0,
 ) -> Scene:
     """The scene of this name, at time 0.
 
     objects: how many move (None: the scene's own number); rate: Hz (None: the scene's own); path: recorded tracks,
-    for the scene that plays them. Raises InputError for an unknown name (it lists them) and for what a scene cannot be.
+    for the scene that plays them; noise: of the states, as a localiser reports them (`Measured`).
+    Raises InputError for an unknown name (it lists them) and for what a scene cannot be.
     """
     entry = _entry(name)
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise InputError(f"seed: expected a whole number from 0, got {seed!r}")
-    return entry.make(objects, seed, rate, None if path is None else Path(path))
+    scene = entry.make(objects, seed, rate, None if path is None else Path(path))
+    return scene if noise == 0.0 else Measured(scene, noise, seed)

@@ -50,7 +50,7 @@ class Trajectory(Scene):
         clips = _find_clips(path)
         first_frame, rows, frames = 0, [], []
         for clip in clips:
-            prefix = f"{clip[0].name.removesuffix(_PEOPLE).removesuffix(_CARTS)}/" if len(clips) > 1 else ""
+            prefix = f"{_prefix(clip[0]).name}/" if len(clips) > 1 else ""
             tracks = [read_tracks(file, _PEOPLE_COLUMNS if _is_people(file) else _CART_COLUMNS) for file in clip]
             start = min(int(t.frame.min()) for t in tracks)
             for track in tracks:
@@ -101,6 +101,16 @@ class Trajectory(Scene):
         return states
 
 
+def clip_paths(path: Path) -> list[Path]:
+    """The clips there, each as a path of its own. Raises InputError as the scene does."""
+    return [path] if path.is_file() else [_prefix(clip[0]) for clip in _find_clips(path)]
+
+
+def _prefix(file: Path) -> Path:
+    """Of the clip that the file is of."""
+    return file.with_name(file.name.removesuffix(_PEOPLE).removesuffix(_CARTS))
+
+
 def _write_carts(states: States, tracks: Tracks) -> None:
     """Heading from psi, velocity along it; the yaw rate is not recorded: central differences of psi over the frames."""
     psi, speed = tracks.values[:, 2], tracks.values[:, 3]
@@ -129,7 +139,7 @@ def _find_clips(path: Path | None) -> list[list[Path]]:
         return [[path]]
     if path.is_dir():
         files = [file for ending in (_PEOPLE, _CARTS) for file in sorted(path.glob(f"*{ending}"))]
-        prefixes = sorted({file.name.removesuffix(_PEOPLE).removesuffix(_CARTS) for file in files})
+        prefixes = sorted({_prefix(file).name for file in files})
         clips = [[f for f in files if f.name in (prefix + _PEOPLE, prefix + _CARTS)] for prefix in prefixes]
     else:
         files = [path.with_name(path.name + ending) for ending in (_PEOPLE, _CARTS)]

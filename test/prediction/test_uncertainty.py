@@ -207,7 +207,7 @@ def test_the_samples_are_standard_normal() -> None:
 def test_the_answers_are_the_same_bytes_on_two_threads_and_when_replayed() -> None:
     digests = []
     for threads in (1, 2, 1):
-        monitor = cm.Monitor(Profile.named("fast").replace(threads=threads))
+        monitor = cm.Monitor(Profile.named("fast").replace(uncertainty=True, threads=threads))
         rng = np.random.default_rng(2)
         for object_id in range(30):
             monitor.add(object_id, cm.Box((0.5, 0.4, 0.3)) if object_id % 2 else cm.Capsule(0.1, 0.5))
