@@ -1,4 +1,7 @@
-"""Support values: how far a shape reaches in a direction. What speed bounds along a separating axis are made of."""
+"""Support values of cores: how far a shape, without the sphere that rounds it, reaches in a direction.
+
+What turns does not change how far a sphere about its centre reaches, so speed bounds along an axis need the core alone.
+"""
 
 from __future__ import annotations
 
@@ -18,32 +21,51 @@ from collision_monitor.geometry.shape_table import (
 
 
 @inlined
-def support_value(table, slot, R, mx, my, mz):
-    """max of m . x over the points x of a shape turned by R (3, 3), margin included. m need not be of unit length."""
+def is_centred_box(kind):
+    """Whether the core is a box about its origin: a segment for a capsule, a point for a sphere."""
+    return kind == BOX or kind == CAPSULE or kind == SPHERE
+
+
+@inlined
+def core_box(table, slot):
+    """Half extents (m) of such a core."""
+    if table.kind[slot] == BOX:
+        return table.size[slot, 0], table.size[slot, 1], table.size[slot, 2]
+    if table.kind[slot] == CAPSULE:
+        return 0.0, 0.0, table.size[slot, 1]
+    return 0.0, 0.0, 0.0
+
+
+@inlined
+def rounding(table, slot):
+    """Radius (m) of the sphere that rounds the core."""
+    if table.kind[slot] == CAPSULE or table.kind[slot] == SPHERE:
+        return table.size[slot, 0] + table.margin[slot]
+    return table.margin[slot]
+
+
+@inlined
+def core_support(table, slot, x, y, z):
+    """max of m . p over the points p of the core, for m = (x, y, z) of any length in the shape's own axes (m)."""
     kind = table.kind[slot]
     s0 = table.size[slot, 0]
     s1 = table.size[slot, 1]
-    length = sqrt(mx * mx + my * my + mz * mz)
-    grown = table.margin[slot] * length
     if kind == SPHERE:
-        return s0 * length + grown
-    x = mx * R[0, 0] + my * R[1, 0] + mz * R[2, 0]
-    y = mx * R[0, 1] + my * R[1, 1] + mz * R[2, 1]
-    z = mx * R[0, 2] + my * R[1, 2] + mz * R[2, 2]
+        return 0.0
     if kind == BOX:
-        return abs(x) * s0 + abs(y) * s1 + abs(z) * table.size[slot, 2] + grown
+        return abs(x) * s0 + abs(y) * s1 + abs(z) * table.size[slot, 2]
     if kind == CAPSULE:
-        return abs(z) * s1 + s0 * length + grown
+        return abs(z) * s1
     if kind == CYLINDER:
-        return abs(z) * s1 + s0 * sqrt(x * x + y * y) + grown
+        return abs(z) * s1 + s0 * sqrt(x * x + y * y)
     if kind == CONE:
-        return max(z * s1, s0 * sqrt(x * x + y * y) - z * s1) + grown
+        return max(z * s1, s0 * sqrt(x * x + y * y) - z * s1)
     if kind == CIRCLE:
-        return s0 * sqrt(x * x + y * y) + grown
+        return s0 * sqrt(x * x + y * y)
     if kind == CONVEX_HULL or kind == POLYGON:
         best = -inf
         first = table.vertex_start[slot]
         for k in range(first, first + table.vertex_count[slot]):
             best = max(best, x * table.vertices[0, k] + y * table.vertices[1, k] + z * table.vertices[2, k])
-        return best + grown
+        return best
     return inf

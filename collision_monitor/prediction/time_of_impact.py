@@ -1,13 +1,7 @@
 """Time of impact of two bodies at constant twist, as an interval whose lower end is safe.
 
-Conservative advancement along a separating axis (Mirtich 1996), with the rotation followed to first order: for a fixed
-unit axis n the gap after a time d is at least
-
-    gap + d n.v - [h_A(n + d n x w_A) - h_A(n)] - [h_B(-n - d n x w_B) - h_B(-n)] - (|w_A|^2 r_A + |w_B|^2 r_B) d^2 / 2
-
-where h is the support value of the body about its own origin and r its farthest point. The bound is concave in d, so a
-chord from 0 to any d lies below it and the chord's root is a safe advance. It is exact to second order, which makes the
-advancement converge quadratically where a bound by |w| r converges linearly.
+Conservative advancement along a separating axis (Mirtich 1996), with the rotation followed to first order
+(advance.py), which makes it converge quadratically where a bound by |w| r converges linearly.
 Lecture topics: "predict the time to collide", "Compute fractional time at which collision actually occurred".
 """
 
@@ -19,11 +13,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.shape_table import SPHERE
 from collision_monitor.narrow_phase.answer import WORK_SIZE
 from collision_monitor.narrow_phase.dispatch import contact, separation
+from collision_monitor.prediction.advance import Placed, advance
 from collision_monitor.prediction.motion import place_shape, relative_position, rotation_at
-from collision_monitor.prediction.support import support_value
 from collision_monitor.records import Method, PredictionStatus
 from collision_monitor.tolerances import EPSILON
 
@@ -59,6 +52,12 @@ IMPACT = np.dtype(
 )
 """One predicted impact. The versions tell whether the motions it rests on still hold."""
 
+
+AT_REST: Final = (0.0, 0.0, 0.0)
+
+FARTHER: Final = 4.0
+"""How much farther than along an axis at rest it is looked for along one that turns. Larger: the bound on where the
+bodies are by then is worse. Smaller: it may stop short."""
 
 _SMALLEST: Final = 1e-240
 """m^4/s^2: a product of a squared length and a squared speed whose round-off is near the smallest number there is."""
@@ -138,59 +137,11 @@ def _interval(dx, dy, dz, vx, vy, vz, reach, growth, end, outward):
 
 
 @inlined
-def _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, d):
-    """Lower bound on the gap along n after d seconds; turn_*: n x w, h_*: the support values at d = 0."""
-    value = gap + d * rate - curvature * d * d
-    if table.kind[a] != SPHERE and (turn_a[0] != 0.0 or turn_a[1] != 0.0 or turn_a[2] != 0.0):
-        m = support_value(table, a, R_a, n[0] + d * turn_a[0], n[1] + d * turn_a[1], n[2] + d * turn_a[2])
-        value -= m - h_a
-    if table.kind[b] != SPHERE and (turn_b[0] != 0.0 or turn_b[1] != 0.0 or turn_b[2] != 0.0):
-        m = support_value(table, b, R_b, -n[0] - d * turn_b[0], -n[1] - d * turn_b[1], -n[2] - d * turn_b[2])
-        value -= m - h_b
-    return value
-
-
-@inlined
-def _safe_advance(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, remaining):
-    """A time d in (0, remaining] up to which the gap along n stays positive; close to the last such time.
-
-    The bound is looked at in turn from outside, where it is negative, and at the root of the chord, where it is not.
-    """
-    low, f_low = 0.0, gap
-    high, f_high = remaining, 0.0
-    d, outside = remaining, True
-    for _ in range(11):
-        f = _gap_after(table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap, d)
-        if outside:
-            if f >= 0.0:
-                return d
-            high, f_high = d, f
-        else:
-            # beyond the two points their line lies above the bound: its root is past the last safe time
-            drop = f_low - f
-            far = d + f * ((d - low) / drop) if drop > 0.0 else high
-            low, f_low = d, f  # f may be a rounding below 0: half the tolerance is there for it
-            if f <= 0.05 * gap:
-                break
-            if far < high:
-                d, outside = far, True
-                continue
-        d, outside = low + (high - low) * (f_low / (f_low - f_high)), False  # below the concave bound: safe
-        if not d > low:
-            break
-    return low
-
-
-@inlined
-def _spin(table, s, rate2):
-    """|w|^2 times the farthest point of the shape from its body's origin: bound on the acceleration of its support."""
-    if rate2 == 0.0:
-        return 0.0
-    x, y, z = table.local_position[s, 0], table.local_position[s, 1], table.local_position[s, 2]
-    offset = sqrt(x * x + y * y + z * z)
-    if table.kind[s] == SPHERE:
-        return rate2 * offset  # turning about its own centre does not move a sphere
-    return rate2 * (offset + table.radius[s])
+def _turning(before, n, elapsed):
+    """How a unit vector that was `before` turns, across it (1/s)."""
+    x, y, z = (n[0] - before[0]) / elapsed, (n[1] - before[1]) / elapsed, (n[2] - before[2]) / elapsed
+    along = x * n[0] + y * n[1] + z * n[2]
+    return (x - along * n[0], y - along * n[1], z - along * n[2])
 
 
 @device
@@ -204,9 +155,9 @@ def shape_impact(table, parts, A, B, a, b, begin, end, margin, tube_0, tube_1, t
     """
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
-    vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
-    curvature = 0.5 * _spin(table, a, A.wx * A.wx + A.wy * A.wy + A.wz * A.wz)
-    curvature += 0.5 * _spin(table, b, B.wx * B.wx + B.wy * B.wy + B.wz * B.wz)
+    v = (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
+    w_a, w_b = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
+    n_before = AT_REST
     t = t_before = begin
     gap_before = inf
     status, query, guess = UNRESOLVED, 0, 0.0
@@ -227,19 +178,20 @@ def shape_impact(table, parts, A, B, a, b, begin, end, margin, tube_0, tube_1, t
                 guess = wanted * (t - t_before) / (gap_before - gap)
             status = HIT
             break
-        t_before, gap_before = t, gap
         n = (out[0], out[1], out[2])
-        turn_a = (n[1] * A.wz - n[2] * A.wy, n[2] * A.wx - n[0] * A.wz, n[0] * A.wy - n[1] * A.wx)
-        turn_b = (n[1] * B.wz - n[2] * B.wy, n[2] * B.wx - n[0] * B.wz, n[0] * B.wy - n[1] * B.wx)
-        rate = n[0] * vx + n[1] * vy + n[2] * vz - tube_1
-        rate -= turn_a[0] * oa[0] + turn_a[1] * oa[1] + turn_a[2] * oa[2]
-        rate += turn_b[0] * ob[0] + turn_b[1] * ob[1] + turn_b[2] * ob[2]
-        h_a = support_value(table, a, R_a, n[0], n[1], n[2])
-        h_b = support_value(table, b, R_b, -n[0], -n[1], -n[2])
+        at = Placed(a, b, R_a, R_b, oa, ob, (px, py, pz), v, w_a, w_b)
         # aim at half the tolerance, so that the last advance ends inside it
-        d = _safe_advance(
-            table, a, b, R_a, R_b, n, turn_a, turn_b, h_a, h_b, rate, curvature, gap - 0.5 * tolerance, end - t
-        )
+        aim = gap - 0.5 * tolerance
+        d, m, until = 0.0, AT_REST, end - t
+        for turns in range(2):
+            d = max(d, advance(table, at, n, m, -tube_1, aim, until))
+            if turns or t == t_before or d >= until:
+                break
+            m = _turning(n_before, n, t - t_before)
+            if m[0] == 0.0 and m[1] == 0.0 and m[2] == 0.0:
+                break
+            until = min(until, FARTHER * d)
+        t_before, gap_before, n_before = t, gap, n
         if d >= end - t:
             return CLEAR, end, query, guess
         if t + d <= t:  # the resolution of the time is reached before the gap is

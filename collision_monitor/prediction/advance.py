@@ -1,0 +1,193 @@
+"""How long two shapes may go on before the gap between them along an axis can close.
+
+The axis n turns at u; from a time on at which it is n, after d seconds it is n + d m and a rest, where m = u x n. Seen
+from a shape that turns at w it turns by k = m + n x w a second. So the gap along it is at least
+
+    gap + d (n.v + m.p) + d^2 m.v - [h_A(n + d k_A) - h_A(n)] - [h_B(-n - d k_B) - h_B(-n)] - c d^2 / 2
+
+p and v: position and velocity of B's origin relative to A's; h: support values of the cores about those origins;
+c bounds the rest: |m|^2 |p| and, for each shape, (|w - u|^2 + |w x u|) r with its farthest point r. Concave in d.
+Where one corner is nearest all the while it is exact to second order with an axis at rest; a face or an edge that turns
+needs an axis that turns with it, else the gap seems to close by |w| r.
+"""
+
+from __future__ import annotations
+
+from math import copysign, inf, sqrt
+from typing import Any, Final, NamedTuple
+
+from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.shape_table import SPHERE
+from collision_monitor.prediction.support import core_box, core_support, is_centred_box, rounding
+from collision_monitor.tolerances import EPSILON
+
+PIECES: Final = 8
+"""Parabolas that are looked at, at most: one more than there are edge directions in two boxes, and one to see it."""
+
+
+class Placed(NamedTuple):
+    """Two shapes at one time, and how their bodies go on. World axes, m, m/s, rad/s."""
+
+    a: Any  # slots in the shape table
+    b: Any
+    R_a: Any  # (3, 3)
+    R_b: Any
+    o_a: Any  # where the shapes are from their bodies' origins
+    o_b: Any
+    p: Any  # body b's origin from body a's
+    v: Any
+    w_a: Any
+    w_b: Any
+
+
+class Axis(NamedTuple):
+    """A direction in a shape's own axes, and by how much it turns there a second."""
+
+    x: Any
+    y: Any
+    z: Any
+    dx: Any
+    dy: Any
+    dz: Any
+
+
+@inlined
+def dot(a, b):
+    """a . b"""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined
+def cross(a, b):
+    """a x b"""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@inlined
+def _seen_from(R, n, k):
+    """The direction n, which turns by k a second, as seen from a shape turned by R (3, 3)."""
+    return Axis(
+        n[0] * R[0, 0] + n[1] * R[1, 0] + n[2] * R[2, 0],
+        n[0] * R[0, 1] + n[1] * R[1, 1] + n[2] * R[2, 1],
+        n[0] * R[0, 2] + n[1] * R[1, 2] + n[2] * R[2, 2],
+        k[0] * R[0, 0] + k[1] * R[1, 0] + k[2] * R[2, 0],
+        k[0] * R[0, 1] + k[1] * R[1, 1] + k[2] * R[2, 1],
+        k[0] * R[0, 2] + k[1] * R[1, 2] + k[2] * R[2, 2],
+    )
+
+
+@inlined
+def _bend(table, s, w, u, offset):
+    """How hard the core of a shape that turns at w can leave the first order, along an axis that turns at u (m/s^2)."""
+    d = (w[0] - u[0], w[1] - u[1], w[2] - u[2])
+    c = cross(w, u)
+    rate = dot(d, d) + sqrt(dot(c, c))
+    if rate == 0.0:
+        return 0.0
+    arm = sqrt(dot(offset, offset))
+    if table.kind[s] == SPHERE:
+        return rate * arm  # turning about its own centre does not move a sphere
+    radius = table.radius[s]
+    return rate * (arm + (radius - rounding(table, s) + 4.0 * EPSILON * radius))
+
+
+@inlined
+def advance(table, at, n, m, rate, gap, until):
+    """A time d in (0, until] (s) up to which the gap along the axis n (unit) stays positive; close to the last such.
+
+    m: how n turns, across it (1/s); rate: how fast the gap grows by itself (m/s); gap: along n now (m).
+    """
+    u = cross(n, m)
+    nw_a, nw_b = cross(n, at.w_a), cross(n, at.w_b)
+    k_a = (m[0] + nw_a[0], m[1] + nw_a[1], m[2] + nw_a[2])
+    k_b = (m[0] + nw_b[0], m[1] + nw_b[1], m[2] + nw_b[2])
+    rate += dot(n, at.v) + dot(m, at.p) - dot(k_a, at.o_a) + dot(k_b, at.o_b)
+    bend = _bend(table, at.a, at.w_a, u, at.o_a) + _bend(table, at.b, at.w_b, u, at.o_b)
+    mm = dot(m, m)
+    if mm > 0.0:
+        last = (at.p[0] + until * at.v[0], at.p[1] + until * at.v[1], at.p[2] + until * at.v[2])
+        bend += mm * sqrt(max(dot(at.p, at.p), dot(last, last)))
+    curvature = max(0.5 * bend - dot(m, at.v), 0.0)
+    A, B = _seen_from(at.R_a, n, k_a), _seen_from(at.R_b, n, k_b)
+    if is_centred_box(table.kind[at.a]) and is_centred_box(table.kind[at.b]):
+        return _between_boxes(core_box(table, at.a), core_box(table, at.b), A, B, rate, curvature, gap, until)
+    return _between_any(table, at.a, at.b, A, B, rate, curvature, gap, until)
+
+
+@inlined
+def _line(size, x, dx, d):
+    """The line that size |x + d dx| follows about d: how far it is below size |x| at 0, and its slope."""
+    side = copysign(size, x + d * dx)
+    return size * abs(x) - side * x, side * dx
+
+
+@inlined
+def _between_boxes(sa, sb, A, B, rate, curvature, gap, remaining):
+    """`advance` for cores that are boxes: the bound is the least of parabolas, one for each choice of their sides.
+
+    Newton's method from outside: the roots fall until the sides at one are those that it was made of.
+    """
+    d, last = 0.0, inf
+    for _ in range(PIECES):
+        g0, s0 = _line(sa[0], A.x, A.dx, d)
+        g1, s1 = _line(sa[1], A.y, A.dy, d)
+        g2, s2 = _line(sa[2], A.z, A.dz, d)
+        g3, s3 = _line(sb[0], B.x, B.dx, d)
+        g4, s4 = _line(sb[1], B.y, B.dy, d)
+        g5, s5 = _line(sb[2], B.z, B.dz, d)
+        start = gap + ((g0 + g1) + (g2 + g3) + (g4 + g5))
+        speed = ((s0 + s1) + (s2 + s3) + (s4 + s5)) - rate
+        root = sqrt(speed * speed + 4.0 * curvature * start)
+        if speed > 0.0:
+            d = 2.0 * start / (speed + root)
+        else:
+            d = (root - speed) / (2.0 * curvature) if curvature > 0.0 else inf
+        d = min(d, remaining)
+        if d >= last:
+            break
+        last = d
+    return last
+
+
+@inlined
+def _gap_after(table, a, b, A, B, h_a, h_b, rate, curvature, gap, d):
+    """Lower bound on the gap after d seconds; h_*: the support values at d = 0."""
+    value = gap + d * rate - curvature * d * d
+    if A.dx != 0.0 or A.dy != 0.0 or A.dz != 0.0:
+        value -= core_support(table, a, A.x + d * A.dx, A.y + d * A.dy, A.z + d * A.dz) - h_a
+    if B.dx != 0.0 or B.dy != 0.0 or B.dz != 0.0:
+        value -= core_support(table, b, -B.x - d * B.dx, -B.y - d * B.dy, -B.z - d * B.dz) - h_b
+    return value
+
+
+@device
+def _between_any(table, a, b, A, B, rate, curvature, gap, remaining):
+    """`advance` for all cores: the bound is looked at in turn from outside, where it is negative, and inside.
+
+    Inside is where the chord has its root: below a concave function.
+    """
+    h_a = core_support(table, a, A.x, A.y, A.z)
+    h_b = core_support(table, b, -B.x, -B.y, -B.z)
+    low, f_low = 0.0, gap
+    high, f_high = remaining, 0.0
+    d, outside = remaining, True
+    for _ in range(11):
+        f = _gap_after(table, a, b, A, B, h_a, h_b, rate, curvature, gap, d)
+        if outside:
+            if f >= 0.0:
+                return d
+            high, f_high = d, f
+        else:
+            # beyond the two points their line lies above the bound: its root is past the last safe time
+            drop = f_low - f
+            far = d + f * ((d - low) / drop) if drop > 0.0 else high
+            low, f_low = d, f  # f may be a rounding below 0: half the tolerance is there for it
+            if f <= 0.05 * gap:
+                break
+            if far < high:
+                d, outside = far, True
+                continue
+        d, outside = low + (high - low) * (f_low / (f_low - f_high)), False
+        if not d > low:
+            break
+    return low
