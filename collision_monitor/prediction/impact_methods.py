@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.errors import UnsupportedError
-from collision_monitor.geometry.pose import Motion, Pose
+from collision_monitor.geometry.pose import Motion, Pose, rotation_matrix
 from collision_monitor.geometry.shapes import Box, HalfSpace, Shape, Sphere
 from collision_monitor.prediction.impact import BUDGET
-from collision_monitor.prediction.impact_batch import lay_out
+from collision_monitor.prediction.motion import make_bodies
 from collision_monitor.prediction.time_of_impact import contact_at, make_scratch, sphere_interval
-from collision_monitor.prediction.two_bodies import Body, Query, first_impacts, make_body
+from collision_monitor.prediction.two_bodies import Body, Query, Scene, first_impacts, make_body, make_scene
 from collision_monitor.tolerances import PARALLEL_SIN2
 
 Array = NDArray[np.float64]
@@ -40,6 +40,25 @@ def _bodies(shape_a: Shape, shape_b: Shape) -> tuple[Body, Body]:
     if any(len(body.pieces) > 1 for body in bodies):
         raise UnsupportedError("expected convex shapes; supported are all but concave Mesh and Polygon")
     return bodies
+
+
+def lay_out(a: Body, b: Body, state_a: Array, state_b: Array, horizon: float) -> tuple[Scene, NDArray[np.int32]]:
+    """The states (N, 13) as N bodies like a and N like b, and the pairs (N, 2) of those in one row."""
+    count = len(state_a)
+    two = make_scene(a, b, horizon)
+    bodies = make_bodies(2 * count)
+    for k, state in enumerate((state_a, state_b)):
+        rows = slice(k * count, (k + 1) * count)
+        motion = bodies.motion[rows]
+        motion["radius"], motion["cover"] = two.bodies.motion["radius"][k], horizon
+        for column, field in enumerate(("x", "y", "z")):
+            motion[field], motion[f"v{field}"], motion[f"w{field}"] = state[:, [column, 7 + column, 10 + column]].T
+        motion["rotation"] = rotation_matrix(state[:, 3:7])
+        bodies.first_shape[rows] = two.bodies.first_shape[k]
+        bodies.spin_radius[rows] = two.bodies.spin_radius[k]
+    bodies.motion["id"] = np.arange(2 * count)
+    pairs = np.arange(2 * count, dtype=np.int32).reshape(2, count).T.copy()
+    return Scene(two.table, two.parts, bodies), pairs
 
 
 def closed_form(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float) -> Array:

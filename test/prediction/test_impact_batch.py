@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from decimal import Decimal, localcontext
+
 import numpy as np
 import pytest
 import trimesh
@@ -52,6 +54,36 @@ def test_each_row_is_the_answer_for_one(a, b, n):
         assert (answers.status[k], answers.lower[k]) == (one.status, pytest.approx(one.lower, rel=1e-12))
         assert answers.upper[k] == pytest.approx(one.upper, rel=1e-12)
     assert {"hit", "clear"} <= set(answers.status)
+
+
+def test_spheres_in_many_motions_against_the_roots_in_100_digits():
+    """Also those that graze by a relative 1e-14 to 1e-1 of their radius, from up to 1e9 radii away."""
+    rng = np.random.default_rng(2)
+    n = 3000
+    away, by = 10.0 ** rng.uniform(0.5, 9, n), 10.0 ** rng.uniform(-14, -1, n) * rng.choice([-1, 1], n)
+    by[::2] = rng.uniform(-1, 1, n // 2)  # half of them plainly
+    v = rng.normal(size=(n, 3))
+    v /= np.linalg.norm(v, axis=1, keepdims=True)
+    side = np.cross(v, rng.normal(size=(n, 3)))
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    p, v = -v * away[:, None] + side * (1 + by)[:, None], v * away[:, None]
+    poses, twists = np.tile(STILL, (n, 1)).astype(float), np.zeros((n, 6))
+    poses[:, :3], twists[:, :3] = p, v
+    answers = time_of_impact_batch(cm.Sphere(0.75), STILL, np.zeros(6), cm.Sphere(0.25), poses, twists, 2.0, 1e-9)
+    for k in range(n):
+        with localcontext(prec=100):
+            P, V = [Decimal(x) for x in p[k]], [Decimal(x) for x in v[k]]
+            a, b = sum(x * x for x in V), sum(x * y for x, y in zip(P, V, strict=True))
+            discriminant = b * b - a * (sum(x * x for x in P) - 1)
+            if discriminant < 0:
+                assert answers.status[k] != "hit"
+                continue
+            assert answers.status[k] != "clear"
+            assert answers.lower[k] <= (-b - discriminant.sqrt()) / a <= answers.upper[k]
+    certain = answers.status == "hit"
+    assert (answers.upper[certain] - answers.lower[certain]).max() < 1e-6
+    assert (answers.status == "unresolved").sum() < 0.2 * n
+    assert certain.sum() > 0.3 * n and (answers.status == "clear").sum() > 0.3 * n
 
 
 def test_single_rows_are_repeated_and_many_fit():

@@ -1,0 +1,105 @@
+"""First impacts of two bodies in many motions, one row of numbers for each: without laying them out as many bodies."""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Final
+
+from collision_monitor._jit import device, kernel
+from collision_monitor.prediction.motion import quaternion_to_matrix
+from collision_monitor.prediction.time_of_impact import CLEAR, HIT, body_impact
+from collision_monitor.tolerances import EPSILON, LARGEST_INPUT, UNIT_QUATERNION
+
+_SMALLEST: Final = 1e-240
+"""m^4/s^2, as in time_of_impact.py: below it products of lengths and speeds lose digits."""
+
+
+@kernel
+def normalise_states(state):
+    """Normalise the quaternions of states (N, 13) in place.
+
+    Returns the first row that is no state, -1 where all are; and the length of its quaternion if that is why, else -1.
+    """
+    for k in range(len(state)):
+        for column in range(13):
+            if not abs(state[k, column]) <= LARGEST_INPUT:
+                return k, -1.0
+        x, y, z, w = state[k, 3], state[k, 4], state[k, 5], state[k, 6]
+        norm = sqrt(x * x + y * y + z * z + w * w)
+        if not abs(norm - 1.0) <= UNIT_QUATERNION:
+            return k, norm
+        for column in range(3, 7):
+            state[k, column] /= norm
+    return -1, -1.0
+
+
+@device
+def _set_motion(motion, state, k):
+    motion.x, motion.y, motion.z = state[k, 0], state[k, 1], state[k, 2]
+    motion.vx, motion.vy, motion.vz = state[k, 7], state[k, 8], state[k, 9]
+    motion.wx, motion.wy, motion.wz = state[k, 10], state[k, 11], state[k, 12]
+
+
+@kernel
+def impacts_of_rows(
+    table, parts, bodies, state_a, state_b, rows, horizon, separation, deep, tolerance, budget, scratch, event,
+    lower, upper, left,
+):  # fmt: skip
+    """First impacts of the two bodies moving as in `rows` of the states (N, 13); the rest of lower, upper (N,) stays.
+
+    What overlaps by more than touching (within `deep`, m) at the start is at 0; left (N,) bool: touches there and is
+    left open.
+    """
+    q_a, q_b = state_a[:, 3:7], state_b[:, 3:7]
+    for r in range(len(rows)):
+        k = rows[r]
+        _set_motion(bodies.motion[0], state_a, k)
+        _set_motion(bodies.motion[1], state_b, k)
+        quaternion_to_matrix(q_a, k, bodies.motion[0].rotation)
+        quaternion_to_matrix(q_b, k, bodies.motion[1].rotation)
+        body_impact(table, parts, bodies, 0, 1, 0.0, horizon, separation, tolerance, budget, scratch, event[0])
+        lower[k] = upper[k] = inf
+        left[k] = False
+        if event[0].status == CLEAR:
+            continue
+        lower[k] = event[0].lower
+        if event[0].status == HIT and event[0].upper <= horizon:
+            upper[k] = event[0].upper
+        if lower[k] <= 0.0:
+            body_impact(table, parts, bodies, 0, 1, 0.0, horizon, deep, tolerance, budget, scratch, event[0])
+            if event[0].status == HIT and event[0].upper <= 0.0:
+                upper[k] = 0.0
+            else:
+                left[k] = True
+
+
+@kernel
+def impacts_of_spheres(a, b, reach, horizon, lower, upper, left):
+    """The same in closed form for spheres whose radii add up to `reach` (m); a, b: columns of the states, (13, N).
+
+    As `sphere_interval`, but the same for all and without a branch, so that the processor does eight at once: the first
+    root c / (-b + sqrt(D)), rounded outward for the lower end and inward for the upper one. left (N,) bool: what
+    touches at the start, grazes or underflows, which this leaves open.
+    """
+    certain = reach * (1.0 - 8.0 * EPSILON)  # the radii are rounded up by nearly as much
+    outer, inner = reach * reach, certain * certain
+    for k in range(len(lower)):
+        dx, dy, dz = b[0, k] - a[0, k], b[1, k] - a[1, k], b[2, k] - a[2, k]
+        vx, vy, vz = b[7, k] - a[7, k], b[8, k] - a[8, k], b[9, k] - a[9, k]
+        ox, oy, oz = dy * vz - dz * vy, dz * vx - dx * vz, dx * vy - dy * vx
+        pp, vv, far = dx * dx + dy * dy + dz * dz, vx * vx + vy * vy + vz * vz, ox * ox + oy * oy + oz * oz
+        size, closing = pp + outer, -(dx * vx + dy * vy + dz * vz)
+        off = size * vv
+        slack = 8.0 * EPSILON * sqrt(off)
+        c = pp - outer - 4.0 * EPSILON * size
+        discriminant = outer * vv - far + 32.0 * EPSILON * off
+        s = sqrt(max(discriminant, 0.0)) + closing + slack
+        first = c / s * (1.0 - 4.0 * EPSILON)
+        may = (discriminant >= 0.0) & (s > 0.0) & (first <= horizon)
+        discriminant = inner * vv - far - 32.0 * EPSILON * off
+        s = sqrt(max(discriminant, 0.0)) + closing - slack
+        sure = (pp - inner + 4.0 * EPSILON * size) / s * (1.0 + 4.0 * EPSILON)
+        must = (discriminant >= 0.0) & (s > 0.0) & (sure <= horizon)
+        lower[k] = first if may else inf
+        upper[k] = sure if must else inf
+        left[k] = (c <= 0.0) | (may & (not must)) | (off < _SMALLEST)
