@@ -7,9 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from collision_monitor._jit import device, kernel
+from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.narrow_phase.dispatch import contact_within
 from collision_monitor.prediction.motion import place_shape, quaternion_to_matrix, turn_quaternion
+from collision_monitor.prediction.prefetch import prefetch
 from collision_monitor.prediction.time_of_impact import CLEAR, body_impact, closing_speed
 from collision_monitor.records import ContactStatus, Phase
 
@@ -32,6 +33,9 @@ BOUND: Final = 10
 SHAPE_I: Final = 16
 SHAPE_J: Final = 17
 STATUS: Final = 18
+
+AHEAD: Final = 2
+"""Pairs whose bodies are asked for while one is examined."""
 
 TOUCHING: Final = int(ContactStatus.TOUCHING)
 UNRESOLVED: Final = int(ContactStatus.UNRESOLVED)
@@ -157,6 +161,17 @@ def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, sc
     return True, tests
 
 
+@inlined
+def _ask_for(table, bodies, i):
+    row = np.intp(i)
+    prefetch(bodies.position, row)
+    prefetch(bodies.quaternion, row)
+    prefetch(bodies.linear, row)
+    prefetch(bodies.angular, row)
+    prefetch(bodies.motion, row)
+    prefetch(table.size, np.intp(bodies.first_shape[i]))
+
+
 @kernel
 def examine(
     table, parts, bodies, pairs, events, now, margin, stale_acceleration, tolerance, budget, results, later, scratch
@@ -169,6 +184,9 @@ def examine(
     q = np.empty((1, 4))
     n = n_later = tests = queries = 0
     for k in range(pairs.size):
+        if k + AHEAD < pairs.size:
+            _ask_for(table, bodies, pairs[k + AHEAD].i)
+            _ask_for(table, bodies, pairs[k + AHEAD].j)
         i, j = pairs[k].i, pairs[k].j
         touching, made = body_contact(
             table, parts, bodies, i, j, now, margin, stale_acceleration, scratch, q, results[n]
