@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.tolerances import HULL_DROP
 
 PLANAR = ("Circle", "Polygon")
+
+AT_ONCE: Final = 1 << 20
+"""Heights of vertices over faces that are computed together: 8 MB."""
 
 
 def is_planar(shape: Shape) -> bool:
@@ -74,9 +77,15 @@ def is_convex_mesh(mesh: Mesh) -> bool:
         return False
     normal /= length[:, None]
     used = mesh.vertices[np.unique(mesh.faces)]
-    height = used @ normal.T - np.einsum("ij,ij->i", a, normal)
+    offset = np.einsum("ij,ij->i", a, normal)
     flat = HULL_DROP * 16 * size
     # inward or outward, but all the same way, and not a sheet that is folded onto itself
-    outward = bool((height <= flat).all()) and bool((height.min(axis=0) < -flat).all())
-    inward = bool((height >= -flat).all()) and bool((height.max(axis=0) > flat).all())
-    return outward or inward
+    outward = inward = True
+    for some in np.array_split(np.arange(len(normal)), len(normal) * len(used) // AT_ONCE + 1):
+        height = used @ normal[some].T - offset[some]
+        low, high = height.min(axis=0), height.max(axis=0)
+        outward = outward and bool((high <= flat).all() and (low < -flat).all())
+        inward = inward and bool((low >= -flat).all() and (high > flat).all())
+        if not (outward or inward):
+            return False
+    return True

@@ -5,6 +5,7 @@ The dtypes and the memory order never depend on the content, so that adding a sh
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
@@ -88,6 +89,31 @@ def take(table: ShapeTable, slots: NDArray[np.int_]) -> ShapeTable:
     """A table of these slots in this order, each as often as it is named; the vertices are shared."""
     rows = {name: getattr(table, name)[slots] for name in table._fields if name not in ("vertices", "vertex_index")}
     return table._replace(**rows)
+
+
+def join(tables: Sequence[ShapeTable]) -> ShapeTable:
+    """One table of the slots of several, in order."""
+    columns = {name: [getattr(table, name) for table in tables] for name in ShapeTable._fields}
+    start = np.cumsum([0] + [len(index) for index in columns["vertex_index"][:-1]])
+    columns["vertex_start"] = [each + np.int32(at) for each, at in zip(columns["vertex_start"], start, strict=True)]
+    return ShapeTable(**{name: np.concatenate(each, axis=int(name == "vertices")) for name, each in columns.items()})
+
+
+def triangle_table(corners: Array) -> ShapeTable:
+    """A table of triangles (n, 3, 3) about their own origins: as `append` of each, for a mesh of many."""
+    n = len(corners)
+    table = _empty(n, LANES * n)
+    radius = np.linalg.norm(corners, axis=2).max(axis=1)
+    lanes = np.minimum(np.arange(LANES, dtype=np.int32), _CORNERS[-1])
+    return table._replace(
+        kind=np.full(n, CONVEX_HULL, np.uint8),
+        radius=np.nextafter(radius * (1 + 1e-15), inf),
+        vertex_start=np.arange(0, LANES * n, LANES, dtype=np.int32),
+        vertex_count=np.full(n, LANES, np.int32),
+        vertices=np.ascontiguousarray(corners[:, lanes].reshape(-1, 3).T),
+        vertex_index=np.tile(lanes, n),
+        local_rotation=np.tile(np.eye(3), (n, 1, 1)),
+    )
 
 
 def hull_vertices(points: Array) -> NDArray[np.int32]:

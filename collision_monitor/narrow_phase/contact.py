@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.distance import cdist
 
 from collision_monitor.errors import PoseError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
@@ -18,11 +17,11 @@ from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
-from collision_monitor.geometry.shape_table import ShapeTable, ShapeTableBuilder
-from collision_monitor.geometry.shapes import ConvexHull, HalfSpace, Mesh, Shape
-from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
-from collision_monitor.narrow_phase.models import Modelled, containing_model
+from collision_monitor.narrow_phase.models import containing_model, parse_model
+from collision_monitor.narrow_phase.nearest_pieces import NearestPieces
+from collision_monitor.narrow_phase.pieces import Pieces, as_pieces, exact_pieces
 from collision_monitor.records import Model
 from collision_monitor.tolerances import FEATURE_TIE, UNIT_QUATERNION
 
@@ -31,34 +30,20 @@ Compound = Shape | Sequence[tuple[Shape, Pose]]
 
 _DIRECTIONS: Final = [sign * np.array(d) / np.linalg.norm(d) for d in KDOP_DIRECTIONS[26] for sign in (1.0, -1.0)]
 
-FIRST_BATCH: Final = 64
-"""Pairs of pieces that are looked at first; each further batch is twice as large."""
-
-
-class _Patch(NamedTuple):
-    """What the patch of a contact is found from: the pieces, about A's origin, and all pairs that were looked at."""
-
-    table: ShapeTable
-    position: Array
-    rotation: Array
-    looked_at: list[tuple[NDArray[np.int32], Array]]  # pairs (m, 2) of pieces and their contacts (m, 15)
-    best: Array  # the contact (15,) of the nearest or deepest
-    pair: NDArray[np.int32]
-
-    def points(self, witness: Array) -> Array:
-        """The corners (k, 3) on A, of all pairs that touch in the same plane: a floor of triangles is one face."""
-        radius = self.table.radius[self.pair]
-        tie = FEATURE_TIE * float(radius[np.isfinite(radius)].sum())
-        patches = []
-        for pairs, rows in self.looked_at:
-            level = (rows[:, 0] <= self.best[0] + tie) & (rows[:, 1:4] @ self.best[1:4] >= 1.0 - FEATURE_TIE)
-            count, points = manifold_batch(self.table, self.position, self.rotation, pairs[level], rows[level])
-            patches += [points[i, : count[i]] + self.position[pairs[level][i, 0]] for i in range(len(count))]
-        patch = patches[0] if len(patches) == 1 else outline(np.concatenate(patches), self.best[1:4], tie)
-        if len(patch) == 1:
-            return witness[None]
-        # where A's origin is in the world
-        return np.asarray(patch + (witness - self.best[4:7] - self.position[self.pair[0]]))
+def _patch(found: NearestPieces, witness: Array) -> Array:
+    """The corners (k, 3) on A of all pieces that touch in the same plane: a floor of triangles is one face."""
+    radius = found.table.radius[found.pair]
+    tie = FEATURE_TIE * float(radius[np.isfinite(radius)].sum())
+    patches = []
+    for pairs, rows in found.looked_at:
+        level = (rows[:, 0] <= found.best[0] + tie) & (rows[:, 1:4] @ found.best[1:4] >= 1.0 - FEATURE_TIE)
+        count, points = manifold_batch(found.table, found.position, found.rotation, pairs[level], rows[level])
+        patches += [points[i, : count[i]] + found.position[pairs[level][i, 0]] for i in range(len(count))]
+    patch = patches[0] if len(patches) == 1 else outline(np.concatenate(patches), found.best[1:4], tie)
+    if len(patch) == 1:
+        return witness[None]
+    # where A's origin is in the world
+    return np.asarray(patch + (witness - found.best[4:7] - found.position[found.pair[0]]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +63,7 @@ class Contact:
     point_b: Array
     model_a: Model
     model_b: Model
-    _patch: _Patch | None = field(repr=False)  # None: the two points alone
+    _found: NearestPieces | None = field(repr=False)  # what the patch is found from; None: the two points alone
 
     @property
     def overlaps(self) -> bool:
@@ -91,22 +76,24 @@ class Contact:
 
         Else `point_a` alone. Found when first asked for.
         """
-        return self.point_a[None] if self._patch is None else self._patch.points(self.point_a)
+        return self.point_a[None] if self._found is None else _patch(self._found, self.point_a)
 
     @cached_property
     def points_b(self) -> Array:
         """The same points on B: a signed distance along the normal from those on A."""
-        return self.point_b[None] if self._patch is None else self.points_a + self.signed_distance * self.normal
+        return self.point_b[None] if self._found is None else self.points_a + self.signed_distance * self.normal
 
 
 class _Side(NamedTuple):
-    """One of the two, in world axes about its own origin."""
+    """One of the two."""
 
     shapes: Sequence[tuple[Shape, Pose]]
-    modelled: Modelled
     pose: Pose
-    rotation: Array  # (n, 3, 3) of the pieces
-    position: Array  # (n, 3) of the pieces
+    rotation: Array  # (3, 3), the pose's
+    pieces: Pieces
+    outline: Sequence[tuple[Shape, Pose]]  # shapes that reach as far as the pieces
+    model: Model
+    excess: float
 
 
 def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, model: Model | str = "exact") -> Contact:
@@ -126,20 +113,22 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
         _check_in_plane(a)
         _check_in_plane(b)
     offset = b.pose.position - a.pose.position
-    patch: _Patch | None
-    row, patch = _deepest(a, b, offset)
+    found: NearestPieces | None
+    found = NearestPieces(a.pieces, (a.rotation, np.zeros(3)), b.pieces, (b.rotation, offset))
+    row = found.best.copy()
+    row[4:7] += found.position[found.pair[0]]
     distance, bound = float(row[0]), float(row[10])
     enclosed = distance > 0.0 and (_holds(a, b, offset) or _holds(b, a, -offset))
     if enclosed:
         # no faces meet, but one is inside of the other, at least this deep
         distance, row[1:4] = -distance, -row[1:4]
-        patch = None
-    convex = len(a.position) == len(b.position) == 1
+        found = None
+    convex = len(a.pieces) == len(b.pieces) == 1
     unbounded = distance == -np.inf  # a fact about the two, with no length to be wrong about
     if distance <= 0.0 and not convex and not unbounded:
         bound += max(_parting(a, b, offset, row[1:4]) + distance, 0.0)
-    excess = a.modelled.excess + b.modelled.excess
-    if distance <= 0.0 and excess > 0.0 and not (a.modelled.convex and b.modelled.convex):
+    excess = a.excess + b.excess
+    if distance <= 0.0 and excess > 0.0 and not all(len(exact_pieces(side.shapes)) == 1 for side in (a, b)):
         bound -= distance  # the models may overlap deeply where the concave objects do not meet at all
     point = a.pose.position + row[4:7]
     return Contact(
@@ -148,9 +137,9 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
         normal=row[1:4],
         point_a=point,
         point_b=point.copy() if unbounded else point + distance * row[1:4],
-        model_a=a.modelled.model,
-        model_b=b.modelled.model,
-        _patch=None if unbounded else patch,
+        model_a=a.model,
+        model_b=b.model,
+        _found=None if unbounded else found,
     )
 
 
@@ -158,15 +147,11 @@ def _side(shape: Compound, pose: Pose, model: Model | str, name: str) -> _Side:
     shapes = shape_pairs(shape, f"shape {name}")
     if not isinstance(pose, Pose):
         raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
+    if parse_model(model) in (Model.AUTO, Model.EXACT):
+        return _Side(shapes, pose, pose.rotation, exact_pieces(shapes), shapes, Model.EXACT, 0.0)
     modelled = containing_model(shapes, model)
-    R = pose.rotation
-    return _Side(
-        shapes=shapes,
-        modelled=modelled,
-        pose=pose,
-        rotation=np.stack([R @ offset.rotation for _, offset in modelled.pieces]),
-        position=np.stack([R @ offset.position for _, offset in modelled.pieces]),
-    )
+    pieces = as_pieces(modelled.pieces)
+    return _Side(shapes, pose, pose.rotation, pieces, modelled.pieces, modelled.model, modelled.excess)
 
 
 def _check_in_plane(side: _Side) -> None:
@@ -174,73 +159,34 @@ def _check_in_plane(side: _Side) -> None:
         raise PoseError(f"expected a turn about z for a shape of the plane, got the quaternion {side.pose.quaternion}")
 
 
-def _deepest(a: _Side, b: _Side, offset: Array) -> tuple[Array, _Patch]:
-    """The contact (15,) of the nearest or deepest pair of pieces, about A's origin (see answer.py), and its patch.
-
-    Pairs are looked at in the order of their bounding spheres' distances, until no other can be nearer.
-    """
-    n, m = len(a.position), len(b.position)
-    builder = ShapeTableBuilder(slots=n + m)
-    for piece, _ in (*a.modelled.pieces, *b.modelled.pieces):
-        builder.append(piece)
-    radius = builder.table.radius[: n + m]
-    position = np.concatenate([a.position, b.position + offset])
-    rotation = np.concatenate([a.rotation, b.rotation])
-    lower: Array = np.full((n, m), -np.inf)
-    finite = np.isfinite(radius[:n])[:, None] & np.isfinite(radius[n:])
-    if finite.any():
-        apart = cdist(position[:n], position[n:]) - (radius[:n, None] + radius[n:])
-        lower[finite] = apart[finite]
-    lower = np.ravel(lower)
-    order = np.argsort(lower, kind="stable")
-    best: Any = None
-    looked_at = []
-    begin, size = 0, FIRST_BATCH
-    while begin < len(order) and (best is None or lower[order[begin]] <= best[0]):
-        some = order[begin : begin + size]
-        pairs = np.stack([some // m, n + some % m], axis=1).astype(np.int32)
-        rows = contact_batch(builder.table, position, rotation, pairs)
-        looked_at.append((pairs, rows))
-        k = int(rows[:, 0].argmin())
-        if best is None or rows[k, 0] < best[0]:
-            best, pair = rows[k].copy(), pairs[k]
-        begin, size = begin + size, 2 * size
-    patch = _Patch(builder.table, position, rotation, looked_at, best.copy(), pair)
-    best[4:7] += position[pair[0]]
-    return best, patch
-
-
 def _holds(outer: _Side, inner: _Side, offset: Array) -> bool:
     """Whether a closed mesh of `outer` holds a piece of `inner`, which is `offset` away; no surfaces meet."""
-    if outer.modelled.model is not Model.EXACT:
+    if outer.model is not Model.EXACT or len(outer.pieces) == 1:
         return False
+    points = offset + inner.pieces.inner @ inner.rotation.T
     for shape, pose in outer.shapes:
-        if not isinstance(shape, Mesh) or not is_closed(shape.faces) or len(outer.position) == 1:
+        if not isinstance(shape, Mesh):
             continue
-        R = outer.pose.rotation
-        points = (offset + _surface(inner) - R @ pose.position) @ (R @ pose.rotation)
-        if (locate_in_polyhedron(points, shape.vertices, shape.faces) >= Location.BOUNDARY).any():
+        own = (points - outer.rotation @ pose.position) @ (outer.rotation @ pose.rotation)
+        own = own[((own >= shape.vertices.min(axis=0)) & (own <= shape.vertices.max(axis=0))).all(axis=1)]
+        if not len(own) or not is_closed(shape.faces):
+            continue
+        if (locate_in_polyhedron(own, shape.vertices, shape.faces) >= Location.BOUNDARY).any():
             return True
     return False
 
 
-def _surface(side: _Side) -> Array:
-    """A point (n, 3) of each piece, about the object's origin, in world axes."""
-    inner = [s.points.mean(axis=0) if isinstance(s, ConvexHull) else np.zeros(3) for s, _ in side.modelled.pieces]
-    return np.asarray(side.position + np.einsum("nij,nj->ni", side.rotation, np.array(inner)))
-
-
 def _parting(a: _Side, b: _Side, offset: Array, normal: Array) -> float:
     """Length (m) of the shortest of some translations that certainly part the two: along axes of either, and normal."""
-    axes = [R @ direction for R in (a.pose.rotation, b.pose.rotation) for direction in _DIRECTIONS]
+    axes = [side.rotation @ direction for side in (a, b) for direction in _DIRECTIONS]
     planes = [
-        sign * side.pose.rotation @ pose.rotation @ shape.normal
+        sign * side.rotation @ pose.rotation @ shape.normal
         for side, sign in ((a, 1.0), (b, -1.0))
-        for shape, pose in side.modelled.pieces
+        for shape, pose in side.outline
         if isinstance(shape, HalfSpace)
     ]
     directions = np.array([normal, *axes, *planes])
     if is_planar(a.shapes[0][0]):
         directions = directions[directions[:, 2] == 0.0]
-    ends = reach(a.modelled.pieces, directions @ a.pose.rotation) - directions @ offset
-    return float((ends + reach(b.modelled.pieces, -directions @ b.pose.rotation)).min())
+    ends = reach(a.outline, directions @ a.rotation) - directions @ offset
+    return float((ends + reach(b.outline, -directions @ b.rotation)).min())

@@ -1,0 +1,106 @@
+"""Which two convex pieces of two objects are nearest: by their bounding spheres, and down two trees of spheres where
+there are many.
+
+(Slides "Bounding volume hierarchies"; Ericson, Real-Time Collision Detection, 6.3)
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.broad_phase.boxes import ranges
+from collision_monitor.geometry.shape_table import ShapeTable, join
+from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.narrow_phase.pieces import Pieces
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+FIRST_BATCH: Final = 64
+"""Pairs of pieces that are looked at first; each further batch is twice as large."""
+
+ALL_PAIRS: Final = 2048
+"""Pairs of pieces up to which all bounding spheres are compared: that is as fast as one way down the trees."""
+
+AT_ONCE: Final = 1024
+"""Pairs of spheres that go down the trees together. Larger: more of them before anything near is known."""
+
+
+class NearestPieces:
+    """The search, and what it found: `best`, the contact (15,) of the nearest or deepest pair of pieces, and `pair`.
+
+    table, position, rotation: of the pieces of both, A's first, about one origin in the same axes. looked_at: all pairs
+    (m, 2) that were tested, in batches with their contacts (m, 15): those of all that are as near as the nearest.
+    """
+
+    def __init__(self, a: Pieces, X_A: tuple[Array, Array], b: Pieces, X_B: tuple[Array, Array]) -> None:
+        """X: rotation (3, 3) and position (3,) of each."""
+        self.table: ShapeTable = join([a.table, b.table])
+        self.position = np.concatenate([a.position @ X_A[0].T + X_A[1], b.position @ X_B[0].T + X_B[1]])
+        self.rotation = np.concatenate([X_A[0] @ a.rotation, X_B[0] @ b.rotation])
+        self.looked_at: list[tuple[NDArray[np.int32], Array]] = []
+        self.best: Any = np.full(1, np.inf)
+        self.pair = np.zeros(2, np.int32)
+        self._first_of_b = len(a)
+        if len(a) * len(b) <= ALL_PAIRS:
+            self._look_at(np.repeat(np.arange(len(a)), len(b)), np.tile(np.arange(len(b)), len(a)))
+        else:
+            self._descend(a, X_A, b, X_B)
+
+    def _look_at(self, i: Indices, j: Indices) -> None:
+        """Test the pieces i of A with j of B, in the order of their spheres' distances, while they can be nearest."""
+        j = self._first_of_b + j
+        radius = self.table.radius
+        lower = np.linalg.norm(self.position[j] - self.position[i], axis=1) - (radius[i] + radius[j])
+        order = np.argsort(lower, kind="stable")
+        begin, size = 0, FIRST_BATCH
+        while begin < len(order) and lower[order[begin]] <= self.best[0]:
+            some = order[begin : begin + size]
+            pairs = np.stack([i[some], j[some]], axis=1).astype(np.int32)
+            rows = contact_batch(self.table, self.position, self.rotation, pairs)
+            self.looked_at.append((pairs, rows))
+            k = int(rows[:, 0].argmin())
+            if rows[k, 0] < self.best[0]:
+                self.best, self.pair = rows[k].copy(), pairs[k]
+            begin, size = begin + size, 2 * size
+
+    def _descend(self, a: Pieces, X_A: tuple[Array, Array], b: Pieces, X_B: tuple[Array, Array]) -> None:
+        """From the whole of both to their halves, the nearest first; what is farther than what was found stays out."""
+        trees = a.spheres, b.spheres
+        centers = [[c @ R.T + p for c in tree.center] for tree, (R, p) in zip(trees, (X_A, X_B), strict=True)]
+        last = len(a.spheres.center) - 1, len(b.spheres.center) - 1
+        stack = [((0, 0), np.zeros((2, 1), np.int64), np.full(1, -np.inf))]
+        farthest = np.inf  # some pair is as near as that
+        while stack:
+            level, nodes, lower = stack.pop()
+            farthest = min(farthest, self.best[0])
+            nodes = nodes[:, lower <= farthest]
+            if level == last:
+                self._look_at(*_leaves(trees, nodes))
+                continue
+            for side in range(2):
+                if level[side] < last[side]:
+                    nodes = np.concatenate([nodes, nodes], axis=1)
+                    nodes[side] *= 2
+                    nodes[side, nodes.shape[1] // 2 :] += 1
+            k, m = level = min(level[0] + 1, last[0]), min(level[1] + 1, last[1])
+            i, j = nodes
+            apart = np.linalg.norm(centers[1][m][j] - centers[0][k][i], axis=1)
+            radii = trees[0].radius[k][i] + trees[1].radius[m][j]
+            lower = apart - radii
+            farthest = min(farthest, float((apart + radii).min(initial=np.inf)))
+            order = np.argsort(lower, kind="stable")
+            for begin in reversed(range(0, len(order), AT_ONCE)):
+                some = order[begin : begin + AT_ONCE]
+                stack.append((level, nodes[:, some], lower[some]))
+
+
+def _leaves(trees: Any, nodes: Indices) -> tuple[Indices, Indices]:
+    """The pieces of A and those of B in each pair of spheres (2, n) of the last levels, each with each."""
+    i, owner = ranges(trees[0].first[nodes[0]], np.diff(trees[0].first)[nodes[0]])
+    j = nodes[1, owner]
+    j, again = ranges(trees[1].first[j], np.diff(trees[1].first)[j])
+    return trees[0].order[i[again]], trees[1].order[j]

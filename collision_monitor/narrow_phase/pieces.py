@@ -1,0 +1,117 @@
+"""The convex pieces of an object as arrays, and a tree of spheres around them: what `contact` searches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from collision_monitor.broad_phase.aabb_tree import aabb_tree
+from collision_monitor.geometry.pieces import convex_pieces, is_convex_mesh
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shape_table import ShapeTable, ShapeTableBuilder, join, triangle_table
+from collision_monitor.geometry.shapes import ConvexHull, Mesh, Polygon, Shape
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class SphereLevels:
+    """Level k has 2^k spheres, center[k] (2^k, 3) and radius[k], each around two of the next.
+
+    Sphere m of the last level holds the pieces order[first[m]] … order[first[m + 1] - 1], one or two of them.
+    """
+
+    center: list[Array]
+    radius: list[Array]
+    order: Indices
+    first: Indices
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """n convex pieces: a table of their shapes, and their poses in the object's frame.
+
+    inner (m, 3): points of them, at least one of each connected part.
+    """
+
+    table: ShapeTable
+    position: Array
+    rotation: Array
+    inner: Array
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    @cached_property
+    def spheres(self) -> SphereLevels:
+        """Bounding spheres of the pieces' own ones, halved by place. (Slides "Bounding volume hierarchies")"""
+        tree = aabb_tree(self.position, self.position)
+        n = len(self.position)
+        position, radius = self.position[tree.order], self.table.radius[tree.order]
+        centers, radii = [], []
+        for k, (low, high) in enumerate(zip(tree.lower, tree.upper, strict=True)):
+            center = low + 0.5 * (high - low)
+            first = np.arange(2**k) * n >> k
+            node = np.repeat(np.arange(2**k), np.diff(first, append=n))
+            far = np.linalg.norm(position - center[node], axis=1) + radius
+            centers.append(center)
+            radii.append(np.maximum.reduceat(far, first))
+        return SphereLevels(centers, radii, tree.order, tree.first)
+
+
+def exact_pieces(shapes: Sequence[tuple[Shape, Pose]]) -> Pieces:
+    """The pieces of an object as it is. They are remembered: a shape never changes."""
+    parts = []
+    for shape, pose in shapes:
+        own = _of_concave(shape) if isinstance(shape, Mesh | Polygon) else _of_convex(shape)
+        if pose.position.any() or pose.quaternion[3] != 1.0:
+            R = pose.rotation
+            turned = (own.position @ R.T + pose.position, R @ own.rotation, own.inner @ R.T + pose.position)
+            own = Pieces(own.table, *turned)
+        parts.append(own)
+    if len(parts) == 1:
+        return parts[0]
+    columns = ([getattr(part, name) for part in parts] for name in ("position", "rotation", "inner"))
+    return Pieces(join([part.table for part in parts]), *map(np.concatenate, columns))
+
+
+@lru_cache(maxsize=1024)
+def _of_convex(shape: Shape) -> Pieces:
+    return as_pieces(((shape, Pose()),))
+
+
+@lru_cache(maxsize=64)
+def _of_concave(shape: Mesh | Polygon) -> Pieces:
+    if isinstance(shape, Mesh) and not is_convex_mesh(shape):
+        corners = shape.vertices[shape.faces]
+        centers = corners.mean(axis=1)  # about its own centre a triangle has a small bounding sphere, and its digits
+        rotation = np.tile(np.eye(3), (len(corners), 1, 1))
+        inner = centers[_one_of_each_part(shape.faces, len(shape.vertices))]
+        return Pieces(triangle_table(corners - centers[:, None]), centers, rotation, inner)
+    return as_pieces(convex_pieces(shape))
+
+
+def _one_of_each_part(faces: Indices, vertices: int) -> Indices:
+    """A face of each connected part of a mesh."""
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    graph = coo_array((np.ones(len(start), np.int8), (start, end)), shape=(vertices, vertices))
+    _, part = connected_components(graph, directed=False)
+    return np.asarray(np.unique(part[faces[:, 0]], return_index=True)[1])
+
+
+def as_pieces(pieces: Sequence[tuple[Shape, Pose]]) -> Pieces:
+    """Convex shapes with their poses in the object's frame."""
+    builder = ShapeTableBuilder(slots=len(pieces), vertices=0)
+    for shape, _ in pieces:
+        builder.append(shape)
+    position = np.stack([pose.position for _, pose in pieces])
+    rotation = np.stack([pose.rotation for _, pose in pieces])
+    middle = np.array([s.points.mean(axis=0) if isinstance(s, ConvexHull) else np.zeros(3) for s, _ in pieces])
+    return Pieces(builder.used, position, rotation, position + np.einsum("nij,nj->ni", rotation, middle))
