@@ -285,7 +285,7 @@ def planes(pair: Pair) -> list[Array]:
 
 
 def parting_in_plane(batch: Batch, k: int) -> float:
-    """The least translation that parts two unions of polygons, exactly: the origin's way out of all their differences."""
+    """The least translation that parts two unions of polygons: the origin's way out of all their differences."""
     differences = []
     for (a, *_), (b, *_) in itertools.product(batch.a.parts, batch.b.parts):
         ours, theirs = a.points @ batch.R_A[k, :2, :2].T, batch.p[k, :2] + b.points @ batch.R_B[k, :2, :2].T

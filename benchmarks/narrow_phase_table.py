@@ -11,10 +11,9 @@ Each answer is checked against definitions written here in NumPy, none of which 
 - Overlapping, moving by the depth along the normal has to part the two, by the support functions; and no other
   direction may part them sooner: for polytopes and polygons none of all face normals and edge crosses (exact), for
   curved shapes none that a search from 200 directions finds.
-- Meshes, whose answers are not one number of one convex pair, against FCL's BVH: its distance where they are apart.
 
 FCL's distance is the second opinion for every other pair that is apart by 5 % of the size, near the origin: nearer, and
-overlapping, FCL is no judge.
+overlapping, FCL is no judge. Compounds, meshes and concave polygons: concave_pairs.py.
 """
 
 from __future__ import annotations
@@ -30,7 +29,6 @@ from typing import Any, NamedTuple
 
 import fcl
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull as Qhull
 from scipy.spatial.transform import Rotation
@@ -394,42 +392,6 @@ def convex_row(kinds: tuple[str, str], count: int, cases: str, done: Callable[[i
     )  # fmt: skip
 
 
-def box_corners(box: cm.Box) -> Array:
-    """The eight corners (8, 3)."""
-    return np.array(list(itertools.product(*[(-s / 2, s / 2) for s in box.size])))
-
-
-def mesh_row(kind: str, count: int, done: Callable[[int], None]) -> Row:
-    """A torus of 256 triangles against another shape, by FCL's BVH."""
-    torus = trimesh.creation.torus(1.0, 0.3, major_sections=16, minor_sections=8)
-    ring = cm.Mesh(torus.vertices, torus.faces)
-    rng = np.random.default_rng(len(kind))
-    worst, wrong, seconds, apart = 0.0, 0, 0.0, 0
-    shapes = [ring if kind == "mesh" else make(kind, rng) for _ in range(SIZES)]
-    theirs = in_fcl(ring)
-    for k in range(count):
-        other = shapes[k % SIZES]
-        mesh = other
-        if isinstance(other, cm.Box | cm.ConvexHull):  # as a mesh: FCL's distance of a mesh and a solid is coarse
-            hull = convex_hull(box_corners(other) if isinstance(other, cm.Box) else other.points)
-            mesh = cm.Mesh(hull.vertices, hull.faces)
-        q = unit(rng.normal(size=(2, 4)))
-        X, Y = cm.Pose((0, 0, 0), q[0]), cm.Pose(unit(rng.normal(size=3)) * rng.uniform(0, 3), q[1])
-        begin = time.process_time()
-        c = cm.contact(ring, X, other, Y)
-        seconds += time.process_time() - begin
-        X_A, X_B = fcl.Transform(X.rotation, X.position), fcl.Transform(Y.rotation, Y.position)
-        objects = fcl.CollisionObject(theirs, X_A), fcl.CollisionObject(in_fcl(mesh), X_B)
-        if fcl.collide(*objects, fcl.CollisionRequest(), fcl.CollisionResult()):
-            wrong += c.signed_distance > c.error_bound
-        elif c.signed_distance > 0.0:  # else one is in the other, which has no distance in FCL
-            distance = float(fcl.distance(*objects, fcl.DistanceRequest(), fcl.DistanceResult()))
-            worst = max(worst, abs(distance - c.signed_distance) / 2.6)
-            apart += 1
-        done(1)
-    return Row(f"mesh – {kind}", "", count, np.nan, np.nan, wrong, apart, worst, 1e6 * seconds / count, np.nan)
-
-
 def main() -> None:
     """Measure all rows, print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -444,16 +406,12 @@ def main() -> None:
         ("circle", "circle"), ("circle", "polygon"), ("polygon", "polygon"),
     ]  # fmt: skip
     every = [kinds for kinds in every if arguments.only in f"{kinds[0]} – {kinds[1]}"]
-    meshes = [kind for kind in ("mesh", "box", "convex hull", "sphere") if arguments.only in f"mesh – {kind}"]
     cases = conformance()
     rows = []
-    with progress_bar("shape pairs", len(every) * count + len(meshes) * (count // 100)) as done:
+    with progress_bar("shape pairs", len(every) * count) as done:
         for kinds in every:
             passed, total = cases.get(kinds, (0, 0))
             rows.append(convex_row(kinds, count, f"{passed} of {total}" if total else "", done))
-            print(rows[-1], file=sys.stderr, flush=True)
-        for kind in meshes:
-            rows.append(mesh_row(kind, count // 100, done))
             print(rows[-1], file=sys.stderr, flush=True)
     columns = [
         "cases",

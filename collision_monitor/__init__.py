@@ -6,6 +6,7 @@
     description     ObjectDescription                      an object with its shapes, group and bounds
     contact         contact, Contact                       two shapes at two poses: distance, normal, points, bound
     features        contact_features                       what touches what: "vertex 3 of A on face 7 of B"
+    overlap         overlap                                yes or no, by the test that one chooses
     decomposition   convex_decomposition                   a concave mesh as convex parts, with their error
     impact          time_of_impact, Impact                 two shapes in motion: when they meet, as an interval
     impact_batch    time_of_impact_batch, Impacts          the same for many motions of two shapes
@@ -42,6 +43,7 @@ _HOME = {
     "contact": "narrow_phase.contact",
     "Contact": "narrow_phase.contact",
     "contact_features": "narrow_phase.features",
+    "overlap": "narrow_phase.overlap",
     "convex_decomposition": "narrow_phase.convex_decomposition",
     "Decomposition": "narrow_phase.convex_decomposition",
     "time_of_impact": "prediction.impact",
@@ -94,6 +96,7 @@ if TYPE_CHECKING:
     from collision_monitor.narrow_phase.convex_decomposition import Decomposition as Decomposition
     from collision_monitor.narrow_phase.convex_decomposition import convex_decomposition as convex_decomposition
     from collision_monitor.narrow_phase.features import contact_features as contact_features
+    from collision_monitor.narrow_phase.overlap import overlap as overlap
     from collision_monitor.prediction.feature_impact import FeatureImpact as FeatureImpact
     from collision_monitor.prediction.feature_impact import edge_edge_impact as edge_edge_impact
     from collision_monitor.prediction.feature_impact import vertex_face_impact as vertex_face_impact

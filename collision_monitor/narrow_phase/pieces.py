@@ -15,7 +15,7 @@ from collision_monitor.broad_phase.aabb_tree import aabb_tree
 from collision_monitor.geometry.pieces import convex_pieces, is_convex_mesh
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shape_table import ShapeTable, ShapeTableBuilder, join, triangle_table
-from collision_monitor.geometry.shapes import ConvexHull, Mesh, Polygon, Shape
+from collision_monitor.geometry.shapes import ConvexHull, HalfSpace, Mesh, Polygon, Shape
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -113,5 +113,17 @@ def as_pieces(pieces: Sequence[tuple[Shape, Pose]]) -> Pieces:
         builder.append(shape)
     position = np.stack([pose.position for _, pose in pieces])
     rotation = np.stack([pose.rotation for _, pose in pieces])
-    middle = np.array([s.points.mean(axis=0) if isinstance(s, ConvexHull) else np.zeros(3) for s, _ in pieces])
+    middle = np.array([_point_of(shape) for shape, _ in pieces])
     return Pieces(builder.used, position, rotation, position + np.einsum("nij,nj->ni", rotation, middle))
+
+
+def _point_of(shape: Shape) -> Array:
+    """A point (3,) of a convex shape, in its own frame."""
+    match shape:
+        case ConvexHull():
+            return np.asarray(shape.points.mean(axis=0))
+        case Polygon():
+            return np.append(shape.points.mean(axis=0), 0.0)
+        case HalfSpace():
+            return np.asarray(shape.offset * shape.normal)
+    return np.zeros(3)

@@ -16,6 +16,7 @@ from collision_monitor.geometry.bounding_tests import (
     circle_circle,
     closest_point_in_aabb,
     kdop_kdop,
+    obb_obb,
     obb_polygon,
     sphere_aabb,
     sphere_obb,
@@ -129,6 +130,38 @@ def test_obb_against_triangles(points, half, seed):
     # 1e-6 to each side, as linear programming is no more exact
     assert obb_polygon(Obb(shift, turn, half + 1e-6), moved) >= box_meets_triangle(half, triangle)
     assert obb_polygon(Obb(shift, turn, half - 1e-6), moved) <= box_meets_triangle(half, triangle)
+
+
+def boxes_meet(a, b):
+    """A point in both boxes, by linear programming over its place in each."""
+    equal = np.hstack([a.rotation, -b.rotation])
+    limits = [(-h, h) for h in (*a.half_extents, *b.half_extents)]
+    return linprog(np.zeros(6), A_eq=equal, b_eq=b.center - a.center, bounds=limits).status == 0
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 2**32 - 1))
+def test_obbs(seed):
+    rng = np.random.default_rng(seed)
+    turns = rotation(seed), rotation(seed) if seed % 4 == 0 else rotation(seed + 1)  # one in four with the same axes
+    a, b = (Obb(rng.normal(size=3), turn, 10.0 ** rng.uniform(-1, 0.3, 3)) for turn in turns)
+    larger, smaller = (a._replace(half_extents=a.half_extents + s) for s in (1e-6, -1e-6))
+    assert obb_obb(larger, b) == obb_obb(b, larger)
+    assert obb_obb(larger, b) >= boxes_meet(a, b)
+    assert obb_obb(smaller, b) <= boxes_meet(a, b)
+
+
+def test_crossed_bars_are_parted_by_their_edges_alone():
+    """Two thin bars, turned about different axes, of which no face normal is a separating axis."""
+    up, across = np.sqrt(0.5) * np.array([[1, -1], [1, 1]]), np.eye(3)
+    about_x, about_y = across.copy(), across.copy()
+    about_x[1:, 1:], about_y[::2, ::2] = up, up
+    first = Obb(np.zeros(3), about_x, np.array([3, 1, 1.0]))
+    second = Obb(np.array([0, 0, 2 * np.sqrt(2) + 0.01]), about_y, np.array([1, 3, 1.0]))
+    assert not obb_obb(first, second)
+    assert obb_obb(first, second._replace(center=second.center - [0, 0, 0.02]))
+    many = Obb(np.stack([second.center, second.center - [0, 0, 0.02]]), about_y, second.half_extents)
+    assert obb_obb(first, many).tolist() == [False, True]
 
 
 @settings(max_examples=20)

@@ -81,6 +81,13 @@ def test_a_hull_whose_origin_is_elsewhere_is_found_inside_a_mesh():
     assert contact(far, Pose(), RING, Pose()).overlaps
 
 
+def test_a_half_space_is_in_no_mesh():
+    """Also where its origin, which is no point of it, is inside."""
+    for offset in (-2.0, -0.5, -0.2, 0.0):
+        c = contact(RING, Pose(), cm.HalfSpace((0, 0, 1), offset), Pose((1, 0, 0)))
+        assert c.signed_distance == pytest.approx(TORUS.vertices[:, 2].min() - offset)
+
+
 def test_a_convex_mesh_is_its_hull():
     c = contact(cm.Mesh(CUBE.vertices, CUBE.faces), Pose(), cm.Sphere(0.5), Pose((0.75, 0, 0)))
     assert c.signed_distance == pytest.approx(-0.25, abs=1e-12)

@@ -60,6 +60,50 @@ def test_common_motion_changes_nothing(a, b):
         assert far.distance == pytest.approx(c.distance, abs=1e-9 + tolerance(a, b))
 
 
+def scaled(shape, s):
+    match shape:
+        case Sphere():
+            return Sphere(s * shape.radius)
+        case Box():
+            return Box(s * np.array(shape.size))
+        case ConvexHull():
+            return ConvexHull(s * shape.points)
+        case HalfSpace():
+            return HalfSpace(shape.normal, s * shape.offset)
+    return type(shape)(s * shape.radius, s * shape.length)
+
+
+@pytest.mark.parametrize(("a", "b"), PAIRS + [(k, HalfSpace((1, 2, 3), 0.1)) for k in KINDS], ids=name)
+def test_scaling_scales_the_answer(a, b):
+    """From nanometres to a million kilometres; by powers of two but for round-off nothing may change."""
+    rng = np.random.default_rng(7)
+    for s in (1e-9, 2.0**-20, 1e-3, 1e9):
+        for _ in range(4):
+            R_A, R_B, p = rotation(rng), rotation(rng), rng.normal(size=3) * 0.7
+            c, large = contact(a, b, p, R_A, R_B), contact(scaled(a, s), scaled(b, s), s * p, R_A, R_B)
+            assert large.distance / s == pytest.approx(c.distance, abs=tolerance(a, b))
+            assert large.bound / s == pytest.approx(c.bound, abs=tolerance(a, b))
+
+
+def mirrored(shape, flip):
+    """Round shapes and boxes are their own image in a mirror through their axis."""
+    return ConvexHull(shape.points * flip) if isinstance(shape, ConvexHull) else shape
+
+
+@pytest.mark.parametrize(("a", "b"), PAIRS, ids=name)
+@pytest.mark.parametrize("flip", [(-1, 1, 1), (1, -1, 1)])
+def test_a_mirror_mirrors_the_answer(a, b, flip):
+    rng, flip = np.random.default_rng(8), np.array(flip, float)
+    F = np.diag(flip)
+    for _ in range(6):
+        R_A, R_B, p = rotation(rng), rotation(rng), rng.normal(size=3) * 0.9
+        c = contact(a, b, p, R_A, R_B)
+        m = contact(mirrored(a, flip), mirrored(b, flip), F @ p, F @ R_A @ F, F @ R_B @ F)
+        assert m.distance == pytest.approx(c.distance, abs=tolerance(a, b))
+        if c.distance > 1e-2:
+            np.testing.assert_allclose(m.normal, F @ c.normal, atol=1e-6)
+
+
 @pytest.mark.parametrize(("a", "b"), PAIRS, ids=name)
 def test_moving_by_the_answer_makes_them_touch(a, b):
     """The translation by -distance along the normal brings any pair to contact: a check that needs no oracle."""

@@ -1,0 +1,66 @@
+"""`overlap`: do two shapes have a point in common, by the narrow phase that one chooses."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from collision_monitor.errors import InputError, PoseError, UnsupportedError
+from collision_monitor.geometry.bounding_volumes import Hull, convex_hull
+from collision_monitor.geometry.cascade import collide
+from collision_monitor.geometry.coordinates import Array
+from collision_monitor.geometry.pieces import shape_pairs
+from collision_monitor.geometry.polyhedra import is_closed
+from collision_monitor.geometry.polyhedron_sat import sat_3d
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape
+from collision_monitor.narrow_phase.contact import Compound, contact
+
+TESTS: Final = ("contact", "cascade", "sat")
+
+_CORNERS: Final = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+
+
+def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, test: str = "contact") -> bool:
+    """Whether two shapes, or compounds given as lists of (shape, pose), overlap or touch.
+
+    test: "contact", any shapes, by the sign of their distance; "cascade", polyhedra, by the lecture's ordered tests
+    (bounding volumes, vertices, edges against faces), exact for the corners as they are placed; "sat", convex ones, by
+    the separating axis test. Raises as `contact` does; UnsupportedError for a shape that the test is not for.
+    """
+    if test == "contact":
+        return contact(shape_a, pose_a, shape_b, pose_b).overlaps
+    if test not in TESTS:
+        raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")
+    solids = [
+        _solids(shape, pose, test, name) for shape, pose, name in ((shape_a, pose_a, "A"), (shape_b, pose_b, "B"))
+    ]
+    if test == "sat":
+        return any(sat_3d(a, b).overlaps for a in solids[0] for b in solids[1])
+    return any(collide(*a, *b).collides for a in solids[0] for b in solids[1])
+
+
+def _solids(shape: Compound, pose: Pose, test: str, name: str) -> list[Hull]:
+    """The shapes' corners and faces in the world."""
+    if not isinstance(pose, Pose):
+        raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
+    found = []
+    for each, offset in shape_pairs(shape, f"shape {name}"):
+        solid = _polyhedron(each, test)
+        placed = (solid.vertices @ offset.rotation.T + offset.position) @ pose.rotation.T + pose.position
+        found.append(Hull(placed, solid.faces))
+    return found
+
+
+def _polyhedron(shape: Shape, test: str) -> Hull:
+    match shape:
+        case Box():
+            return convex_hull(_CORNERS * np.array(shape.size))
+        case ConvexHull():
+            return convex_hull(shape.points)
+        case Mesh() if test == "cascade" and is_closed(shape.faces):
+            vertices: Array = shape.vertices
+            return Hull(vertices, shape.faces)
+    kinds = "Box, ConvexHull, closed Mesh" if test == "cascade" else "Box, ConvexHull"
+    raise UnsupportedError(f"test {test}: {type(shape).__name__} is no such polyhedron; supported are {kinds}")
