@@ -21,7 +21,7 @@ from collision_monitor.snapshot import Snapshot
 __all__ = ["METADATA", "Recorder", "Recording", "Splitting"]
 
 FLUSH_PERIOD: Final = 0.25
-"""s between two flushes: with the time a flush takes, a killed process loses less than the last 0.5 s."""
+"""s between two flushes: with the grace and the time that a flush takes, a killed process loses less than 0.5 s."""
 
 QUEUE_BYTES: Final = 256 << 20
 """Most bytes that wait for the disk; beyond, messages are dropped and counted."""
@@ -34,8 +34,13 @@ EVENT_SNAPSHOT_PERIODS: Final = (0.1, 1.0)
 """s between two snapshots of a recording on events, at least and at most, and half of what is wanted before each event
 in between: they are held back and mostly dropped, and so much more than what is wanted is kept."""
 
-_TURN: Final = 1024
-"""Messages (0.5 ms) after which the thread lets go of Python's lock: else a step may wait 5 ms to get it back."""
+_GRACE: Final = 0.1
+"""s that a flush which is due waits for another message: a caller hands messages over when a step is done, and what the
+thread does then falls between two steps."""
+
+_TURN: Final = 512
+"""Waiting messages that wake the thread, and after which (0.3 ms) it lets go of Python's lock: else a step may wait
+5 ms to get it back."""
 
 _LARGE: Final = 24 << 20
 """Bytes of one block, freed at once: from then on the C library keeps what is freed below that size. Else it hands the
@@ -98,7 +103,9 @@ class Recorder:
         self._dropped = 0
         self._recorded = 0
         self._recorded_bytes = 0
+        self._flush_due = time.monotonic() + FLUSH_PERIOD
         self._taken = 0  # by the thread, written or not kept
+        self._unflushed = self._unflushed_written = 0  # taken, and written, since the last flush
         bytes(_LARGE)
         self._parts = _create(self.path, types, metadata, splitting, overwrite, snapshots)
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
@@ -144,7 +151,7 @@ class Recorder:
                 return
             self._queue.append(entry)
             self._waiting += cost
-            if self._waiting >= _WAKE_BYTES:
+            if len(self._queue) >= _TURN or self._waiting >= _WAKE_BYTES or time.monotonic() >= self._flush_due:
                 self._wake.notify()
 
     @property
@@ -212,37 +219,37 @@ class Recorder:
             self._parts.close()
 
     def _write_what_waits(self) -> bool:
-        """Sleep until the next flush is due, then write. False: the session is closed and nothing is left."""
+        """Sleep until there is something to do, then write. False: the session is closed and nothing is left."""
         with self._wake:
-            if not self._closing and self._waiting < _WAKE_BYTES:
-                self._wake.wait(FLUSH_PERIOD)
+            if not self._closing and len(self._queue) < _TURN and self._waiting < _WAKE_BYTES:
+                self._wake.wait(max(0.0, self._flush_due + _GRACE - time.monotonic()))
             batch, self._queue = self._queue, []
             size, closing = self._waiting, self._closing
-        flushed = time.monotonic()
-        taken = written = 0
         for begin in range(0, len(batch), _TURN):
             turn = batch[begin : begin + _TURN]
-            written += self._parts.write(turn)
-            taken += sum(entry.snapshot is None for entry in turn)
-            if begin:
+            self._unflushed_written += self._parts.write(turn)
+            self._unflushed += sum(entry.snapshot is None for entry in turn)
+            if time.monotonic() >= self._flush_due:
+                self._flush()
+            elif begin + _TURN < len(batch):
                 time.sleep(_PAUSE)
-            if time.monotonic() - flushed >= FLUSH_PERIOD:
-                self._flush(taken, written)
-                flushed, taken, written = time.monotonic(), 0, 0
-        if taken:
-            self._flush(taken, written)
+        if closing or time.monotonic() >= self._flush_due:
+            self._flush()
         with self._wake:
             self._waiting -= size
             self._is_full = self._parts.is_full
             self._wake.notify_all()
         return not closing
 
-    def _flush(self, taken: int, written: int) -> None:
-        self._parts.flush()
+    def _flush(self) -> None:
+        if self._unflushed:
+            self._parts.flush()
         with self._wake:
-            self._taken += taken
-            self._recorded += written
+            self._taken += self._unflushed
+            self._recorded += self._unflushed_written
             self._recorded_bytes = self._parts.size
+            self._flush_due = time.monotonic() + FLUSH_PERIOD
+        self._unflushed = self._unflushed_written = 0
 
 
 def _snapshot_period(splitting: Splitting) -> float:
