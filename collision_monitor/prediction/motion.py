@@ -201,12 +201,11 @@ def turn_quaternion(q, i, wx, wy, wz, t, out):
     out[3] = c * w - ax * x - ay * y - az * z
 
 
-@device
-def angle_between(a, i, bx, by, bz, bw):
-    """Upper bound on the angle (rad) between the orientations a[i] and b; exact to second order for small angles."""
-    dot = a[i, 0] * bx + a[i, 1] * by + a[i, 2] * bz + a[i, 3] * bw
+@inlined
+def chord_angle(ax, ay, az, aw, bx, by, bz, bw):
+    """Upper bound on the angle (rad) between two unit quaternions; exact to second order for small ones."""
+    dot = ax * bx + ay * by + az * bz + aw * bw
     sign = 1.0 if dot >= 0.0 else -1.0
-    dx, dy = a[i, 0] - sign * bx, a[i, 1] - sign * by
-    dz, dw = a[i, 2] - sign * bz, a[i, 3] - sign * bw
+    dx, dy, dz, dw = ax - sign * bx, ay - sign * by, az - sign * bz, aw - sign * bw
     chord = sqrt(dx * dx + dy * dy + dz * dz + dw * dw)  # = 2 sin(angle / 4)
     return 2.0 * chord * (1.0 + 0.056 * chord * chord)  # >= 4 asin(chord / 2) up to angle pi

@@ -12,8 +12,9 @@ import numpy as np
 
 from collision_monitor._jit import device, kernel
 from collision_monitor.broad_phase.hashed_grid import put_box
-from collision_monitor.prediction.motion import angle_between, quaternion_to_matrix, turn_quaternion
+from collision_monitor.prediction.motion import quaternion_to_matrix, turn_quaternion
 from collision_monitor.prediction.spread import surface_spread
+from collision_monitor.prediction.turning import BLOCK, COLUMNS, turned_away
 from collision_monitor.records import StateFlag
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 
@@ -125,6 +126,16 @@ def _estimate_twist(bodies, i, numbers, k, x, y, z, w, elapsed):
     bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2] = rate * rx, rate * ry, rate * rz
 
 
+@device
+def _turned_away(bodies, start, count, columns, angles):
+    """`turned_away`, unless turning moves none of them."""
+    turns = False
+    for i in range(start, start + count):
+        turns |= bodies.spin_radius[i] > 0.0
+    if turns:
+        turned_away(bodies, start, count, columns, angles)
+
+
 @kernel
 def find_moved(bodies, spread, sigmas, count, now, horizon, stale_acceleration, moved, ending):
     """Slots among the first `count` whose predictions no longer hold at `now`, into moved; returns how many.
@@ -136,8 +147,10 @@ def find_moved(bodies, spread, sigmas, count, now, horizon, stale_acceleration, 
     it was predicted no further: who turns often is not predicted far.
     """
     n = n_ending = 0
-    turned = np.empty(4)
+    columns, angles = np.empty((COLUMNS, BLOCK)), np.empty(BLOCK)
     for i in range(count):
+        if i % BLOCK == 0:
+            _turned_away(bodies, i, min(BLOCK, count - i), columns, angles)
         if not bodies.used[i] or not bodies.seen[i] or bodies.static[i]:
             continue
         m = bodies.motion[i]
@@ -157,10 +170,8 @@ def find_moved(bodies, spread, sigmas, count, now, horizon, stale_acceleration, 
             dx, dy, dz = bodies.angular[i, 0] - m.wx, bodies.angular[i, 1] - m.wy, bodies.angular[i, 2] - m.wz
             off = sqrt(dx * dx + dy * dy + dz * dz)
             drift += r * off
-            # turned back to the last state's time: the difference from there to now is bounded by the rate's
-            turn_quaternion(bodies.ref_quaternion, i, m.wx, m.wy, m.wz, since - age, turned)
-            angle = angle_between(bodies.quaternion, i, turned[0], turned[1], turned[2], turned[3])
-            apart += r * (angle + off * age)
+            # known at the last state's time: the difference from there to now is bounded by the rate's
+            apart += r * (angles[i % BLOCK] + off * age)
         if not (apart <= m.tube_0 and drift <= m.tube_1):
             if bodies.slack[i] > 0.0:  # else it is new
                 bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)

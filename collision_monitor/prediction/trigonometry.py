@@ -32,6 +32,12 @@ def sin_cos(x):
     """
     if not abs(x) < LARGEST:
         return sin(x), cos(x)
+    return sin_cos_within(x)
+
+
+@inlined
+def sin_cos_within(x):
+    """The same for |x| < LARGEST; without a branch, so that a loop over many takes several at once."""
     k = np.rint(x * TWO_OVER_PI)
     r = ((x - k * HALF_PI_1) - k * HALF_PI_2) - k * HALF_PI_3
     z = r * r
@@ -54,11 +60,9 @@ def sin_cos(x):
     c = -1.0 / 720.0 + z * c
     c = 1.0 / 24.0 + z * c
     c = 1.0 - (0.5 * z - z * z * c)
-    quadrant = np.int64(k) & 3
-    if quadrant == 0:
-        return s, c
-    if quadrant == 1:
-        return c, -s
-    if quadrant == 2:
-        return -s, -c
-    return -c, s
+    quadrant = k - 4.0 * np.floor(0.25 * k)
+    is_swapped = (quadrant == 1.0) | (quadrant == 3.0)
+    sine, cosine = (c, s) if is_swapped else (s, c)
+    sine = -sine if quadrant >= 2.0 else sine
+    cosine = -cosine if (quadrant == 1.0) | (quadrant == 2.0) else cosine
+    return sine, cosine

@@ -1,0 +1,45 @@
+"""How far bodies have turned away from their reference motion, several at once."""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Final
+
+from collision_monitor._jit import device
+from collision_monitor.prediction.motion import chord_angle
+from collision_monitor.prediction.trigonometry import LARGEST, sin_cos_within
+
+BLOCK: Final = 128
+"""Bodies whose numbers are laid side by side in the cache."""
+COLUMNS: Final = 12
+
+
+@device
+def turned_away(bodies, start, count, columns, angles):
+    """Upper bounds on the angles (rad) between bodies' last states and their references at that time, into angles.
+
+    Of `count` <= BLOCK bodies from slot `start` on; columns (COLUMNS, BLOCK): scratch. inf: turned too far to tell.
+    No branch, no call: the processor takes four or eight bodies at a time.
+    """
+    for k in range(count):
+        i = start + k
+        m = bodies.motion[i]
+        for c in range(4):
+            columns[c, k] = bodies.ref_quaternion[i, c]
+            columns[4 + c, k] = bodies.quaternion[i, c]
+        columns[8, k], columns[9, k], columns[10, k] = m.wx, m.wy, m.wz
+        columns[11, k] = bodies.time[i] - m.time
+    for k in range(count):
+        x, y, z, w = columns[0, k], columns[1, k], columns[2, k], columns[3, k]
+        wx, wy, wz = columns[8, k], columns[9, k], columns[10, k]
+        rate = sqrt(wx * wx + wy * wy + wz * wz)
+        half = 0.5 * rate * columns[11, k]
+        sine, cosine = sin_cos_within(half)
+        sine = sine / rate if rate > 0.0 else 0.0
+        ax, ay, az = sine * wx, sine * wy, sine * wz
+        bx = cosine * x + ax * w + ay * z - az * y
+        by = cosine * y - ax * z + ay * w + az * x
+        bz = cosine * z + ax * y - ay * x + az * w
+        bw = cosine * w - ax * x - ay * y - az * z
+        angle = chord_angle(columns[4, k], columns[5, k], columns[6, k], columns[7, k], bx, by, bz, bw)
+        angles[k] = angle if abs(half) < LARGEST else inf
