@@ -23,8 +23,11 @@ SPREAD: Final = 4.0
 OUTLIER: Final = 4.0
 """A time that is this many times the usual one counts as that: the machine was busy with something else."""
 
-EXAMINE, REFINE = 0, 1
-"""What is done to a pair: looked at now, or its first impact sought."""
+EXAMINE, REFINE, TREES = 0, 1, 2
+"""What is done to a pair: looked at now, its first impact sought, or to a handful of pairs: when their trees meet."""
+
+HANDFUL: Final = 8
+"""Pairs of sphere trees that cost about as much as one pair of shapes, and count as one."""
 
 
 class PairBudget:
@@ -52,7 +55,7 @@ class StepClock:
     """
 
     def __init__(self) -> None:
-        self.cost = [1e-5, 1e-5]  # s for a pair, by kind of work
+        self.cost = [1e-5, 1e-5, 1e-5]  # s for a pair, by kind of work
         self.began = self.stopped = 0.0
         self._end = self._deviation = self._aside = 0.0  # s
         self._depth = 0

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from collision_monitor import filters, records
 from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.broad_phase.hashed_grid import make_hashed_grid, regridded, remove_boxes
-from collision_monitor.budget import EXAMINE, REFINE, PairBudget, StepClock, TimeBudget
+from collision_monitor.budget import EXAMINE, HANDFUL, REFINE, TREES, PairBudget, StepClock, TimeBudget
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import CollisionMonitorError, InputError, Refusal, UnsupportedError
 from collision_monitor.geometry.pieces import is_planar
@@ -31,8 +31,9 @@ from collision_monitor.prediction import active_pairs, answers, candidates, coar
 from collision_monitor.prediction.event_list import EventList, keep_first
 from collision_monitor.prediction.motion import Bodies, enlarge, make_bodies, make_parts
 from collision_monitor.prediction.patches import with_patches
+from collision_monitor.prediction.sphere_trees import Tree, Trees, body_tree, joined_trees
 from collision_monitor.prediction.spread import worst_stddevs
-from collision_monitor.prediction.time_of_impact import BOUND_ONLY, IMPACT, Scratch, make_scratch
+from collision_monitor.prediction.time_of_impact import BOUND_ONLY, CLEAR, IMPACT, TREE_BOUND, Scratch, make_scratch
 from collision_monitor.prediction.uncertain_predictions import Scene, UncertainPredictions
 from collision_monitor.profiles import NO_BUDGET, NO_LIMIT, Profile
 from collision_monitor.records import Model
@@ -169,6 +170,8 @@ class Monitor:
         self._pool: ThreadPoolExecutor | None = None
         self._use_threads()
         self.clock = StepClock()
+        self._tree_of: dict[int, Tree | None] = {}  # by slot: of those that a step with a budget has to do with
+        self._trees: Trees | None = None  # all of them, until one changes
         self._timed = timed
         self._deferred = 0  # pairs that were left in the last step
         self._outside: NDArray[np.bool_] = np.zeros(0, np.bool_)  # bodies outside of the region, which rest
@@ -201,6 +204,8 @@ class Monitor:
             self._bodies.slack[:] = 0.0  # it is counted in horizons
         if "threads" in changed:
             self._use_threads()
+        if self._has_budget:
+            self._plant_trees()
 
     def _use_threads(self) -> None:
         if self._pool is not None:
@@ -298,6 +303,10 @@ class Monitor:
             remove_boxes(self._grid, np.array([i], np.int32))
         bodies.static[i] = d.static
         bodies.motion["version"][i] += 1
+        self._tree_of.pop(i, None)
+        self._trees = None
+        if self._has_budget:
+            self._plant_tree(i)  # now, so that the next step need not
         self._uncertain.describe(i, d)
         self._names[d.object_id] = d.name
         self._allow(d.object_id, frozenset(d.allowed))
@@ -464,13 +473,28 @@ class Monitor:
         self._last = StepResult(self._now_ns, self._step, contacts, predictions, status, cut=cut)
         return self._last
 
+    @property
+    def _has_budget(self) -> bool:
+        return self._profile.budget_ms < NO_BUDGET or self._profile.pairs_per_step < NO_LIMIT
+
     def _budget(self) -> PairBudget | None:
         """What this step may do; None: everything, and nothing was left before."""
         p = self._profile
-        has_budget = p.budget_ms < NO_BUDGET
-        if has_budget and self._timed:
+        if p.budget_ms < NO_BUDGET and self._timed:
             return TimeBudget(self.clock, 1e-3 * p.budget_ms, p.pairs_per_step)
-        return PairBudget(p.pairs_per_step) if has_budget or p.pairs_per_step < NO_LIMIT or self._deferred else None
+        return PairBudget(p.pairs_per_step) if self._has_budget or self._deferred else None
+
+    def _plant_tree(self, i: int) -> None:
+        self._tree_of[i] = body_tree(self._shapes.table, self._parts.next, int(self._bodies.first_shape[i]))
+
+    def _plant_trees(self) -> Trees:
+        """The sphere trees of all bodies; they depend on the shapes alone."""
+        if self._trees is None or len(self._trees.root) < len(self._bodies.used):
+            for i in np.flatnonzero(self._bodies.used[: self._top]).tolist():
+                if i not in self._tree_of:
+                    self._plant_tree(i)
+            self._trees = joined_trees([self._tree_of.get(i) for i in range(self._top)], len(self._bodies.used))
+        return self._trees
 
     def _states(self, ids: ArrayLike, poses: Any, twists: Any) -> NDArray[np.void]:
         try:
@@ -704,9 +728,12 @@ class Monitor:
             self._events.add(joined([pending, later]), bodies.motion)
         else:
             self._events.add(pending, bodies.motion)
+            n = self._pass_by_trees(pairs[:n], events[:n], now, budget)
             self._pairs, self._pair_events, results, later = self._examine_urgent(
                 pairs[:n], events[:n], now, work, budget
             )
+            which, found = self._look_at_trees(self._events.events, now, budget)
+            self._events.replace(which, found.compress(found["status"] != CLEAR), bodies.motion)
             which, refined = self._refine(now, work, budget)
             budget.stop()
             self._events.replace(which, joined([later, refined]), bodies.motion)
@@ -772,6 +799,41 @@ class Monitor:
         by_key = np.argsort(pairs["key"], kind="stable")
         return pairs.take(by_key), events.take(by_key), results.take(by_key, axis=0), joined(laters)
 
+    def _pass_by_trees(
+        self, pairs: NDArray[np.void], events: NDArray[np.void], now: float, budget: PairBudget
+    ) -> int:
+        """Let pairs that came due pass whose sphere trees do not meet yet; the others go to the front: how many."""
+        new = np.flatnonzero(pairs["touched"] == 0)
+        which, found = self._look_at_trees(events.take(new), now, budget)
+        which = new[which]
+        events[which] = found
+        apart = (found["status"] == CLEAR) | (found["lower"] > now)
+        self._events.add(found.compress(apart & (found["status"] != CLEAR)), self._bodies.motion)
+        kept = np.ones(len(pairs), np.bool_)
+        kept[which[apart]] = False
+        n = int(np.count_nonzero(kept))
+        pairs[:n], events[:n] = pairs.compress(kept), events.compress(kept)
+        return n
+
+    def _look_at_trees(
+        self, events: NDArray[np.void], now: float, budget: PairBudget
+    ) -> tuple[NDArray[np.int64], NDArray[np.void]]:
+        """When the sphere trees meet, of pairs of which only the bounding spheres are known; soonest first, by budget.
+
+        Returns the places among the events of those that were done, and their events now; CLEAR: they do not meet.
+        """
+        trees = self._plant_trees()
+        has_tree = trees.root >= 0
+        coarsely = (events["method"] == BOUND_ONLY) & (has_tree[events["i"]] | has_tree[events["j"]])
+        todo = np.flatnonzero(coarsely)
+        todo = todo[np.lexsort((events["key"][todo], events["lower"][todo]))]
+        found, at = events.take(todo), 0
+        while at < len(todo) and (count := budget.next(-(-(len(todo) - at) // HANDFUL), TREES)):
+            end = min(at + count * HANDFUL, len(todo))
+            coarse.tighten(self._bodies, trees, found[at:end], now, self._profile.contact_margin, self._scratch[0])
+            at = end
+        return todo[:at], found[:at]
+
     def _refine(
         self, now: float, work: dict[str, int], budget: PairBudget
     ) -> tuple[NDArray[np.int64], NDArray[np.void]]:
@@ -780,7 +842,7 @@ class Monitor:
         Returns the places in the event list of those that were done, and the events in place of them.
         """
         pending = self._events.events
-        todo = np.flatnonzero(pending["method"] == BOUND_ONLY)
+        todo = np.flatnonzero((pending["method"] == BOUND_ONLY) | (pending["method"] == TREE_BOUND))
         found = [np.zeros(0, IMPACT)]
         at = 0
         while at < len(todo) and (count := budget.next(len(todo) - at, REFINE)):

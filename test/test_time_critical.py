@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,16 @@ import pytest
 from collision_monitor import records
 from collision_monitor.budget import EXAMINE, FEWEST, PairBudget, StepClock, TimeBudget
 from collision_monitor.codec import encode_descriptions, encode_states
+from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import ProfileError
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Box, ConvexHull
 from collision_monitor.monitor import Monitor, StepResult
 from collision_monitor.pipeline import Pipeline
 from collision_monitor.plain import PlainMonitor, disagreements
+from collision_monitor.prediction import sphere_trees
 from collision_monitor.profiles import Profile
-from collision_monitor.world import make_scene
+from collision_monitor.world import Scene, make_scene
 
 SECOND = 1_000_000_000
 MODES = ("steady", "jumps")
@@ -26,11 +31,20 @@ def by_pair(rows: np.ndarray[Any, Any]) -> dict[tuple[int, int], Any]:
     return {(int(row["id_a"]), int(row["id_b"])): row for row in rows}
 
 
-def play(profile: Profile, mode: str, steps: int = 25) -> list[tuple[StepResult, StepResult]]:
+def rods(scene: Scene) -> list[ObjectDescription]:
+    """Long hulls and boxes in place of the scene's objects: their bounding spheres say little, their trees more."""
+    random = np.random.default_rng(4)
+    corners = random.normal(size=(40, 3))
+    corners *= (0.8, 0.1, 0.08) / np.linalg.norm(corners, axis=1, keepdims=True)
+    shapes = [ConvexHull(corners), Box((0.1, 1.4, 0.12))]
+    return [replace(d, shapes=((shapes[d.object_id % 2], Pose()),)) for d in scene.descriptions]
+
+
+def play(profile: Profile, mode: str, steps: int = 25, *, long: bool = False) -> list[tuple[StepResult, StepResult]]:
     """Answers with a budget, and those of plain recomputation of the same states."""
-    scene = make_scene("clutter", objects=300)
+    scene = make_scene("clutter", objects=150 if long else 300)
     limited, plain = Monitor(profile), PlainMonitor(profile.replace(pairs_per_step=1_000_000_000))
-    for description in scene.descriptions:
+    for description in rods(scene) if long else scene.descriptions:
         limited.describe(description)
         plain.describe(description)
     random = np.random.default_rng(3)
@@ -45,10 +59,10 @@ def play(profile: Profile, mode: str, steps: int = 25) -> list[tuple[StepResult,
 
 
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("limit", [1, 40, 150])
-def test_no_collision_is_reported_clear_and_every_interval_holds(mode: str, limit: int) -> None:
+@pytest.mark.parametrize(("limit", "long"), [(1, False), (40, False), (150, False), (30, True), (200, True)])
+def test_no_collision_is_reported_clear_and_every_interval_holds(mode: str, limit: int, long: bool) -> None:
     deferred = unresolved = 0
-    for mine, truth in play(Profile(pairs_per_step=limit), mode):
+    for mine, truth in play(Profile(pairs_per_step=limit), mode, long=long):
         told = by_pair(mine.contacts[mine.contacts["phase"] != records.Phase.END])
         touching = by_pair(truth.contacts[truth.contacts["phase"] != records.Phase.END])
         stated, true = by_pair(mine.predictions), by_pair(truth.predictions)
@@ -77,6 +91,18 @@ def test_no_collision_is_reported_clear_and_every_interval_holds(mode: str, limi
         deferred += mine.status.deferred
         unresolved += mine.status.unresolved
     assert deferred > 0 and unresolved > 0
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_sphere_trees_tell_more_than_bounding_spheres(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With as many pairs in a step, fewer are told that do not collide, and none later than it does."""
+    told = []
+    for corners in (sphere_trees.MOST_CORNERS, 0):
+        monkeypatch.setattr(sphere_trees, "MOST_CORNERS", corners)
+        played = play(Profile(pairs_per_step=200), mode, 10, long=True)
+        told.append(sum(len(mine.contacts) + len(mine.predictions) for mine, _ in played))
+    true = sum(len(truth.contacts) + len(truth.predictions) for _, truth in played)
+    assert true <= told[0] < 0.8 * told[1]
 
 
 @pytest.mark.parametrize("mode", MODES)

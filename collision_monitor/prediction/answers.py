@@ -9,6 +9,7 @@ import numpy as np
 
 from collision_monitor._jit import kernel
 from collision_monitor.prediction.active_pairs import BEGIN, BOUND, CLOSING, END, PERSIST, SHAPE_I, SHAPE_J, STATUS
+from collision_monitor.prediction.time_of_impact import BOUND_ONLY, TREE_BOUND
 from collision_monitor.records import CONTACT, PREDICTION, PredictionStatus
 
 UNRESOLVED: Final = int(PredictionStatus.UNRESOLVED)
@@ -97,7 +98,7 @@ def write_predictions(
             status = UNRESOLVED
             floats[n, 1] = inf
         octets[n, 120] = status
-        octets[n, 121] = event.method
+        octets[n, 121] = BOUND_ONLY if event.method == TREE_BOUND else event.method
         octets[n, 122], octets[n, 123] = bodies.model[i], bodies.model[j]
         stale_i = not bodies.static[i] and now - bodies.time[i] > stale_after
         stale_j = not bodies.static[j] and now - bodies.time[j] > stale_after

@@ -1,4 +1,4 @@
-"""What the bounding spheres alone say of pairs that there is no time to look at: little, at once, and never too late.
+"""What bounding spheres and sphere trees say of pairs that nobody has time to look at: at once, and never too late.
 
 (Slides "Time-critical collision detection": from coarse to fine, and the answer so far whenever time is up. Hubbard,
 Approximating polyhedra with spheres for time-critical collision detection, 1996.)
@@ -22,9 +22,11 @@ from collision_monitor.prediction.active_pairs import (
     has_changed,
 )
 from collision_monitor.prediction.motion import Bodies, relative_position
+from collision_monitor.prediction.sphere_trees import tree_meeting
 from collision_monitor.prediction.time_of_impact import (
     BOUND_ONLY,
     CLEAR,
+    TREE_BOUND,
     body_impact,
     meeting_of_spheres,
     sphere_interval,
@@ -84,6 +86,30 @@ def bound_pairs(table, parts, bodies, pairs, now, margin, tolerance, budget, eve
         if events[n].status != CLEAR:
             n += 1
     return n, queries
+
+
+@kernel
+def tighten(bodies, trees, events, now, margin, scratch):
+    """Let events (IMPACT) of which only the bounding spheres are known begin when the sphere trees meet.
+
+    status = CLEAR where they do not, as long as the motions are predicted.
+    """
+    for k in range(events.size):
+        event = events[k]
+        A, B = bodies.motion[event.i], bodies.motion[event.j]
+        begin, end = max(now, event.lower), min(A.cover, B.cover)
+        if begin < end:
+            wait = tree_meeting(
+                bodies, trees, event.i, event.j, begin, end, margin, scratch.rotation[0], scratch.rotation[1]
+            )
+            if wait == inf:
+                event.status = CLEAR
+            elif wait > 0.0:
+                px, py, pz = relative_position(A, B, begin)
+                vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
+                event.lower = begin + wait
+                meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, wait, event)
+        event.method = TREE_BOUND
 
 
 @kernel

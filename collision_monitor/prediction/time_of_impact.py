@@ -27,6 +27,8 @@ CLOSED_FORM: Final = int(Method.CLOSED_FORM)
 CONSERVATIVE_ADVANCEMENT: Final = int(Method.CONSERVATIVE_ADVANCEMENT)
 
 BOUND_ONLY: Final = int(Method.BOUND)
+TREE_BOUND: Final = 255
+"""The same of a pair whose sphere trees were looked at; told as BOUND too."""
 
 IMPACT = np.dtype(
     [

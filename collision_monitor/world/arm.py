@@ -53,8 +53,8 @@ def lathe(profile: list[tuple[float, float]], segments: int = SEGMENTS) -> Mesh:
     return Mesh(vertices, np.concatenate(faces))
 
 
-def _link(length: float, radius: float) -> Mesh:
-    """Two round joints and a waist between them, about its middle."""
+def link(length: float, radius: float) -> Mesh:
+    """A link of the arm: two round joints and a waist between them, about its middle."""
     half, waist = length / 2, 0.85 * radius
     end = [(radius * np.cos(a), half + radius * np.sin(a)) for a in np.linspace(0.0, np.pi / 2, 6)[:-1]]
     outline = [(radius, half - 0.5 * radius), (waist, 0.5 * half), (waist, 0.0)]
@@ -79,7 +79,7 @@ class Arm(Scene):
         radii = np.linspace(0.08, 0.05, len(LENGTHS))
         self.descriptions = [
             ObjectDescription(
-                int(i), _link(length, float(radius)), f"link_{i}", allowed=tuple({max(1, i - 1), min(4, i + 1)} - {i})
+                int(i), link(length, float(radius)), f"link_{i}", allowed=tuple({max(1, i - 1), min(4, i + 1)} - {i})
             )
             for i, length, radius in zip(self._ids.tolist(), LENGTHS, radii, strict=True)
         ]

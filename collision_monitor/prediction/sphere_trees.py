@@ -1,0 +1,193 @@
+"""Sphere trees of long bodies: when two could meet at the earliest, between their bounding spheres and their shapes.
+
+(Slides "Time-critical collision detection": from coarse to fine through the spheres of a tree.) A monitored body is
+convex, or a model of it is; one that is long is halved across its length, LEVELS times, and each piece has a sphere.
+The octree of `geometry.sphere_tree` is finer and for solids with holes; its cells stand out too far for this: what it
+says of two long hulls after a hundred pairs of spheres is said here after ten (docs/tradeoff.md).
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.shape_table import BOX, CONVEX_HULL
+from collision_monitor.prediction.motion import relative_position, rotation_at
+from collision_monitor.prediction.time_of_impact import sphere_interval
+
+Array = NDArray[np.float64]
+
+LEVELS: Final = 2
+"""Below the first: four pieces. One more costs twice as much and tells little."""
+
+WORTH: Final = 0.7
+"""A tree whose finest spheres are larger than this part of the first says hardly more than that one."""
+
+MOST_CORNERS: Final = 2000
+"""Beyond it a tree takes a second to make."""
+
+ROUNDED_UP: Final = 1e-12
+"""Spheres are larger by this part, so that they contain their piece whatever was rounded."""
+
+
+class Trees(NamedTuple):
+    """The trees of all bodies, one after another; centres in the body's frame (m)."""
+
+    root: Any  # (N,) int32: a body's first sphere; -1: it has no tree, but its bounding sphere
+    center: Any  # (K, 3)
+    radius: Any  # (K,)
+    child: Any  # (K,) int32: the first of its two halves, -1: none
+    stack: Any  # (M, 2) int32: scratch, the pairs of spheres that are still to be looked at
+
+
+Tree = tuple[Array, Array]
+"""Centres (2^(LEVELS + 1) - 1, 3) and radii of one tree, in the order of the levels."""
+
+_CHILD: Final = np.array([2 * k + 1 if k < 2**LEVELS - 1 else -1 for k in range(2 ** (LEVELS + 1) - 1)], np.int32)
+
+
+def body_tree(table: Any, next_part: NDArray[np.int32], first_shape: int) -> Tree | None:
+    """Of the body whose shapes begin at that slot of the table; None where it has corners nowhere, or no length."""
+    corners, margin, slot = [], 0.0, first_shape
+    while slot >= 0:
+        if table.kind[slot] == CONVEX_HULL:
+            begin = int(table.vertex_start[slot])
+            points = table.vertices[:, begin : begin + int(table.vertex_count[slot])].T
+        elif table.kind[slot] == BOX:
+            points = table.size[slot, :3] * np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(-1, 3)
+        else:
+            return None
+        corners.append(points @ table.local_rotation[slot].T + table.local_position[slot])
+        margin = max(margin, float(table.margin[slot]))
+        slot = int(next_part[slot])
+    found = np.unique(np.concatenate(corners), axis=0)
+    return _halved(found, margin) if 1 < len(found) <= MOST_CORNERS else None
+
+
+def _halved(corners: Array, margin: float) -> Tree | None:
+    """Of the convex hull of the corners (n, 3), grown by the margin (m)."""
+    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    axes = np.linalg.svd(corners - middle, full_matrices=False)[2]
+    if len(axes) < 3:
+        return None
+    points = (corners - middle) @ axes.T
+    points = points[:, np.argsort(-np.ptp(points, axis=0))]
+    axes = axes[np.argsort(-np.ptp((corners - middle) @ axes.T, axis=0))]
+    cuts = np.linspace(points[:, 0].min(), points[:, 0].max(), 2**LEVELS + 1)
+    sections = [_section(points, float(cut)) for cut in cuts[1:-1]]
+    sections = [np.empty((0, 3)), *sections, np.empty((0, 3))]
+    spheres = []
+    for level in range(LEVELS + 1):
+        step = 2 ** (LEVELS - level)
+        for k in range(0, 2**LEVELS, step):
+            inside = (points[:, 0] >= cuts[k]) & (points[:, 0] <= cuts[k + step])
+            piece = np.concatenate([points[inside], sections[k], sections[k + step]])
+            center = 0.5 * (piece.min(axis=0) + piece.max(axis=0))
+            spheres.append((*center, float(np.linalg.norm(piece - center, axis=1).max())))
+    found = np.array(spheres)
+    radius = (found[:, 3] + margin) * (1.0 + ROUNDED_UP)
+    if radius[-(2**LEVELS) :].max() > WORTH * radius[0]:
+        return None
+    return found[:, :3] @ axes + middle, radius + ROUNDED_UP * float(np.abs(middle).max())
+
+
+def _section(points: Array, cut: float) -> Array:
+    """Points (m, 3) of the plane x = cut, of whose convex hull the section of the points' hull is: of all lines."""
+    low, high = points[points[:, 0] < cut], points[points[:, 0] > cut]
+    share = (cut - low[:, None, 0]) / (high[:, 0] - low[:, None, 0])
+    section: Array = (low[:, None] + share[..., None] * (high - low[:, None])).reshape(-1, 3)
+    return section
+
+
+def joined_trees(trees: list[Tree | None], capacity: int) -> Trees:
+    """Of the bodies in the slots 0, 1, …; capacity: how many slots there are."""
+    size = 2 ** (LEVELS + 1) - 1
+    there = [tree for tree in trees if tree is not None]
+    root = np.full(capacity, -1, np.int32)
+    root[[k for k, tree in enumerate(trees) if tree is not None]] = size * np.arange(len(there))
+    first = np.repeat(size * np.arange(len(there), dtype=np.int32), size)
+    child = np.tile(_CHILD, len(there))
+    return Trees(
+        root=root,
+        center=np.concatenate([np.empty((0, 3)), *(center for center, _ in there)]),
+        radius=np.concatenate([np.empty(0), *(radius for _, radius in there)]),
+        child=np.where(child < 0, -1, first + child).astype(np.int32),
+        stack=np.zeros((8 * LEVELS + 8, 2), np.int32),
+    )
+
+
+@inlined
+def _sphere(trees, at, m, R, rate, span):
+    """Centre and its velocity relative to the body's, radius and how fast it grows, of a sphere of a turning body."""
+    if at < 0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, m.radius, 0.0
+    cx, cy, cz = trees.center[at, 0], trees.center[at, 1], trees.center[at, 2]
+    x = R[0, 0] * cx + R[0, 1] * cy + R[0, 2] * cz
+    y = R[1, 0] * cx + R[1, 1] * cy + R[1, 2] * cz
+    z = R[2, 0] * cx + R[2, 1] * cy + R[2, 2] * cz
+    growth = rate * sqrt(cx * cx + cy * cy + cz * cz)
+    if rate * span >= 2.0:
+        return x, y, z, 0.0, 0.0, 0.0, trees.radius[at], growth
+    # off its tangent by (rate t)^2 / 2 of the lever, whose chord over the span is
+    growth *= 0.5 * rate * span
+    return x, y, z, m.wy * z - m.wz * y, m.wz * x - m.wx * z, m.wx * y - m.wy * x, trees.radius[at], growth
+
+
+@device
+def tree_meeting(bodies, trees, i, j, begin, end, margin, R_i, R_j):
+    """Seconds after `begin` before which the trees of bodies i and j cannot meet; infinite: not until `end`.
+
+    A sphere's centre moves straight on from where its body's bounding sphere meets the other, as fast as it does then;
+    by how much turning moves it off that way is a growth of its radius. R_i, R_j (3, 3): scratch.
+    """
+    A, B = bodies.motion[i], bodies.motion[j]
+    px, py, pz = relative_position(A, B, begin)
+    vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
+    tube_1 = A.tube_1 + B.tube_1
+    tube_0 = A.tube_0 + B.tube_0 + A.tube_1 * (begin - A.tube_time) + B.tube_1 * (begin - B.tube_time)
+    reach = A.radius + B.radius + margin + tube_0
+    soonest, last = sphere_interval(px, py, pz, vx, vy, vz, reach, tube_1, end - begin, 1.0)
+    if soonest > last:
+        return inf
+    span = last - soonest
+    tube_0 += tube_1 * soonest
+    px, py, pz = px + vx * soonest, py + vy * soonest, pz + vz * soonest
+    rotation_at(A, begin + soonest, R_i)
+    rotation_at(B, begin + soonest, R_j)
+    wide = (margin + tube_0) * (1.0 + 1e-12)
+    rate_a = sqrt(A.wx * A.wx + A.wy * A.wy + A.wz * A.wz)
+    rate_b = sqrt(B.wx * B.wx + B.wy * B.wy + B.wz * B.wz)
+    stack = trees.stack
+    stack[0, 0], stack[0, 1] = trees.root[i], trees.root[j]
+    waiting, best = 1, inf
+    while waiting > 0:
+        waiting -= 1
+        a, b = stack[waiting, 0], stack[waiting, 1]
+        ax, ay, az, aux, auy, auz, radius_a, growth_a = _sphere(trees, a, A, R_i, rate_a, span)
+        bx, by, bz, bux, buy, buz, radius_b, growth_b = _sphere(trees, b, B, R_j, rate_b, span)
+        first, last = sphere_interval(
+            px + (bx - ax), py + (by - ay), pz + (bz - az), vx + (bux - aux), vy + (buy - auy), vz + (buz - auz),
+            wide + radius_a + radius_b, tube_1 + growth_a + growth_b, span, 1.0,
+        )  # fmt: skip
+        if first > last or first >= best:
+            continue
+        next_a = -1 if a < 0 else trees.child[a]
+        next_b = -1 if b < 0 else trees.child[b]
+        if next_a >= 0 and (next_b < 0 or radius_a >= radius_b):
+            for k in range(2):
+                stack[waiting, 0], stack[waiting, 1] = next_a + k, b
+                waiting += 1
+            continue
+        if next_b >= 0:
+            for k in range(2):
+                stack[waiting, 0], stack[waiting, 1] = a, next_b + k
+                waiting += 1
+            continue
+        best = first
+        if best == 0.0:
+            break
+    return best + soonest
