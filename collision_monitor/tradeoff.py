@@ -191,6 +191,12 @@ def _by_pair(answers: NDArray[np.void]) -> dict[tuple[int, int], Any]:
     return {(int(answer["id_a"]), int(answer["id_b"])): answer for answer in answers}
 
 
+def deepest(answer: StepResult) -> NDArray[np.void]:
+    """Of each contact the row that tells the pair's distance."""
+    rows = answer.contacts
+    return rows.compress((rows["phase"] != Phase.END) & (rows["point_index"] == 0))
+
+
 def _stated(answer: StepResult) -> NDArray[np.void]:
     """The predictions of stated motions: not those that only what is uncertain could bring about."""
     return answer.predictions.compress(answer.predictions["status"] != PredictionStatus.POSSIBLE)
@@ -201,7 +207,7 @@ def _compare(scene: str, profile: Profile, objects: int, played: Played, truths:
     distances: list[float] = []
     times: list[float] = []
     for mine, truth in zip(played.answers, truths, strict=True):
-        touching, really = (_by_pair(r.contacts[r.contacts["phase"] != Phase.END]) for r in (mine, truth))
+        touching, really = (_by_pair(deepest(answer)) for answer in (mine, truth))
         stated, true = _by_pair(_stated(mine)), _by_pair(truth.predictions)
         told = touching.keys() | stated.keys()
         alarms += len(told)

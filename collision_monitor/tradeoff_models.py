@@ -18,8 +18,8 @@ from collision_monitor.monitor import Monitor, StepResult
 from collision_monitor.narrow_phase.contact import contact
 from collision_monitor.narrow_phase.models import containing_model, parse_model
 from collision_monitor.profiles import Profile
-from collision_monitor.records import Model, Phase
-from collision_monitor.tradeoff import Errors, Played, Row, Step, play
+from collision_monitor.records import Model
+from collision_monitor.tradeoff import Errors, Played, Row, Step, deepest, play
 
 NEAR: Final = 0.3
 """m: pairs up to this far apart are compared."""
@@ -73,9 +73,7 @@ def model_tradeoff(
 
 
 def _told(answer: StepResult) -> dict[Pair, Any]:
-    rows = answer.contacts[answer.contacts["phase"] != Phase.END]
-    deepest = rows[rows["point_index"] == 0]
-    return {(int(row["id_a"]), int(row["id_b"])): row for row in deepest}
+    return {(int(row["id_a"]), int(row["id_b"])): row for row in deepest(answer)}
 
 
 def _exact(described: list[ObjectDescription], states: NDArray[np.void], pairs: set[Pair]) -> dict[Pair, float]:

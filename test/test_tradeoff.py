@@ -134,12 +134,13 @@ def test_a_session_can_be_measured(capsys: pytest.CaptureFixture[str]) -> None:
         (("--profile", "hasty"), "expected one of balanced, exact, fast"),
         ((str(GOLDEN), "--scene", "fleet"), "got both"),
         (("none.mcap",), "none.mcap"),
+        (("--profile", "fast", "--model", "obb"), "got both: --profile and --model"),
         ((str(GOLDEN), "--noise", "0.1"), "measured as it was recorded"),
         (("--scene", "fleet", "--noise", "2"), "noise: expected more than 0 and at most 1, got 2"),
         (("--scene", "trajectory"), "give a clip's prefix"),
         (("--scene", "crossing", "--seconds", "0.1", "--csv", "/no/such/folder/rows.csv"), "can be written"),
     ],
-    ids=["scene", "profile", "both", "session", "noise", "much", "tracks", "output"],
+    ids=["scene", "profile", "both", "session", "models", "noise", "much", "tracks", "output"],
 )
 def test_bad_input_is_one_line(arguments: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["tradeoff", *arguments]) == 1

@@ -94,6 +94,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.session is not None and args.scene:
         raise InputError("tradeoff: expected a session or scenes, got both")
+    if args.model and args.profile:
+        raise InputError("tradeoff: expected profiles or models, got both: --profile and --model")
     if args.session is not None and args.noise:
         raise InputError(
             f"tradeoff, --noise: a session is measured as it was recorded, leave it out (got {args.noise:g})"

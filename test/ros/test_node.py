@@ -16,9 +16,11 @@ from collision_monitor.codec import Removal
 from collision_monitor.description import ObjectDescription
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Sphere
+from collision_monitor.plain import PlainMonitor
 from collision_monitor.ros import main, qos
 from collision_monitor.session import Session
 from collision_monitor.session.replay import Verdict, replay
+from collision_monitor.world import make_scene
 from collision_monitor_msgs.msg import Contact, MonitorStatus
 
 BALL = ((Sphere(0.5), Pose()),)
@@ -42,6 +44,21 @@ OVERLAPPING = (state(3, (0, 10, 0)), state(4, (0.9, 10, 0)))
 """Two balls, 0.1 m into each other."""
 LYING = (state(5, (20, 0, 0)), state(6, (20.5, 0.5, 0.95)))
 """Two cubes of 1 m, one 5 cm deep in the other's upper face, a quarter of which it covers."""
+
+
+def call(team, kind, name, request):
+    client = team.node.create_client(kind, f"/object_monitor/{name}")
+    assert client.wait_for_service(10.0)
+    future = client.call_async(request)
+    team.until(future.done)
+    return future.result()
+
+
+def set_parameter(team, name, value):
+    """Why it was refused; empty: it was not."""
+    request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+    (result,) = call(team, SetParameters, "set_parameters", request).results
+    return "" if result.successful else result.reason
 
 
 def test_a_known_contact_and_a_known_impact(start, team):
@@ -203,20 +220,11 @@ def test_settings_change_while_it_runs_and_the_session_replays(start, team, tmp_
     monitor = start("run", "--record", "run.mcap", "--ros-args", "-p", "horizon:=1")
     team.meet()
 
-    def call(kind, name, request):
-        client = team.node.create_client(kind, f"/object_monitor/{name}")
-        assert client.wait_for_service(10.0)
-        future = client.call_async(request)
-        team.until(future.done)
-        return future.result()
-
     def change(name, value):
-        request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
-        (result,) = call(SetParameters, "set_parameters", request).results
-        return "" if result.successful else result.reason
+        return set_parameter(team, name, value)
 
     def values(*names):
-        found = call(GetParameters, "get_parameters", GetParameters.Request(names=names)).values
+        found = call(team, GetParameters, "get_parameters", GetParameters.Request(names=names)).values
         return [value.string_value or value.double_value for value in found]
 
     cubes = [ObjectDescription(k, ((Box((1, 1, 1)), Pose()),), name=f"cube {k}") for k in (5, 6)]
@@ -308,3 +316,56 @@ def test_a_signal_ends_it_while_the_kernels_compile(start, monkeypatch, tmp_path
         time.sleep(0.1)
     assert monitor.stop(signal.SIGTERM) == 0
     assert "Traceback" not in monitor.words
+
+
+def test_a_budget_that_is_too_small_leaves_pairs_unresolved_and_none_clear(start, team, tmp_path):
+    """Every body takes another course in each message: a step takes milliseconds, and has 50 microseconds."""
+    monitor = start("run", "--record", "run.mcap", "--ros-args", "-p", "budget_ms:=0.05")
+    scene, truth, random = make_scene("clutter", objects=300), PlainMonitor(), np.random.default_rng(6)
+    for description in scene.descriptions:
+        truth.describe(description)
+    team.meet()
+    team.describe(*scene.descriptions)
+    team.status(lambda s: s.objects == 300)
+
+    def ask():
+        states = scene.step()
+        states["linear"] += random.uniform(-0.3, 0.3, states["linear"].shape)
+        stamp = team.now
+        contacts, predictions = team.ask(*states, stamp=stamp)
+        found = truth.step(stamp, states)
+        status = team.status(lambda s: s.step == contacts.step)
+        told = {(c.id_a, c.id_b): c for c in contacts.contacts if c.phase != Contact.END}
+        stated = {(p.id_a, p.id_b): p for p in predictions.predictions}
+        assert _pairs(found.contacts[found.contacts["phase"] != records.Phase.END]) <= told.keys() | stated.keys()
+        for row in found.contacts[found.contacts["phase"] != records.Phase.END]:
+            if (mine := told.get((int(row["id_a"]), int(row["id_b"])))) is not None:
+                assert abs(mine.signed_distance - row["signed_distance"]) <= mine.error_bound + 1e-9
+        for row in found.predictions[found.predictions["status"] == records.PredictionStatus.HIT]:
+            mine = stated.get((int(row["id_a"]), int(row["id_b"])))
+            assert mine is not None or row["upper"] >= 2.0 or (row["id_a"], row["id_b"]) in told
+            assert mine is None or (mine.lower <= row["upper"] and row["lower"] <= mine.upper)
+        bounds = [p for p in stated.values() if p.method == records.Method.BOUND]
+        assert {p.status for p in bounds} <= {int(records.PredictionStatus.UNRESOLVED)}
+        return status, len(bounds), len(stated.keys() - _pairs(found.predictions))
+
+    for _ in range(5):
+        status, bounds, _ = ask()
+        assert status.deferred > 0 and bounds > 0
+        assert status.unresolved >= bounds
+    assert "expected 0.05 to" in (reason := set_parameter(team, "budget_ms", 0.0)) or "out of range" in reason
+    assert set_parameter(team, "budget_ms", 1e6) == ""
+    status, bounds, beyond = ask()
+    assert (status.deferred, bounds) == (0, 0)
+    assert beyond < 20, "near misses, within the tolerance of the motion"
+    assert set_parameter(team, "budget_ms", 0.05) == ""
+    assert ask()[0].deferred > 0
+
+    assert monitor.stop() == 0
+    assert "Traceback" not in monitor.words
+    report = replay(Session(tmp_path / "run.mcap"))
+    assert (report.verdict, report.steps, report.notes) == (Verdict.IDENTICAL, 7, [])
+
+
+def _pairs(rows):
+    return {(int(row["id_a"]), int(row["id_b"])) for row in rows}
