@@ -108,7 +108,11 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
     a, b = _side(shape_a, pose_a, model, "A"), _side(shape_b, pose_b, model, "B")
     planes = {is_planar(shape) for shape, _ in (*a.shapes, *b.shapes)}
     if len(planes) > 1:
-        raise UnsupportedError("Circle and Polygon meet each other only; got one of them with a shape of space")
+        kinds = sorted({type(shape).__name__ for shape, _ in (*a.shapes, *b.shapes)})
+        raise UnsupportedError(
+            "Circle and Polygon meet each other only; supported are pairs of Circle, Polygon, or of "
+            f"Sphere, Box, Capsule, Cylinder, Cone, ConvexHull, Mesh, HalfSpace; got {', '.join(kinds)}"
+        )
     if planes == {True}:
         _check_in_plane(a)
         _check_in_plane(b)

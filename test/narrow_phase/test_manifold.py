@@ -115,6 +115,27 @@ def test_edges_and_corners():
         np.testing.assert_array_equal(c.points_b, c.point_b[None])
 
 
+@pytest.mark.parametrize("gap", [0.2, 0.0, -0.05])
+def test_edges_in_the_plane_share_an_interval(gap):
+    """A polygon stands with an edge on one of another, which is concave: where both are, on the line between them."""
+    rng = np.random.default_rng(9)
+    bench = cm.Polygon([(0, 0), (6, 0), (6, 1), (4, 1), (4, 0.2), (2, 0.2), (2, 1), (0, 1)])  # two seats 1 m high
+    for _ in range(20):
+        width, at = rng.uniform(0.4, 1.5), rng.uniform(0.3, 0.8)
+        foot = cm.Polygon([(0, 0), (width, 0), (0.7 * width, 0.5), (0.2 * width, 0.8)])
+        turn, left = rng.uniform(0, 7), rng.choice([0.0, 4.0])
+        X = Pose((*rng.uniform(-9, 9, 2), 0), about_z(turn))
+        c = contact(bench, X, foot, X @ Pose((left + at, 1 + gap, 0)))
+        expected = np.array([[left + at, 1, 0], [min(left + at + width, left + 2), 1, 0]])
+        assert same_points((c.points_a - X.position) @ X.rotation, expected)
+        np.testing.assert_allclose(c.points_b, c.points_a + c.signed_distance * c.normal, atol=1e-12)
+        assert c.signed_distance == pytest.approx(gap, abs=1e-12)
+        tilted = contact(bench, X, foot, X @ Pose((left + at, 1 + gap + 0.3, 0), about_z(0.01)))
+        assert len(tilted.points_a) == 1  # on its corner
+    round_one = contact(bench, Pose(), cm.Circle(0.5), Pose((1, 1.4, 0)))
+    np.testing.assert_array_equal(round_one.points_a, round_one.point_a[None])
+
+
 def test_a_floor_of_triangles_is_one_face():
     n = 9
     x, y = np.meshgrid(np.linspace(-2, 2, n), np.linspace(-2, 2, n), indexing="ij")
