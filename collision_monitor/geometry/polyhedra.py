@@ -6,7 +6,7 @@ A mesh is vertices (n, 3) in m and faces (m, 3) of vertex indices, counter-clock
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,9 @@ from collision_monitor.geometry.coordinates import Array, Booleans, Indices, Sig
 from collision_monitor.geometry.lines import segments_intersect
 from collision_monitor.geometry.orientation import orient2d, orient3d
 from collision_monitor.geometry.point_in_polygon import Location
+
+AT_ONCE: Final = 256
+"""Points that are located together in a mesh. Larger: more faces are near some of them. Smaller: more turns."""
 
 
 def mesh_edges(faces: ArrayLike) -> Indices:
@@ -58,11 +61,14 @@ def locate_in_polyhedron(points: ArrayLike, vertices: ArrayLike, faces: ArrayLik
     low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     p = points.reshape(-1, 3)
     on_face, odd = np.zeros(len(p), bool), np.zeros(len(p), bool)
-    for first in range(0, len(p), 1024):  # so that the table of points against faces stays small
-        some = slice(first, first + 1024)
-        beside = (low[:, :2] <= p[some, None, :2]) & (p[some, None, :2] <= high[:, :2])
-        below = p[some, None, 2] <= high[:, 2]
+    order = np.argsort(p[:, 0])
+    for first in range(0, len(p), AT_ONCE):  # few points side by side, so that few faces are in question for each
+        some = order[first : first + AT_ONCE]
+        near = np.flatnonzero((low[:, 0] <= p[some[-1], 0]) & (p[some[0], 0] <= high[:, 0]))
+        beside = (low[near, :2] <= p[some, None, :2]) & (p[some, None, :2] <= high[near, :2])
+        below = p[some, None, 2] <= high[near, 2]
         i, j = np.nonzero(beside.all(axis=-1) & below)
+        j = near[j]
         q, corners = p[some][i], (a[j], b[j], c[j])
         height = np.asarray(orient3d(*corners, q))
         in_plane = height == 0.0

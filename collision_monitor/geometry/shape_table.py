@@ -40,6 +40,9 @@ LANES: Final = 8
 """Hull vertices come in blocks of this many, the last one repeated, so that the support scan has no tail."""
 
 
+AT_ONCE: Final = 1 << 20
+"""Heights of points over planes that are computed together: 8 MB."""
+
 _CORNERS: Final = np.arange(3, dtype=np.int32)
 """Of a triangle."""
 
@@ -129,8 +132,11 @@ def hull_vertices(points: Array) -> NDArray[np.int32]:
     # qhull merges what is nearly coplanar; a vertex that it dropped although it sticks out stays in
     keep = np.zeros(len(first), bool)
     keep[hull.vertices] = True
-    outside = (centred / scale) @ hull.equations[:, :3].T + hull.equations[:, 3]
-    keep |= outside.max(axis=1) > HULL_DROP
+    normal, offset = hull.equations[:, :3], hull.equations[:, 3]
+    rest = np.flatnonzero(~keep)
+    for some in np.array_split(rest, len(rest) * len(normal) // AT_ONCE + 1):
+        outside = (centred[some] / scale) @ normal.T + offset
+        keep[some] = outside.max(axis=1, initial=-inf) > HULL_DROP
     return first[keep].astype(np.int32)
 
 
