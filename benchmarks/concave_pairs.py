@@ -1,6 +1,6 @@
 """How right compounds, meshes and concave polygons are: the second table of docs/narrow_phase.md.
 
-    nice python benchmarks/concave_pairs.py                  # 100,000 random pairs of each, about half an hour
+    nice python benchmarks/concave_pairs.py                  # 100,000 random pairs of each, about an hour
     nice python benchmarks/concave_pairs.py --pairs 1000     # a quick look
 
 Every object is the union of convex parts that are known by the way it was made: the shapes of a compound, the cells of
