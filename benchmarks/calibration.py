@@ -1,10 +1,10 @@
-"""Are the probabilities and times of impact under uncertainty right? Random scenes, each against 20,000 true futures.
+"""Are the probabilities and times of impact under uncertainty right? Random scenes, each against 50,000 true futures.
 
 Two bodies with random shapes, motions and uncertainties; the monitor's answer is compared with what becomes of them
 when the errors are drawn anew for each future, position, velocity, orientation and angular velocity each on its own.
 Prints a Markdown table and ends with 1 where an answer is off by more than stated.
 
-    python benchmarks/calibration.py                              about half a minute
+    python benchmarks/calibration.py                              about a minute
     python benchmarks/calibration.py --png docs/images/calibration.png
     python benchmarks/calibration.py --scenes 1000 --futures 5000 --seed 7
 """
@@ -220,7 +220,7 @@ def draw(rows: list[Row], confidence: float, path: Path) -> None:
             chosen = [r for r in rows if which(r)]
             x, y = [r.truth for r in chosen], [r.probability for r in chosen]
             left.plot(x, y, "o", color=color, markersize=4, alpha=0.7, label=f"{name}: {len(chosen)} scenes")
-        left.set_xlabel("part of 20,000 futures in which they meet within 2 s")
+        left.set_xlabel("part of the true futures in which they meet within 2 s")
         left.set_ylabel("stated probability")
         left.legend(frameon=False)
         early = np.sort([r.too_early for r in rows if r.told and np.isfinite(r.too_early)])[::-1]
@@ -236,7 +236,7 @@ def main() -> int:
     """Ends with 1 where a probability is off by more than MOST_OFF."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", type=int, default=120)
-    parser.add_argument("--futures", type=int, default=20_000)
+    parser.add_argument("--futures", type=int, default=50_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--profile", default="balanced", choices=Profile.names())
     parser.add_argument("--samples", type=int, help="in place of the profile's")

@@ -27,6 +27,7 @@ def bodies_in(
     """
     age = np.where(bodies.static[:top], 0.0, now - bodies.time[:top])
     centre = bodies.position[:top] + bodies.linear[:top] * age[:, None]
+    centre += 0.5 * bodies.acceleration[:top] * age[:, None] ** 2
     outside = np.maximum(np.maximum(np.asarray(low) - centre, centre - np.asarray(high)), 0.0)
     reach = bodies.motion["radius"][:top] + 0.5 * stale_acceleration * age**2
     return np.asarray((outside**2).sum(axis=1) <= reach**2)
@@ -42,6 +43,7 @@ def approaches(bodies: Bodies, i: NDArray[np.int32], j: NDArray[np.int32], now: 
     position, velocity = np.zeros((len(i), 3)), np.zeros((len(i), 3))
     for slots, sign in ((i, -1.0), (j, 1.0)):
         age = np.where(bodies.static[slots], 0.0, now - bodies.time[slots])
-        position += sign * (bodies.position[slots] + bodies.linear[slots] * age[:, None])
-        velocity += sign * bodies.linear[slots]
+        change = bodies.acceleration[slots] * age[:, None]
+        position += sign * (bodies.position[slots] + (bodies.linear[slots] + 0.5 * change) * age[:, None])
+        velocity += sign * (bodies.linear[slots] + change)
     return np.asarray((position * velocity).sum(axis=1) <= 0.0)

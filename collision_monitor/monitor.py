@@ -296,7 +296,7 @@ class Monitor:
         if d.static:
             assert pose is not None
             bodies.position[i], bodies.quaternion[i] = pose.position, pose.quaternion
-            bodies.linear[i] = bodies.angular[i] = 0.0
+            bodies.linear[i] = bodies.angular[i] = bodies.acceleration[i] = 0.0
             bodies.seen[i] = True
         elif bodies.static[i]:
             bodies.seen[i] = False  # it moves now, and where to is not known yet

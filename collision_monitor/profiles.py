@@ -57,7 +57,7 @@ class Profile:
     )
     uncertainty: bool = switch(True, "Whether it is told when and how likely pairs meet, where states declare it.")
     uncertainty_samples: int = number(
-        512, 16, 4096, "1", "Samples of what is uncertain, for each pair that may meet, where states declare it."
+        1024, 16, 4096, "1", "Samples of what is uncertain, for each pair that may meet, where states declare it."
     )
     confidence: float = number(0.95, 0.5, 0.9999, "1", "At which the earliest and latest times are stated.")
     min_probability: float = number(
@@ -169,7 +169,7 @@ _NAMED: Final[dict[str, dict[str, Any]]] = {
         "impact_tolerance": 1e-4,
         "impact_iterations": 64,
         "uncertainty": True,
-        "uncertainty_samples": 512,
+        "uncertainty_samples": 1024,
         **dict.fromkeys(_TOLERANCES, 1e-3),
     },
     "fast": {
@@ -186,7 +186,7 @@ _NAMED: Final[dict[str, dict[str, Any]]] = {
         "impact_tolerance": 1e-6,
         "impact_iterations": 256,
         "uncertainty": True,
-        "uncertainty_samples": 1024,
+        "uncertainty_samples": 2048,
         **dict.fromkeys(_TOLERANCES, 1e-9),
     },
 }

@@ -103,19 +103,25 @@ class Pose:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A pose and its twist in the world frame: linear (m/s) of the body's origin, angular (rad/s). Raises PoseError."""
+    """A pose, its twist and its acceleration, in the world frame; raises PoseError.
+
+    linear (m/s) and acceleration (m/s^2) are of the body's origin, angular in rad/s.
+    """
 
     pose: Pose
     linear: Any = (0.0, 0.0, 0.0)
     angular: Any = (0.0, 0.0, 0.0)
+    acceleration: Any = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         if not isinstance(self.pose, Pose):
             raise PoseError(f"Motion: expected a Pose first, got {type(self.pose).__name__}")
         object.__setattr__(self, "linear", vector(self.linear, "linear velocity"))
         object.__setattr__(self, "angular", vector(self.angular, "angular velocity"))
+        object.__setattr__(self, "acceleration", vector(self.acceleration, "acceleration"))
 
     def at(self, time: float) -> Pose:
-        """The pose after `time` seconds at constant twist."""
+        """The pose after `time` seconds at constant angular velocity and acceleration."""
         turn = from_rotation_vector(self.angular * time)
-        return Pose(self.pose.position + self.linear * time, multiply(turn, self.pose.quaternion))
+        moved = (self.linear + 0.5 * self.acceleration * time) * time
+        return Pose(self.pose.position + moved, multiply(turn, self.pose.quaternion))

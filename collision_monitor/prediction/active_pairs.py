@@ -9,7 +9,14 @@ import numpy as np
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.narrow_phase.dispatch import contact_within
-from collision_monitor.prediction.motion import place_shape, quaternion_to_matrix, turn_quaternion
+from collision_monitor.prediction.motion import (
+    place_shape,
+    position_now,
+    quaternion_to_matrix,
+    relative_position_now,
+    relative_velocity_now,
+    turn_quaternion,
+)
 from collision_monitor.prediction.prefetch import prefetch
 from collision_monitor.prediction.time_of_impact import CLEAR, body_impact, closing_speed
 from collision_monitor.records import ContactStatus, Phase
@@ -107,9 +114,9 @@ def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, sc
     out = scratch.out
     age_i = rotation_now(bodies, i, now, q, R_i)
     age_j = rotation_now(bodies, j, now, q, R_j)
-    px = bodies.position[j, 0] - bodies.position[i, 0] + (bodies.linear[j, 0] * age_j - bodies.linear[i, 0] * age_i)
-    py = bodies.position[j, 1] - bodies.position[i, 1] + (bodies.linear[j, 1] * age_j - bodies.linear[i, 1] * age_i)
-    pz = bodies.position[j, 2] - bodies.position[i, 2] + (bodies.linear[j, 2] * age_j - bodies.linear[i, 2] * age_i)
+    px = relative_position_now(bodies, i, age_i, j, age_j, 0)
+    py = relative_position_now(bodies, i, age_i, j, age_j, 1)
+    pz = relative_position_now(bodies, i, age_i, j, age_j, 2)
     widen = 0.5 * stale_acceleration * (age_i * age_i + age_j * age_j)
     wanted = margin + widen
     best = inf
@@ -139,9 +146,9 @@ def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, sc
     if best == inf:
         return False, tests
     v = (
-        bodies.linear[j, 0] - bodies.linear[i, 0],
-        bodies.linear[j, 1] - bodies.linear[i, 1],
-        bodies.linear[j, 2] - bodies.linear[i, 2],
+        relative_velocity_now(bodies, i, age_i, j, age_j, 0),
+        relative_velocity_now(bodies, i, age_i, j, age_j, 1),
+        relative_velocity_now(bodies, i, age_i, j, age_j, 2),
     )
     wa = (bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2])
     wb = (bodies.angular[j, 0], bodies.angular[j, 1], bodies.angular[j, 2])
@@ -153,9 +160,8 @@ def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, sc
         result[BOUND] -= best
         certain = excess <= margin
     result[STATUS] = TOUCHING if certain else UNRESOLVED
-    ti = age_i
     for c in range(3):
-        at = bodies.position[i, c] + bodies.linear[i, c] * ti
+        at = position_now(bodies, i, age_i, c)
         result[4 + c] += at
         result[7 + c] += at
     return True, tests

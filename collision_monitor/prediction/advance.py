@@ -5,8 +5,9 @@ from a shape that turns at w it turns by k = m + n x w a second. So the gap alon
 
     gap + d (n.v + m.p) + d^2 m.v - [h_A(n + d k_A) - h_A(n)] - [h_B(-n - d k_B) - h_B(-n)] - c d^2 / 2
 
-p and v: position and velocity of B's origin relative to A's; h: support values of the cores about those origins;
-c bounds the rest: |m|^2 |p| and, for each shape, (|w - u|^2 + |w x u|) r with its farthest point r. Concave in d.
+p and v: position and velocity of B's origin relative to A's; where it accelerates by a there is n.a d^2 / 2 more, of
+which no more is counted than keeps the bound concave. h: support values of the cores about those origins. c bounds the
+rest: |m|^2 |p| and, for each shape, (|w - u|^2 + |w x u|) r with its farthest point r.
 Where one corner is nearest all the while it is exact to second order with an axis at rest; a face or an edge that turns
 needs an axis that turns with it, else the gap seems to close by |w| r.
 """
@@ -36,6 +37,7 @@ class Placed(NamedTuple):
     o_b: Any
     p: Any  # body b's origin from body a's
     v: Any
+    acceleration: Any  # of b's origin relative to a's, constant
     w_a: Any
     w_b: Any
 
@@ -105,8 +107,11 @@ def advance(table, at, n, m, rate, gap, until):
     bend = _bend(table, at.a, at.w_a, u, at.o_a) + _bend(table, at.b, at.w_b, u, at.o_b)
     mm = dot(m, m)
     if mm > 0.0:
+        bent = 0.5 * sqrt(dot(at.acceleration, at.acceleration)) * until * until
         last = (at.p[0] + until * at.v[0], at.p[1] + until * at.v[1], at.p[2] + until * at.v[2])
-        bend += mm * sqrt(max(dot(at.p, at.p), dot(last, last)))
+        bend += mm * (sqrt(max(dot(at.p, at.p), dot(last, last))) + bent)
+    # n turns while they accelerate: m.a d^3 / 2, bounded by its chord
+    bend += abs(dot(m, at.acceleration)) * until - dot(n, at.acceleration)
     curvature = max(0.5 * bend - dot(m, at.v), 0.0)
     A, B = _seen_from(at.R_a, n, k_a), _seen_from(at.R_b, n, k_b)
     if is_centred_box(table.kind[at.a]) and is_centred_box(table.kind[at.b]):

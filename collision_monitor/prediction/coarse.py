@@ -21,7 +21,15 @@ from collision_monitor.prediction.active_pairs import (
     UNRESOLVED,
     has_changed,
 )
-from collision_monitor.prediction.motion import Bodies, relative_position
+from collision_monitor.prediction.motion import (
+    Bodies,
+    half_acceleration,
+    position_now,
+    relative_position,
+    relative_position_now,
+    relative_velocity,
+    relative_velocity_now,
+)
 from collision_monitor.prediction.sphere_trees import tree_meeting
 from collision_monitor.prediction.time_of_impact import (
     BOUND_ONLY,
@@ -53,9 +61,10 @@ def bound_impact(bodies, i, j, begin, end, margin, event):
     tube_1 = A.tube_1 + B.tube_1
     tube_0 = A.tube_0 + B.tube_0 + A.tube_1 * (begin - A.tube_time) + B.tube_1 * (begin - B.tube_time)
     px, py, pz = relative_position(A, B, begin)
-    vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
+    vx, vy, vz = relative_velocity(A, B, begin)
+    bent = half_acceleration(A, B) * (end - begin)
     reach = A.radius + B.radius + margin + tube_0
-    first, last = sphere_interval(px, py, pz, vx, vy, vz, reach, tube_1, end - begin, 1.0)
+    first, last = sphere_interval(px, py, pz, vx, vy, vz, reach, tube_1 + bent, end - begin, 1.0)
     if first > last:
         return
     event.i, event.j = i, j
@@ -130,9 +139,9 @@ def relative_now(bodies, i, j, now):
     """Position of j relative to i by their last states (m), and how old those are (s)."""
     age_i = 0.0 if bodies.static[i] else now - bodies.time[i]
     age_j = 0.0 if bodies.static[j] else now - bodies.time[j]
-    px = bodies.position[j, 0] - bodies.position[i, 0] + (bodies.linear[j, 0] * age_j - bodies.linear[i, 0] * age_i)
-    py = bodies.position[j, 1] - bodies.position[i, 1] + (bodies.linear[j, 1] * age_j - bodies.linear[i, 1] * age_i)
-    pz = bodies.position[j, 2] - bodies.position[i, 2] + (bodies.linear[j, 2] * age_j - bodies.linear[i, 2] * age_i)
+    px = relative_position_now(bodies, i, age_i, j, age_j, 0)
+    py = relative_position_now(bodies, i, age_i, j, age_j, 1)
+    pz = relative_position_now(bodies, i, age_i, j, age_j, 2)
     return px, py, pz, age_i, age_j
 
 
@@ -171,13 +180,13 @@ def leave(bodies, pairs, events, now, margin, stale_acceleration, results, later
             pairs[n].touching = 1 if touching else 0
             pairs[n].leaving = 0 if stays else 1
             if touching:
-                _write_bound(bodies, i, j, px, py, pz, distance, reach, age_i, results[n])
+                _write_bound(bodies, i, j, px, py, pz, distance, reach, age_i, age_j, results[n])
             n += 1
     return n, n_later
 
 
 @device
-def _write_bound(bodies, i, j, px, py, pz, distance, reach, age_i, result):
+def _write_bound(bodies, i, j, px, py, pz, distance, reach, age_i, age_j, result):
     """A contact of which only the bounding spheres are known: the true distance is within reach of the centres'."""
     result[:] = 0.0
     result[0] = distance
@@ -185,11 +194,11 @@ def _write_bound(bodies, i, j, px, py, pz, distance, reach, age_i, result):
     if distance > 0.0:
         result[1], result[2], result[3] = px / distance, py / distance, pz / distance
     for c in range(3):
-        result[4 + c] = bodies.position[i, c] + bodies.linear[i, c] * age_i
+        result[4 + c] = position_now(bodies, i, age_i, c)
     result[7], result[8], result[9] = result[4] + px, result[5] + py, result[6] + pz
     result[BOUND] = reach
     for c in range(3):
-        result[CLOSING] -= (bodies.linear[j, c] - bodies.linear[i, c]) * result[1 + c]
+        result[CLOSING] -= relative_velocity_now(bodies, i, age_i, j, age_j, c) * result[1 + c]
     result[SHAPE_I], result[SHAPE_J] = bodies.first_shape[i], bodies.first_shape[j]
     result[STATUS] = UNRESOLVED
 

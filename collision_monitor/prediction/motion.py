@@ -1,4 +1,4 @@
-"""Bodies and how they move: constant twist from a reference state, and how far the truth may be from it.
+"""Bodies and how they move: constant twist and acceleration from a reference state, and how far the truth may be off.
 
 The deviation of a body is bounded by a tube: every point of it stays within tube_0 + tube_1 * (t - tube_time) metres
 of where the reference motion puts it. While that holds, what was predicted from the reference holds too.
@@ -22,6 +22,9 @@ MOTION = np.dtype(
         ("vx", np.float64),  # m/s
         ("vy", np.float64),
         ("vz", np.float64),
+        ("ax", np.float64),  # m/s^2: of the origin, constant
+        ("ay", np.float64),
+        ("az", np.float64),
         ("radius", np.float64),  # of the sphere about the body's origin that holds all its shapes
         ("time", np.float64),  # s after the monitor's origin, like all times
         ("tube_0", np.float64),  # m
@@ -64,6 +67,7 @@ class Bodies(NamedTuple):
     quaternion: Any  # (N, 4)
     linear: Any  # (N, 3)
     angular: Any  # (N, 3)
+    acceleration: Any  # (N, 3): where it is measured, else 0
 
 
 class Parts(NamedTuple):
@@ -98,6 +102,7 @@ def make_bodies(capacity: int) -> Bodies:
         quaternion=np.zeros((n, 4)),
         linear=np.zeros((n, 3)),
         angular=np.zeros((n, 3)),
+        acceleration=np.zeros((n, 3)),
     )
 
 
@@ -154,10 +159,53 @@ def rotation_at(m, t, out):
 def relative_position(A, B, t):
     """Position of motion B relative to motion A at time t (m): positions are subtracted before anything is added."""
     ta, tb = t - A.time, t - B.time
+    sa, sb = 0.5 * ta * ta, 0.5 * tb * tb
     return (
-        B.x - A.x + (B.vx * tb - A.vx * ta),
-        B.y - A.y + (B.vy * tb - A.vy * ta),
-        B.z - A.z + (B.vz * tb - A.vz * ta),
+        B.x - A.x + (B.vx * tb - A.vx * ta) + (B.ax * sb - A.ax * sa),
+        B.y - A.y + (B.vy * tb - A.vy * ta) + (B.ay * sb - A.ay * sa),
+        B.z - A.z + (B.vz * tb - A.vz * ta) + (B.az * sb - A.az * sa),
+    )
+
+
+@inlined
+def relative_velocity(A, B, t):
+    """Velocity of motion B relative to motion A at time t (m/s)."""
+    ta, tb = t - A.time, t - B.time
+    return (
+        B.vx - A.vx + (B.ax * tb - A.ax * ta),
+        B.vy - A.vy + (B.ay * tb - A.ay * ta),
+        B.vz - A.vz + (B.az * tb - A.az * ta),
+    )
+
+
+@inlined
+def half_acceleration(A, B):
+    """Half of how hard motion B accelerates relative to motion A (m/s^2); 0 where neither does."""
+    x, y, z = B.ax - A.ax, B.ay - A.ay, B.az - A.az
+    return 0.5 * sqrt(x * x + y * y + z * z)
+
+
+@inlined
+def position_now(bodies, i, age, c):
+    """Coordinate c of body i's origin `age` seconds after its last state (m)."""
+    return bodies.position[i, c] + (bodies.linear[i, c] * age + 0.5 * bodies.acceleration[i, c] * age * age)
+
+
+@inlined
+def relative_position_now(bodies, i, age_i, j, age_j, c):
+    """Coordinate c of body j's origin relative to body i's (m), each so long (s) after its last state."""
+    moved = bodies.linear[j, c] * age_j - bodies.linear[i, c] * age_i
+    bent = 0.5 * bodies.acceleration[j, c] * age_j * age_j - 0.5 * bodies.acceleration[i, c] * age_i * age_i
+    return bodies.position[j, c] - bodies.position[i, c] + (moved + bent)
+
+
+@inlined
+def relative_velocity_now(bodies, i, age_i, j, age_j, c):
+    """Coordinate c of its velocity (m/s)."""
+    return (
+        bodies.linear[j, c]
+        - bodies.linear[i, c]
+        + (bodies.acceleration[j, c] * age_j - bodies.acceleration[i, c] * age_i)
     )
 
 

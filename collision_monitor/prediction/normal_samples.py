@@ -2,7 +2,7 @@
 
 A rank-1 lattice, its generating vector built component by component (Sloan and Reztsov, 2002) for the weighted
 worst-case error of smooth periodic functions, mapped by the inverse of the normal distribution (quasi-Monte Carlo).
-The first coordinate is drawn twice as wide and weighted back (importance sampling): so the few points there are reach
+The first coordinate is drawn wider and weighted back (importance sampling): so the few points there are reach
 4 standard deviations out in the direction that matters most, and a rare event is not seen as an impossible one.
 """
 
@@ -40,7 +40,7 @@ def generating_vector(count: int, dimensions: int) -> list[int]:
     """Of the lattice {k z / count}: each component makes the worst-case errors smallest, given those before it.
 
     That of all points, which counts three times, and that of the coarser lattice in them (after Cools, Kuo and Nuyens,
-    2006). They are those of the Korobov space of smoothness 2 with weights 1 / j^2: later coordinates matter less.
+    2006). They are those of the Korobov space of smoothness 2 with weights 1 / sqrt(j): later coordinates matter less.
     """
     x = np.arange(count) / count
     kernel = 2.0 * math.pi**2 * (x * x - x + 1.0 / 6.0)
@@ -52,12 +52,12 @@ def generating_vector(count: int, dimensions: int) -> list[int]:
     for j in range(1, dimensions + 1):
         best, least = 1, math.inf  # at first they are all the same
         for z in candidates if j > 1 else ():
-            with_z = product * (1.0 + kernel[k * z % count] / j**2)
+            with_z = product * (1.0 + kernel[k * z % count] / math.sqrt(j))
             error = (with_z.mean() - 1.0) ** 3 * (with_z[::stride].mean() - 1.0)
             if error < least:
                 best, least = z, error
         vector.append(best)
-        product *= 1.0 + kernel[k * best % count] / j**2
+        product *= 1.0 + kernel[k * best % count] / math.sqrt(j)
     return vector
 
 

@@ -18,7 +18,7 @@ from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.narrow_phase.manifold import CORNERS, manifold_batch, reduce_points
 from collision_monitor.prediction.active_pairs import SHAPE_I, SHAPE_J, STATUS, TOUCHING, rotation_now
 from collision_monitor.prediction.coarse import relative_now
-from collision_monitor.prediction.motion import Bodies, Parts, place_shape
+from collision_monitor.prediction.motion import Bodies, Parts, place_shape, position_now, relative_velocity_now
 from collision_monitor.prediction.time_of_impact import closing_speed
 from collision_monitor.records import MOST_POINTS
 from collision_monitor.tolerances import FEATURE_TIE
@@ -105,11 +105,11 @@ def _join(bodies, pairs, results, now, of, tie, patch, counts, most, count, poin
             continue
         count[k] = m
         i, j = pairs[k].i, pairs[k].j
-        px, py, pz, age, _ = relative_now(bodies, i, j, now)
+        px, py, pz, age, age_j = relative_now(bodies, i, j, now)
         v = (
-            bodies.linear[j, 0] - bodies.linear[i, 0],
-            bodies.linear[j, 1] - bodies.linear[i, 1],
-            bodies.linear[j, 2] - bodies.linear[i, 2],
+            relative_velocity_now(bodies, i, age, j, age_j, 0),
+            relative_velocity_now(bodies, i, age, j, age_j, 1),
+            relative_velocity_now(bodies, i, age, j, age_j, 2),
         )
         wa = (bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2])
         wb = (bodies.angular[j, 0], bodies.angular[j, 1], bodies.angular[j, 2])
@@ -118,7 +118,7 @@ def _join(bodies, pairs, results, now, of, tie, patch, counts, most, count, poin
             for d in range(3):
                 out[4 + d] = corners[c, d]
                 out[7 + d] = corners[c, d] + out[0] * out[1 + d]
-                points[k, c, d] = corners[c, d] + (bodies.position[i, d] + bodies.linear[i, d] * age)
+                points[k, c, d] = corners[c, d] + position_now(bodies, i, age, d)
             closing[k, c] = closing_speed(v, wa, wb, px, py, pz, out)
 
 

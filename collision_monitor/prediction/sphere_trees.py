@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.shape_table import BOX, CONVEX_HULL
-from collision_monitor.prediction.motion import relative_position, rotation_at
+from collision_monitor.prediction.motion import half_acceleration, relative_position, relative_velocity, rotation_at
 from collision_monitor.prediction.time_of_impact import sphere_interval
 
 Array = NDArray[np.float64]
@@ -146,8 +146,8 @@ def tree_meeting(bodies, trees, i, j, begin, end, margin, R_i, R_j):
     """
     A, B = bodies.motion[i], bodies.motion[j]
     px, py, pz = relative_position(A, B, begin)
-    vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
-    tube_1 = A.tube_1 + B.tube_1
+    vx, vy, vz = relative_velocity(A, B, begin)
+    tube_1 = A.tube_1 + B.tube_1 + half_acceleration(A, B) * (end - begin)  # no more than that off its tangent
     tube_0 = A.tube_0 + B.tube_0 + A.tube_1 * (begin - A.tube_time) + B.tube_1 * (begin - B.tube_time)
     reach = A.radius + B.radius + margin + tube_0
     soonest, last = sphere_interval(px, py, pz, vx, vy, vz, reach, tube_1, end - begin, 1.0)

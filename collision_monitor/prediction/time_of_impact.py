@@ -16,7 +16,13 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.narrow_phase.answer import WORK_SIZE
 from collision_monitor.narrow_phase.dispatch import contact, separation
 from collision_monitor.prediction.advance import Placed, advance
-from collision_monitor.prediction.motion import place_shape, relative_position, rotation_at
+from collision_monitor.prediction.motion import (
+    half_acceleration,
+    place_shape,
+    relative_position,
+    relative_velocity,
+    rotation_at,
+)
 from collision_monitor.records import Method, PredictionStatus
 from collision_monitor.tolerances import EPSILON
 
@@ -157,7 +163,7 @@ def shape_impact(table, parts, A, B, a, b, begin, end, margin, tube_0, tube_1, t
     """
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
-    v = (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
+    acceleration = (B.ax - A.ax, B.ay - A.ay, B.az - A.az)
     w_a, w_b = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
     n_before = AT_REST
     t = t_before = begin
@@ -180,8 +186,8 @@ def shape_impact(table, parts, A, B, a, b, begin, end, margin, tube_0, tube_1, t
                 guess = wanted * (t - t_before) / (gap_before - gap)
             status = HIT
             break
-        n = (out[0], out[1], out[2])
-        at = Placed(a, b, R_a, R_b, oa, ob, (px, py, pz), v, w_a, w_b)
+        n, v = (out[0], out[1], out[2]), relative_velocity(A, B, t)
+        at = Placed(a, b, R_a, R_b, oa, ob, (px, py, pz), v, acceleration, w_a, w_b)
         # aim at half the tolerance, so that the last advance ends inside it
         aim = gap - 0.5 * tolerance
         d, m, until = 0.0, AT_REST, end - t
@@ -219,7 +225,7 @@ def contact_at(table, parts, A, B, a, b, t, scratch):
     for k in range(3):
         out[4 + k] += oa[k]
         out[7 + k] += oa[k]
-    v = (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
+    v = relative_velocity(A, B, t)
     out[15] = closing_speed(v, (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz), px, py, pz, out)
     return out[0]
 
@@ -277,19 +283,20 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
     tube_1 = A.tube_1 + B.tube_1
     tube_0 = A.tube_0 + B.tube_0 + A.tube_1 * (begin - A.tube_time) + B.tube_1 * (begin - B.tube_time)
     px, py, pz = relative_position(A, B, begin)
-    vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
+    vx, vy, vz = relative_velocity(A, B, begin)
+    bent = half_acceleration(A, B) * (end - begin)  # m/s: a path that bends is within that of its tangent
     # the time in which the bounding spheres overlap holds every impact
     first, last = 0.0, end - begin
     reach = A.radius + B.radius + margin
     if reach < inf:
-        first, last = sphere_interval(px, py, pz, vx, vy, vz, reach + tube_0, tube_1, last, 1.0)
+        first, last = sphere_interval(px, py, pz, vx, vy, vz, reach + tube_0, tube_1 + bent, last, 1.0)
         if first > last:
             return 0
     event.i, event.j = i, j
     event.key = (np.uint64(A.id) << np.uint64(32)) | np.uint64(B.id)
     event.version_i, event.version_j = A.version, B.version
     a, b = bodies.first_shape[i], bodies.first_shape[j]
-    if bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0 and reach < inf:
+    if bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0 and reach < inf and bent == 0.0:
         _sphere_impact(A, B, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, begin, first, end, event)
         return 1
     event.method = CONSERVATIVE_ADVANCEMENT
@@ -327,9 +334,9 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
 def _set_geometry(event, A, t, out):
     """Where and how they meet, from a contact at time t relative to A's origin."""
     ta = t - A.time
-    event.point_x = A.x + A.vx * ta + 0.5 * (out[4] + out[7])
-    event.point_y = A.y + A.vy * ta + 0.5 * (out[5] + out[8])
-    event.point_z = A.z + A.vz * ta + 0.5 * (out[6] + out[9])
+    event.point_x = A.x + (A.vx + 0.5 * A.ax * ta) * ta + 0.5 * (out[4] + out[7])
+    event.point_y = A.y + (A.vy + 0.5 * A.ay * ta) * ta + 0.5 * (out[5] + out[8])
+    event.point_z = A.z + (A.vz + 0.5 * A.az * ta) * ta + 0.5 * (out[6] + out[9])
     event.normal_x, event.normal_y, event.normal_z = out[1], out[2], out[3]
     event.closing_speed = out[15]
 
@@ -354,7 +361,9 @@ def _sphere_impact(A, B, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, be
 @inlined
 def meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, t, event):
     """Where and how the bounding spheres of A and B meet, t seconds after begin."""
-    dx, dy, dz = px + vx * t, py + vy * t, pz + vz * t
+    dx, dy, dz = (
+        relative_position(A, B, begin + t) if half_acceleration(A, B) > 0.0 else (px + vx * t, py + vy * t, pz + vz * t)
+    )
     length = sqrt(dx * dx + dy * dy + dz * dz)
     if length > 0.0:
         nx, ny, nz = dx / length, dy / length, dz / length
@@ -362,8 +371,8 @@ def meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, t, event):
         nx, ny, nz = 0.0, 0.0, 1.0
     ta = begin + t - A.time
     share = A.radius / (A.radius + B.radius) * length
-    event.point_x = A.x + A.vx * ta + share * nx
-    event.point_y = A.y + A.vy * ta + share * ny
-    event.point_z = A.z + A.vz * ta + share * nz
+    event.point_x = A.x + (A.vx + 0.5 * A.ax * ta) * ta + share * nx
+    event.point_y = A.y + (A.vy + 0.5 * A.ay * ta) * ta + share * ny
+    event.point_z = A.z + (A.vz + 0.5 * A.az * ta) * ta + share * nz
     event.normal_x, event.normal_y, event.normal_z = nx, ny, nz
     event.closing_speed = -(vx * nx + vy * ny + vz * nz)

@@ -12,7 +12,7 @@ import numpy as np
 
 from collision_monitor._jit import device, kernel
 from collision_monitor.broad_phase.hashed_grid import put_box
-from collision_monitor.prediction.motion import quaternion_to_matrix, turn_quaternion
+from collision_monitor.prediction.motion import position_now, quaternion_to_matrix, turn_quaternion
 from collision_monitor.prediction.spread import surface_spread
 from collision_monitor.prediction.turning import BLOCK, COLUMNS, turned_away
 from collision_monitor.records import StateFlag
@@ -45,6 +45,7 @@ _ORIENTATION_STDDEV: Final = 17
 
 _TWIST_UNKNOWN: Final = int(StateFlag.TWIST_UNKNOWN)
 _DISCONTINUITY: Final = int(StateFlag.DISCONTINUITY)
+_ACCELERATION_VALID: Final = int(StateFlag.ACCELERATION_VALID)
 
 
 @kernel
@@ -67,6 +68,9 @@ def take_states(bodies, slots, numbers, flags, time, verdicts):
         usable = True
         for c in range(13 if known_twist else 7):
             usable &= abs(numbers[k, c]) <= LARGEST_INPUT
+        accelerates = (flags[k] & _ACCELERATION_VALID) != 0
+        for c in range(13, 16 if accelerates else 13):
+            usable &= abs(numbers[k, c]) <= LARGEST_INPUT
         for c in range(16, STATE_NUMBERS):  # standard deviations; NaN: unknown
             usable &= not (numbers[k, c] < 0.0 or numbers[k, c] > LARGEST_INPUT)
         if not usable:
@@ -87,6 +91,9 @@ def take_states(bodies, slots, numbers, flags, time, verdicts):
                 bodies.angular[i, c] = numbers[k, 10 + c]
         elif bodies.seen[i] and (flags[k] & _DISCONTINUITY) == 0:
             _estimate_twist(bodies, i, numbers, k, x, y, z, w, time - bodies.time[i])
+            for c in range(3 if accelerates else 0):
+                # what is estimated is the mean since the last state, and it was that fast half-way
+                bodies.linear[i, c] += 0.5 * numbers[k, 13 + c] * (time - bodies.time[i])
             for c in (_POSITION_STDDEV, _ORIENTATION_STDDEV):
                 if numbers[k, c] > 0.0 and not numbers[k, c + 2] > 0.0:
                     # of a difference of two poses, if the last one was as uncertain as this one
@@ -95,6 +102,7 @@ def take_states(bodies, slots, numbers, flags, time, verdicts):
             bodies.linear[i] = 0.0
             bodies.angular[i] = 0.0
         for c in range(3):
+            bodies.acceleration[i, c] = numbers[k, 13 + c] if accelerates else 0.0
             bodies.position[i, c] = numbers[k, c]
         bodies.quaternion[i, 0], bodies.quaternion[i, 1] = x, y
         bodies.quaternion[i, 2], bodies.quaternion[i, 3] = z, w
@@ -159,9 +167,18 @@ def find_moved(bodies, spread, sigmas, count, now, horizon, stale_acceleration, 
         dx = bodies.position[i, 0] - m.x + (bodies.linear[i, 0] * age - m.vx * since)
         dy = bodies.position[i, 1] - m.y + (bodies.linear[i, 1] * age - m.vy * since)
         dz = bodies.position[i, 2] - m.z + (bodies.linear[i, 2] * age - m.vz * since)
+        ux, uy, uz = bodies.linear[i, 0] - m.vx, bodies.linear[i, 1] - m.vy, bodies.linear[i, 2] - m.vz
+        ax, ay, az = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
+        harder = 0.0
+        if ax != 0.0 or ay != 0.0 or az != 0.0 or m.ax != 0.0 or m.ay != 0.0 or m.az != 0.0:
+            dx += 0.5 * (ax * age * age - m.ax * since * since)
+            dy += 0.5 * (ay * age * age - m.ay * since * since)
+            dz += 0.5 * (az * age * age - m.az * since * since)
+            ux, uy, uz = ux + (ax * age - m.ax * since), uy + (ay * age - m.ay * since), uz + (az * age - m.az * since)
+            harder = sqrt((ax - m.ax) ** 2 + (ay - m.ay) ** 2 + (az - m.az) ** 2)
         apart = sqrt(dx * dx + dy * dy + dz * dz)
-        dx, dy, dz = bodies.linear[i, 0] - m.vx, bodies.linear[i, 1] - m.vy, bodies.linear[i, 2] - m.vz
-        drift = sqrt(dx * dx + dy * dy + dz * dz)
+        # of half a difference of accelerations, over the two horizons for which a body is predicted at most
+        drift = sqrt(ux * ux + uy * uy + uz * uz) + harder * horizon
         if age > 0.0:
             apart += 0.5 * stale_acceleration * age * age
             drift += stale_acceleration * age
@@ -238,9 +255,16 @@ def swept_box(bodies, i, begin, margin):
     half = m.radius + margin + m.tube_0 + m.spread_0 + (m.tube_1 + m.spread_1) * (begin - m.tube_time + sweep)
     ahead = 0.5 * sweep
     middle = begin - m.time + ahead
+    # of a t^2 / 2 the middle of both ends, and half of what is between
+    first, last = 0.25 * (middle - ahead) ** 2, 0.25 * (middle + ahead) ** 2
+    between, bent = first + last, last - first
     return (
-        m.x + middle * m.vx, m.y + middle * m.vy, m.z + middle * m.vz,
-        half + ahead * abs(m.vx), half + ahead * abs(m.vy), half + ahead * abs(m.vz),
+        m.x + middle * m.vx + between * m.ax,
+        m.y + middle * m.vy + between * m.ay,
+        m.z + middle * m.vz + between * m.az,
+        half + ahead * abs(m.vx) + bent * abs(m.ax),
+        half + ahead * abs(m.vy) + bent * abs(m.ay),
+        half + ahead * abs(m.vz) + bent * abs(m.az),
     )  # fmt: skip
 
 
@@ -261,9 +285,11 @@ def restart_motion(
         age = 0.0 if bodies.static[i] else now - bodies.time[i]
         m.vx, m.vy, m.vz = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
         m.wx, m.wy, m.wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
-        m.x = bodies.position[i, 0] + m.vx * age
-        m.y = bodies.position[i, 1] + m.vy * age
-        m.z = bodies.position[i, 2] + m.vz * age
+        m.ax, m.ay, m.az = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
+        m.x = position_now(bodies, i, age, 0)
+        m.y = position_now(bodies, i, age, 1)
+        m.z = position_now(bodies, i, age, 2)
+        m.vx, m.vy, m.vz = m.vx + m.ax * age, m.vy + m.ay * age, m.vz + m.az * age
         turn_quaternion(bodies.quaternion, i, m.wx, m.wy, m.wz, age, q)
         for c in range(4):
             bodies.ref_quaternion[i, c] = q[c]

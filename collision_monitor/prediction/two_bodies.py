@@ -56,7 +56,8 @@ def make_body(shape: Compound, motion: Motion, name: str) -> Body:
         raise UnsupportedError(f"shape {name}: a HalfSpace has no end and cannot turn")
     if is_planar(shapes[0][0]):
         x, y, _ = motion.linear
-        motion = Motion(flat_pose(motion.pose), (x, y, 0.0), (0.0, 0.0, motion.angular[2]))
+        level = (*motion.acceleration[:2], 0.0)
+        motion = Motion(flat_pose(motion.pose), (x, y, 0.0), (0.0, 0.0, motion.angular[2]), level)
     modelled = containing_model(shapes, "exact")
     return Body(shapes, modelled.pieces, modelled.shapes, motion)
 
@@ -89,6 +90,7 @@ def _set_motion(
     motion["id"], motion["radius"], motion["cover"] = k, radius, horizon
     motion["x"], motion["y"], motion["z"] = body.motion.pose.position
     motion["vx"], motion["vy"], motion["vz"] = body.motion.linear
+    motion["ax"], motion["ay"], motion["az"] = body.motion.acceleration
     motion["wx"], motion["wy"], motion["wz"] = body.motion.angular
     motion["rotation"] = body.motion.pose.rotation
     # only one ball about the origin is never moved by turning

@@ -14,7 +14,14 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.prediction.motion import MOTION, quaternion_to_matrix, turn_quaternion
+from collision_monitor.prediction.known_axes import AXES, parted_until, remember
+from collision_monitor.prediction.motion import (
+    MOTION,
+    half_acceleration,
+    position_now,
+    quaternion_to_matrix,
+    turn_quaternion,
+)
 from collision_monitor.prediction.normal_samples import PILOT
 from collision_monitor.prediction.spread import FIFTH_ROOT, is_uncertain, surface_spread, unknown_acceleration
 from collision_monitor.prediction.time_of_impact import (
@@ -41,7 +48,7 @@ PILOT_PART: Final = 0.2
 """A pair that is stated to pass, and met with less than this part of the probability that is told in the coarse lattice
 of samples, is left out; and again after each further one."""
 
-OUTWARD: Final = 1.0
+OUTWARD: Final = 2.0
 """Standard errors of a quantile by which the earliest time is earlier and the latest later than the samples' own."""
 
 
@@ -54,6 +61,7 @@ class Room(NamedTuple):
     frame: Any  # (3, 3): rows across the path, along it, and across both
     joint: Any  # (6, 6): covariance of position at the time of closest approach and of velocity, then its root
     block: Any  # (3, 3)
+    axes: Any  # (AXES, 4): directions that parted the bodies in other samples
     scratch: Scratch
 
 
@@ -66,6 +74,7 @@ def make_room() -> Room:
         np.zeros((3, 3)),
         np.zeros((6, 6)),
         np.zeros((3, 3)),
+        np.zeros((AXES, 4)),
         make_scratch(),
     )
 
@@ -74,10 +83,13 @@ def make_room() -> Room:
 def carry_on(bodies, i, now, q, m):
     """Body i's last state carried on to `now` as the motion m (MOTION), whose time 0 is now; returns its age (s)."""
     age = 0.0 if bodies.static[i] else now - bodies.time[i]
-    m.x = bodies.position[i, 0] + bodies.linear[i, 0] * age
-    m.y = bodies.position[i, 1] + bodies.linear[i, 1] * age
-    m.z = bodies.position[i, 2] + bodies.linear[i, 2] * age
-    m.vx, m.vy, m.vz = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
+    m.ax, m.ay, m.az = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
+    m.x, m.y, m.z = (
+        position_now(bodies, i, age, 0), position_now(bodies, i, age, 1), position_now(bodies, i, age, 2)
+    )  # fmt: skip
+    m.vx = bodies.linear[i, 0] + m.ax * age
+    m.vy = bodies.linear[i, 1] + m.ay * age
+    m.vz = bodies.linear[i, 2] + m.az * age
     m.wx, m.wy, m.wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
     turn_quaternion(bodies.quaternion, i, m.wx, m.wy, m.wz, age, q[0])
     quaternion_to_matrix(q, 0, m.rotation)
@@ -97,8 +109,9 @@ def _first_contact(table, parts, bodies, i, j, begin, end, margin, tube_0, tube_
     reach = A.radius + B.radius + margin + tube_0
     if reach < inf:
         vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
-        first, last = sphere_interval(B.x - A.x, B.y - A.y, B.z - A.z, vx, vy, vz, reach, tube_1, end, 1.0)
-        if bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0:  # single spheres
+        bent = half_acceleration(A, B) * end
+        first, last = sphere_interval(B.x - A.x, B.y - A.y, B.z - A.z, vx, vy, vz, reach, tube_1 + bent, end, 1.0)
+        if bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0 and bent == 0.0:  # single spheres
             return first
         first = max(first, begin)
         if first > last:
@@ -225,8 +238,10 @@ def _take_root(joint):
 
 
 @inlined
-def _turn(m, R, dx, dy, dz):
-    """Set the rotation of the motion m (MOTION) to R turned by the rotation vector d (rad)."""
+def _turn(m, R, w, off, x, y, z):
+    """Let the motion m (MOTION), which is R and turns at w (3,), be off by (x, y, z) times `off` (rad now, rad/s)."""
+    m.wx, m.wy, m.wz = w[0] + off[1] * x, w[1] + off[1] * y, w[2] + off[1] * z
+    dx, dy, dz = off[0] * x, off[0] * y, off[0] * z
     angle = sqrt(dx * dx + dy * dy + dz * dz)
     c = 2.0 * np.sin(0.5 * angle) ** 2
     s = np.sin(angle)
@@ -241,13 +256,21 @@ def _turn(m, R, dx, dy, dz):
 
 
 @device
-def _orientation_spread(spread, i, radius, at):
-    """Standard deviation (rad) of the orientation `at` seconds after the last state; 0 where turning moves nothing."""
+def _orientation_spread(spread, i, radius, age, t):
+    """How an error of the orientation goes on that is one standard deviation t seconds from now: (rad now, rad/s).
+
+    That of a rate which is not known is on average in proportion to how much of the whole it makes; 0, 0 where turning
+    moves nothing. age: s since the last state.
+    """
     if radius == 0.0:
-        return 0.0
-    turning = 0.5 * FIFTH_ROOT * spread.acceleration[i, 1] * at * at
-    rate = spread.stddev[i, 3] * at
-    return sqrt(spread.stddev[i, 1] ** 2 + rate * rate + turning * turning)
+        return 0.0, 0.0
+    at = age + t
+    pose, rate = spread.stddev[i, 1] ** 2, spread.stddev[i, 3] ** 2
+    turning = (0.5 * FIFTH_ROOT * spread.acceleration[i, 1]) ** 2
+    whole = sqrt(pose + (rate + turning * at * at) * at * at)
+    if whole == 0.0:
+        return 0.0, 0.0
+    return (pose + (rate + turning * age * at) * age * at) / whole, (rate + turning * at * (at + age)) * at / whole
 
 
 @device
@@ -300,6 +323,16 @@ def _summarise(times, weights, order, confidence, safe, answer):
         if inside >= 0.5 * total and length < shortest:
             shortest = length
             answer[MOST_LIKELY] = 0.5 * (times[order[high]] + times[order[low]])
+
+
+@inlined
+def _is_straight(parts, bodies, i, j, A, B):
+    """Whether the bodies are a shape each that moves straight and does not turn, and not two spheres."""
+    a, b = bodies.first_shape[i], bodies.first_shape[j]
+    turns = A.wx != 0.0 or A.wy != 0.0 or A.wz != 0.0 or B.wx != 0.0 or B.wy != 0.0 or B.wz != 0.0
+    round = bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0
+    turns = turns or half_acceleration(A, B) > 0.0
+    return not turns and not round and parts.next[a] < 0 and parts.next[b] < 0
 
 
 @device
@@ -392,8 +425,7 @@ def impact_probabilities(
         if not bodies.static[j]:
             _add_covariance(spread, j, age_j, t, stale_acceleration, planar, room)
         _take_root(room.joint)
-        turn_i = _orientation_spread(spread, i, r_i, age_i + t)
-        turn_j = _orientation_spread(spread, j, r_j, age_j + t)
+        turn_i, turn_j = _orientation_spread(spread, i, r_i, age_i, t), _orientation_spread(spread, j, r_j, age_j, t)
         for r in range(3):
             for c in range(3):
                 room.rotation[0, r, c] = A.rotation[r, c]
@@ -404,6 +436,9 @@ def impact_probabilities(
         bias = 0.0 if r_i == 0.0 and r_j == 0.0 else -0.75 * coarse
         px, py, pz = B.x, B.y, B.z
         vx, vy, vz = B.vx, B.vy, B.vz
+        w_i, w_j = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
+        straight = _is_straight(parts, bodies, i, j, A, B) and turn_i[0] + turn_i[1] + turn_j[0] + turn_j[1] == 0.0
+        room.axes[:, 3] = inf  # none is known
         stride = max(1, weights.size // PILOT)
         seen = 0.0
         likely = True
@@ -414,13 +449,22 @@ def impact_probabilities(
             for n in range(first, weights.size, stride):
                 z = points[n]
                 _shift(room, z, t, px, py, pz, vx, vy, vz)
-                if turn_i > 0.0:
-                    _turn(A, room.rotation[0], level * turn_i * z[6], level * turn_i * z[7], turn_i * z[8])
-                if turn_j > 0.0:
-                    _turn(B, room.rotation[1], level * turn_j * z[9], level * turn_j * z[10], turn_j * z[11])
+                if turn_i[0] + turn_i[1] > 0.0:
+                    _turn(A, room.rotation[0], w_i, turn_i, level * z[6], level * z[7], z[8])
+                if turn_j[0] + turn_j[1] > 0.0:
+                    _turn(B, room.rotation[1], w_j, turn_j, level * z[9], level * z[10], z[11])
+                parted = 0.0
+                if straight:
+                    parted = parted_until(room.axes, A, B, horizon, margin + bias + 0.5 * coarse)
+                    if parted == inf:
+                        times[n] = inf
+                        continue
                 times[n] = _first_contact(
-                    table, parts, bodies, i, j, begin, horizon, margin, bias, 0.0, coarse, budget, room
+                    table, parts, bodies, i, j, max(begin, parted), horizon, margin, bias, 0.0, coarse, budget, room
                 )
+                if straight:
+                    a, b = bodies.first_shape[i], bodies.first_shape[j]
+                    remember(table, parts, A, B, a, b, times[n] == inf, n, room.scratch, room.axes)
                 seen += weights[n] if times[n] < inf else 0.0
         if likely:
             _summarise(times, weights, np.argsort(times), confidence, safe, answers[k])

@@ -30,13 +30,13 @@ SHAPES: dict[str, Any] = {
 
 @kernel
 def _advances(table: Any, rotation: Any, rows: Any, gap: float, until: float, found: Any) -> None:
-    """rows (N, 7, 3): n, m, offset of A and B from their bodies' origins, p, v, and w of A and B in two more rows."""
+    """rows (N, 9, 3): n, m, offset of A and B from their bodies' origins, p, v, w of A and of B, acceleration."""
     for k in range(len(rows)):
         r = rows[k]
         at = Placed(
             0, 1, rotation[0, k], rotation[1, k], (r[2, 0], r[2, 1], r[2, 2]), (r[3, 0], r[3, 1], r[3, 2]),
-            (r[4, 0], r[4, 1], r[4, 2]), (r[5, 0], r[5, 1], r[5, 2]), (r[6, 0], r[6, 1], r[6, 2]),
-            (r[7, 0], r[7, 1], r[7, 2]),
+            (r[4, 0], r[4, 1], r[4, 2]), (r[5, 0], r[5, 1], r[5, 2]), (r[8, 0], r[8, 1], r[8, 2]),
+            (r[6, 0], r[6, 1], r[6, 2]), (r[7, 0], r[7, 1], r[7, 2]),
         )  # fmt: skip
         found[k] = advance(table, at, (r[0, 0], r[0, 1], r[0, 2]), (r[1, 0], r[1, 1], r[1, 2]), 0.0, gap, until)
 
@@ -50,9 +50,9 @@ def _table(a: Any, b: Any) -> ShapeTable:
 
 def _along(shapes: tuple[Any, Any], rotations: Array, row: Array, times: Array) -> Array:
     """The gap along the axis at the times (T,), as it is: supports of the shapes as they stand then."""
-    n, m, *offsets, p, v, w_a, w_b = row
+    n, m, *offsets, p, v, w_a, w_b, acceleration = row
     axis = rotation_matrix(from_rotation_vector(times[:, None] * np.cross(n, m))) @ n
-    gap = np.einsum("ti,ti->t", axis, p + times[:, None] * v)
+    gap = np.einsum("ti,ti->t", axis, p + times[:, None] * v + 0.5 * times[:, None] ** 2 * acceleration)
     for shape, R, w, offset, sign in zip(shapes, rotations, (w_a, w_b), offsets, (1.0, -1.0), strict=True):
         turned = rotation_matrix(from_rotation_vector(times[:, None] * w))
         own = np.einsum("ij,tki,tk->tj", R, turned, sign * axis)  # R^T turned^T axis
@@ -69,11 +69,12 @@ def test_the_gap_stays_open_along_every_axis(a: str, b: str) -> None:
     shapes, count = (SHAPES[a], SHAPES[b]), 60
     q = rng.normal(size=(2, count, 4))
     rotation = rotation_matrix(q / np.linalg.norm(q, axis=-1, keepdims=True))
-    rows = rng.normal(size=(count, 8, 3))
+    rows = rng.normal(size=(count, 9, 3))
     n = rows[:, 0]
     n /= np.linalg.norm(n, axis=1, keepdims=True)
     rows[:, 1] -= np.einsum("ki,ki->k", rows[:, 1], n)[:, None] * n
     rows[: count // 4, 1] = 0.0  # axes at rest
+    rows[::3, 8] = 0.0  # and no acceleration
     rows[:, 2:4] *= rng.choice([0.0, 0.3], (count, 2, 1))
     gaps = np.array([_along(shapes, rotation[:, k], rows[k], np.zeros(1))[0] for k in range(count)])
     gap = 0.5
@@ -91,7 +92,7 @@ def test_with_an_axis_that_turns_with_a_face_little_is_left(a: str, b: str) -> N
     """A ball-like motion onto a turning face: along the face's own normal, nearly the true time; at rest, far less."""
     shapes = (SHAPES[a], cm.Sphere(0.2))
     n, w = np.array([0.0, 0.0, 1.0]), np.array([0.4, -0.3, 0.0])
-    rows = np.zeros((2, 8, 3))
+    rows = np.zeros((2, 9, 3))
     rows[:, 0], rows[:, 4], rows[:, 5], rows[:, 6] = n, (0.0, 0.0, 0.31 + 0.2 + 0.3), (0.0, 0.0, -1.0), w
     rows[1, 1] = np.cross(w, n)
     rotation = np.tile(np.eye(3), (2, 2, 1, 1))
