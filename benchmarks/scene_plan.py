@@ -21,11 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.description import ObjectDescription
-from collision_monitor.geometry.shapes import Circle, Sphere
+from collision_monitor.geometry.shapes import Box, Circle, Mesh, Sphere
 from collision_monitor.monitor import Monitor
 from collision_monitor.profiles import Profile
 from collision_monitor.world import make_scene
 from collision_monitor.world.scene import state_array
+
+POINT: Final = (1e-9, 1e-9, 1e-9)
+"""m, of a box that is a point."""
 
 States = NDArray[np.void]
 Rows = NDArray[np.void]
@@ -150,9 +153,34 @@ def region(objects: int) -> Item:
     return Item(off, on, _played(scene), _same, both_inside)
 
 
+def sat(objects: int) -> Item:
+    """Spheres as boxes of a nanometre that are grown by the radius: each pair has its axes looked at."""
+    scene = make_scene("clutter", objects=objects)
+    radii = np.random.default_rng(1).uniform(0.1, 0.4, objects).tolist()
+    ids = [d.object_id for d in scene.descriptions]
+    balls = [ObjectDescription(i, Sphere(radius)) for i, radius in zip(ids, radii, strict=True)]
+    boxes = [ObjectDescription(i, Box(POINT), padding=radius) for i, radius in zip(ids, radii, strict=True)]
+    return Item(_monitor(balls), _monitor(boxes), _played(scene))
+
+
+def meshes(objects: int) -> Item:
+    """Boxes as closed meshes of twelve triangles."""
+    scene = make_scene("clutter", objects=objects)
+    sizes = np.random.default_rng(1).uniform(0.2, 0.8, (objects, 3))
+    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    faces = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6),
+             (0, 6, 4), (1, 5, 7), (1, 7, 3)]  # fmt: skip
+    ids = [d.object_id for d in scene.descriptions]
+    boxes = [ObjectDescription(i, Box(tuple(size))) for i, size in zip(ids, sizes.tolist(), strict=True)]
+    soups = [ObjectDescription(i, Mesh(size * corners, faces)) for i, size in zip(ids, sizes, strict=True)]
+    return Item(_monitor(boxes), _monitor(soups), _played(scene))
+
+
 ITEMS: Final[dict[str, Callable[[int], Item]]] = {
     "rotation": rotation,
     "3-D": space,
+    "SAT": sat,
+    "meshes": meshes,
     "uncertainty": uncertainty,
     "static pairs": static_pairs,
     "groups that never meet": groups,

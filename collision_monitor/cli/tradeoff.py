@@ -33,6 +33,9 @@ NOISE: Final = {"fleet": 0.005}
 
 SECONDS: Final = 5.0
 
+MOST_IN_LEGEND: Final = 4
+"""Points of a panel; more have their names beside them."""
+
 DESCRIPTION = """\
 Run scenes, or a recorded session, through the profiles, and compare every answer with exact ones that are computed
 anew at every step: time per step, false alarms, misses, errors of distance and of time to collision.
@@ -122,7 +125,7 @@ def run(args: argparse.Namespace) -> int:
         if args.csv:
             _write_csv(rows, args.csv)
         if args.png:
-            _draw(rows, args.png)
+            draw(rows, args.png)
     except OSError as error:
         raise InputError(f"expected a file that can be written, got {error.filename}: {error.strerror}") from None
     return 0
@@ -206,7 +209,8 @@ def _write_csv(rows: Sequence[Row], path: Path) -> None:
         writer.writerows(map(_flat, rows))
 
 
-def _draw(rows: Sequence[Row], path: Path) -> None:
+def draw(rows: Sequence[Row], path: Path) -> None:
+    """Time against error, a panel for each scene. Raises OSError."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -234,8 +238,13 @@ def _draw(rows: Sequence[Row], path: Path) -> None:
         if max(times) > 5.0 * min(times):
             panel.set(xscale="log", yscale="log", ylim=(0.5 * min(times), 2.0 * max(times)))
         else:
-            panel.set(xscale="log", ylim=(0.0, 1.4 * max(times)))
-        panel.legend(loc="lower left")
+            panel.set(xscale="log", ylim=(0.0, 1.5 * max(times)))
+        if len(shown) <= MOST_IN_LEGEND:
+            panel.legend(loc="lower left")
+        else:
+            for row in shown:
+                at = (row.ttc_error_s.p99, row.step_ms)
+                panel.annotate(row.profile, at, (0, 8), textcoords="offset points", rotation=60, fontsize=7)
         panel.grid(alpha=0.3)
     figure.savefig(path, dpi=120)
     plt.close(figure)

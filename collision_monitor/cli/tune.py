@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.progress import progress_bar
 from collision_monitor.cli.quantities import positive
+from collision_monitor.cli.tradeoff import draw
 from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--budget-ms", type=positive, metavar="MS", help="of a step, in ms on this machine")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="parameter file (default: SESSION.yaml here)")
     parser.add_argument("--force", action="store_true", help="overwrite it")
+    parser.add_argument("--png", type=Path, metavar="FILE", help="draw time against error of all that was tried")
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
     parser.set_defaults(command=tune_command)
 
@@ -67,6 +69,11 @@ def tune_command(args: argparse.Namespace) -> int:
         print(json.dumps({"chosen": chosen and chosen.name, "demands": asdict(demands), "rows": rows}))
     else:
         print("\n".join(_as_text(trials, chosen.name if chosen else None)))
+    if args.png:
+        try:
+            draw([each.row for each in trials], args.png)
+        except OSError as error:
+            raise InputError(f"{args.png}: expected a file that can be written, got: {error.strerror}") from None
     if chosen is None:
         return EXIT_NONE
     asked = ", ".join(f"{key} {value:g}" for key, value in asdict(demands).items() if value is not None)
