@@ -1,7 +1,7 @@
 """The cheapest tolerances that keep the errors of a recording below what its user allows.
 
 The profile `balanced` is made looser and tighter in steps; each, and `fast` and `exact`, is measured on the recording
-against exact answers. Of those that meet every demand the cheapest is chosen, and of those that cost the same the tightest.
+against exact answers. Of those that meet every demand the cheapest is taken; of those that cost the same, the tightest.
 """
 
 from __future__ import annotations
