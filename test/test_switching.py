@@ -234,3 +234,9 @@ class TestCustomProfiles:
             Profile.named("none.yaml")
         with pytest.raises(ProfileError, match=r"expected one of balanced, exact, fast, or a \.yaml file, got 'hasty'"):
             Monitor("hasty")
+
+
+@pytest.mark.parametrize("name", Profile.names())
+def test_the_profiles_in_config_are_those_of_their_name(name: str) -> None:
+    path = Path(__file__).parents[1] / "config" / f"{name}.yaml"
+    assert Profile.named(str(path)) == Profile.named(name)
