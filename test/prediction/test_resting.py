@@ -15,8 +15,8 @@ def test_impacts_at_one_instant_come_out_together_in_order() -> None:
     count, answers = 8, []
     for order in (np.arange(count), np.arange(count)[::-1]):
         monitor = cm.Monitor("exact")
-        for k in order:
-            monitor.add(int(k), cm.Sphere(0.5))
+        for k in range(count):
+            monitor.add(k, cm.Sphere(0.5))
         monitor.add(100, cm.HalfSpace((0, 0, 1), 0.0), static=True, pose=cm.Pose())
         rows = np.zeros(count, STATE)
         rows["id"], rows["quaternion"][:, 3] = np.arange(count), 1.0
