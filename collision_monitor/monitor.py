@@ -733,7 +733,8 @@ class Monitor:
                 pairs[:n], events[:n], now, work, budget
             )
             which, found = self._look_at_trees(self._events.events, now, budget)
-            self._events.replace(which, found.compress(found["status"] != CLEAR), bodies.motion)
+            if len(which):
+                self._events.replace(which, found.compress(found["status"] != CLEAR), bodies.motion)
             which, refined = self._refine(now, work, budget)
             budget.stop()
             self._events.replace(which, joined([later, refined]), bodies.motion)
@@ -803,11 +804,15 @@ class Monitor:
         self, pairs: NDArray[np.void], events: NDArray[np.void], now: float, budget: PairBudget
     ) -> int:
         """Let pairs that came due pass whose sphere trees do not meet yet; the others go to the front: how many."""
-        new = np.flatnonzero(pairs["touched"] == 0)
+        new = np.flatnonzero((pairs["touched"] == 0) & (events["method"] == BOUND_ONLY))
+        if not len(new):
+            return len(pairs)
         which, found = self._look_at_trees(events.take(new), now, budget)
         which = new[which]
         events[which] = found
         apart = (found["status"] == CLEAR) | (found["lower"] > now)
+        if not apart.any():
+            return len(pairs)
         self._events.add(found.compress(apart & (found["status"] != CLEAR)), self._bodies.motion)
         kept = np.ones(len(pairs), np.bool_)
         kept[which[apart]] = False
