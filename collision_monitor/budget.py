@@ -105,7 +105,7 @@ class TimeBudget(PairBudget):
         now = self._measure()
         fit = int((self._deadline - now) / self._clock.cost[work])
         if fit < min(left, FEWEST):
-            if self.done == 0:
+            if self.done == 0 and now < self._deadline:
                 self._clock.cost[work] *= 1.0 - LEARNING  # or one bad estimate would stop all steps to come
             self._limit = min(self._limit, max(self.done, FEWEST))  # the step is over
             self._clock.stopped = self._clock.stopped or now

@@ -804,7 +804,7 @@ class Monitor:
         self, pairs: NDArray[np.void], events: NDArray[np.void], now: float, budget: PairBudget
     ) -> int:
         """Let pairs that came due pass whose sphere trees do not meet yet; the others go to the front: how many."""
-        new = np.flatnonzero((pairs["touched"] == 0) & (events["method"] == BOUND_ONLY))
+        new = np.flatnonzero((pairs["touched"] == 0) & self._may_tell_by_trees(events))
         if not len(new):
             return len(pairs)
         which, found = self._look_at_trees(events.take(new), now, budget)
@@ -820,6 +820,15 @@ class Monitor:
         pairs[:n], events[:n] = pairs.compress(kept), events.compress(kept)
         return n
 
+    def _may_tell_by_trees(self, events: NDArray[np.void]) -> NDArray[np.bool_]:
+        """Of which of the events only the bounding spheres are known, and a sphere tree might tell more."""
+        trees = self._plant_trees()
+        if not len(trees.radius):
+            return np.zeros(len(events), np.bool_)
+        has_tree = trees.root >= 0
+        may: NDArray[np.bool_] = (events["method"] == BOUND_ONLY) & (has_tree[events["i"]] | has_tree[events["j"]])
+        return may
+
     def _look_at_trees(
         self, events: NDArray[np.void], now: float, budget: PairBudget
     ) -> tuple[NDArray[np.int64], NDArray[np.void]]:
@@ -828,9 +837,7 @@ class Monitor:
         Returns the places among the events of those that were done, and their events now; CLEAR: they do not meet.
         """
         trees = self._plant_trees()
-        has_tree = trees.root >= 0
-        coarsely = (events["method"] == BOUND_ONLY) & (has_tree[events["i"]] | has_tree[events["j"]])
-        todo = np.flatnonzero(coarsely)
+        todo = np.flatnonzero(self._may_tell_by_trees(events))
         todo = todo[np.lexsort((events["key"][todo], events["lower"][todo]))]
         found, at = events.take(todo), 0
         while at < len(todo) and (count := budget.next(-(-(len(todo) - at) // HANDFUL), TREES)):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from collision_monitor import records
-from collision_monitor.budget import EXAMINE, FEWEST, PairBudget, StepClock, TimeBudget
+from collision_monitor.budget import EXAMINE, FEWEST, TREES, PairBudget, StepClock, TimeBudget
 from collision_monitor.codec import encode_descriptions, encode_states
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import ProfileError
@@ -222,6 +222,14 @@ class TestBudgets:
                 budget.stop()
             assert len(tries) < 100
         assert len(tries) > 5
+
+    def test_steps_that_are_always_late_do_not_make_a_pair_cost_nothing(self) -> None:
+        clock = StepClock()
+        for _ in range(5000):
+            with clock:
+                budget = TimeBudget(clock, 0.0, 100)
+                assert budget.next(50, TREES) == FEWEST
+        assert clock.cost[TREES] > 0.0
 
     def test_the_end_of_a_step_is_left_room_for(self) -> None:
         clock = StepClock()

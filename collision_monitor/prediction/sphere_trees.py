@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 LEVELS: Final = 2
 """Below the first: four pieces. One more costs twice as much and tells little."""
 
-WORTH: Final = 0.7
+WORTH: Final = 0.4
 """A tree whose finest spheres are larger than this part of the first says hardly more than that one."""
 
 MOST_CORNERS: Final = 2000
