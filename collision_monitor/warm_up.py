@@ -1,19 +1,29 @@
-"""Compile every kernel the monitor uses, so that the first step of a session does not wait for the compiler."""
+"""Compile every kernel ahead, so that neither the first step of a session nor a first call waits for the compiler.
+
+    python -m collision_monitor.warm_up [monitor | functions]      without a name: both, one after the other
+"""
 
 from __future__ import annotations
+
+import sys
 
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Sphere
+from collision_monitor.detection import WORTH_THREADS, Detector, default_threads
+from collision_monitor.geometry.pose import Motion, Pose
+from collision_monitor.geometry.shapes import Box, Shape, Sphere
 from collision_monitor.monitor import Monitor
+from collision_monitor.narrow_phase.contact import contact
+from collision_monitor.prediction.feature_impact import vertex_face_impact
+from collision_monitor.prediction.impact import time_of_impact
+from collision_monitor.prediction.impact_batch import time_of_impact_batch
 from collision_monitor.records import STATE
 
 OBJECTS = 70  # more than the arrays have room for at first: growing them is warmed up too
 
 
-def main() -> None:
+def warm_up_monitor() -> None:
     """Step a small scene through all that a step can do; the compiled kernels stay in the cache."""
     monitor = Monitor()
     monitor.add(OBJECTS, Box((500, 10, 1)), static=True, pose=Pose((0, 0, -0.5)))
@@ -49,5 +59,25 @@ def _step_uncertain(monitor: Monitor, poses: NDArray[np.float64]) -> None:
     monitor.step(3_020_000_000, states, covariance=np.zeros((len(poses), 12)))
 
 
+def warm_up_functions() -> None:
+    """Call what can be called without a monitor, once with each kind of argument that has a kernel of its own."""
+    box, ball = Box((1, 1, 1)), Sphere(0.5)
+    for threads in sorted({1, default_threads()}):
+        shapes: list[Shape] = [box, ball] * WORTH_THREADS
+        positions = np.arange(3.0 * len(shapes)).reshape(-1, 3)
+        Detector(shapes, threads=threads).detect(positions, np.tile([0.0, 0.0, 0.0, 1.0], (len(shapes), 1)))
+    contact(box, Pose(), ball, Pose())
+    time_of_impact(box, Motion(Pose(), angular=(0, 0, 1)), ball, Motion(Pose((3, 0, 0)), acceleration=(-1, 0, 0)))
+    poses, twists = np.zeros((2, 7)), np.zeros((2, 6))
+    poses[:, 6] = 1.0
+    for shape in (box, ball):
+        time_of_impact_batch(shape, poses, twists, shape, poses + np.eye(1, 7), twists)
+    vertex_face_impact(np.arange(24.0).reshape(8, 3))
+
+
+PARTS = {"monitor": warm_up_monitor, "functions": warm_up_functions}
+
+
 if __name__ == "__main__":
-    main()
+    for part in sys.argv[1:] or PARTS:
+        PARTS[part]()

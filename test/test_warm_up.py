@@ -6,7 +6,9 @@ import json
 import subprocess
 import sys
 
-SESSION = """
+import pytest
+
+START = """
 import json, time
 began = time.perf_counter()
 import numpy as np
@@ -19,6 +21,9 @@ class Listener(event.Listener):
 
 event.register("numba:compile", Listener())
 import collision_monitor as cm
+"""
+
+SESSION = START + """
 from collision_monitor.profiles import Profile
 monitor = cm.Monitor(Profile(threads=2))
 rng = np.random.default_rng(0)
@@ -44,9 +49,50 @@ print(json.dumps({"compiled": compiled, "contacts": len(result.contacts), "first
 """
 
 
-def test_nothing_is_compiled_after_the_warm_up() -> None:
+FUNCTIONS = START + """
+from collision_monitor.detection import Detector
+rng = np.random.default_rng(0)
+solids = [cm.Sphere(0.5), cm.Box((1, 2, 3)), cm.Capsule(0.2, 1), cm.Cylinder(0.3, 1), cm.Cone(0.3, 1),
+          cm.ConvexHull(rng.normal(size=(20, 3)))]
+corners = np.array([(x, y, z) for z in (0, 1) for x, y in ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2))], float)
+sides = [t for i in range(6) for j in [(i + 1) % 6] for t in ((i, j, 6 + j), (i, 6 + j, 6 + i))]
+ends = [t for i in range(1, 5) for t in ((0, i + 1, i), (6, 6 + i, 7 + i))]
+corner = cm.Mesh(corners, [*sides, *ends])
+flat = [cm.Circle(1), cm.Polygon(corners[:6, :2]), cm.Polygon([(0, 0), (1, 0), (0, 1)])]
+still, aside = cm.Pose(), cm.Pose((0.5, 0.1, 0))
+first = None
+for kinds in ([*solids, corner, [(solids[0], still), (solids[1], aside)]], flat):
+    for a in kinds:
+        for b in kinds:
+            cm.contact(a, still, b, aside)
+            first = first or time.perf_counter() - began
+            moving = cm.Motion(cm.Pose((5, 0, 0)), (-1, 0, 0), (0, 0, 0.5))
+            cm.time_of_impact(a, cm.Motion(still), b, moving)
+            cm.time_of_impact(a, cm.Motion(still), b, cm.Motion(moving.pose, acceleration=(-1, 0, 0)))
+poses = np.zeros((9, 7)); poses[:, 6] = 1
+for a in (*solids, corner):
+    cm.time_of_impact_batch(a, poses, np.ones((9, 6)), corner, poses + 5 * np.eye(1, 7), np.zeros((9, 6)))
+    cm.contact(a, still, cm.HalfSpace((0, 0, 1)), still)
+for a in solids[1::4]:
+    cm.contact_features(cm.contact(a, still, solids[1], aside), a, still, solids[1], aside)
+for test in ("contact", "cascade", "sat"):
+    cm.overlap(solids[1], still, solids[1], aside, test)
+cm.vertex_face_impact(rng.normal(size=(8, 3)))
+cm.edge_edge_impact(rng.normal(size=(5, 8, 3)))
+for threads in (1, 2):
+    for kinds in (solids[:1], solids[1:2], solids):
+        detector = Detector([kinds[i % len(kinds)] for i in range(4000)], threads=threads)
+        turned = rng.normal(size=(4000, 4))
+        turned /= np.linalg.norm(turned, axis=1)[:, None]
+        contacts = detector.detect(rng.uniform(0, 30, (4000, 3)), turned)
+print(json.dumps({"compiled": compiled, "contacts": len(contacts), "first": first}))
+"""
+
+
+@pytest.mark.parametrize("session", [SESSION, FUNCTIONS], ids=["monitor", "functions"])
+def test_nothing_is_compiled_after_the_warm_up(session: str) -> None:
     subprocess.run([sys.executable, "-m", "collision_monitor.warm_up"], check=True)
-    told = subprocess.run([sys.executable, "-c", SESSION], check=True, capture_output=True, text=True).stdout
+    told = subprocess.run([sys.executable, "-c", session], check=True, capture_output=True, text=True).stdout
     answer = json.loads(told)
     assert answer["compiled"] == []
     assert answer["contacts"] > 10

@@ -101,7 +101,7 @@ class MonitorNode(Node):
         patience.start()
         try:
             with stop.ending():
-                warm_up.main()
+                warm_up.warm_up_monitor()
         finally:
             patience.cancel()
 

@@ -88,7 +88,7 @@ def _run(pending: list[stages.Stage], reason: str, ros: machine.RosInstall | Non
         log.write(f"{reason}\n")
         for stage in pending:
             _stamp(stage).unlink(missing_ok=True)
-        with ThreadPoolExecutor() as pool:
+        with ThreadPoolExecutor(max_workers=2) as pool:  # compilers, all of them: more than two wait for memory
             running: list[tuple[stages.Stage, Future[None]]] = []
             for stage in pending:
                 print(f"  {stage.name:<12} {stage.text:<34}", end="", flush=True)

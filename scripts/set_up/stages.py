@@ -171,10 +171,10 @@ def _install_package(ros: machine.RosInstall | None, log: IO[str]) -> None:
     _call(log, ros, *pip, "--no-deps", "--no-build-isolation", *settings, "--editable", ROOT)
 
 
-# warm-up -------------------------------------------------------------------------------------------------------------
+# kernels -------------------------------------------------------------------------------------------------------------
 
 
-def _warm_up_inputs(ros: machine.RosInstall | None) -> str:
+def _kernel_inputs(ros: machine.RosInstall | None) -> str:
     # the rule of collision_monitor/_jit.py, which names the folder of the compiled kernels
     sources = sorted((ROOT / "collision_monitor").rglob("*.py"))
     constants = ("tolerances.py", "records.py", "warm_up.py")
@@ -186,10 +186,13 @@ def _has_kernels(source: bytes) -> bool:
     return b"_jit" in source or b"numba" in source
 
 
-def _warm_up(ros: machine.RosInstall | None, log: IO[str]) -> None:
+def _compile_monitor(ros: machine.RosInstall | None, log: IO[str]) -> None:
     remove_old_kernels()
-    if (ROOT / "collision_monitor" / "warm_up.py").exists():
-        _call(log, ros, PYTHON, "-m", "collision_monitor.warm_up")
+    _call(log, ros, PYTHON, "-m", "collision_monitor.warm_up", "monitor")
+
+
+def _compile_functions(ros: machine.RosInstall | None, log: IO[str]) -> None:
+    _call(log, ros, PYTHON, "-m", "collision_monitor.warm_up", "functions")
 
 
 def remove_old_kernels() -> None:
@@ -204,7 +207,8 @@ STAGES = (
     Stage("packages", "installing Python packages", _packages_inputs, _install_packages),
     Stage("package", "installing collision-monitor", _package_inputs, _install_package),
     Stage("messages", "building collision_monitor_msgs", _messages_inputs, _build_messages, alongside=True),
-    Stage("warm-up", "compiling the kernels", _warm_up_inputs, _warm_up),
+    Stage("monitor", "compiling the monitor", _kernel_inputs, _compile_monitor, alongside=True),
+    Stage("functions", "compiling the functions beside it", _kernel_inputs, _compile_functions),
 )
 
 MODULES = (

@@ -63,13 +63,13 @@ def test_an_interrupted_installation_starts_anew(stamps: Path, name: str) -> Non
     assert pending() == NAMES
 
 
-@pytest.mark.parametrize("name", ["messages", "package", "warm-up"])
+@pytest.mark.parametrize("name", ["messages", "package", "monitor", "functions"])
 def test_an_interrupted_later_stage_runs_alone(stamps: Path, name: str) -> None:
     (stamps / name).unlink()
     assert pending() == [name]
 
 
-@pytest.mark.parametrize("name", ["packages", "messages", "package", "warm-up"])
+@pytest.mark.parametrize("name", ["packages", "messages", "package", "monitor", "functions"])
 def test_changed_inputs_run_their_stage_alone(stamps: Path, name: str) -> None:
     (stamps / name).write_text("the digest of something else")
     assert pending() == [name]
