@@ -67,7 +67,7 @@ def every_pair(shapes: list[Shape], positions: Array, quaternions: Array, margin
     builder = ShapeTableBuilder()
     for shape in shapes:
         builder.append(shape)
-    pairs = np.argwhere(np.triu(np.ones((len(shapes), len(shapes)), bool), 1)).astype(np.int32)
+    pairs = np.column_stack(np.triu_indices(len(shapes), 1)).astype(np.int32)
     contacts = contact_batch(builder.table, positions, rotation_matrix(quaternions), pairs)
     near = contacts[:, 0] <= margin
     return pairs[near], contacts[near]

@@ -42,6 +42,8 @@ for step in range(30):
     twists[rng.integers(0, 300, 3)] *= -1
     if step == 5:
         monitor.profile = monitor.profile.replace(contact_points=4)
+    if step in (20, 22, 24):
+        monitor.profile = monitor.profile.replace(budget_ms=1000.0 if step == 22 else 0.2)
     if step == 10:
         monitor.remove(7)
         monitor.add(2000, cm.Sphere(1))

@@ -11,12 +11,10 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import ConvexHull as Qhull
-from scipy.spatial import QhullError
-from scipy.spatial.distance import cdist
 
 from collision_monitor.geometry.bounding_volumes import BoundingSphere
 from collision_monitor.geometry.coordinates import Array, point_set
+from collision_monitor.geometry.qhull import qhull
 from collision_monitor.tolerances import EPSILON
 
 OUTSIDE: Final = 1e-12
@@ -33,6 +31,8 @@ def sphere_from_centroid(points: ArrayLike) -> BoundingSphere:
 
 def sphere_from_widest_pair(points: ArrayLike) -> BoundingSphere:
     """Centre half-way between the two points farthest apart. O(h²) for h points on the hull."""
+    from scipy.spatial.distance import cdist
+
     points = point_set(points, "points")
     outer = _outer(points)
     offset = outer - outer[0]
@@ -112,10 +112,8 @@ def _outer(points: Array) -> Array:
     """The hull's corners, on which the widest pair and the smallest sphere depend; all points where they are flat."""
     if len(points) <= 64:
         return points
-    try:
-        return np.asarray(points[np.sort(Qhull(points).vertices)])
-    except QhullError:
-        return points
+    hull = qhull(points)
+    return points if hull is None else np.asarray(points[np.sort(hull.vertices)])
 
 
 def _around(points: Array, center: Array) -> BoundingSphere:

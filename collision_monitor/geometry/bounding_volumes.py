@@ -13,12 +13,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import ConvexHull as Qhull
-from scipy.spatial import QhullError
 
 from collision_monitor.errors import InputError, ShapeError
 from collision_monitor.geometry.coordinates import Array, Indices, coordinates, point_set
 from collision_monitor.geometry.orientation import orient3d
+from collision_monitor.geometry.qhull import qhull
 from collision_monitor.tolerances import EPSILON
 
 
@@ -138,10 +137,9 @@ def convex_hull(points: ArrayLike) -> Hull:
     points = point_set(points, "points", 3, least=4)
     center = 0.5 * points.min(axis=0) + 0.5 * points.max(axis=0)
     size = float(np.abs(points - center).max())
-    try:
-        hull = Qhull((points - center) / (size or 1.0))
-    except QhullError:
-        raise ShapeError("convex hull: expected points that span a solid, got points in one plane") from None
+    hull = qhull((points - center) / (size or 1.0))
+    if hull is None:
+        raise ShapeError("convex hull: expected points that span a solid, got points in one plane")
     used, faces = np.unique(hull.simplices, return_inverse=True)
     vertices, faces = points[used], faces.reshape(-1, 3)
     # Qhull gives the triangles any way round

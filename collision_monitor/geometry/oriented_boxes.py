@@ -9,12 +9,11 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import ConvexHull as Qhull
-from scipy.spatial import QhullError
 
 from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.bounding_volumes import Obb, convex_hull
 from collision_monitor.geometry.coordinates import Array, point_set
+from collision_monitor.geometry.qhull import qhull
 from collision_monitor.tolerances import EPSILON
 
 EDGE_DIRECTIONS: Final = 32
@@ -80,10 +79,10 @@ def _flat(points: Array) -> Obb:
     """The box of points in one plane, turned about its normal; of points on one line, along it."""
     axes = obb_pca(points).rotation  # the eigenvalues ascend: the first axis is the normal
     offset = points - points.mean(axis=0)
-    try:
-        a, b = np.moveaxis((offset @ axes[:, 1:])[Qhull(offset @ axes[:, 1:]).simplices], 1, 0)
-    except QhullError:
+    hull = qhull(offset @ axes[:, 1:])
+    if hull is None:
         return _along(points, axes)
+    a, b = np.moveaxis(hull.points[hull.simplices], 1, 0)
     edges = _distinct((b - a) @ axes[:, 1:].T)
     across = np.cross(axes[:, 0], edges)
     best = int((np.ptp(edges @ offset.T, axis=1) * np.ptp(across @ offset.T, axis=1)).argmin())
@@ -108,10 +107,10 @@ def _turned(vertices: Array, edges: Array, normal: Array) -> tuple[float, Array]
 def _outline(vertices: Array, edges: Array, normal: Array) -> tuple[Array, Array]:
     """The corners and edges that are on the outline when seen along `normal`; all where that is a line."""
     u = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-    try:
-        around = vertices[Qhull(vertices @ np.column_stack([u, np.cross(normal, u)])).vertices]
-    except QhullError:
+    hull = qhull(vertices @ np.column_stack([u, np.cross(normal, u)]))
+    if hull is None:
         return vertices, edges
+    around = vertices[hull.vertices]
     return around, np.roll(around, -1, axis=0) - around
 
 

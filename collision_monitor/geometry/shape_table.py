@@ -11,14 +11,13 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull as Qhull
-from scipy.spatial import QhullError
 
 from collision_monitor._jit import device
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.geometry import shapes
 from collision_monitor.geometry.polygons import corners, is_convex, is_counter_clockwise
 from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.qhull import qhull
 from collision_monitor.records import ShapeType
 from collision_monitor.tolerances import HULL_DROP
 
@@ -125,9 +124,8 @@ def hull_vertices(points: Array) -> NDArray[np.int32]:
     first = np.sort(first)
     centred = points[first] - points[first].mean(axis=0)
     scale = float(np.abs(centred).max())
-    try:
-        hull = Qhull(centred / scale)
-    except QhullError:
+    hull = qhull(centred / scale)
+    if hull is None:
         return first.astype(np.int32)
     # qhull merges what is nearly coplanar; a vertex that it dropped although it sticks out stays in
     keep = np.zeros(len(first), bool)

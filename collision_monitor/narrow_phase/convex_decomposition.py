@@ -12,7 +12,6 @@ from importlib import import_module
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import Hull, convex_hull
@@ -166,6 +165,8 @@ def _half(polygon: Array, height: Array) -> Array:
 
 def _to_surface(points: Array, corners: Array) -> tuple[Array, Indices]:
     """Distances (n,) of points from the nearest of some triangles (m, 3, 3), or a little more, and which it is."""
+    from scipy.spatial import cKDTree
+
     _, near = cKDTree(corners.mean(axis=1)).query(points, min(NEIGHBOURS, len(corners)))
     near = near.reshape(len(points), -1)
     apart = closest_point_on_triangle(points[:, None], *np.moveaxis(corners[near], 2, 0))[1]

@@ -11,8 +11,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import HalfspaceIntersection, cKDTree
-from scipy.spatial.transform import Rotation
 
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.bounding_spheres import minimal_sphere
@@ -174,6 +172,8 @@ def _enclose(pieces: Pieces, model: Model) -> tuple[Shape, Pose]:
             if single and not isinstance(shape, ConvexHull | Triangle):
                 low, high = -reach([(shape, Pose())], -np.eye(3)), reach([(shape, Pose())], np.eye(3))
                 return _box(high - low), pose @ Pose((low + high) / 2)
+            from scipy.spatial.transform import Rotation
+
             box = obb_minimum_volume(_corners(pieces))
             axes = np.array(box.rotation)
             axes[:, 2] *= np.sign(np.linalg.det(axes))
@@ -220,6 +220,8 @@ def _corners(pieces: Pieces) -> Array:
 
 def _kdop(pieces: Pieces, k: int) -> tuple[Shape, Pose]:
     """The slabs around the pieces as the polytope that they cut out."""
+    from scipy.spatial import HalfspaceIntersection
+
     normals = np.array(KDOP_DIRECTIONS[k], float)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.concatenate([normals, -normals])
@@ -262,6 +264,8 @@ def _excess_around_concave(shapes: Sequence[tuple[Shape, Pose]], pieces: Pieces,
     if not len(centres):
         return slack
     if all(isinstance(s, Triangle) for s, _ in pieces):
+        from scipy.spatial import cKDTree
+
         # no nearer than the nearest face is the nearest vertex, which is found at once
         return float(cKDTree(_corners(pieces)).query(centres)[0].max()) + slack
     return float(_distances(centres, pieces).max()) + slack

@@ -8,8 +8,6 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from collision_monitor.broad_phase.aabb_tree import aabb_tree
 from collision_monitor.geometry.pieces import convex_pieces, is_convex_mesh
@@ -100,6 +98,9 @@ def _of_concave(shape: Mesh | Polygon) -> Pieces:
 
 def _one_of_each_part(faces: Indices, vertices: int) -> Indices:
     """A face of each connected part of a mesh."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     graph = coo_array((np.ones(len(start), np.int8), (start, end)), shape=(vertices, vertices))
     _, part = connected_components(graph, directed=False)

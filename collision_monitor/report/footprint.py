@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from scipy.spatial import ConvexHull as Qhull
-from scipy.spatial import QhullError
 
 from collision_monitor.description import ObjectDescription
 from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.qhull import qhull
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, Polygon, Shape, Triangle
 from collision_monitor.session.history import Floats
@@ -53,10 +52,8 @@ def _from_above(points: Floats, pose: Pose) -> Floats:
 
 def _hull(points: Floats, pose: Pose) -> Floats:
     seen = _from_above(points, pose)
-    try:
-        return np.asarray(seen[Qhull(seen).vertices], np.float64)
-    except QhullError:  # it is seen from its edge
-        return seen
+    hull = qhull(seen)
+    return seen if hull is None else np.asarray(seen[hull.vertices], np.float64)  # None: it is seen from its edge
 
 
 def _round(shape: Shape, pose: Pose) -> Floats:

@@ -15,10 +15,10 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull as Qhull
 
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.pose import from_rotation_vector, multiply
+from collision_monitor.geometry.qhull import qhull
 from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Cylinder, Shape, Sphere
 
 Array = NDArray[np.float64]
@@ -61,7 +61,8 @@ class MovingBodies:
 
 
 def _hull_measures(points: Array) -> tuple[float, float, float]:
-    hull = Qhull(points)
+    hull = qhull(points)
+    assert hull is not None  # random points on a sphere
     curvature = 0.0
     for facet, around in enumerate(hull.neighbors):
         for corner, other in enumerate(around):
