@@ -11,7 +11,7 @@ unexport PYTHONPATH
 endif
 unexport PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup demo test lint bench bench-peers clean
+.PHONY: help setup demo test test-core lint bench bench-peers clean
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -23,9 +23,13 @@ setup: ## set up what is missing: environment, ROS 2, messages, package, compile
 demo: setup ## watch the monitor at work, live
 	@$(BIN)/collision-monitor demo
 
-test: lint ## set up, lint and run every test
+test: ## set up, lint and run every test
+	@$(MAKE) --no-print-directory setup
+	@$(MAKE) --no-print-directory -j2 lint test-core
+	@$(BIN)/python -m pytest -n 3 --dist worksteal test/ros test/setup
+
+test-core: setup ## the tests of everything but the node and the set-up
 	@$(BIN)/python -m pytest -n auto --dist loadfile --ignore=test/ros --ignore=test/setup
-	@$(BIN)/python -m pytest -n 2 --dist loadfile test/ros test/setup
 
 lint: setup ## ruff and mypy --strict
 	@$(BIN)/ruff check .

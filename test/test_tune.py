@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from collision_monitor.cli.main import main
 from collision_monitor.cli.parameter_file import check_parameter_file
 from collision_monitor.errors import InputError
 from collision_monitor.profiles import Profile
@@ -77,22 +78,27 @@ def test_a_demand_of_nothing_is_refused() -> None:
         tune("none", [], [], Demands(budget_ms=0.0))
 
 
-def test_the_command(tmp_path: Path) -> None:
-    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-        command = [PROGRAM, "tune", str(GOLDEN), *map(str, arguments)]
-        return subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=tmp_path)
+def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
 
-    good = run("--max-ttc-error", 0.05, "--png", "tried.png")
+    def run(*arguments: object) -> tuple[int, str, str]:
+        code = main(["tune", str(GOLDEN), *map(str, arguments)])
+        return code, *capsys.readouterr()
+
+    command = [PROGRAM, "tune", GOLDEN, "--max-ttc-error", "0.05", "--png", "tried.png"]
+    good = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert good.returncode == 0, good.stderr
     assert "→ " in good.stdout and "written balanced.yaml" in good.stdout
     check_parameter_file(tmp_path / "balanced.yaml")
     assert (tmp_path / "tried.png").read_bytes().startswith(b"\x89PNG")
-    again = run("--max-ttc-error", 0.05)
-    assert again.returncode == 1 and "--force" in again.stderr
-    none = run("--budget-ms", 1e-6, "--json", "-o", "none.yaml")
-    assert none.returncode == 3
-    answer = json.loads(none.stdout)
+    code, _, told = run("--max-ttc-error", 0.05)
+    assert code == 1 and "--force" in told
+    code, out, _ = run("--budget-ms", 1e-6, "--json", "-o", "none.yaml")
+    assert code == 3
+    answer = json.loads(out)
     assert answer["chosen"] is None
     assert all("step time" in each["failures"][-1] for each in answer["rows"])
     assert not (tmp_path / "none.yaml").exists()
-    assert run("--budget-ms", 0).returncode == 2
+    with pytest.raises(SystemExit) as wrong:
+        run("--budget-ms", 0)
+    assert wrong.value.code == 2

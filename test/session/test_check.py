@@ -16,6 +16,7 @@ from session_scene import NODE, TYPES
 
 from collision_monitor import Sphere, records
 from collision_monitor.cli.check import EXAMPLE
+from collision_monitor.cli.main import main
 from collision_monitor.codec import encode_descriptions, encode_states
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import InputError
@@ -179,34 +180,34 @@ def _empty(tmp_path: Path) -> Path:
     return tmp_path / "empty"
 
 
-def test_the_command_and_its_exit_codes(yard: Path, tmp_path: Path) -> None:
+def test_the_command_and_its_exit_codes(yard: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     expect = tmp_path / "expect.yaml"
 
-    def run(text: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    def run(text: str, *arguments: str) -> tuple[int, str, str]:
         expect.write_text(text)
-        command = [PROGRAM, "check", *arguments, "--expect", expect]
-        return subprocess.run(command, capture_output=True, text=True, timeout=60)
+        code = main(["check", *arguments, "--expect", str(expect)])
+        return code, *capsys.readouterr()
 
-    good = run("expect: [{contact: [cart, person_1]}, {replay: identical}]", str(yard))
-    assert good.returncode == 0
-    assert "1 sessions: 1 hold, 0 fail" in good.stdout
+    code, out, _ = run("expect: [{contact: [cart, person_1]}, {replay: identical}]", str(yard))
+    assert code == 0
+    assert "1 sessions: 1 hold, 0 fail" in out
     report = tmp_path / "junit.xml"
-    bad = run("expect: [{no_contact: any}]", str(yard), "--replay", "fast", "--json", "--junit", str(report))
-    assert bad.returncode == 3
-    assert json.loads(bad.stdout)["sessions"][0]["outcomes"][0]["holds"] is False
+    code, out, _ = run("expect: [{no_contact: any}]", str(yard), "--replay", "fast", "--json", "--junit", str(report))
+    assert code == 3
+    assert json.loads(out)["sessions"][0]["outcomes"][0]["holds"] is False
     assert ElementTree.parse(report).getroot()[0].get("failures") == "1"
-    assert run("expect: [{contact: [cart, person_1]}]", str(yard), str(tmp_path / "none.mcap")).returncode == 1
+    assert run("expect: [{contact: [cart, person_1]}]", str(yard), str(tmp_path / "none.mcap"))[0] == 1
     for text, words in (
         ("expect: [{touch: any}]", "expected one of contact"),
         ("expect: [{no_contact: any, no_contact: [cart, cat]}]", "the same key twice"),
         ("expect: " + "[" * 2000, "expected YAML"),
     ):
-        wrong = run(text, str(yard))
-        assert wrong.returncode == 2
-        assert wrong.stderr.count("\n") == 1 and words in wrong.stderr
-    unwritable = run("expect: [{no_contact: any}]", str(yard), "--junit", str(tmp_path / "nowhere" / "junit.xml"))
-    assert unwritable.returncode == 1
-    assert "expected a file that can be written" in unwritable.stderr
+        code, _, told = run(text, str(yard))
+        assert code == 2
+        assert told.count("\n") == 1 and words in told
+    code, _, told = run("expect: [{no_contact: any}]", str(yard), "--junit", str(tmp_path / "nowhere" / "junit.xml"))
+    assert code == 1
+    assert "expected a file that can be written" in told
 
 
 def test_the_example_of_the_docs_is_what_it_prints(yard: Path, tmp_path: Path) -> None:
