@@ -34,6 +34,7 @@ from collision_monitor.prediction.patches import with_patches
 from collision_monitor.prediction.sphere_trees import Tree, Trees, body_tree, joined_trees
 from collision_monitor.prediction.spread import worst_stddevs
 from collision_monitor.prediction.time_of_impact import BOUND_ONLY, CLEAR, IMPACT, TREE_BOUND, Scratch, make_scratch
+from collision_monitor.prediction.turning import make_columns
 from collision_monitor.prediction.uncertain_predictions import Scene, UncertainPredictions
 from collision_monitor.profiles import NO_BUDGET, NO_LIMIT, Profile
 from collision_monitor.records import Model
@@ -41,7 +42,7 @@ from collision_monitor.rows import joined
 
 NANOSECOND = 1e-9
 
-MOST_QUERIES = 0.125
+MOST_QUERIES = 0.01
 """Part of the bodies up to which each is looked up in the hashed grid; for more, a new grid is built and swept once."""
 
 FEWEST_PAIRS_FOR_THREADS = 500
@@ -181,6 +182,7 @@ class Monitor:
         self._ids = np.zeros(0, np.uint32)
         self._ids_slots = np.zeros(0, np.int32)
         self._candidates = np.zeros((1024, 2), np.int32)
+        self._columns = make_columns()
         self._last: StepResult | None = None
 
     # ------------------------------------------------------------------ settings
@@ -659,6 +661,7 @@ class Monitor:
 
     def _partners(self, which: NDArray[np.int32], now: float) -> NDArray[np.int32]:
         """Pairs (P, 2) of the bodies in `which` with all whose swept boxes meet theirs."""
+        margin = self._profile.contact_margin
         is_new = np.zeros(len(self._grid.box), np.bool_)
         is_new[which] = True
         if len(which) > MOST_QUERIES * self._top:
@@ -666,10 +669,12 @@ class Monitor:
             centre = np.stack([box["x"], box["y"], box["z"]], axis=1)
             half = np.stack([box["hx"], box["hy"], box["hz"]], axis=1)
             half[box["level"] < 0] = np.nan  # not in the grid: meets nothing
-            return box_pairs(centre, half, is_new[: self._top])
+            pairs = box_pairs(centre, half, is_new[: self._top])
+            return pairs[: candidates.keep_new(self._bodies, self._grid, pairs, is_new, now, margin)]
+        found = np.empty(len(self._grid.box), np.int32)
         while True:
             n = candidates.find_partners(
-                self._bodies, self._grid, which, is_new, now, self.profile.contact_margin, self._candidates
+                self._bodies, self._grid, which, is_new, now, margin, found, self._candidates
             )
             if n <= len(self._candidates):
                 return self._candidates[:n]
@@ -705,7 +710,7 @@ class Monitor:
         p = self.profile
         n, m = tracking.find_moved(
             self._bodies, self._uncertain.spread, self._uncertain.sigmas(p), self._top, now, p.horizon,
-            p.stale_acceleration, moved, ending,
+            p.stale_acceleration, self._columns, moved, ending,
         )  # fmt: skip
         return moved[:n], ending[:m]
 

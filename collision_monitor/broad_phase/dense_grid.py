@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit import allocating_kernel, device, inlined
 from collision_monitor.broad_phase.lanes import LANES, boxes_overlap, lowest_bit, spheres_overlap
 from collision_monitor.errors import InputError
 from collision_monitor.tolerances import EPSILON
@@ -395,14 +395,14 @@ def sort_pairs(pairs: Any, count: int, other: Any, begins: Any) -> None:
             begins[i] += 1
 
 
-@kernel
+@allocating_kernel
 def classify_bodies(size: Any, starts: Any, grid: Any) -> None:
     """Put bodies with half extents `size` (N,) into classes once, for many frames."""
     classify(size, starts, np.empty((_OCTAVES, 2), np.int64), np.empty((_OCTAVES, 2)), grid)
     measure_classes(size, grid)
 
 
-@kernel
+@allocating_kernel
 def _box_pairs(centre: Any, half: Any, starts: Any, grid: Any, pairs: Any) -> int:
     """Pairs into pairs (P, 2), sorted unless there are more than P; returns how many there are."""
     n = centre.shape[0]

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit import allocating_kernel, device, inlined, kernel
 
 LEVELS: Final = 128
 LEVEL_OFFSET: Final = 64
@@ -44,6 +44,17 @@ BOX = np.dtype(
     align=True,
 )
 """One box, all that a look at it reads side by side."""
+
+
+class Region(NamedTuple):
+    """A box to ask for, which need not be in the grid (m)."""
+
+    x: float
+    y: float
+    z: float
+    hx: float
+    hy: float
+    hz: float
 
 
 class HashedGrid(NamedTuple):
@@ -148,13 +159,14 @@ def put_box(grid, i, cx, cy, cz, hx, hy, hz):
 
 
 @inlined
-def _overlap(a, b):
+def overlap(a, b):
+    """Do two boxes (BOX or Region) overlap or touch?"""
     return abs(a.x - b.x) <= a.hx + b.hx and abs(a.y - b.y) <= a.hy + b.hy and abs(a.z - b.z) <= a.hz + b.hz
 
 
 @device
 def query_box(grid, box, i, found):
-    """The boxes but number i that overlap `box` (its centre and half extents), into found[0:n], in no particular order.
+    """The boxes but number i that overlap `box` (BOX or Region), into found[0:n], in no particular order.
 
     Returns n. n can be larger than found.size: then the rest was counted but not written.
     """
@@ -174,7 +186,7 @@ def query_box(grid, box, i, found):
         if not (cells <= 2.0 * count and outermost < FARTHEST_CELL):
             j = grid.level_head[level]
             while j >= 0:
-                if j != i and _overlap(box, grid.box[j]):
+                if j != i and overlap(box, grid.box[j]):
                     if n < found.size:
                         found[n] = j
                     n += 1
@@ -187,7 +199,7 @@ def query_box(grid, box, i, found):
                     while j >= 0:
                         other = grid.box[j]
                         if (
-                            _overlap(box, other)
+                            overlap(box, other)
                             and other.cell_x == x
                             and other.cell_y == y
                             and other.cell_z == z
@@ -216,7 +228,7 @@ def remove_boxes(grid, which):
         remove_box(grid, which[k])
 
 
-@kernel
+@allocating_kernel
 def query_boxes(grid, which, pairs):
     """All (i, j) with i in `which` (M,) and j overlapping it, into pairs (P, 2); returns how many there are.
 

@@ -103,7 +103,7 @@ def rotation_now(bodies, i, now, q, R):
 
 
 @device
-def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, scratch, q, result):
+def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, scratch, result):
     """Do bodies i and j touch at `now`, from their last states? The deepest contact of their shapes into result.
 
     Not heard of for a time, a body may be off by what it could have accelerated, and a coarse model by its excess: the
@@ -112,8 +112,8 @@ def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, sc
     """
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
-    age_i = rotation_now(bodies, i, now, q, R_i)
-    age_j = rotation_now(bodies, j, now, q, R_j)
+    age_i = rotation_now(bodies, i, now, scratch.quaternion, R_i)
+    age_j = rotation_now(bodies, j, now, scratch.quaternion, R_j)
     px = relative_position_now(bodies, i, age_i, j, age_j, 0)
     py = relative_position_now(bodies, i, age_i, j, age_j, 1)
     pz = relative_position_now(bodies, i, age_i, j, age_j, 2)
@@ -187,16 +187,13 @@ def examine(
     Pairs that stay active, or have just ended, are moved to the front of pairs and events; those that are certified
     apart for a while go into `later` (IMPACT). Returns (active, later, narrow-phase tests, impact queries).
     """
-    q = np.empty((1, 4))
     n = n_later = tests = queries = 0
     for k in range(pairs.size):
         if k + AHEAD < pairs.size:
             _ask_for(table, bodies, pairs[k + AHEAD].i)
             _ask_for(table, bodies, pairs[k + AHEAD].j)
         i, j = pairs[k].i, pairs[k].j
-        touching, made = body_contact(
-            table, parts, bodies, i, j, now, margin, stale_acceleration, scratch, q, results[n]
-        )
+        touching, made = body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, scratch, results[n])
         tests += made
         pair, event = pairs[k], events[k]
         stays = touching

@@ -43,8 +43,10 @@ def write_contacts(pairs, results, bodies, shape_index, now, floats, words, octe
         if pair.touching == 1:
             floats[n, 0] = results[k, 0]
             floats[n, 1] = results[k, BOUND]
-            floats[n, 2:8] = results[k, 4:10]
-            floats[n, 8:11] = results[k, 1:4]
+            for c in range(6):
+                floats[n, 2 + c] = results[k, 4 + c]
+            for c in range(3):
+                floats[n, 8 + c] = results[k, 1 + c]
             floats[n, 11] = results[k, CLOSING]
             words[n, 28] = shape_index[int(results[k, SHAPE_I])]
             words[n, 29] = shape_index[int(results[k, SHAPE_J])]

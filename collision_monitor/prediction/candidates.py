@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from collision_monitor._jit import device, kernel
-from collision_monitor.broad_phase.hashed_grid import BOX, query_box
+from collision_monitor.broad_phase.hashed_grid import Region, overlap, query_box
 from collision_monitor.prediction.time_of_impact import CLEAR, body_impact
 from collision_monitor.prediction.tracking import swept_box
 
@@ -21,21 +21,19 @@ def _allowed(allowed, id_a, id_b):
 
 
 @kernel
-def find_partners(bodies, grid, which, is_new, now, margin, pairs):
+def find_partners(bodies, grid, which, is_new, now, margin, found, pairs):
     """Pairs of each body in `which` (M,) with all whose swept box meets its own, each pair once, into pairs (P, 2).
 
     Only what a body sweeps after the time until which it was predicted before can meet what is not known yet.
-    is_new (N,) bool marks the bodies in `which`. Returns how many there are; more than P: call again with more room.
+    is_new (N,) bool marks the bodies in `which`, found (N,) int32 is scratch. Returns how many there are; more than P:
+    call again with more room.
     """
-    found = np.empty(grid.box.size, np.int32)
-    new_part = np.empty(1, BOX)
-    box = new_part[0]
     n = 0
     for k in range(which.size):
         i = which[k]
         covered = bodies.motion[i].covered
-        box.x, box.y, box.z, box.hx, box.hy, box.hz = swept_box(bodies, i, max(now, covered), margin)
-        for m in range(query_box(grid, box, i, found)):
+        x, y, z, hx, hy, hz = swept_box(bodies, i, max(now, covered), margin)
+        for m in range(query_box(grid, Region(x, y, z, hx, hy, hz), i, found)):
             j = found[m]
             other = bodies.motion[j].covered
             if is_new[j]:
@@ -47,6 +45,29 @@ def find_partners(bodies, grid, which, is_new, now, margin, pairs):
                 pairs[n, 0] = i
                 pairs[n, 1] = j
             n += 1
+    return n
+
+
+@kernel
+def keep_new(bodies, grid, pairs, is_new, now, margin):
+    """Move those of the pairs (P, 2) of overlapping boxes, one of them new, to the front that `find_partners` finds.
+
+    Returns how many. Where most boxes are looked at anyway, all their pairs are found sooner by one sweep.
+    """
+    n = 0
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        if not is_new[i] or (is_new[j] and bodies.motion[j].covered < bodies.motion[i].covered):
+            i, j = j, i
+        covered = bodies.motion[i].covered
+        if covered > now:
+            if not is_new[j] and bodies.motion[j].cover <= covered:
+                continue
+            x, y, z, hx, hy, hz = swept_box(bodies, i, covered, margin)
+            if not overlap(Region(x, y, z, hx, hy, hz), grid.box[j]):
+                continue
+        pairs[n, 0], pairs[n, 1] = i, j
+        n += 1
     return n
 
 

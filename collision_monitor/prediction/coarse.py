@@ -11,7 +11,7 @@ from math import inf, isfinite, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, kernel
+from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.prediction.active_pairs import (
     BOUND,
     CLOSING,
@@ -41,14 +41,14 @@ from collision_monitor.prediction.time_of_impact import (
 )
 
 
-@device
+@inlined
 def is_cheap(bodies, i, j):
     """Is the pair settled as fast as its bound? Two spheres, or one with a half-space, which has no bounding sphere."""
     spheres = bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0
     return spheres or not (isfinite(bodies.motion[i].radius) and isfinite(bodies.motion[j].radius))
 
 
-@device
+@inlined
 def bound_impact(bodies, i, j, begin, end, margin, event):
     """Since when the pair's bounding spheres meet in [begin, end], into the IMPACT record `event`, UNRESOLVED.
 

@@ -24,8 +24,11 @@ def _before(a, b):
 
 
 @kernel
-def sort_order(events, order):
-    """The order of events by (lower, key) into order (n,) int64: merge sort from runs sorted by insertion."""
+def sort_order(events, order, spare):
+    """The order of events by (lower, key) into order (n,) int64: merge sort from runs sorted by insertion.
+
+    spare (n,) int64: scratch.
+    """
     n = events.size
     for start in range(0, n, 16):
         for k in range(start, min(start + 16, n)):
@@ -34,7 +37,7 @@ def sort_order(events, order):
                 order[m] = order[m - 1]
                 m -= 1
             order[m] = k
-    source, target = order, np.empty_like(order)
+    source, target = order, spare
     width = 16
     while width < n:
         for start in range(0, n, 2 * width):
@@ -49,8 +52,8 @@ def sort_order(events, order):
                     b += 1
         source, target = target, source
         width *= 2
-    if width > 16:
-        order[:] = source.copy()
+    for m in range(n):
+        order[m] = source[m]
 
 
 @inlined
@@ -104,13 +107,18 @@ def _place(key, new, place):
     return at
 
 
-@kernel
-def keep_first(new, motion, pending, pairs):
+def keep_first(new: Events, motion: NDArray[np.void], pending: Events, pairs: NDArray[np.void]) -> int:
     """Move those of `new` to the front that are the first impact of their pair; returns how many.
 
     Where a pair was predicted further, it may have an earlier impact: in `pending`, or in the active pairs, which are
     looked at in every step. An earlier one that was not sure to happen ends where the later one is sure.
     """
+    room = np.empty(4 << (2 * len(new)).bit_length(), np.int32)
+    return int(_keep_first(new, motion, pending, pairs, room, np.ones(len(new), np.bool_)))
+
+
+@kernel
+def _keep_first(new, motion, pending, pairs, room, keep):
     later = 0
     for k in range(new.size):
         later += _was_predicted(new[k], motion)
@@ -119,11 +127,11 @@ def keep_first(new, motion, pending, pairs):
     size = 4
     while size < 4 * later:
         size *= 2
-    place = np.full(size, -1, np.int32)
+    place = room[:size]
+    place[:] = -1
     for k in range(new.size):
         if _was_predicted(new[k], motion):
             place[_place(new[k].key, new, place)] = k
-    keep = np.ones(new.size, np.bool_)
     for k in range(pending.size):
         at = place[_place(pending[k].key, new, place)]
         if at >= 0 and _holds(motion, pending[k]):
@@ -188,8 +196,8 @@ class EventList:
         need = len(self.events) + len(new)
         if need > len(self._spare):
             self._spare = np.empty(2 * need, IMPACT)
-        order = np.empty(len(new), np.int64)
-        sort_order(new, order)
+        order, spare = np.empty((2, len(new)), np.int64)
+        sort_order(new, order, spare)
         n = merge(self.events, new, order, motion, self._spare)
         self._room, self._spare = self._spare, self._room
         self.events = self._room[:n]

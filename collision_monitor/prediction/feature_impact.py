@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit import allocating_kernel, device, inlined
 from collision_monitor.errors import InputError
 from collision_monitor.prediction.arguments import count, number
 from collision_monitor.tolerances import EPSILON, LARGEST_INPUT
@@ -112,7 +112,7 @@ def _impacts(x: ArrayLike, face: bool, separation: float, tolerance: float | Non
 # In the kernels, terms is (_AXES, 7): A, B, C at the start and at the end along an axis, and the sum's round-off.
 
 
-@kernel
+@allocating_kernel
 def _solve(
     x: Any, face: bool, separation: float, tolerance: float, budget: int, status: Any, lower: Any, upper: Any
 ) -> None:

@@ -11,7 +11,7 @@ from math import isfinite, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import kernel
+from collision_monitor._jit import allocating_kernel
 from collision_monitor.geometry.shape_table import ShapeTable, take
 from collision_monitor.narrow_phase.answer import work_array
 from collision_monitor.narrow_phase.dispatch import contact_batch
@@ -34,7 +34,7 @@ SHAPE_PAIR = np.dtype(
 )
 
 
-@kernel
+@allocating_kernel
 def _shape_pairs(table, parts, bodies, pairs, results, now, found):
     """The shapes of each settled contact whose bounding spheres come as near as it: found (m,) SHAPE_PAIR; how many.
 
@@ -79,7 +79,7 @@ def _shape_pairs(table, parts, bodies, pairs, results, now, found):
     return n
 
 
-@kernel
+@allocating_kernel
 def _join(bodies, pairs, results, now, of, tie, patch, counts, most, count, points, closing, work):
     """Of the patches (m, 4, 3) of the shapes of each pair, at most `most` corners: count (n,), and for those of several
     points (n, 4, 3) in the world and the closing speeds (n, 4) there."""

@@ -75,13 +75,14 @@ class Scratch(NamedTuple):
     """Room for one thread's intermediate results, so that the kernels allocate nothing."""
 
     rotation: Any  # (4, 3, 3)
+    quaternion: Any  # (1, 4)
     out: Any  # (16,)
     work: Any  # (WORK_SIZE,)
 
 
 def make_scratch() -> Scratch:
     """Scratch for one thread."""
-    return Scratch(np.zeros((4, 3, 3)), np.zeros(16), np.zeros(WORK_SIZE))
+    return Scratch(np.zeros((4, 3, 3)), np.zeros((1, 4)), np.zeros(16), np.zeros(WORK_SIZE))
 
 
 @device

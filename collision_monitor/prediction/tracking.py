@@ -145,17 +145,17 @@ def _turned_away(bodies, start, count, columns, angles):
 
 
 @kernel
-def find_moved(bodies, spread, sigmas, count, now, horizon, stale_acceleration, moved, ending):
+def find_moved(bodies, spread, sigmas, count, now, horizon, stale_acceleration, columns, moved, ending):
     """Slots among the first `count` whose predictions no longer hold at `now`, into moved; returns how many.
 
     Those that hold but end within the horizon go into `ending`, their number is returned second.
     A body's surface may be off its reference by tube_0 now and drift by tube_1 a second; both are checked, with the
     drift that an unheard-of body may have made; and so is whether it may be further off, by `sigmas` standard
     deviations, than its box allows for. Its slack is halved where it left its motion and doubled where that held until
-    it was predicted no further: who turns often is not predicted far.
+    it was predicted no further: who turns often is not predicted far. columns: scratch, of `make_columns`.
     """
     n = n_ending = 0
-    columns, angles = np.empty((COLUMNS, BLOCK)), np.empty(BLOCK)
+    angles = columns[COLUMNS]
     for i in range(count):
         if i % BLOCK == 0:
             _turned_away(bodies, i, min(BLOCK, count - i), columns, angles)
@@ -277,7 +277,6 @@ def restart_motion(
 
     sigmas: by how many standard deviations that is widened; 0: nothing is uncertain.
     """
-    q = np.empty(4)
     for k in range(which.size):
         i = which[k]
         m = bodies.motion[i]
@@ -290,9 +289,7 @@ def restart_motion(
         m.y = position_now(bodies, i, age, 1)
         m.z = position_now(bodies, i, age, 2)
         m.vx, m.vy, m.vz = m.vx + m.ax * age, m.vy + m.ay * age, m.vz + m.az * age
-        turn_quaternion(bodies.quaternion, i, m.wx, m.wy, m.wz, age, q)
-        for c in range(4):
-            bodies.ref_quaternion[i, c] = q[c]
+        turn_quaternion(bodies.quaternion, i, m.wx, m.wy, m.wz, age, bodies.ref_quaternion[i])
         quaternion_to_matrix(bodies.ref_quaternion, i, m.rotation)
         m.time = m.tube_time = now
         m.covered = -np.inf

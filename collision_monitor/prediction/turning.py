@@ -5,6 +5,9 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from collision_monitor._jit import device
 from collision_monitor.prediction.motion import chord_angle
 from collision_monitor.prediction.trigonometry import LARGEST, sin_cos_within
@@ -12,6 +15,11 @@ from collision_monitor.prediction.trigonometry import LARGEST, sin_cos_within
 BLOCK: Final = 128
 """Bodies whose numbers are laid side by side in the cache."""
 COLUMNS: Final = 12
+
+
+def make_columns() -> NDArray[np.float64]:
+    """Scratch (COLUMNS + 1, BLOCK) for a block; the last row for the angles."""
+    return np.empty((COLUMNS + 1, BLOCK))
 
 
 @device

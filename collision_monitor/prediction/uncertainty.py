@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit import allocating_kernel, device, inlined
 from collision_monitor.prediction.known_axes import AXES, parted_until, remember
 from collision_monitor.prediction.motion import (
     MOTION,
@@ -383,7 +383,7 @@ def _shift(room, z, t, px, py, pz, vx, vy, vz):
     B.z = pz + y[0, 0] * F[0, 2] + y[0, 1] * F[1, 2] + y[0, 2] * F[2, 2] - t * dz
 
 
-@kernel
+@allocating_kernel
 def impact_probabilities(
     table, parts, bodies, spread, pairs, stated, now, horizon, margin, stale_acceleration, tolerance, budget,
     confidence, sigmas, safe_sigmas, least_probability, planar, points, weights, room, answers,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import kernel
+from collision_monitor._jit import allocating_kernel
 from collision_monitor.description import ObjectDescription
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Sphere
@@ -26,7 +26,7 @@ WALL = 0.2
 """m, thickness."""
 
 
-@kernel
+@allocating_kernel
 def _overlapping_pairs(position, radius, cell_size, cells):  # type: ignore[no-untyped-def]
     """Pairs (n, 2) of overlapping spheres in a fixed order; the cell is at least as large as the largest sphere."""
     n = len(position)

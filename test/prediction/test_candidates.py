@@ -1,0 +1,41 @@
+"""Bodies that start anew or are predicted further: looked up one by one or found by one sweep, they meet the same."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from collision_monitor import monitor as core
+from collision_monitor.monitor import Monitor
+from collision_monitor.profiles import Profile
+from collision_monitor.world import make_scene
+
+
+@pytest.mark.parametrize("scene", ["clutter", "fleet"])
+def test_one_sweep_finds_the_pairs_that_looking_up_finds(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    both: list[tuple[int, int]] = []
+    find = Monitor._partners
+
+    def compare(self: Monitor, which: Any, now: float) -> Any:
+        monkeypatch.setattr(core, "MOST_QUERIES", 2.0)
+        looked_up = {tuple(sorted(pair)) for pair in find(self, which, now).tolist()}
+        monkeypatch.setattr(core, "MOST_QUERIES", -1.0)
+        swept = find(self, which, now)
+        assert {tuple(sorted(pair)) for pair in swept.tolist()} == looked_up
+        assert len(swept) == len(looked_up)
+        both.append((len(which), len(swept)))
+        return swept
+
+    monkeypatch.setattr(Monitor, "_partners", compare)
+    played = make_scene(scene)
+    monitor = Monitor(Profile(horizon=1.0))
+    for description in played.descriptions:
+        monitor.describe(description)
+    for step in range(120):
+        monitor.step(step * 20_000_000, played.states())
+        played.step(0.02)
+    some = [(bodies, pairs) for bodies, pairs in both if bodies < len(played.descriptions) / 2]
+    assert len(some) > 10, "bodies that are predicted further, beside others that are not"
+    assert sum(pairs for _, pairs in some) > 100
