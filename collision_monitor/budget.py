@@ -12,7 +12,10 @@ from time import perf_counter
 from typing import Final, Self
 
 FEWEST: Final = 8
-"""Pairs in a step, and between two looks at the clock, at least: some 50 µs."""
+"""Pairs in a step at least, so that what is left is settled in the end."""
+
+WORTH_A_LOOK: Final = 5e-5
+"""Work (s) between two looks at the clock, at least; or a pair."""
 
 LEARNING: Final = 0.2
 """Weight of the latest measurement in the running means; that of a pair's cost rises at once and falls slowly."""
@@ -101,16 +104,17 @@ class TimeBudget(PairBudget):
         self._out = (0, 0, 0.0)  # the pairs that are being done: how many, what work, since when
 
     def next(self, left: int, work: int) -> int:
-        """See PairBudget. Never more than half of what seems to fit: so the estimate is checked on the way."""
+        """See PairBudget. About half of what seems to fit: so the estimate is checked on the way."""
         now = self._measure()
-        fit = int((self._deadline - now) / self._clock.cost[work])
-        if fit < min(left, FEWEST):
-            if self.done == 0 and now < self._deadline:
+        cost = self._clock.cost[work]
+        fit = int((self._deadline - now) / cost)
+        if fit < 1:
+            if now < self._deadline:
                 self._clock.cost[work] *= 1.0 - LEARNING  # or one bad estimate would stop all steps to come
             self._limit = min(self._limit, max(self.done, FEWEST))  # the step is over
             self._clock.stopped = self._clock.stopped or now
             return super().next(left, work)
-        count = super().next(min(left, max(FEWEST, fit // 2)), work)
+        count = super().next(min(left, fit, max(fit // 2, 1 + int(WORTH_A_LOOK / cost))), work)
         self._out = (count, work, now)
         return count
 

@@ -223,6 +223,27 @@ class TestBudgets:
             assert len(tries) < 100
         assert len(tries) > 5
 
+    def test_a_bad_estimate_is_forgotten_where_other_work_goes_on(self) -> None:
+        """Pairs of trees that fit use up the few pairs of each step; the others come to their turn all the same."""
+        clock = StepClock()
+        clock.cost[EXAMINE] = 1.0
+        for _ in range(100):
+            with clock:
+                budget = TimeBudget(clock, 0.01, 1000)
+                assert budget.next(FEWEST, TREES) == FEWEST
+                if budget.next(500, EXAMINE):
+                    break
+                budget.stop()
+        else:
+            raise AssertionError("no pair was ever looked at")
+
+    def test_pairs_that_cost_much_are_done_one_by_one(self) -> None:
+        with StepClock() as clock:
+            clock.cost[EXAMINE] = 0.3
+            budget = TimeBudget(clock, 1.0, 1000)
+            assert budget.next(FEWEST, TREES) == FEWEST
+            assert budget.next(500, EXAMINE) == 1
+
     def test_steps_that_are_always_late_do_not_make_a_pair_cost_nothing(self) -> None:
         clock = StepClock()
         for _ in range(5000):
