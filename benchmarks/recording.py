@@ -3,10 +3,10 @@
     python benchmarks/recording.py            # three minutes
     python benchmarks/recording.py --quick    # half a minute
 
-Sustained: messages of 1 kB written as fast as the disk takes them, none dropped. Step: the same steps with and without
-a recorder beside them that takes 20,000 messages/s, in blocks that alternate within one run, so that whatever else
-the machine does meets both alike. Killed: a process that records 20,000 messages/s is killed (SIGKILL) at a random
-moment; lost is the time between the last message in the file and the signal.
+Sustained: messages of 1 kB written as fast as the disk takes them, none dropped. Step: the same steps alone, beside
+20,000 messages/s that nobody keeps, and beside a recorder that does, in blocks that take turns within one run, so that
+whatever else the machine does meets all alike. Killed: a process that records 20,000 messages/s is killed (SIGKILL) at
+a random moment; lost is the time between the last message in the file and the signal.
 """
 
 from __future__ import annotations
@@ -42,10 +42,11 @@ TYPES = {
 }
 SHAPES, STATES, CONTACTS, PREDICTIONS = TYPES
 OBJECTS = 200
-BLOCKS = {False: 60, True: 8}
-"""Pairs of blocks, one with a recorder and one without; quick or not."""
+WARM = 200
+ROUNDS = {False: 60, True: 8}
+"""Rounds of three blocks; quick or not."""
 QUIET = 0.25
-"""Cores that other processes may take while a pair of blocks counts as quiet: a step that has to share its core says
+"""Cores that other processes may take while a round counts as quiet: a step that has to share its core says
 nothing of the recorder."""
 RATE = 20_000
 """Messages/s that the recorder takes while steps are timed."""
@@ -111,59 +112,76 @@ class Crossing:
         return encode_states(1_000_000_000 + step * 20_000_000, "world", step + 1, rows)
 
 
-def step_cost(folder: Path, blocks: int, block: float) -> dict[str, float]:
-    """Duration of a step beside a recorder and without one: median of the blocks' ratios; µs for each `write`."""
-    scene, pipeline, data = Crossing(), Pipeline("balanced"), [payload(k) for k in range(64)]
-    pipeline.on_shapes(scene.shapes())
-    step = 0
-    for step in range(200):
-        pipeline.on_states(scene.states(step))
+class Nobody:
+    """Takes messages and keeps none: what it slows a step by is what making and handing over messages does."""
+
+    def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
+        """As of a Recorder."""
+
+
+def step_cost(folder: Path, rounds: int, steps: int) -> dict[str, float]:
+    """Duration of a step with nothing beside it, beside messages that nobody keeps, and beside a recorder.
+
+    Ratios: medians over rounds of three blocks, each the same steps in a pipeline of its own. write_us: of a `write`.
+    """
+    scene, data = Crossing(), [payload(k) for k in range(64)]
+    pipelines = [Pipeline("balanced") for _ in range(3)]
+    for pipeline in pipelines:
+        pipeline.on_shapes(scene.shapes())
+        for step in range(WARM):
+            pipeline.on_states(scene.states(step))
     gc.collect()
     gc.freeze()  # as the node does
-    durations: dict[bool, list[float]] = {False: [], True: []}
-    others: list[float] = []
-    writing, written = 0.0, 0
-    recorder = Recorder(folder / "steps.mcap", TYPES, pipeline.metadata(), patient=False)
-    for k in range(2 * blocks):
-        recording = bool(k % 2) ^ bool(k // 2 % 2)  # off on on off …: drift meets both alike
-        begin, first, in_block, busy = time.perf_counter(), written, [], _busy_elsewhere()
-        while (now := time.perf_counter()) - begin < block:
-            step += 1
+    durations = np.empty((rounds, 3))
+    others = np.empty((rounds, 3))
+    writing, written, recorded = 0.0, 0, 0.0
+    recorder = Recorder(folder / "steps.mcap", TYPES, pipelines[0].metadata(), patient=False)
+    takers: tuple[Recorder | Nobody | None, ...] = (None, Nobody(), recorder)
+    for k in range(3 * rounds):
+        arm = k % 3 if k // 3 % 2 else 2 - k % 3  # to and fro: drift meets all alike
+        taker, sent, spent, in_block = takers[arm], 0, 0.0, []
+        begin, busy = time.perf_counter(), _busy_elsewhere()
+        for step in range(WARM + k // 3 * steps, WARM + (k // 3 + 1) * steps):
             states = scene.states(step)
             before = time.perf_counter()
-            outputs = pipeline.on_states(states)
+            outputs = pipelines[arm].on_states(states)
             in_block.append(time.perf_counter() - before)
             assert outputs is not None
-            if recording:
+            if taker is not None:
                 before = time.perf_counter()
-                recorder.write(STATES, states, step, step)
-                recorder.write(CONTACTS, outputs.contacts, step, step)
-                recorder.write(PREDICTIONS, outputs.predictions, step, step)
-                written += 3
-                while written - first < (now - begin) * RATE:
-                    recorder.write(STATES, data[written % 64], step, step)
-                    written += 1
-                writing += time.perf_counter() - before
+                taker.write(STATES, states, step, step)
+                taker.write(CONTACTS, outputs.contacts, step, step)
+                taker.write(PREDICTIONS, outputs.predictions, step, step)
+                sent += 3
+                while sent < (before - begin) * RATE:
+                    taker.write(STATES, data[sent % 64], step, step)
+                    sent += 1
+                spent += time.perf_counter() - before
             time.sleep(0.0005)
-        durations[recording].append(float(np.mean(in_block)))
-        others.append((_busy_elsewhere() - busy) / (time.perf_counter() - begin))
-        while recording and recorder.status()["recorded_messages"] < written:
-            time.sleep(0.05)  # what waits for the disk belongs to this block
+        durations[k // 3, arm] = np.mean(in_block)
+        others[k // 3, arm] = (_busy_elsewhere() - busy) / (time.perf_counter() - begin)
+        if taker is recorder:
+            writing, written, recorded = writing + spent, written + sent, recorded + time.perf_counter() - begin
+            while recorder.status()["recorded_messages"] < written:
+                time.sleep(0.05)  # what waits for the disk belongs to this block
     recorder.close()
     assert recorder.status()["recording_dropped"] == 0
-    ratios = np.array(durations[True]) / np.array(durations[False])
-    quiet = ratios[np.max(np.reshape(others, (-1, 2)), axis=1) < QUIET]
+    off, calls, on = durations.T
+    quiet = others.max(axis=1) < QUIET
     return {
-        "step_ms": 1e3 * float(np.median(durations[False])),
-        "step_ms_recording": 1e3 * float(np.median(durations[True])),
-        "ratio": float(np.median(ratios)),
-        "ratio_10_percent": float(np.quantile(ratios, 0.1)),
-        "ratio_90_percent": float(np.quantile(ratios, 0.9)),
-        "quiet_blocks": len(quiet),
-        "ratio_quiet": float(np.median(quiet)) if len(quiet) else float("nan"),
+        "step_ms": 1e3 * float(np.median(off)),
+        "step_ms_recording": 1e3 * float(np.median(on)),
+        "ratio": float(np.median(on / off)),
+        "ratio_10_percent": float(np.quantile(on / off, 0.1)),
+        "ratio_90_percent": float(np.quantile(on / off, 0.9)),
+        "ratio_of_means": float(on.mean() / off.mean()),
+        "ratio_nobody": float(np.median(calls / off)),
+        "ratio_to_nobody": float(np.median(on / calls)),
+        "quiet_blocks": int(quiet.sum()),
+        "ratio_quiet": float(np.median((on / off)[quiet])) if quiet.any() else float("nan"),
         "others_cores": float(np.median(others)),
         "write_us": 1e6 * writing / written,
-        "messages_per_s": written / (blocks * block),
+        "messages_per_s": written / recorded,
     }
 
 
@@ -257,7 +275,7 @@ def main() -> None:
         folder = Path(name)
         results: dict[str, dict[str, object]] = {
             "sustained": {**sustained(folder, 3 if args.quick else 20)},
-            "step": {**step_cost(folder, BLOCKS[args.quick], 0.5)},
+            "step": {**step_cost(folder, ROUNDS[args.quick], 400)},
             "killed": killed(folder, 3 if args.quick else 20),
             "snapshot": {**snapshot_cost()},
             "replay": {**replay_speed(folder, 500 if args.quick else 3000)},
@@ -271,8 +289,9 @@ def main() -> None:
         f"step       {step['step_ms']:.3f} ms of {OBJECTS} boxes; {step['step_ms_recording']:.3f} ms beside "
         f"{step['messages_per_s']:,.0f} messages/s: ratio {step['ratio']:.3f} "
         f"({step['ratio_10_percent']:.3f} to {step['ratio_90_percent']:.3f}), {step['ratio_quiet']:.3f} in the "
-        f"{step['quiet_blocks']} of {BLOCKS[args.quick]} pairs when others took under {QUIET} cores "
-        f"(else {step['others_cores']:.1f}); {step['write_us']:.1f} µs for each write"
+        f"{step['quiet_blocks']} of {ROUNDS[args.quick]} rounds when others took under {QUIET} cores, "
+        f"{step['ratio_of_means']:.3f} of the means; {step['ratio_nobody']:.3f} beside messages that nobody keeps, "
+        f"{step['ratio_to_nobody']:.3f} from there to recording; {step['write_us']:.1f} µs for each write"
     )
     lost = kill["lost_s"]
     assert isinstance(lost, list)
