@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collision_monitor._jit import device, kernel
+from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.broad_phase.hashed_grid import Region, overlap, query_box
 from collision_monitor.prediction.time_of_impact import CLEAR, body_impact
 from collision_monitor.prediction.tracking import swept_box
@@ -20,6 +20,22 @@ def _allowed(allowed, id_a, id_b):
     return k < allowed.size and allowed[k] == key
 
 
+@inlined
+def _finds(bodies, is_new, i, j):
+    """Of a pair whose boxes meet: is it for i, which starts anew or is predicted further, to look at what is new?
+
+    Where both are new, for the one that was predicted less far, or else has the smaller slot; and there is nothing to
+    look at with one that is predicted no further than i was before.
+    """
+    covered = bodies.motion[i].covered
+    if not is_new[i]:
+        return False
+    if not is_new[j]:
+        return bodies.motion[j].cover > covered
+    other = bodies.motion[j].covered
+    return covered < other or (covered == other and i < j)
+
+
 @kernel
 def find_partners(bodies, grid, which, is_new, now, margin, found, pairs):
     """Pairs of each body in `which` (M,) with all whose swept box meets its own, each pair once, into pairs (P, 2).
@@ -31,15 +47,10 @@ def find_partners(bodies, grid, which, is_new, now, margin, found, pairs):
     n = 0
     for k in range(which.size):
         i = which[k]
-        covered = bodies.motion[i].covered
-        x, y, z, hx, hy, hz = swept_box(bodies, i, max(now, covered), margin)
+        x, y, z, hx, hy, hz = swept_box(bodies, i, max(now, bodies.motion[i].covered), margin)
         for m in range(query_box(grid, Region(x, y, z, hx, hy, hz), i, found)):
             j = found[m]
-            other = bodies.motion[j].covered
-            if is_new[j]:
-                if other < covered or (other == covered and j < i):
-                    continue  # j finds i
-            elif bodies.motion[j].cover <= covered:
+            if not _finds(bodies, is_new, i, j):
                 continue
             if n < pairs.shape[0]:
                 pairs[n, 0] = i
@@ -57,12 +68,12 @@ def keep_new(bodies, grid, pairs, is_new, now, margin):
     n = 0
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
-        if not is_new[i] or (is_new[j] and bodies.motion[j].covered < bodies.motion[i].covered):
+        if not _finds(bodies, is_new, i, j):
             i, j = j, i
-        covered = bodies.motion[i].covered
-        if covered > now:
-            if not is_new[j] and bodies.motion[j].cover <= covered:
+            if not _finds(bodies, is_new, i, j):
                 continue
+        covered = bodies.motion[i].covered
+        if covered > now:  # else what is new of it is its whole box
             x, y, z, hx, hy, hz = swept_box(bodies, i, covered, margin)
             if not overlap(Region(x, y, z, hx, hy, hz), grid.box[j]):
                 continue
