@@ -10,14 +10,9 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.detection import WORTH_THREADS, Detector, default_threads
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import Box, Shape, Sphere
 from collision_monitor.monitor import Monitor
-from collision_monitor.narrow_phase.contact import contact
-from collision_monitor.prediction.feature_impact import vertex_face_impact
-from collision_monitor.prediction.impact import time_of_impact
-from collision_monitor.prediction.impact_batch import time_of_impact_batch
 from collision_monitor.records import STATE
 
 OBJECTS = 70  # more than the arrays have room for at first: growing them is warmed up too
@@ -61,6 +56,13 @@ def _step_uncertain(monitor: Monitor, poses: NDArray[np.float64]) -> None:
 
 def warm_up_functions() -> None:
     """Call what can be called without a monitor, once with each kind of argument that has a kernel of its own."""
+    # imported here: a node, which warms up the monitor when it starts, needs none of it
+    from collision_monitor.detection import WORTH_THREADS, Detector, default_threads
+    from collision_monitor.narrow_phase.contact import contact
+    from collision_monitor.prediction.feature_impact import vertex_face_impact
+    from collision_monitor.prediction.impact import time_of_impact
+    from collision_monitor.prediction.impact_batch import time_of_impact_batch
+
     box, ball = Box((1, 1, 1)), Sphere(0.5)
     for threads in sorted({1, default_threads()}):
         shapes: list[Shape] = [box, ball] * WORTH_THREADS
