@@ -24,7 +24,6 @@ demo: setup ## watch the monitor at work, live
 	@$(BIN)/collision-monitor demo
 
 test: ## set up, lint and run every test
-	@$(MAKE) --no-print-directory setup
 	@$(MAKE) --no-print-directory -j2 lint test-core
 	@$(BIN)/python -m pytest -n 3 --dist worksteal test/ros test/setup
 
