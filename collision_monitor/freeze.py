@@ -141,7 +141,7 @@ def _thaw_bodies(m: Monitor, snapshot: Snapshot, facts: dict[str, Any], top: int
     enlarge(Spread(**spread), m._uncertain.spread)
     m._grid = regridded(snapshot.array("boxes", m._grid.box, top), capacity)
     used = np.flatnonzero(bodies["used"])
-    m._slots = dict(zip(bodies["motion"]["id"][used].tolist(), used.tolist(), strict=True))
+    m._slots = dict(zip(bodies["id"][used].tolist(), used.tolist(), strict=True))
     m._names = {object_id: facts["names"][str(object_id)] for object_id in m._slots}
     for object_id, others in facts["allowed"].items():
         m._allow(int(object_id), frozenset(others))

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor import filters, records
 from collision_monitor.broad_phase.dense_grid import box_pairs
-from collision_monitor.broad_phase.hashed_grid import make_hashed_grid, regridded, remove_boxes
+from collision_monitor.broad_phase.hashed_grid import make_hashed_grid, read_boxes, regridded, remove_boxes
 from collision_monitor.budget import EXAMINE, HANDFUL, REFINE, TREES, PairBudget, StepClock, TimeBudget
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import CollisionMonitorError, InputError, Refusal, UnsupportedError
@@ -28,7 +28,7 @@ from collision_monitor.geometry.shapes import HalfSpace, Shape
 from collision_monitor.narrow_phase.models import monitored_model, parse_model, shape_class
 from collision_monitor.plan import ScenePlan, scene_plan
 from collision_monitor.prediction import active_pairs, answers, candidates, coarse, tracking
-from collision_monitor.prediction.event_list import EventList, keep_first
+from collision_monitor.prediction.event_list import EventList, count_until, keep_first
 from collision_monitor.prediction.motion import Bodies, enlarge, make_bodies, make_parts
 from collision_monitor.prediction.patches import with_patches
 from collision_monitor.prediction.sphere_trees import Tree, Trees, body_tree, joined_trees
@@ -287,7 +287,7 @@ class Monitor:
         self._planar = planar
         bodies, table = self._bodies, self._shapes.table
         bodies.used[i] = True
-        bodies.motion["id"][i] = d.object_id
+        bodies.id[i] = d.object_id
         bodies.group[i], bodies.mask[i] = d.group, d.mask
         radius = max(float(np.linalg.norm(table.local_position[s]) + table.radius[s]) for s in slots)
         bodies.motion["radius"][i] = radius
@@ -304,7 +304,7 @@ class Monitor:
             bodies.seen[i] = False  # it moves now, and where to is not known yet
             remove_boxes(self._grid, np.array([i], np.int32))
         bodies.static[i] = d.static
-        bodies.motion["version"][i] += 1
+        bodies.version[i] += 1
         self._tree_of.pop(i, None)
         self._trees = None
         if self._has_budget:
@@ -343,7 +343,7 @@ class Monitor:
         self._drop_shapes(i)
         self._uncertain.forget(i)
         self._bodies.used[i] = self._bodies.seen[i] = self._bodies.static[i] = False
-        self._bodies.motion["version"][i] += 1
+        self._bodies.version[i] += 1
         self._renewed.discard(i)
         self._free.append(i)
         del self._slots[object_id], self._names[object_id]
@@ -429,7 +429,7 @@ class Monitor:
         self._end_pairs(list(range(len(self._pairs))))
         self._events.clear()
         bodies.seen[:] = bodies.static & bodies.used
-        bodies.motion["version"] += 1
+        bodies.version[:] += 1
         remove_boxes(self._grid, np.arange(self._top, dtype=np.int32))
         self._renewed = {i for i in range(self._top) if bodies.used[i]}
 
@@ -508,6 +508,9 @@ class Monitor:
         if given.dtype == records.STATE:
             if given.ndim != 1:
                 raise InputError(f"states: expected one dimension, got shape {given.shape}")
+            unknown = given["flags"] & records.StateFlag.TWIST_UNKNOWN  # whose standard deviations will be written in
+            if given.flags.carray and not unknown.any():
+                return given
             if len(given) > len(self._buffer):
                 self._buffer = np.empty(len(given), records.STATE)
             states = self._buffer[: len(given)]
@@ -601,7 +604,7 @@ class Monitor:
             outside = bodies.used[:top] & ~inside
         self._renewed.update(np.flatnonzero(was & ~outside & bodies.used[:top]).tolist())
         remove_boxes(self._grid, np.flatnonzero(outside).astype(np.int32))
-        bodies.motion["version"][:top][outside & ~was] += 1
+        bodies.version[:top][outside & ~was] += 1
         self._end_pairs(np.flatnonzero(outside[self._pairs["i"]] | outside[self._pairs["j"]]).tolist())
         self._outside = outside if bounded else outside[:0]
 
@@ -655,8 +658,8 @@ class Monitor:
         else:
             events, queries = self._first_impacts(pairs, now)
         work["impact_queries"] += queries
-        events = events[: keep_first(events, bodies.motion, self._events.events, self._pairs)]
-        bodies.motion["covered"][which] = bodies.motion["cover"][which]
+        events = events[: keep_first(events, bodies, self._events.events, self._pairs)]
+        tracking.remember_cover(bodies, which)
         return events
 
     def _partners(self, which: NDArray[np.int32], now: float) -> NDArray[np.int32]:
@@ -665,10 +668,8 @@ class Monitor:
         is_new = np.zeros(len(self._grid.box), np.bool_)
         is_new[which] = True
         if len(which) > MOST_QUERIES * self._top:
-            box = self._grid.box[: self._top]
-            centre = np.stack([box["x"], box["y"], box["z"]], axis=1)
-            half = np.stack([box["hx"], box["hy"], box["hz"]], axis=1)
-            half[box["level"] < 0] = np.nan  # not in the grid: meets nothing
+            centre, half = np.empty((2, self._top, 3))
+            read_boxes(self._grid.box, centre, half)
             pairs = box_pairs(centre, half, is_new[: self._top])
             return pairs[: candidates.keep_new(self._bodies, self._grid, pairs, is_new, now, margin)]
         found = np.empty(len(self._grid.box), np.int32)
@@ -720,30 +721,28 @@ class Monitor:
         """Look at the pairs that are due or touch; the contacts (records.CONTACT). New events go into the list."""
         bodies = self._bodies
         is_due = new["lower"] <= now
-        due = joined([self._events.take_due(bodies.motion, now), new.compress(is_due)])
+        due = joined([self._events.take_due(bodies.version, now), new.compress(is_due)])
         work["events_due"] = len(due)
         room = len(self._pairs) + len(due)
-        pairs = np.empty(room, active_pairs.PAIR)
-        events = np.empty(room, IMPACT)
+        pairs, events, later = np.empty(room, active_pairs.PAIR), np.empty(room, IMPACT), np.empty(room, IMPACT)
+        results = np.empty((room, active_pairs.RESULT))
         order = np.argsort(due["key"], kind="stable")
         n = active_pairs.unite(bodies, self._pairs, self._pair_events, due, order, pairs, events)
         pending = new.compress(~is_due)
         if budget is None:
-            self._pairs, self._pair_events, results, later = self._examine(pairs[:n], events[:n], now, work)
-            self._events.add(joined([pending, later]), bodies.motion)
+            later = later[: self._examine(pairs, events, np.arange(n), now, results, later, work)]
+            self._events.add(joined([pending, later]), bodies.version)
         else:
-            self._events.add(pending, bodies.motion)
+            self._events.add(pending, bodies.version)
             n = self._pass_by_trees(pairs[:n], events[:n], now, budget)
-            self._pairs, self._pair_events, results, later = self._examine_urgent(
-                pairs[:n], events[:n], now, work, budget
-            )
+            later = later[: self._examine_urgent(pairs[:n], events[:n], now, results, later, work, budget)]
             which, found = self._look_at_trees(self._events.events, now, budget)
             if len(which):
-                self._events.replace(which, found.compress(found["status"] != CLEAR), bodies.motion)
+                self._events.replace(which, found.compress(found["status"] != CLEAR), bodies.version)
             which, refined = self._refine(now, work, budget)
             budget.stop()
-            self._events.replace(which, joined([later, refined]), bodies.motion)
-        n = len(self._pairs)
+            self._events.replace(which, joined([later, refined]), bodies.version)
+        self._pairs, self._pair_events = pairs[:n], events[:n]
         contacts = np.empty(n, records.CONTACT)
         n = answers.write_contacts(
             self._pairs, results, bodies, self._parts.index, now,
@@ -760,50 +759,49 @@ class Monitor:
         return self._with_orphans(contacts, now)
 
     def _examine(
-        self, pairs: NDArray[np.void], events: NDArray[np.void], now: float, work: dict[str, int]
-    ) -> tuple[NDArray[np.void], NDArray[np.void], NDArray[np.float64], NDArray[np.void]]:
-        """Look at these pairs; those that stay active, their events and results, and events for later."""
+        self,
+        pairs: NDArray[np.void],
+        events: NDArray[np.void],
+        which: NDArray[np.int64],
+        now: float,
+        results: NDArray[np.float64],
+        later: NDArray[np.void],
+        work: dict[str, int],
+    ) -> int:
+        """Look at these active pairs: their events and results, and events for later; returns how many of the last."""
         p = self._profile
-        results = np.empty((len(pairs) + 1, active_pairs.RESULT))
-        later = np.empty(len(pairs), IMPACT)
-        n, n_later, tests, queries = active_pairs.examine(
-            self._shapes.table, self._parts, self._bodies, pairs, events, now, p.contact_margin,
+        n_later, tests, queries = active_pairs.examine(
+            self._shapes.table, self._parts, self._bodies, pairs, events, which, now, p.contact_margin,
             p.stale_acceleration, p.impact_tolerance, p.impact_iterations, results, later, self._scratch[0],
         )  # fmt: skip
         work["narrow_phase_tests"] += tests
         work["impact_queries"] += queries
-        return pairs[:n], events[:n], results[:n], later[:n_later]
+        return int(n_later)
 
     def _examine_urgent(
         self,
         pairs: NDArray[np.void],
         events: NDArray[np.void],
         now: float,
+        results: NDArray[np.float64],
+        later: NDArray[np.void],
         work: dict[str, int],
         budget: PairBudget,
-    ) -> tuple[NDArray[np.void], NDArray[np.void], NDArray[np.float64], NDArray[np.void]]:
+    ) -> int:
         """As `_examine`, the most urgent first, as long as the budget lasts; of the others, what their bounds say."""
         p = self._profile
         order, at = coarse.urgency(self._bodies, pairs, events, self._step)
-        parts = [self._examine(pairs.take(order[:at]), events.take(order[:at]), now, work)]
+        n = self._examine(pairs, events, order[:at], now, results, later, work) if at else 0
         while at < len(order) and (count := budget.next(len(order) - at, EXAMINE)):
-            chunk = order[at : at + count]
-            parts.append(self._examine(pairs.take(chunk), events.take(chunk), now, work))
+            n += self._examine(pairs, events, order[at : at + count], now, results, later[n:], work)
             at += count
-        for kept, its_events, *_ in parts:
-            its_events["lower"][kept["touching"] == 1] = now  # since when nobody has looked at it
-        left, left_events = pairs.take(order[at:]), events.take(order[at:])
-        results = np.empty((len(left) + 1, active_pairs.RESULT))
-        later = np.empty(len(left), IMPACT)
-        n, n_later = coarse.leave(
-            self._bodies, left, left_events, now, p.contact_margin, p.stale_acceleration, results, later
-        )
-        parts.append((left[:n], left_events[:n], results[:n], later[:n_later]))
+        done, left = order[:at], order[at:]
+        events["lower"][done[pairs["touching"][done] == 1]] = now  # since when nobody has looked at it
         work["deferred"] += len(left)
-        all_pairs, all_events, all_results, laters = zip(*parts, strict=True)
-        pairs, events, results = joined(all_pairs), joined(all_events), np.concatenate(all_results)
-        by_key = np.argsort(pairs["key"], kind="stable")
-        return pairs.take(by_key), events.take(by_key), results.take(by_key, axis=0), joined(laters)
+        bounded = coarse.leave(
+            self._bodies, pairs, events, left, now, p.contact_margin, p.stale_acceleration, results, later[n:]
+        )
+        return n + int(bounded)
 
     def _pass_by_trees(
         self, pairs: NDArray[np.void], events: NDArray[np.void], now: float, budget: PairBudget
@@ -818,7 +816,7 @@ class Monitor:
         apart = (found["status"] == CLEAR) | (found["lower"] > now)
         if not apart.any():
             return len(pairs)
-        self._events.add(found.compress(apart & (found["status"] != CLEAR)), self._bodies.motion)
+        self._events.add(found.compress(apart & (found["status"] != CLEAR)), self._bodies.version)
         kept = np.ones(len(pairs), np.bool_)
         kept[which[apart]] = False
         n = int(np.count_nonzero(kept))
@@ -891,7 +889,7 @@ class Monitor:
     def _predictions(self, now: float) -> NDArray[np.void]:
         p = self.profile
         pending = self._events.events
-        within = int(np.searchsorted(pending["lower"], now + p.horizon, side="right"))
+        within = count_until(pending, now + p.horizon)
         predictions = np.empty(within + len(self._pairs), records.PREDICTION)
         slots = np.empty((len(predictions), 2), np.int32)
         n = answers.write_predictions(
@@ -929,16 +927,14 @@ class Monitor:
         predictions: NDArray[np.void],
         work: dict[str, int],
     ) -> StepStatus:
-        bodies, top = self._bodies, self._top
         unresolved = np.count_nonzero(contacts["status"] == records.ContactStatus.UNRESOLVED)
         unresolved += np.count_nonzero(predictions["status"] == records.PredictionStatus.UNRESOLVED)
-        used, static, seen = bodies.used[:top], bodies.static[:top], bodies.seen[:top]
-        stale = used & seen & ~static & (now - bodies.time[:top] > self.profile.stale_after)
+        static, unseen, stale = tracking.count_bodies(self._bodies, self._top, now, self._profile.stale_after)
         return StepStatus(
             objects=len(self._slots),
-            objects_static=int(np.count_nonzero(used & static)),
-            objects_unseen=int(np.count_nonzero(used & ~seen)),
-            objects_stale=int(np.count_nonzero(stale)),
+            objects_static=int(static),
+            objects_unseen=int(unseen),
+            objects_stale=int(stale),
             contacts=int(np.count_nonzero(self._pairs["touching"])),
             predictions=len(predictions),
             unresolved=int(unresolved),

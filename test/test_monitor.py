@@ -494,3 +494,22 @@ def test_the_predictions_of_bodies_that_start_together_do_not_end_together() -> 
         poses[:, :3] += twists[:, :3] / rate
     assert looked_up[0] > 200
     assert max(looked_up[1:]) < looked_up[0] / 10
+
+
+@pytest.mark.parametrize("flags", [0, records.StateFlag.TWIST_UNKNOWN])
+def test_states_that_are_handed_over_stay_as_they_are(flags: int) -> None:
+    """Also those whose twist the monitor estimates, with what it is off: that is worked out on a copy."""
+    swarm, mine, copied = Swarm(20, seed=5), Monitor(), Monitor()
+    swarm.describe(mine)
+    swarm.describe(copied)
+    for step in range(5):
+        states = swarm.states()
+        states["flags"], states["position_stddev"] = flags, 0.01
+        before = states.copy()
+        answer = mine.step(step * SECOND // 50, states)
+        assert states.tobytes() == before.tobytes()
+        before.flags.writeable = False
+        other = copied.step(step * SECOND // 50, before)
+        assert answer.contacts.tobytes() == other.contacts.tobytes()
+        assert answer.predictions.tobytes() == other.predictions.tobytes()
+        swarm.move(0.02)

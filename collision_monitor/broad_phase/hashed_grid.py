@@ -82,8 +82,8 @@ def make_hashed_grid(capacity: int) -> HashedGrid:
 def regridded(box: NDArray[np.void], capacity: int) -> HashedGrid:
     """A grid of this capacity that holds those of the boxes (N,) BOX that were in a grid."""
     grid = make_hashed_grid(capacity)
-    centre = np.stack([box["x"], box["y"], box["z"]], axis=1)
-    half = np.stack([box["hx"], box["hy"], box["hz"]], axis=1)
+    centre, half = np.empty((2, len(box), 3))
+    read_boxes(box, centre, half)
     put_boxes(grid, np.flatnonzero(box["level"] >= 0).astype(np.int32), centre, half)
     return grid
 
@@ -219,6 +219,18 @@ def put_boxes(grid, which, centre, half):
     for k in range(which.size):
         i = which[k]
         put_box(grid, i, centre[i, 0], centre[i, 1], centre[i, 2], half[i, 0], half[i, 1], half[i, 2])
+
+
+@kernel
+def read_boxes(box, centre, half):
+    """The first N of the boxes (BOX) into centre, half (N, 3); those that are not in the grid with a NaN half extent,
+    which meets nothing.
+    """
+    for i in range(centre.shape[0]):
+        centre[i, 0], centre[i, 1], centre[i, 2] = box[i].x, box[i].y, box[i].z
+        half[i, 0], half[i, 1], half[i, 2] = box[i].hx, box[i].hy, box[i].hz
+        if box[i].level < 0:
+            half[i, 0] = np.nan
 
 
 @kernel

@@ -29,7 +29,7 @@ PAIR = np.dtype(
         ("since", np.float64),  # s after the monitor's origin: when it began to touch
         ("touching", np.uint8),
         ("touched", np.uint8),  # the same, one step before
-        ("leaving", np.uint8),  # reported once more (END), then dropped
+        ("leaving", np.uint8),  # gone with the next step: certified apart for a while, or reported once more (END)
     ]
 )
 
@@ -54,7 +54,7 @@ END: Final = int(Phase.END)
 @device
 def has_changed(bodies, event):
     """Does the event rest on a motion that no longer holds?"""
-    return bodies.motion[event.i].version != event.version_i or bodies.motion[event.j].version != event.version_j
+    return bodies.version[event.i] != event.version_i or bodies.version[event.j] != event.version_j
 
 
 @kernel
@@ -68,7 +68,7 @@ def unite(bodies, pairs, events, due, order, new_pairs, new_events):
     while k < pairs.size or m < order.size:
         if k < pairs.size:
             i, j = pairs[k].i, pairs[k].j
-            key = (np.uint64(bodies.motion[i].id) << np.uint64(32)) | np.uint64(bodies.motion[j].id)
+            key = (np.uint64(bodies.id[i]) << np.uint64(32)) | np.uint64(bodies.id[j])
             gone = not (bodies.used[i] and bodies.used[j]) or key != pairs[k].key
             changed = has_changed(bodies, events[k])
             if gone or pairs[k].leaving == 1 or (changed and pairs[k].touching == 0):
@@ -180,22 +180,25 @@ def _ask_for(table, bodies, i):
 
 @kernel
 def examine(
-    table, parts, bodies, pairs, events, now, margin, stale_acceleration, tolerance, budget, results, later, scratch
+    table, parts, bodies, pairs, events, which, now, margin, stale_acceleration, tolerance, budget, results, later,
+    scratch,
 ):  # fmt: skip
-    """Look at every active pair at `now`: contact into results (n, RESULT), and what does not touch is predicted on.
+    """Look at the active pairs `which` (M,) at `now`: contact into results (n, RESULT), and what does not touch is
+    predicted on.
 
-    Pairs that stay active, or have just ended, are moved to the front of pairs and events; those that are certified
-    apart for a while go into `later` (IMPACT). Returns (active, later, narrow-phase tests, impact queries).
+    All that is known of a pair stays at its index; it is `leaving` where it has just ended, or is certified apart for a
+    while: then its event goes into `later` (IMPACT). Returns (later, narrow-phase tests, impact queries).
     """
-    n = n_later = tests = queries = 0
-    for k in range(pairs.size):
-        if k + AHEAD < pairs.size:
-            _ask_for(table, bodies, pairs[k + AHEAD].i)
-            _ask_for(table, bodies, pairs[k + AHEAD].j)
-        i, j = pairs[k].i, pairs[k].j
-        touching, made = body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, scratch, results[n])
-        tests += made
+    n_later = tests = queries = 0
+    for at in range(which.size):
+        if at + AHEAD < which.size:
+            _ask_for(table, bodies, pairs[which[at + AHEAD]].i)
+            _ask_for(table, bodies, pairs[which[at + AHEAD]].j)
+        k = which[at]
         pair, event = pairs[k], events[k]
+        i, j = pair.i, pair.j
+        touching, made = body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, scratch, results[k])
+        tests += made
         stays = touching
         if not touching:
             predicted = bodies.motion[i].time == now or bodies.motion[j].time == now
@@ -208,12 +211,8 @@ def examine(
                         n_later += 1
                     else:
                         stays = True
-        if stays or pair.touched == 1:
-            pairs[n] = pair
-            events[n] = event
-            if touching and pairs[n].touched == 0:
-                pairs[n].since = now
-            pairs[n].touching = 1 if touching else 0
-            pairs[n].leaving = 0 if stays else 1
-            n += 1
-    return n, n_later, tests, queries
+        if touching and pair.touched == 0:
+            pair.since = now
+        pair.touching = 1 if touching else 0
+        pair.leaving = 0 if stays else 1
+    return n_later, tests, queries

@@ -95,7 +95,7 @@ def keep_checked(bodies, allowed, pairs):
             continue
         if (bodies.group[i] & bodies.mask[j]) == 0 or (bodies.group[j] & bodies.mask[i]) == 0:
             continue
-        if _allowed(allowed, bodies.motion[i].id, bodies.motion[j].id):
+        if _allowed(allowed, bodies.id[i], bodies.id[j]):
             continue
         pairs[n, 0], pairs[n, 1] = i, j
         n += 1

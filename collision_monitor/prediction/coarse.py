@@ -21,6 +21,7 @@ from collision_monitor.prediction.active_pairs import (
     UNRESOLVED,
     has_changed,
 )
+from collision_monitor.prediction.event_list import sort_order
 from collision_monitor.prediction.motion import (
     Bodies,
     half_acceleration,
@@ -54,7 +55,7 @@ def bound_impact(bodies, i, j, begin, end, margin, event):
 
     event.status = CLEAR where they do not, and the bodies cannot.
     """
-    if bodies.motion[i].id > bodies.motion[j].id:
+    if bodies.id[i] > bodies.id[j]:
         i, j = j, i
     A, B = bodies.motion[i], bodies.motion[j]
     event.status = CLEAR
@@ -68,8 +69,8 @@ def bound_impact(bodies, i, j, begin, end, margin, event):
     if first > last:
         return
     event.i, event.j = i, j
-    event.key = (np.uint64(A.id) << np.uint64(32)) | np.uint64(B.id)
-    event.version_i, event.version_j = A.version, B.version
+    event.key = (np.uint64(bodies.id[i]) << np.uint64(32)) | np.uint64(bodies.id[j])
+    event.version_i, event.version_j = bodies.version[i], bodies.version[j]
     event.shape_i, event.shape_j = bodies.first_shape[i], bodies.first_shape[j]
     event.lower, event.upper = begin + first, inf
     event.status, event.method = UNRESOLVED, BOUND_ONLY
@@ -146,14 +147,15 @@ def relative_now(bodies, i, j, now):
 
 
 @kernel
-def leave(bodies, pairs, events, now, margin, stale_acceleration, results, later):
-    """As `active_pairs.examine`, for pairs that nobody looks at in this step.
+def leave(bodies, pairs, events, which, now, margin, stale_acceleration, results, later):
+    """As `active_pairs.examine`, for the pairs `which` (M,) that nobody looks at in this step.
 
     Who touched goes on touching, UNRESOLVED, with the distance of the centres and a bound that holds whatever it is.
-    Who did not is UNRESOLVED from now on. Where the bounding spheres are apart, neither. Returns (active, later).
+    Who did not is UNRESOLVED from now on. Where the bounding spheres are apart, neither. Returns the number in `later`.
     """
-    n = n_later = 0
-    for k in range(pairs.size):
+    n_later = 0
+    for at in range(which.size):
+        k = which[at]
         pair, event = pairs[k], events[k]
         i, j = pair.i, pair.j
         px, py, pz, age_i, age_j = relative_now(bodies, i, j, now)
@@ -174,15 +176,11 @@ def leave(bodies, pairs, events, now, margin, stale_acceleration, results, later
                 else:
                     event.lower = min(since, now)  # who waits longest is looked at first
                     stays = True
-        if stays or pair.touched == 1:
-            pairs[n] = pair
-            events[n] = event
-            pairs[n].touching = 1 if touching else 0
-            pairs[n].leaving = 0 if stays else 1
-            if touching:
-                _write_bound(bodies, i, j, px, py, pz, distance, reach, age_i, age_j, results[n])
-            n += 1
-    return n, n_later
+        if touching:
+            _write_bound(bodies, i, j, px, py, pz, distance, reach, age_i, age_j, results[k])
+        pair.touching = 1 if touching else 0
+        pair.leaving = 0 if stays else 1
+    return n_later
 
 
 @device
@@ -203,6 +201,41 @@ def _write_bound(bodies, i, j, px, py, pz, distance, reach, age_i, age_j, result
     result[STATUS] = UNRESOLVED
 
 
+_WAIT = np.dtype([("lower", np.float64), ("key", np.uint64)])
+"""Since when an active pair waits (s), and what decides among equals; sorted as events are."""
+
+
+@kernel
+def _by_turns(bodies, pairs, events, step, waits, order, turns):
+    """`urgency` into turns (n,) int64; waits (n,) _WAIT and order (n,) int64: scratch. Returns how many are cheap."""
+    for k in range(pairs.size):
+        waits[k].lower = events[k].lower
+        waits[k].key = ((pairs[k].key ^ step) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(32)
+    sort_order(waits, order, turns)
+    n = left = 0
+    for k in order:
+        if is_cheap(bodies, pairs[k].i, pairs[k].j):
+            turns[n] = k
+            n += 1
+        else:
+            order[left] = k
+            left += 1
+    cheap = n
+    apart = touched = 0  # how far each of the two has come
+    while n < pairs.size:
+        while apart < left and pairs[order[apart]].touched == 1:
+            apart += 1
+        if apart < left:
+            turns[n] = order[apart]
+            n, apart = n + 1, apart + 1
+        while touched < left and pairs[order[touched]].touched == 0:
+            touched += 1
+        if touched < left:
+            turns[n] = order[touched]
+            n, touched = n + 1, touched + 1
+    return cheap
+
+
 def urgency(
     bodies: Bodies, pairs: NDArray[np.void], events: NDArray[np.void], step: int
 ) -> tuple[NDArray[np.int64], int]:
@@ -211,12 +244,6 @@ def urgency(
     The rest by turns: those that did not touch, since their certified time ran out, and those that did, since they were
     looked at last. Ties change from step to step, so that nobody waits forever.
     """
-    i, j = pairs["i"], pairs["j"]
-    radius, spin = bodies.motion["radius"], bodies.spin_radius
-    cheap = ~(np.isfinite(radius[i]) & np.isfinite(radius[j])) | ((spin[i] == 0.0) & (spin[j] == 0.0))
-    ties = ((pairs["key"] ^ np.uint64(step)) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(32)
-    by_age = np.lexsort((ties, events["lower"]))
-    touched = pairs["touched"][by_age] == 1
-    turn = np.empty(len(pairs), np.int64)
-    turn[by_age] = np.where(touched, np.cumsum(touched), np.cumsum(~touched))
-    return np.lexsort((pairs["touched"], turn, ~cheap)), int(np.count_nonzero(cheap))
+    order, turns = np.empty((2, len(pairs)), np.int64)
+    cheap = _by_turns(bodies, pairs, events, np.uint64(step), np.empty(len(pairs), _WAIT), order, turns)
+    return turns, int(cheap)

@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
+from collision_monitor.prediction.motion import Bodies
 from collision_monitor.prediction.time_of_impact import BOUND_ONLY, HIT, IMPACT, UNRESOLVED
 
 Events = NDArray[np.void]
+Versions = NDArray[np.uint32]
 
 
 @device
@@ -57,17 +59,30 @@ def sort_order(events, order, spare):
 
 
 @inlined
-def _holds(motion, event):
+def _holds(version, event):
     """Does the event rest on motions that have not changed since?"""
-    return motion[event.i].version == event.version_i and motion[event.j].version == event.version_j
+    return version[event.i] == event.version_i and version[event.j] == event.version_j
 
 
 @kernel
-def take_due(events, motion, now, due):
+def count_until(events, time):
+    """How many events at the front (sorted) begin by this time (s)."""
+    low, high = 0, events.size
+    while low < high:
+        middle = (low + high) // 2
+        if events[middle].lower <= time:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@kernel
+def take_due(events, version, now, due):
     """Events at the front (sorted) that are due by `now` and still hold, into due; returns (how many passed, due)."""
     passed = n = 0
     while passed < events.size and events[passed].lower <= now:
-        if _holds(motion, events[passed]):
+        if _holds(version, events[passed]):
             due[n] = events[passed]
             n += 1
         passed += 1
@@ -75,11 +90,11 @@ def take_due(events, motion, now, due):
 
 
 @kernel
-def merge(old, new, order, motion, merged):
+def merge(old, new, order, version, merged):
     """old, and new in its order, both sorted, into merged; what no longer holds is left out. Returns the length."""
     i = k = n = 0
     while i < old.size or k < new.size:
-        if i < old.size and not _holds(motion, old[i]):
+        if i < old.size and not _holds(version, old[i]):
             i += 1
         elif k >= new.size or (i < old.size and not _before(new[order[k]], old[i])):
             merged[n] = old[i]
@@ -107,21 +122,21 @@ def _place(key, new, place):
     return at
 
 
-def keep_first(new: Events, motion: NDArray[np.void], pending: Events, pairs: NDArray[np.void]) -> int:
+def keep_first(new: Events, bodies: Bodies, pending: Events, pairs: NDArray[np.void]) -> int:
     """Move those of `new` to the front that are the first impact of their pair; returns how many.
 
     Where a pair was predicted further, it may have an earlier impact: in `pending`, or in the active pairs, which are
     looked at in every step. An earlier one that was not sure to happen ends where the later one is sure.
     """
     room = np.empty(4 << (2 * len(new)).bit_length(), np.int32)
-    return int(_keep_first(new, motion, pending, pairs, room, np.ones(len(new), np.bool_)))
+    return int(_keep_first(new, bodies, pending, pairs, room, np.ones(len(new), np.bool_)))
 
 
 @kernel
-def _keep_first(new, motion, pending, pairs, room, keep):
+def _keep_first(new, bodies, pending, pairs, room, keep):
     later = 0
     for k in range(new.size):
-        later += _was_predicted(new[k], motion)
+        later += _was_predicted(new[k], bodies)
     if later == 0:
         return new.size
     size = 4
@@ -130,11 +145,11 @@ def _keep_first(new, motion, pending, pairs, room, keep):
     place = room[:size]
     place[:] = -1
     for k in range(new.size):
-        if _was_predicted(new[k], motion):
+        if _was_predicted(new[k], bodies):
             place[_place(new[k].key, new, place)] = k
     for k in range(pending.size):
         at = place[_place(pending[k].key, new, place)]
-        if at >= 0 and _holds(motion, pending[k]):
+        if at >= 0 and _holds(bodies.version, pending[k]):
             keep[at] = False
             if pending[k].status == UNRESOLVED and new[at].status == HIT:
                 lower = pending[k].lower
@@ -156,9 +171,9 @@ def _keep_first(new, motion, pending, pairs, room, keep):
 
 
 @inlined
-def _was_predicted(event, motion):
+def _was_predicted(event, bodies):
     """Was its pair predicted before this step, by motions that still hold?"""
-    return min(motion[event.i].covered, motion[event.j].covered) > -inf
+    return min(bodies.motion[event.i].covered, bodies.motion[event.j].covered) > -inf
 
 
 class EventList:
@@ -177,27 +192,27 @@ class EventList:
         """Forget all events."""
         self.events = self._room[:0]
 
-    def take_due(self, motion: NDArray[np.void], now: float) -> Events:
-        """Take off and return what is due by `now` and whose bodies' motion (N,) still holds, in order."""
-        due = np.empty(int(np.searchsorted(self.events["lower"], now, side="right")), IMPACT)
-        passed, n = take_due(self.events, motion, now, due)
+    def take_due(self, version: Versions, now: float) -> Events:
+        """Take off and return what is due by `now`, and what of it rests on motions that are still these, in order."""
+        due = np.empty(count_until(self.events, now), IMPACT)
+        passed, n = take_due(self.events, version, now, due)
         self.events = self.events[passed:]
         return due[:n]
 
-    def replace(self, which: NDArray[np.int64], new: Events, motion: NDArray[np.void]) -> None:
+    def replace(self, which: NDArray[np.int64], new: Events, version: Versions) -> None:
         """`add`, in place of the events at the indices `which`."""
         kept = np.ones(len(self.events), np.bool_)
         kept[which] = False
         self.events = self.events.compress(kept)
-        self.add(new, motion)
+        self.add(new, version)
 
-    def add(self, new: Events, motion: NDArray[np.void]) -> None:
+    def add(self, new: Events, version: Versions) -> None:
         """Merge `new` in, in any order, and drop what no longer holds."""
         need = len(self.events) + len(new)
         if need > len(self._spare):
             self._spare = np.empty(2 * need, IMPACT)
         order, spare = np.empty((2, len(new)), np.int64)
         sort_order(new, order, spare)
-        n = merge(self.events, new, order, motion, self._spare)
+        n = merge(self.events, new, order, version, self._spare)
         self._room, self._spare = self._spare, self._room
         self.events = self._room[:n]

@@ -56,7 +56,7 @@ def lay_out(a: Body, b: Body, state_a: Array, state_b: Array, horizon: float) ->
         motion["rotation"] = rotation_matrix(state[:, 3:7])
         bodies.first_shape[rows] = two.bodies.first_shape[k]
         bodies.spin_radius[rows] = two.bodies.spin_radius[k]
-    bodies.motion["id"] = np.arange(2 * count)
+    bodies.id[:] = np.arange(2 * count)
     pairs = np.arange(2 * count, dtype=np.int32).reshape(2, count).T.copy()
     return Scene(two.table, two.parts, bodies), pairs
 

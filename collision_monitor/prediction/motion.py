@@ -37,8 +37,6 @@ MOTION = np.dtype(
         ("wx", np.float64),  # rad/s
         ("wy", np.float64),
         ("wz", np.float64),
-        ("id", np.uint32),
-        ("version", np.uint32),  # counts up whenever the motion changes
         ("rotation", np.float64, (3, 3)),  # at `time`
     ]
 )
@@ -49,6 +47,8 @@ class Bodies(NamedTuple):
     """N slots of bodies, structure of arrays but for the motions. World frame."""
 
     used: Any  # (N,) bool: the slot holds a body
+    id: Any  # (N,) uint32
+    version: Any  # (N,) uint32: counts up whenever the motion changes
     static: Any  # (N,) bool
     seen: Any  # (N,) bool: there is a state (always for static bodies)
     group: Any  # (N,) uint32
@@ -85,6 +85,8 @@ def make_bodies(capacity: int) -> Bodies:
     motion["covered"] = -np.inf
     return Bodies(
         used=np.zeros(n, np.bool_),
+        id=np.zeros(n, np.uint32),
+        version=np.zeros(n, np.uint32),
         static=np.zeros(n, np.bool_),
         seen=np.zeros(n, np.bool_),
         group=np.zeros(n, np.uint32),

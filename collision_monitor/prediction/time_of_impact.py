@@ -277,7 +277,7 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
     event.status = CLEAR where there is none. Overlapping or within `margin` (m) already is an impact at begin.
     The reference motions and their tubes are read from `bodies`; ids decide which body counts as i.
     """
-    if bodies.motion[i].id > bodies.motion[j].id:
+    if bodies.id[i] > bodies.id[j]:
         i, j = j, i
     A, B = bodies.motion[i], bodies.motion[j]
     event.status = CLEAR
@@ -294,8 +294,8 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
         if first > last:
             return 0
     event.i, event.j = i, j
-    event.key = (np.uint64(A.id) << np.uint64(32)) | np.uint64(B.id)
-    event.version_i, event.version_j = A.version, B.version
+    event.key = (np.uint64(bodies.id[i]) << np.uint64(32)) | np.uint64(bodies.id[j])
+    event.version_i, event.version_j = bodies.version[i], bodies.version[j]
     a, b = bodies.first_shape[i], bodies.first_shape[j]
     if bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0 and reach < inf and bent == 0.0:
         _sphere_impact(A, B, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, begin, first, end, event)

@@ -204,6 +204,27 @@ def find_moved(bodies, spread, sigmas, count, now, horizon, stale_acceleration, 
     return n, n_ending
 
 
+@kernel
+def remember_cover(bodies, which):
+    """Bodies `which` (M,) have been predicted until their cover times, by this motion."""
+    for i in which:
+        bodies.motion[i].covered = bodies.motion[i].cover
+
+
+@kernel
+def count_bodies(bodies, count, now, stale_after):
+    """How many of the first `count` slots hold bodies that are static, that nothing was heard of, and that are stale:
+    that nothing was heard of for stale_after (s).
+    """
+    static = unseen = stale = 0
+    for i in range(count):
+        if bodies.used[i]:
+            static += bodies.static[i]
+            unseen += not bodies.seen[i]
+            stale += bodies.seen[i] and not bodies.static[i] and now - bodies.time[i] > stale_after
+    return static, unseen, stale
+
+
 @device
 def _is_covered(bodies, spread, sigmas, i, now, horizon, stale_acceleration):
     """Is body i as certain as its box allows for?"""
@@ -280,7 +301,7 @@ def restart_motion(
     for k in range(which.size):
         i = which[k]
         m = bodies.motion[i]
-        m.version += np.uint32(1)
+        bodies.version[i] += np.uint32(1)
         age = 0.0 if bodies.static[i] else now - bodies.time[i]
         m.vx, m.vy, m.vz = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
         m.wx, m.wy, m.wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]

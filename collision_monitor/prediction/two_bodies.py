@@ -86,8 +86,9 @@ def _set_motion(
 ) -> None:
     bodies.first_shape[k] = slots[0]
     radius = float((np.linalg.norm(table.local_position[slots], axis=1) + table.radius[slots]).max())
+    bodies.id[k] = k
     motion = bodies.motion[k]
-    motion["id"], motion["radius"], motion["cover"] = k, radius, horizon
+    motion["radius"], motion["cover"] = radius, horizon
     motion["x"], motion["y"], motion["z"] = body.motion.pose.position
     motion["vx"], motion["vy"], motion["vz"] = body.motion.linear
     motion["ax"], motion["ay"], motion["az"] = body.motion.acceleration

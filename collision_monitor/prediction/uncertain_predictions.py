@@ -55,7 +55,7 @@ def renew(entries, pairs, bodies, spread, now, renewed):
     motion = bodies.motion
     for k in range(entries.size):
         entry = entries[k]
-        holds = motion[entry.i].version == entry.version_i and motion[entry.j].version == entry.version_j
+        holds = bodies.version[entry.i] == entry.version_i and bodies.version[entry.j] == entry.version_j
         if holds and entry.until >= now:
             renewed[n] = entry
             n += 1
@@ -64,13 +64,13 @@ def renew(entries, pairs, bodies, spread, now, renewed):
         widened = motion[i].spread_0 + motion[i].spread_1 + motion[j].spread_0 + motion[j].spread_1 > 0.0
         if not (widened or is_uncertain(spread, i) or is_uncertain(spread, j)):
             continue
-        if motion[i].id > motion[j].id:
+        if bodies.id[i] > bodies.id[j]:
             i, j = j, i
         entry = renewed[n]
-        entry.key = (np.uint64(motion[i].id) << np.uint64(32)) | np.uint64(motion[j].id)
+        entry.key = (np.uint64(bodies.id[i]) << np.uint64(32)) | np.uint64(bodies.id[j])
         entry.until = min(motion[i].cover, motion[j].cover)
         entry.i, entry.j = i, j
-        entry.version_i, entry.version_j = motion[i].version, motion[j].version
+        entry.version_i, entry.version_j = bodies.version[i], bodies.version[j]
         n += 1
     return n
 

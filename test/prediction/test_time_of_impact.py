@@ -34,8 +34,8 @@ class PairScene:
         self.pairs = np.arange(n, dtype=np.int32).reshape(-1, 2)
         self.bodies.first_shape[:] = np.arange(n)
         self.bodies.spin_radius[:] = np.where(self.table.kind[:n] == ShapeType.SPHERE, 0.0, self.table.radius[:n])
+        self.bodies.id[:] = np.arange(n)
         m = self.motion = self.bodies.motion
-        m["id"] = np.arange(n)
         m["radius"] = self.table.radius[:n]
         m["cover"] = HORIZON
         m["tube_0"] = m["tube_1"] = tube
