@@ -466,7 +466,7 @@ def box_pairs(centre: ArrayLike, half: ArrayLike, starts: ArrayLike | None = Non
     if starting.shape != (n,):
         raise InputError(f"starts: expected {n} flags, one for each box, got an array of shape {starting.shape}")
     grid = make_grid(n)
-    pairs = np.empty((4 * n + 16, 2), np.int32)
+    pairs = np.empty((16 * n + 16, 2), np.int32)  # more than most scenes have; what is not written costs nothing
     count = _box_pairs(centre, half, starting, grid, pairs)
     if count > len(pairs):
         pairs = np.empty((count, 2), np.int32)
