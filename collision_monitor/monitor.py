@@ -184,6 +184,8 @@ class Monitor:
         self._candidates = np.zeros((1024, 2), np.int32)
         self._columns = make_columns()
         self._last: StepResult | None = None
+        if self._has_budget:
+            self._prepare_for_budget()
 
     # ------------------------------------------------------------------ settings
 
@@ -207,7 +209,7 @@ class Monitor:
         if "threads" in changed:
             self._use_threads()
         if self._has_budget:
-            self._plant_trees()
+            self._prepare_for_budget()
 
     def _use_threads(self) -> None:
         if self._pool is not None:
@@ -485,6 +487,12 @@ class Monitor:
         if p.budget_ms < NO_BUDGET and self._timed:
             return TimeBudget(self.clock, 1e-3 * p.budget_ms, p.pairs_per_step)
         return PairBudget(p.pairs_per_step) if self._has_budget or self._deferred else None
+
+    def _prepare_for_budget(self) -> None:
+        """Let no step wait for what only some of those with a budget need: the trees, and kernels from the cache."""
+        none, scratch = np.empty(0, IMPACT), self._scratch[0]
+        coarse.tighten(self._bodies, self._plant_trees(), none, 0.0, 0.0, scratch)
+        self._impacts(coarse.refine, none, 0.0, scratch)
 
     def _plant_tree(self, i: int) -> None:
         self._tree_of[i] = body_tree(self._shapes.table, self._parts.next, int(self._bodies.first_shape[i]))

@@ -98,3 +98,17 @@ def test_nothing_is_compiled_after_the_warm_up(session: str) -> None:
     answer = json.loads(told)
     assert answer["compiled"] == []
     assert answer["contacts"] > 10
+
+
+@pytest.mark.parametrize("when", ["Monitor(limited)", "Monitor(); monitor.profile = limited"])
+def test_no_step_with_a_budget_is_the_first_to_load_a_kernel(when: str) -> None:
+    """28 ms in a step of 1.6: what the first ones had no time for was loaded by the first that had."""
+    program = (
+        "from collision_monitor.monitor import Monitor, Profile\n"
+        "from collision_monitor.prediction import coarse\n"
+        "limited = Profile(budget_ms=1.0)\n"
+        f"monitor = {when}\n"
+        "print(len(coarse.refine.signatures), len(coarse.tighten.signatures))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300)
+    assert done.stdout.split() == ["1", "1"], done.stderr
