@@ -5,8 +5,10 @@
 
 Sustained: messages of 1 kB written as fast as the disk takes them, none dropped. Step: the same steps alone, beside
 20,000 messages/s that nobody keeps, and beside a recorder that does, in blocks that take turns within one run, so that
-whatever else the machine does meets all alike. Killed: a process that records 20,000 messages/s is killed (SIGKILL) at
-a random moment; lost is the time between the last message in the file and the signal.
+whatever else the machine does meets all alike. Beside its work: of the last, the mean of all steps over the mean of
+those during which the recorder's thread slept, which an uneven machine hardly changes. Killed: a process that records
+20,000 messages/s is killed (SIGKILL) at a random moment; lost is the time between the last message in the file and the
+signal.
 """
 
 from __future__ import annotations
@@ -21,7 +23,9 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -119,10 +123,39 @@ class Nobody:
         """As of a Recorder."""
 
 
+def watched(recorder: Recorder) -> list[tuple[float, float]]:
+    """When the recorder's thread begins and ends its turns and flushes, from now on (s)."""
+    spans: list[tuple[float, float]] = []
+    parts: Any = recorder._parts
+
+    def watch(work: Callable[..., Any]) -> Callable[..., Any]:
+        def run(*given: Any) -> Any:
+            begin = time.perf_counter()
+            done = work(*given)
+            spans.append((begin, time.perf_counter()))
+            return done
+
+        return run
+
+    parts.write, parts.flush = watch(parts.write), watch(parts.flush)
+    return spans
+
+
+def beside_its_work(steps: list[tuple[float, float]], spans: list[tuple[float, float]]) -> float:
+    """Mean duration of the steps (begin, end; in order) over that of those which none of the spans meets."""
+    begin, end = np.array(steps).T
+    met = np.zeros(len(steps), np.bool_)
+    for since, until in spans:
+        met[np.searchsorted(end, since) : np.searchsorted(begin, until)] = True
+    took = end - begin
+    return float(took.mean() / took[~met].mean())
+
+
 def step_cost(folder: Path, rounds: int, steps: int) -> dict[str, float]:
     """Duration of a step with nothing beside it, beside messages that nobody keeps, and beside a recorder.
 
-    Ratios: medians over rounds of three blocks, each the same steps in a pipeline of its own. write_us: of a `write`.
+    Ratios: medians over rounds of three blocks, each the same steps in a pipeline of its own; beside_its_work: see
+    there. write_us: of a `write`.
     """
     scene, data = Crossing(), [payload(k) for k in range(64)]
     pipelines = [Pipeline("balanced") for _ in range(3)]
@@ -136,6 +169,7 @@ def step_cost(folder: Path, rounds: int, steps: int) -> dict[str, float]:
     others = np.empty((rounds, 3))
     writing, written, recorded = 0.0, 0, 0.0
     recorder = Recorder(folder / "steps.mcap", TYPES, pipelines[0].metadata(), patient=False)
+    spans, recorded_steps = watched(recorder), []
     takers: tuple[Recorder | Nobody | None, ...] = (None, Nobody(), recorder)
     for k in range(3 * rounds):
         arm = k % 3 if k // 3 % 2 else 2 - k % 3  # to and fro: drift meets all alike
@@ -145,7 +179,10 @@ def step_cost(folder: Path, rounds: int, steps: int) -> dict[str, float]:
             states = scene.states(step)
             before = time.perf_counter()
             outputs = pipelines[arm].on_states(states)
-            in_block.append(time.perf_counter() - before)
+            after = time.perf_counter()
+            in_block.append(after - before)
+            if taker is recorder:
+                recorded_steps.append((before, after))
             assert outputs is not None
             if taker is not None:
                 before = time.perf_counter()
@@ -175,6 +212,7 @@ def step_cost(folder: Path, rounds: int, steps: int) -> dict[str, float]:
         "ratio_10_percent": float(np.quantile(on / off, 0.1)),
         "ratio_90_percent": float(np.quantile(on / off, 0.9)),
         "ratio_of_means": float(on.mean() / off.mean()),
+        "beside_its_work": beside_its_work(recorded_steps, spans),
         "ratio_nobody": float(np.median(calls / off)),
         "ratio_to_nobody": float(np.median(on / calls)),
         "quiet_blocks": int(quiet.sum()),
@@ -290,7 +328,8 @@ def main() -> None:
         f"{step['messages_per_s']:,.0f} messages/s: ratio {step['ratio']:.3f} "
         f"({step['ratio_10_percent']:.3f} to {step['ratio_90_percent']:.3f}), {step['ratio_quiet']:.3f} in the "
         f"{step['quiet_blocks']} of {ROUNDS[args.quick]} rounds when others took under {QUIET} cores, "
-        f"{step['ratio_of_means']:.3f} of the means; {step['ratio_nobody']:.3f} beside messages that nobody keeps, "
+        f"{step['ratio_of_means']:.3f} of the means, {step['beside_its_work']:.3f} beside its work; "
+        f"{step['ratio_nobody']:.3f} beside messages that nobody keeps, "
         f"{step['ratio_to_nobody']:.3f} from there to recording; {step['write_us']:.1f} µs for each write"
     )
     lost = kill["lost_s"]
