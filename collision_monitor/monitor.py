@@ -271,7 +271,7 @@ class Monitor:
             raise UnsupportedError(f"object {d.object_id}: a HalfSpace has no end and can only be static")
         planar = self._is_planar(d)
         pose = flat_pose(d.pose) if planar and d.pose is not None else d.pose
-        modelled = monitored_model(d.shapes, self._model_of(d))
+        modelled = monitored_model(d.shapes, self.model_of(d))
         slots: list[int] = []
         try:
             for shape, offset in modelled.pieces:
@@ -318,11 +318,14 @@ class Monitor:
         self._renewed.add(i)
         self._ids = np.zeros(0, np.uint32)
 
-    def _model_of(self, d: ObjectDescription) -> Model:
-        """The description's own, or else the profile's for shapes of its class."""
-        kind = shape_class(d.shapes)
-        if d.model is not Model.AUTO or kind is None:
-            return d.model
+    def model_of(self, description: ObjectDescription) -> Model:
+        """What stands for such an object: the description's own choice, or else the profile's for its class of shapes.
+
+        An object that was described before another choice of the profile keeps its model until it is described again.
+        """
+        kind = shape_class(description.shapes)
+        if description.model is not Model.AUTO or kind is None:
+            return description.model
         return parse_model(getattr(self._profile, f"model_{kind}"))
 
     def _is_planar(self, d: ObjectDescription) -> bool:

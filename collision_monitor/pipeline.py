@@ -22,6 +22,7 @@ from collision_monitor.codec import (
     decode_parameter_event,
     decode_states,
     encode_contacts,
+    encode_descriptions,
     encode_parameter_event,
     encode_predictions,
     encode_status,
@@ -65,6 +66,18 @@ class Outputs:
     result: StepResult
     digest: int
     limit: bytes | None = None
+
+
+@dataclass(frozen=True)
+class SettingsChange:
+    """What a session needs where settings change, in this order: complete CDR messages.
+
+    settings: the ParameterEvent. shapes: an ObjectDescriptionArray of the objects that have another model from now on;
+    None: there are none.
+    """
+
+    settings: bytes
+    shapes: bytes | None
 
 
 class Pipeline:
@@ -149,7 +162,10 @@ class Pipeline:
         return self._outputs(result)
 
     def on_settings(self, data: bytes) -> None:
-        """A ParameterEvent: settings that hold from here on, as `change_settings` gave it."""
+        """A ParameterEvent: settings that hold from here on, as `change_settings` gave it.
+
+        Objects keep their models until they are described again, as a session does behind it.
+        """
         try:
             changed = decode_parameter_event(data).changed
             changes = {_FIELD.get(name, name): value for name, value in changed.items() if name not in self._kept}
@@ -157,12 +173,20 @@ class Pipeline:
         except (MessageError, ProfileError) as error:
             self.monitor.refuse(Refusal.MALFORMED, str(error))
 
-    def change_settings(self, profile: Profile, stamp_ns: int, node: str = "") -> bytes:
-        """Go by this profile from here on. Returns what changes, as the ParameterEvent that a replay needs here."""
-        changes = self.monitor.profile.differences(profile)
+    def change_settings(self, profile: Profile, stamp_ns: int, node: str = "") -> SettingsChange:
+        """Go by this profile from here on; objects whose model it chooses otherwise are described again."""
+        monitor = self.monitor
+        changes = monitor.profile.differences(profile)
+        objects = list(self.objects.values())
+        models = list(map(monitor.model_of, objects))
         self._limit = changes.get(LIMIT, self._limit)
-        self.monitor.profile = profile
-        return encode_parameter_event(stamp_ns, node, {_PARAMETER.get(name, name): changes[name] for name in changes})
+        monitor.profile = profile
+        named = {_PARAMETER.get(name, name): value for name, value in changes.items()}
+        remodelled = [it for it, model in zip(objects, models, strict=True) if monitor.model_of(it) is not model]
+        shapes = encode_descriptions(stamp_ns, self.frame_id, remodelled) if remodelled else None
+        if shapes is not None:
+            self.on_shapes(shapes)
+        return SettingsChange(encode_parameter_event(stamp_ns, node, named), shapes)
 
     # -- out
 

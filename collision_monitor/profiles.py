@@ -71,7 +71,7 @@ class Profile:
     pairs_per_step: int = number(
         NO_LIMIT, 1, NO_LIMIT, "1", "Pairs for a step, the same way: answers that depend on no clock."
     )
-    model_primitive: str = choice(_MODELS, "For boxes, capsules, cylinders and cones, as they are described.")
+    model_primitive: str = choice(_MODELS, "For boxes, capsules, cylinders and cones that choose none.")
     model_hull: str = choice(_MODELS, "The same for convex hulls.")
     model_mesh: str = choice(_MODELS, "The same for meshes; auto: the convex hull of concave ones.")
     model_compound: str = choice(_MODELS, "The same for objects of several shapes.")

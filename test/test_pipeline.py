@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from collision_monitor import codec, records
 from collision_monitor.codec import (
     decode_contacts,
+    decode_descriptions,
     decode_predictions,
     decode_status,
     encode_descriptions,
@@ -20,8 +21,9 @@ from collision_monitor.codec import (
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import Refusal
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import HalfSpace, Sphere
+from collision_monitor.geometry.shapes import Box, HalfSpace, Sphere
 from collision_monitor.pipeline import Outputs, Pipeline
+from collision_monitor.records import Model
 
 STEP = 10_000_000
 START = 1_000_000_000_000
@@ -310,3 +312,28 @@ def test_no_message_makes_the_pipeline_raise(data: st.DataObject) -> None:
     outputs = run.step(rows((1, 0, 0), (2, 0.5, 0)))
     outputs = outputs or run.step(rows((1, 0, 0), (2, 0.5, 0)))  # the first one may be refused for its stamp
     assert outputs is not None
+
+
+def test_a_profile_with_other_models_holds_for_what_is_described_already() -> None:
+    """Contacts persist, what chose a model itself keeps it, and whoever gets the recorded changes says the same."""
+    boxes = [ObjectDescription(k, Box((1, 1, 1)), name=f"box {k}") for k in (1, 2)]
+    own = ObjectDescription(3, Box((1, 1, 1)), model=Model.OBB)
+    run, other = Run(*boxes, own), Run(*boxes, own)
+    told = []
+    changes: list[dict[str, Any]] = [{}, {"model_primitive": "sphere"}, {"threads": 2}, {"model_primitive": "auto"}]
+    for models in changes:
+        change = run.pipeline.change_settings(run.pipeline.monitor.profile.replace(**models), run.stamp)
+        assert (change.shapes is not None) == ("model_primitive" in models)
+        other.pipeline.on_settings(change.settings)
+        if change.shapes is not None:
+            assert [it.object_id for it in decode_descriptions(change.shapes).objects] == [1, 2]
+            other.pipeline.on_shapes(change.shapes)
+        answers = [each.step(rows((1, 0.0, 0.0), (2, 0.9, 0.0), (3, 5.0, 0.0))) for each in (run, other)]
+        assert answers[0] is not None and answers[1] is not None
+        assert answers[0].contacts == answers[1].contacts
+        assert answers[0].predictions == answers[1].predictions
+        told.append(answers[0].result.contacts[0])
+    assert [Model(row["model_a"]) for row in told] == [Model.EXACT, Model.SPHERE, Model.SPHERE, Model.EXACT]
+    begin, persist = records.Phase.BEGIN, records.Phase.PERSIST
+    assert [row["phase"] for row in told] == [begin, persist, persist, persist]
+    assert np.all(np.diff([row["duration"] for row in told]) > 0.0)

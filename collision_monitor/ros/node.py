@@ -145,8 +145,11 @@ class MonitorNode(Node):
     def _on_settings(self, profile: Profile) -> None:
         """Between two steps, like all callbacks."""
         now = self._now()
-        data = self._pipeline.change_settings(profile, now, self.get_fully_qualified_name())
-        self._record(self._settings_topic, data, now, now, settings=self._pipeline.settings())
+        change = self._pipeline.change_settings(profile, now, self.get_fully_qualified_name())
+        self._record(self._settings_topic, change.settings, now, now, settings=self._pipeline.settings())
+        if change.shapes is not None:
+            objects = tuple(self._pipeline.objects.values())
+            self._record(self._shapes_topic, change.shapes, now, now, objects=objects)
         self._times.longest_latency = profile.max_time_step
         self.get_logger().info(f"settings changed, profile {profile.name}")
 

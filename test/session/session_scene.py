@@ -79,7 +79,9 @@ def record(
         now += STEP
         if k in switches:
             change = pipeline.change_settings(switches[k], now, NODE)
-            recorder.write(SETTINGS, change, now, now, settings=pipeline.settings())
+            recorder.write(SETTINGS, change.settings, now, now, settings=pipeline.settings())
+            if change.shapes is not None:
+                recorder.write(SHAPES, change.shapes, now, now, objects=tuple(pipeline.objects.values()))
         if topic == SHAPES:
             pipeline.on_shapes(data)
             recorder.write(topic, data, now, now, objects=tuple(pipeline.objects.values()))

@@ -18,7 +18,7 @@ from collision_monitor.session import Session, Splitting
 from collision_monitor.session.history import AS_RECORDED, read_history
 from collision_monitor.session.replay import Verdict, replay
 
-FAST = Profile.named("fast").replace(horizon=1.0, contact_margin=0.01, contact_points=4)
+FAST = Profile.named("fast").replace(horizon=1.0, contact_margin=0.01, contact_points=4, model_primitive="kdop14")
 SWITCHES = {20: FAST, 35: Profile.named("exact").replace(threads=2, contact_points=2)}
 
 
