@@ -262,10 +262,17 @@ def test_settings_change_while_it_runs_and_the_session_replays(start, team, tmp_
     assert team.status(lambda s: s.step == 5).contacts == 2
     assert "out of range" in change("contact_points", 5)
 
+    assert change("model_primitive", "kdop14") == ""
+    assert "expected one of" in change("model_primitive", "potato")
+    contacts, _ = team.ask(*LYING)
+    assert {(row.model_a, row.model_b, row.phase) for row in contacts.contacts if row.id_a == 5} == {
+        (int(records.Model.KDOP14), int(records.Model.KDOP14), Contact.PERSIST)
+    }
+
     assert monitor.stop() == 0
     assert "Traceback" not in monitor.words
     report = replay(Session(tmp_path / "run.mcap"))
-    assert (report.verdict, report.steps, report.notes) == (Verdict.IDENTICAL, 5, [])
+    assert (report.verdict, report.steps, report.notes) == (Verdict.IDENTICAL, 6, [])
 
 
 @pytest.mark.parametrize("executor", ["single", "events"])
