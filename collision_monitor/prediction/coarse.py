@@ -116,7 +116,7 @@ def tighten(bodies, trees, events, now, margin, scratch):
                 event.status = CLEAR
             elif wait > 0.0:
                 px, py, pz = relative_position(A, B, begin)
-                vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
+                vx, vy, vz = relative_velocity(A, B, begin)
                 event.lower = begin + wait
                 meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, wait, event)
         event.method = TREE_BOUND

@@ -376,4 +376,5 @@ def meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, t, event):
     event.point_y = A.y + (A.vy + 0.5 * A.ay * ta) * ta + share * ny
     event.point_z = A.z + (A.vz + 0.5 * A.az * ta) * ta + share * nz
     event.normal_x, event.normal_y, event.normal_z = nx, ny, nz
+    vx, vy, vz = relative_velocity(A, B, begin + t)
     event.closing_speed = -(vx * nx + vy * ny + vz * nz)

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 import collision_monitor as cm
 from collision_monitor import Motion, Pose, contact, time_of_impact
 from collision_monitor.errors import PoseError
-from collision_monitor.records import STATE, StateFlag
+from collision_monitor.profiles import Profile
+from collision_monitor.records import STATE, Method, StateFlag
 
 SECOND = 1_000_000_000
 VALID, UNKNOWN = int(StateFlag.ACCELERATION_VALID), int(StateFlag.TWIST_UNKNOWN)
@@ -194,3 +195,24 @@ def test_an_estimated_twist_is_that_at_the_last_state() -> None:
     (prediction,) = result.predictions
     assert prediction["lower"] <= 0.9 <= prediction["upper"]  # t^2 = 1 at t = 1
     assert prediction["upper"] - prediction["lower"] < 1e-3
+
+
+@pytest.mark.parametrize("shape", [cm.Box((1.0, 0.7, 0.4)), cm.Box((0.1, 1.6, 0.1))], ids=["spheres", "sphere trees"])
+def test_a_bound_says_how_fast_they_close_when_it_begins(shape: cm.Box) -> None:
+    """Not how fast they close now: who has no time for a pair is told by the bound how urgent it is."""
+    pairs, speed, hard = 20, 0.5, 2.0
+    monitor = cm.Monitor(Profile(pairs_per_step=1))
+    rows = np.zeros(2 * pairs, STATE)
+    rows["id"], rows["quaternion"][:, 3], rows["flags"] = np.arange(2 * pairs), 1.0, VALID
+    rows["position"][:, 1], rows["position"][1::2, 0] = np.repeat(100.0 * np.arange(pairs), 2), 3.0
+    rows["linear"][::2, 0], rows["acceleration"][::2, 0] = speed, hard
+    for k in range(2 * pairs):
+        monitor.add(k, shape)
+    for step in range(3):
+        now = 0.1 * step
+        rows["position"][::2, 0] = speed * now + 0.5 * hard * now * now
+        rows["linear"][::2, 0] = speed + hard * now
+        result = monitor.step(round(now * SECOND), rows)
+        bounds = result.predictions[result.predictions["method"] == int(Method.BOUND)]
+        assert len(bounds) > pairs // 2
+        assert np.allclose(bounds["closing_speed"], speed + hard * (now + bounds["lower"]))
