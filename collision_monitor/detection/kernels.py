@@ -14,7 +14,9 @@ import numpy as np
 from numba import prange
 
 from collision_monitor._jit import device, inlined, kernel, parallel_kernel
+from collision_monitor._prefetch import prefetch
 from collision_monitor.broad_phase.dense_grid import (
+    AHEAD,
     CLASSES,
     PAD,
     STARTING,
@@ -147,6 +149,9 @@ def _gather(path: int, positions: Any, quaternions: Any, grid: Any, frame: Any, 
     gather_centres(positions, grid, begin, end)
     good = True
     for p in range(begin, end):
+        ahead = np.intp(grid.order[min(p + AHEAD, end - 1)])
+        prefetch(frame.body, ahead)
+        prefetch(quaternions, ahead)
         i = grid.order[p]
         frame.extent[0, p] = frame.body[i, 3]
         x, y, z, w = quaternions[i, 0], quaternions[i, 1], quaternions[i, 2], quaternions[i, 3]
@@ -179,6 +184,18 @@ def _boxes(a: Any, b: Any, RA: Any, RB: Any, px: float, py: float, pz: float, ou
     return True
 
 
+@inlined
+def _ask_for(table: Any, path: int, order: Any, size: Any, rotation: Any, q: Any) -> None:
+    """What a test of place q will read of it: in no order of the memory, unlike what it is a candidate of."""
+    prefetch(rotation, q)
+    prefetch(rotation, q + 1)  # the rest of it: a matrix is longer than a line
+    if path == BOXES:
+        prefetch(size, q)
+    else:
+        prefetch(table.size, np.intp(order[q]))
+        prefetch(table.margin, np.intp(order[q]))
+
+
 @device
 def _narrow(
     table: Any, path: int, limit: float, grid: Any, frame: Any, found: Any, owner: Any, count: int, hits: int,
@@ -188,6 +205,8 @@ def _narrow(
     order, centre, size, rotation = grid.order, grid.centre, frame.size, frame.rotation
     last = pair.shape[0] - 1
     for k in range(count):
+        if path != SPHERES:
+            _ask_for(table, path, order, size, rotation, np.intp(found[min(k + AHEAD, count - 1)]))
         p, q = owner[k], found[k]
         i, j = order[p], order[q]
         if i > j:
@@ -268,6 +287,10 @@ def _write(positions: Any, frame: Any, hits: Any, total: int, pairs: Any, contac
     begin, end = _block(part, frame, total)
     stride = hits.pair.shape[1]
     for k in range(begin, end):
+        ahead = hits.order[0, min(k + AHEAD, end - 1)]
+        contact = hits.contact[ahead // stride]
+        prefetch(contact, np.intp(ahead % stride))
+        prefetch(contact, np.intp(ahead % stride + 1))  # and with that the end of the one before
         at = hits.order[0, k]
         b, h = at // stride, at % stride
         i = hits.pair[b, h, 0]

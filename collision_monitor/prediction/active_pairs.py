@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._prefetch import prefetch
 from collision_monitor.narrow_phase.dispatch import contact_within
 from collision_monitor.prediction.motion import (
     place_shape,
@@ -17,7 +18,6 @@ from collision_monitor.prediction.motion import (
     relative_velocity_now,
     turn_quaternion,
 )
-from collision_monitor.prediction.prefetch import prefetch
 from collision_monitor.prediction.time_of_impact import CLEAR, body_impact, closing_speed
 from collision_monitor.records import ContactStatus, Phase
 
