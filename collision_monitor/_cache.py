@@ -23,8 +23,11 @@ _IMPORT = re.compile(
 
 
 def _path(module: str) -> Path | None:
+    """The module's file: one of this package, or one that was started or imported, such as a benchmark."""
     base = _PACKAGE.parent.joinpath(*module.split("."))
-    return next((path for path in (base.with_suffix(".py"), base / "__init__.py") if path.is_file()), None)
+    loaded = getattr(sys.modules.get(module), "__file__", None)
+    candidates = [base.with_suffix(".py"), base / "__init__.py", *([Path(loaded)] if loaded else [])]
+    return next((path for path in candidates if path.is_file()), None)
 
 
 @functools.cache

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import types
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -43,3 +45,19 @@ def test_the_same_content_gives_the_same_folder(package: Path) -> None:
     before = _cache.folder("collision_monitor.top")
     _forget()
     assert _cache.folder("collision_monitor.top") == before
+
+
+def test_a_kernel_outside_the_package_is_compiled_anew_when_the_package_changes(
+    package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A benchmark that inlines what it measures: it went on measuring the code of the day before."""
+    script = types.ModuleType("a_benchmark")
+    folder = tmp_path / "elsewhere"
+    folder.mkdir()
+    script.__file__ = str(folder / "a_benchmark.py")
+    Path(script.__file__).write_text("from collision_monitor.top import sum_of\n")
+    monkeypatch.setitem(sys.modules, "a_benchmark", script)
+    before = _cache.folder("a_benchmark")
+    (package / "bottom.py").write_text("ONE = 3\n")
+    _forget()
+    assert _cache.folder("a_benchmark") != before
