@@ -106,26 +106,31 @@ def plot(results: list[dict[str, Any]], file: Path) -> None:
     from matplotlib import pyplot
 
     scenes = [scene for scene in SCENES if any(entry["scene"] == scene for entry in results)]
-    figure, axes = pyplot.subplots(1, len(scenes), figsize=(4.2 * len(scenes), 4.6), sharey=True, squeeze=False)
+    figure, axes = pyplot.subplots(
+        1, len(scenes), figsize=(3.6 * len(scenes) + 1.6, 4.6), sharey=True, squeeze=False, layout="constrained"
+    )
+    curves: dict[str, dict[str, list[tuple[int, float]]]] = {scene: {} for scene in scenes}
+    for entry in results:
+        mine = [(f"ours, {row['threads']} thr.", row["median_ms"]) for row in entry["ours"]]
+        theirs = [(row["peer"], row["total_ms"]) for row in entry["peers"] if "error" not in row]
+        for name, ms in mine + theirs:
+            curves[entry["scene"]].setdefault(name, []).append((entry["n"], ms))
+    names = sorted({name for of_scene in curves.values() for name in of_scene if not name.startswith("ours")})
+    colours = dict(zip(names, pyplot.get_cmap("tab20").colors, strict=False))
+    lines: dict[str, Any] = {}
     for axis, scene in zip(axes[0], scenes, strict=True):
-        curves: dict[str, list[tuple[int, float]]] = {}
-        for entry in results:
-            if entry["scene"] == scene:
-                for row in entry["ours"]:
-                    curves.setdefault(f"ours, {row['threads']} thr.", []).append((entry["n"], row["median_ms"]))
-                for row in entry["peers"]:
-                    if "error" not in row:
-                        curves.setdefault(row["peer"], []).append((entry["n"], row["total_ms"]))
-        last = {name: max(points) for name, points in curves.items()}
-        for name in sorted(curves, key=lambda name: (not name.startswith("ours"), -last[name][1])):
-            style = {"linewidth": 2.6, "color": "black"} if name.startswith("ours") else {"linewidth": 1.0}
+        for name, points in curves[scene].items():
+            ours = name.startswith("ours")
+            style = {"linewidth": 2.6, "color": "black"} if ours else {"linewidth": 1.0, "color": colours.get(name)}
             dashes = "--" if name == "ours, 1 thr." else "-"
-            axis.plot(*zip(*sorted(curves[name]), strict=True), dashes, marker="o", markersize=3, label=name, **style)
+            (line,) = axis.plot(*zip(*sorted(points), strict=True), dashes, marker="o", markersize=3, **style)
+            lines[name] = line
         axis.set(xscale="log", yscale="log", title=scene, xlabel="objects")
         axis.grid(which="both", linewidth=0.3)
-        axis.legend(fontsize=6)
     axes[0][0].set_ylabel("ms per frame, every pose new")
-    figure.tight_layout()
+    best = {name: min(max(of_scene[name])[1] for of_scene in curves.values() if name in of_scene) for name in lines}
+    order = sorted(lines, key=lambda name: -best[name])  # as the lines lie above each other
+    figure.legend([lines[name] for name in order], order, loc="outside right center", fontsize=7)
     figure.savefig(file, dpi=90)
 
 
