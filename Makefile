@@ -28,7 +28,7 @@ test: ## set up, lint and run every test
 	@$(BIN)/python -m pytest -n 3 --dist worksteal test/ros test/setup
 
 test-core: setup ## the tests of everything but the node and the set-up
-	@$(BIN)/python -m pytest -n auto --dist loadfile --ignore=test/ros --ignore=test/setup
+	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore=test/ros --ignore=test/setup
 
 lint: setup ## ruff and mypy --strict
 	@$(BIN)/ruff check .

@@ -28,6 +28,7 @@ from collision_monitor.geometry.shapes import (
     Sphere,
 )
 from collision_monitor.pipeline import Pipeline
+from collision_monitor.profiles import Profile
 from collision_monitor.snapshot import Snapshot
 
 START, STEP = 1_000_000_000_000, 20_000_000
@@ -98,7 +99,8 @@ def test_from_every_moment_the_bytes_are_the_same(planar: bool, monkeypatch: pyt
     monkeypatch.setattr(monitor, "FEWEST_PAIRS_FOR_THREADS", 2)
     make, walls = (flats, [FENCE]) if planar else (solids, [WALL, FLOOR])
     messages = list(inputs(make(np.random.default_rng(3)), walls, steps=60, seed=5))
-    pipeline, frozen, answers = Pipeline(), list[bytes](), list[Answers]()
+    pipeline = Pipeline(Profile(uncertainty_samples=64))  # 1,024 would take most of the time
+    frozen, answers = list[bytes](), list[Answers]()
     for message in messages:
         frozen.append(pipeline.snapshot().encode())
         answers.append(take(pipeline, *message))
