@@ -135,7 +135,7 @@ class MonitorNode(Node):
     def _on_shapes(self, data: bytes) -> None:
         received = self._now()
         message = self._pipeline.on_shapes(data)
-        self._record(self._shapes_topic, data, received, received, objects=tuple(self._pipeline.objects.values()))
+        self._record_shapes(data, received)
         if message is not None:
             self._markers.describe(message)
             _keep_from_collector()
@@ -148,8 +148,7 @@ class MonitorNode(Node):
         change = self._pipeline.change_settings(profile, now, self.get_fully_qualified_name())
         self._record(self._settings_topic, change.settings, now, now, settings=self._pipeline.settings())
         if change.shapes is not None:
-            objects = tuple(self._pipeline.objects.values())
-            self._record(self._shapes_topic, change.shapes, now, now, objects=objects)
+            self._record_shapes(change.shapes, now)
         self._times.longest_latency = profile.max_time_step
         self.get_logger().info(f"settings changed, profile {profile.name}")
 
@@ -225,6 +224,11 @@ class MonitorNode(Node):
     def _record(self, topic: str, data: bytes, log_time: int, publish_time: int, **what: Any) -> None:
         if self._recorder is not None:
             self._recorder.write(topic, data, log_time, publish_time, **what)
+
+    def _record_shapes(self, data: bytes, received: int) -> None:
+        """An ObjectDescriptionArray that the pipeline has taken in, and all that is described since."""
+        objects = tuple(self._pipeline.objects.values())
+        self._record(self._shapes_topic, data, received, received, objects=objects)
 
     def _tell_of_recording(self) -> None:
         """A recording that fails or loses messages is said at once, not only where someone reads the status."""
