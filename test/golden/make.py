@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 HERE: Final = Path(__file__).parent
-sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "session")]
+sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "helpers")]
 
 from session_scene import record  # noqa: E402
 

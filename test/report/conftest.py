@@ -1,13 +1,10 @@
-"""Sessions for all tests of this folder, not to be changed; the helpers of the sessions' own tests record them."""
+"""Sessions for all tests of this folder, not to be changed."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "session"))
 from played_session import record_drive, record_scene
 
 

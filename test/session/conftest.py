@@ -1,13 +1,10 @@
-"""A recorded session for all tests of this folder; they import the scene that is in it from beside them."""
+"""A recorded session for all tests of this folder."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
 from session_scene import record
 
 
