@@ -23,7 +23,7 @@ import collision_monitor as cm
 from collision_monitor.geometry.pose import rotation_matrix
 from collision_monitor.geometry.shape_table import ShapeTableBuilder
 from collision_monitor.narrow_phase.dispatch import contact_batch
-from collision_monitor.profiles import Profile
+from collision_monitor.settings.profile import Profile
 from collision_monitor.world.trajectory import FRAME_RATE, Trajectory
 
 Array = NDArray[np.float64]

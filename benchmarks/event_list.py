@@ -24,7 +24,7 @@ from rich.table import Table
 from collision_monitor import Box, Monitor, records
 from collision_monitor.geometry.pose import from_rotation_vector, multiply
 from collision_monitor.plain import PlainMonitor, disagreements
-from collision_monitor.profiles import Profile
+from collision_monitor.settings.profile import Profile
 
 RATE = 100.0
 MOVES = ("steady", "turns", "noise", "jumps")

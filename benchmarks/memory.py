@@ -26,7 +26,7 @@ from rich.progress import track
 from rich.table import Table
 
 from collision_monitor import Box, Monitor
-from collision_monitor.profiles import Profile
+from collision_monitor.settings.profile import Profile
 
 PAGE = os.sysconf("SC_PAGESIZE")
 

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from collision_monitor import Box, ConvexHull, Monitor, StepResult, records
 from collision_monitor.plain import PlainMonitor
 from collision_monitor.prediction import sphere_trees
-from collision_monitor.profiles import Profile
+from collision_monitor.settings.profile import Profile
 from collision_monitor.world.arm import link
 
 WARM = 50

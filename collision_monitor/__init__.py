@@ -25,7 +25,7 @@ _HOME = {
     "Monitor": "monitor",
     "StepResult": "monitor",
     "StepStatus": "monitor",
-    "Profile": "profiles",
+    "Profile": "settings.profile",
     "ObjectDescription": "description",
     "Model": "records",
     "Pose": "geometry.pose",
@@ -104,8 +104,8 @@ if TYPE_CHECKING:
     from collision_monitor.prediction.impact import time_of_impact as time_of_impact
     from collision_monitor.prediction.impact_batch import Impacts as Impacts
     from collision_monitor.prediction.impact_batch import time_of_impact_batch as time_of_impact_batch
-    from collision_monitor.profiles import Profile as Profile
     from collision_monitor.records import Model as Model
+    from collision_monitor.settings.profile import Profile as Profile
 
 
 def __getattr__(name: str) -> Any:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.prediction.motion import Bodies
 from collision_monitor.records import Method
-from collision_monitor.settings import EVERYWHERE, Vector
+from collision_monitor.settings.setting import EVERYWHERE, Vector
 
 
 def is_bounded(low: Vector, high: Vector) -> bool:

@@ -22,8 +22,8 @@ from collision_monitor.prediction.motion import Bodies, Parts, enlarge, make_bod
 from collision_monitor.prediction.spread import Spread
 from collision_monitor.prediction.time_of_impact import IMPACT
 from collision_monitor.prediction.uncertain_predictions import ENTRY
-from collision_monitor.profiles import Profile
 from collision_monitor.records import ShapeType
+from collision_monitor.settings.profile import Profile
 from collision_monitor.snapshot import Snapshot, check_range
 
 MONITOR = "monitor"

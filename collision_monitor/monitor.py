@@ -36,9 +36,9 @@ from collision_monitor.prediction.spread import worst_stddevs
 from collision_monitor.prediction.time_of_impact import BOUND_ONLY, CLEAR, IMPACT, TREE_BOUND, Scratch, make_scratch
 from collision_monitor.prediction.turning import make_columns
 from collision_monitor.prediction.uncertain_predictions import Scene, UncertainPredictions
-from collision_monitor.profiles import NO_BUDGET, NO_LIMIT, Profile
 from collision_monitor.records import Model
 from collision_monitor.rows import joined
+from collision_monitor.settings.profile import NO_BUDGET, NO_LIMIT, Profile
 
 NANOSECOND = 1e-9
 

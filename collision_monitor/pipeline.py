@@ -31,8 +31,8 @@ from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import CollisionMonitorError, InputError, MessageError, ProfileError, Refusal
 from collision_monitor.freeze import freeze, thaw
 from collision_monitor.monitor import Monitor, StepResult
-from collision_monitor.profiles import Profile
 from collision_monitor.provenance import provenance
+from collision_monitor.settings.profile import Profile
 from collision_monitor.snapshot import Snapshot
 
 Records = NDArray[np.void]

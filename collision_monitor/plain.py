@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.monitor import Monitor, StepResult
-from collision_monitor.profiles import Profile
 from collision_monitor.records import Phase, PredictionStatus
+from collision_monitor.settings.profile import Profile
 
 
 class PlainMonitor(Monitor):

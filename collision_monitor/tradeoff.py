@@ -16,8 +16,8 @@ from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import InputError, MessageError
 from collision_monitor.monitor import Monitor, StepResult
 from collision_monitor.plain import PlainMonitor
-from collision_monitor.profiles import Profile
 from collision_monitor.records import Phase, PredictionStatus
+from collision_monitor.settings.profile import Profile
 
 REFERENCE = "exact"
 """The profile whose plain recomputation is the truth, without what is uncertain: that is no error of a profile."""

@@ -17,8 +17,8 @@ from collision_monitor.geometry.shapes import Box
 from collision_monitor.monitor import Monitor, StepResult
 from collision_monitor.narrow_phase.contact import contact
 from collision_monitor.narrow_phase.models import containing_model, parse_model
-from collision_monitor.profiles import Profile
 from collision_monitor.records import Model
+from collision_monitor.settings.profile import Profile
 from collision_monitor.tradeoff import Errors, Played, Row, Step, deepest, play
 
 NEAR: Final = 0.3

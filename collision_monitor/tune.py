@@ -14,7 +14,7 @@ import yaml
 
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import InputError
-from collision_monitor.profiles import Profile
+from collision_monitor.settings.profile import Profile
 from collision_monitor.tradeoff import Row, Step, tradeoff
 
 FACTORS: Final = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.01)

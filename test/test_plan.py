@@ -13,8 +13,8 @@ from collision_monitor import plan
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Circle, Cone, ConvexHull, Cylinder, HalfSpace, Sphere
 from collision_monitor.monitor import Monitor
-from collision_monitor.profiles import Profile
 from collision_monitor.records import Phase, PredictionStatus
+from collision_monitor.settings.profile import Profile
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 import scene_plan

@@ -28,7 +28,7 @@ from collision_monitor.geometry.shapes import (
     Sphere,
 )
 from collision_monitor.pipeline import Pipeline
-from collision_monitor.profiles import Profile
+from collision_monitor.settings.profile import Profile
 from collision_monitor.snapshot import Snapshot
 
 START, STEP = 1_000_000_000_000, 20_000_000

@@ -14,8 +14,8 @@ from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, Sphere
 from collision_monitor.monitor import Monitor, StepResult
 from collision_monitor.plain import PlainMonitor, disagreements
-from collision_monitor.profiles import Profile
 from collision_monitor.records import Model
+from collision_monitor.settings.profile import Profile
 from collision_monitor.world import make_scene
 
 SECOND = 1_000_000_000

@@ -20,7 +20,7 @@ from collision_monitor.monitor import Monitor, StepResult
 from collision_monitor.pipeline import Pipeline
 from collision_monitor.plain import PlainMonitor, disagreements
 from collision_monitor.prediction import sphere_trees
-from collision_monitor.profiles import Profile
+from collision_monitor.settings.profile import Profile
 from collision_monitor.world import Scene, make_scene
 
 SECOND = 1_000_000_000

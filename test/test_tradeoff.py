@@ -16,8 +16,8 @@ from collision_monitor.errors import InputError
 from collision_monitor.geometry.shapes import Sphere
 from collision_monitor.monitor import Monitor
 from collision_monitor.plain import PlainMonitor
-from collision_monitor.profiles import Profile
 from collision_monitor.records import PredictionStatus
+from collision_monitor.settings.profile import Profile
 from collision_monitor.tradeoff import Step, tradeoff
 from collision_monitor.world.scene import state_array
 

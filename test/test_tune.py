@@ -14,7 +14,7 @@ import yaml
 from collision_monitor.cli.main import main
 from collision_monitor.cli.parameter_file import check_parameter_file
 from collision_monitor.errors import InputError
-from collision_monitor.profiles import Profile
+from collision_monitor.settings.profile import Profile
 from collision_monitor.tradeoff import Errors, recorded
 from collision_monitor.tune import FACTORS, Demands, candidates, parameter_file, tune
 

@@ -24,7 +24,7 @@ import collision_monitor as cm
 """
 
 SESSION = START + """
-from collision_monitor.profiles import Profile
+from collision_monitor.settings.profile import Profile
 monitor = cm.Monitor(Profile(threads=2))
 rng = np.random.default_rng(0)
 kinds = [cm.Box((1, 2, 3)), cm.Sphere(0.5), cm.Capsule(0.2, 1), cm.Cylinder(0.3, 1), cm.Cone(0.3, 1),

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor._jit import allocating_kernel, device, inlined
-from collision_monitor._prefetch import prefetch
+from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.broad_phase.lanes import LANES, boxes_overlap, lowest_bit, spheres_overlap
 from collision_monitor.errors import InputError
 from collision_monitor.tolerances import EPSILON

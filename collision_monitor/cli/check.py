@@ -66,10 +66,10 @@ def add_parser(subparsers: Any) -> None:
 
 def check_command(args: argparse.Namespace) -> int:
     """Return the exit code. Raises InputError, UnsupportedError."""
-    from collision_monitor.profiles import Profile
     from collision_monitor.session.check import check_sessions, junit_xml
     from collision_monitor.session.expectations import read_expectations
     from collision_monitor.session.many import find_sessions
+    from collision_monitor.settings.profile import Profile
 
     try:
         expectations = read_expectations(args.expect)

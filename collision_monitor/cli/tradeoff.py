@@ -91,7 +91,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print. Raises InputError, ProfileError, SessionError."""
-    from collision_monitor.profiles import Profile
+    from collision_monitor.settings.profile import Profile
     from collision_monitor.tradeoff import recorded, tradeoff
     from collision_monitor.tradeoff_models import MODELS, SAMPLES, model_tradeoff
 

@@ -14,7 +14,7 @@ import numpy as np
 from numba import prange
 
 from collision_monitor._jit import device, inlined, kernel, parallel_kernel
-from collision_monitor._prefetch import prefetch
+from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.broad_phase.dense_grid import (
     AHEAD,
     CLASSES,

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor._prefetch import prefetch
+from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.narrow_phase.dispatch import contact_within
 from collision_monitor.prediction.motion import (
     place_shape,

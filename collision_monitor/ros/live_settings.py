@@ -13,8 +13,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from collision_monitor.errors import ProfileError
-from collision_monitor.profiles import Profile
 from collision_monitor.ros.parameters import PROFILE, plain
+from collision_monitor.settings.profile import Profile
 
 
 class LiveSettings:

@@ -19,7 +19,6 @@ from visualization_msgs.msg import MarkerArray
 from collision_monitor import codec, warm_up
 from collision_monitor.errors import CollisionMonitorError, Refusal, SessionError
 from collision_monitor.pipeline import Outputs, Pipeline
-from collision_monitor.profiles import Profile
 from collision_monitor.records import Phase
 from collision_monitor.ros import qos
 from collision_monitor.ros.live_settings import LiveSettings
@@ -28,6 +27,7 @@ from collision_monitor.ros.parameters import read_monitor_parameters
 from collision_monitor.ros.process import StopRequest
 from collision_monitor.ros.step_times import StepTimes
 from collision_monitor.session import Recorder, Recording
+from collision_monitor.settings.profile import Profile
 from collision_monitor_msgs.msg import (
     ContactArray,
     MonitorStatus,

@@ -15,9 +15,9 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 
 from collision_monitor.errors import InputError, ProfileError, SessionError
-from collision_monitor.profiles import Profile
 from collision_monitor.session import ONE_FILE, Splitting
-from collision_monitor.settings import Setting
+from collision_monitor.settings.profile import Profile
+from collision_monitor.settings.setting import Setting
 
 T = TypeVar("T", str, int, float, str | int | float)
 

@@ -28,9 +28,9 @@ from collision_monitor.codec import (
 from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import InputError, MessageError, SessionError
 from collision_monitor.pipeline import LIMIT, Outputs, Pipeline
-from collision_monitor.profiles import Profile
 from collision_monitor.records import ContactStatus, Phase
 from collision_monitor.session.reader import Recorded, Session
+from collision_monitor.settings.profile import Profile
 
 Floats = NDArray[np.float64]
 Records = NDArray[np.void]

@@ -13,10 +13,10 @@ import numpy as np
 from collision_monitor.codec import decode_states
 from collision_monitor.errors import InputError, MessageError, SessionError
 from collision_monitor.pipeline import Pipeline
-from collision_monitor.profiles import Profile
 from collision_monitor.provenance import provenance
 from collision_monitor.session.compare import Difference, compare_answers, compare_status, compare_within
 from collision_monitor.session.reader import Place, Recorded, RecordedSnapshot, Session
+from collision_monitor.settings.profile import Profile
 from collision_monitor.snapshot import Snapshot
 
 _HALF: Final = 1 << 31

@@ -14,8 +14,8 @@ from collision_monitor.description import ObjectDescription
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Capsule, Sphere
 from collision_monitor.pipeline import Pipeline
-from collision_monitor.profiles import Profile
 from collision_monitor.session import Recorder
+from collision_monitor.settings.profile import Profile
 
 NODE = "/object_monitor"
 TYPES = {

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import collision_monitor as cm
-from collision_monitor.profiles import Profile
 from collision_monitor.records import STATE, PredictionStatus, StateFlag
+from collision_monitor.settings.profile import Profile
 
 SECOND = 1_000_000_000
 HORIZON = 2.0

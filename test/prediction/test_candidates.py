@@ -8,7 +8,7 @@ import pytest
 
 from collision_monitor import monitor as core
 from collision_monitor.monitor import Monitor
-from collision_monitor.profiles import Profile
+from collision_monitor.settings.profile import Profile
 from collision_monitor.world import make_scene
 
 

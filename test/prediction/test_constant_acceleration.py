@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 import collision_monitor as cm
 from collision_monitor import Motion, Pose, contact, time_of_impact
 from collision_monitor.errors import PoseError
-from collision_monitor.profiles import Profile
 from collision_monitor.records import STATE, Method, StateFlag
+from collision_monitor.settings.profile import Profile
 
 SECOND = 1_000_000_000
 VALID, UNKNOWN = int(StateFlag.ACCELERATION_VALID), int(StateFlag.TWIST_UNKNOWN)

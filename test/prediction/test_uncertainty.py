@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 import collision_monitor as cm
 from collision_monitor.errors import InputError, Refusal
 from collision_monitor.prediction.normal_samples import DIMENSIONS, normal_samples
-from collision_monitor.profiles import Profile
 from collision_monitor.records import STATE, ContactStatus, PredictionStatus
+from collision_monitor.settings.profile import Profile
 
 SECOND = 1_000_000_000
 HORIZON = 2.0

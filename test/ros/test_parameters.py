@@ -9,9 +9,9 @@ import yaml
 from rclpy.node import Node
 
 from collision_monitor.errors import InputError
-from collision_monitor.profiles import Profile
 from collision_monitor.ros.parameters import MonitorParameters, read_monitor_parameters
 from collision_monitor.session import Splitting
+from collision_monitor.settings.profile import Profile
 
 CONFIG = Path(__file__).parents[2] / "config" / "monitor.yaml"
 

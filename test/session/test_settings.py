@@ -13,10 +13,10 @@ from collision_monitor.cli.main import main
 from collision_monitor.codec import decode_contacts, decode_parameter_event, decode_status, encode_parameter_event
 from collision_monitor.errors import MessageError
 from collision_monitor.pipeline import Pipeline
-from collision_monitor.profiles import Profile
 from collision_monitor.session import Session, Splitting
 from collision_monitor.session.history import AS_RECORDED, read_history
 from collision_monitor.session.replay import Verdict, replay
+from collision_monitor.settings.profile import Profile
 
 FAST = Profile.named("fast").replace(horizon=1.0, contact_margin=0.01, contact_points=4, model_primitive="kdop14")
 SWITCHES = {20: FAST, 35: Profile.named("exact").replace(threads=2, contact_points=2)}

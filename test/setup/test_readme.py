@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from collision_monitor.profiles import Profile
+from collision_monitor.settings.profile import Profile
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()

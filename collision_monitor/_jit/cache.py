@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numba
 
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).parents[1]
 _IMPORT = re.compile(
     rb"^\s*(?:from (collision_monitor[\w.]*) import (\([^)]*\)|[^\n]*)|import (collision_monitor[\w.]*))", re.MULTILINE
 )

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from collision_monitor import _cache
+from collision_monitor._jit import cache
 
 TOP = "from collision_monitor.middle import (\n    sum_of,\n)\n"
 MIDDLE = "from collision_monitor import bottom\n"
@@ -21,30 +21,30 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     folder.mkdir()
     for name, text in (("top", TOP), ("middle", MIDDLE), ("bottom", "ONE = 1\n"), ("beside", "TWO = 2\n")):
         (folder / f"{name}.py").write_text(text)
-    monkeypatch.setattr(_cache, "_PACKAGE", folder)
+    monkeypatch.setattr(cache, "_PACKAGE", folder)
     _forget()
     yield folder
     _forget()
 
 
 def _forget() -> None:
-    for cached in (_cache.folder, _cache._imports, _cache._file_digest):
+    for cached in (cache.folder, cache._imports, cache._file_digest):
         cached.cache_clear()
 
 
 def test_a_change_below_a_module_renames_its_folder_and_no_other(package: Path) -> None:
     names = ("top", "middle", "bottom", "beside")
-    before = {name: _cache.folder(f"collision_monitor.{name}") for name in names}
+    before = {name: cache.folder(f"collision_monitor.{name}") for name in names}
     (package / "bottom.py").write_text("ONE = 3\n")
     _forget()
-    changed = {name for name in names if _cache.folder(f"collision_monitor.{name}") != before[name]}
+    changed = {name for name in names if cache.folder(f"collision_monitor.{name}") != before[name]}
     assert changed == {"top", "middle", "bottom"}
 
 
 def test_the_same_content_gives_the_same_folder(package: Path) -> None:
-    before = _cache.folder("collision_monitor.top")
+    before = cache.folder("collision_monitor.top")
     _forget()
-    assert _cache.folder("collision_monitor.top") == before
+    assert cache.folder("collision_monitor.top") == before
 
 
 def test_a_kernel_outside_the_package_is_compiled_anew_when_the_package_changes(
@@ -57,7 +57,7 @@ def test_a_kernel_outside_the_package_is_compiled_anew_when_the_package_changes(
     script.__file__ = str(folder / "a_benchmark.py")
     Path(script.__file__).write_text("from collision_monitor.top import sum_of\n")
     monkeypatch.setitem(sys.modules, "a_benchmark", script)
-    before = _cache.folder("a_benchmark")
+    before = cache.folder("a_benchmark")
     (package / "bottom.py").write_text("ONE = 3\n")
     _forget()
-    assert _cache.folder("a_benchmark") != before
+    assert cache.folder("a_benchmark") != before

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numba
 
-from collision_monitor import _cache
+from collision_monitor._jit import cache
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -33,7 +33,7 @@ _OPTIONS: dict[str, Any] = {
 
 def _compile(function: F, options: dict[str, Any]) -> F:
     if not _CACHE_IS_CHOSEN:
-        numba.config.CACHE_DIR = _cache.folder(function.__module__)
+        numba.config.CACHE_DIR = cache.folder(function.__module__)
     compiled: F = numba.njit(**options)(function)
     return compiled
 

@@ -17,7 +17,7 @@ import yaml
 
 from collision_monitor.errors import ProfileError
 from collision_monitor.records import MOST_POINTS, Model
-from collision_monitor.settings import EVERYWHERE, Setting, choice, number, settings_of, switch, vector
+from collision_monitor.settings.setting import EVERYWHERE, Setting, choice, number, settings_of, switch, vector
 
 NO_BUDGET: Final = 1e6
 """ms, a quarter of an hour: a step has as long as it takes, and no clock is looked at."""
