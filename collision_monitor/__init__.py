@@ -26,7 +26,7 @@ _HOME = {
     "StepResult": "monitor",
     "StepStatus": "monitor",
     "Profile": "settings.profile",
-    "ObjectDescription": "description",
+    "ObjectDescription": "objects.description",
     "Model": "records",
     "Pose": "geometry.pose",
     "Motion": "geometry.pose",
@@ -44,8 +44,8 @@ _HOME = {
     "Contact": "narrow_phase.contact",
     "contact_features": "narrow_phase.features",
     "overlap": "narrow_phase.overlap",
-    "convex_decomposition": "narrow_phase.convex_decomposition",
-    "Decomposition": "narrow_phase.convex_decomposition",
+    "convex_decomposition": "objects.convex_decomposition",
+    "Decomposition": "objects.convex_decomposition",
     "time_of_impact": "prediction.impact",
     "Impact": "prediction.impact",
     "time_of_impact_batch": "prediction.impact_batch",
@@ -66,7 +66,6 @@ _HOME = {
 __all__ = ["__version__", *_HOME]
 
 if TYPE_CHECKING:
-    from collision_monitor.description import ObjectDescription as ObjectDescription
     from collision_monitor.errors import CollisionMonitorError as CollisionMonitorError
     from collision_monitor.errors import InputError as InputError
     from collision_monitor.errors import MessageError as MessageError
@@ -93,10 +92,11 @@ if TYPE_CHECKING:
     from collision_monitor.monitor import StepStatus as StepStatus
     from collision_monitor.narrow_phase.contact import Contact as Contact
     from collision_monitor.narrow_phase.contact import contact as contact
-    from collision_monitor.narrow_phase.convex_decomposition import Decomposition as Decomposition
-    from collision_monitor.narrow_phase.convex_decomposition import convex_decomposition as convex_decomposition
     from collision_monitor.narrow_phase.features import contact_features as contact_features
     from collision_monitor.narrow_phase.overlap import overlap as overlap
+    from collision_monitor.objects.convex_decomposition import Decomposition as Decomposition
+    from collision_monitor.objects.convex_decomposition import convex_decomposition as convex_decomposition
+    from collision_monitor.objects.description import ObjectDescription as ObjectDescription
     from collision_monitor.prediction.feature_impact import FeatureImpact as FeatureImpact
     from collision_monitor.prediction.feature_impact import edge_edge_impact as edge_edge_impact
     from collision_monitor.prediction.feature_impact import vertex_face_impact as vertex_face_impact

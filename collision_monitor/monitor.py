@@ -18,14 +18,14 @@ from collision_monitor import filters, records
 from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.broad_phase.hashed_grid import make_hashed_grid, read_boxes, regridded, remove_boxes
 from collision_monitor.budget import EXAMINE, HANDFUL, REFINE, TREES, PairBudget, StepClock, TimeBudget
-from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import CollisionMonitorError, InputError, Refusal, UnsupportedError
 from collision_monitor.geometry.pieces import is_planar
 from collision_monitor.geometry.plane import flat_pose, flat_states
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shape_table import CIRCLE, SPHERE, ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Shape
-from collision_monitor.narrow_phase.models import monitored_model, parse_model, shape_class
+from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.objects.models import monitored_model, parse_model, shape_class
 from collision_monitor.plan import ScenePlan, scene_plan
 from collision_monitor.prediction import active_pairs, answers, candidates, coarse, tracking
 from collision_monitor.prediction.event_list import EventList, count_until, keep_first

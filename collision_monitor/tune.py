@@ -12,8 +12,8 @@ from typing import Final
 
 import yaml
 
-from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import InputError
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.settings.profile import Profile
 from collision_monitor.tradeoff import Row, Step, tradeoff
 

@@ -456,7 +456,7 @@ def test_objects_come_and_go_without_a_trace() -> None:
 
 
 def monitor_description(monitor: Monitor, object_id: int):  # type: ignore[no-untyped-def]
-    from collision_monitor.description import ObjectDescription
+    from collision_monitor.objects.description import ObjectDescription
 
     slot = int(monitor._bodies.first_shape[monitor._slot(object_id)])
     table = monitor._shapes.table

@@ -11,7 +11,6 @@ import pytest
 
 from collision_monitor import monitor, records
 from collision_monitor.codec import Removal, encode_descriptions, encode_states
-from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import (
@@ -27,6 +26,7 @@ from collision_monitor.geometry.shapes import (
     Shape,
     Sphere,
 )
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline import Pipeline
 from collision_monitor.settings.profile import Profile
 from collision_monitor.snapshot import Snapshot

@@ -9,10 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from collision_monitor.cli.main import main
-from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.polyhedra import is_closed
 from collision_monitor.geometry.pose import Pose
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.tradeoff import Step
 from collision_monitor.tradeoff_models import model_tradeoff
 from collision_monitor.world import make_scene

@@ -17,7 +17,7 @@ from collision_monitor.cli.quantities import not_negative, positive, whole
 from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
-    from collision_monitor.description import ObjectDescription
+    from collision_monitor.objects.description import ObjectDescription
     from collision_monitor.tradeoff import Row, Step
 
 MESHES: Final = "arm"

@@ -9,10 +9,10 @@ import numpy as np
 
 from collision_monitor.codec.cdr import Buffer, Floats, Ids, Reader, Writer, write_header
 from collision_monitor.codec.shapes import LEAST_SHAPE, make_shape, read_shape, write_shape
-from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import CollisionMonitorError, InputError, ShapeError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Sphere
+from collision_monitor.objects.description import ObjectDescription
 
 _ADD, _REMOVE = 0, 1
 _IDENTITY = Pose()

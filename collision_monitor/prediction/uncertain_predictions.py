@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
-from collision_monitor.description import ObjectDescription
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.prediction.acceleration_bounds import widen_intervals
 from collision_monitor.prediction.motion import Bodies, enlarge
 from collision_monitor.prediction.normal_samples import normal_samples

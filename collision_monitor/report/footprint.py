@@ -6,11 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from collision_monitor.description import ObjectDescription
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.qhull import qhull
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, Polygon, Shape, Triangle
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session.history import Floats
 
 DIRECTIONS: Final = 64

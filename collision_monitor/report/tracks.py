@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from collision_monitor.geometry.pose import from_rotation_vector, multiply, rotation_matrix
 from collision_monitor.geometry.shape_table import ShapeTableBuilder, take
 from collision_monitor.narrow_phase.dispatch import contact_batch
-from collision_monitor.narrow_phase.models import Modelled, containing_model
+from collision_monitor.objects.models import Modelled, containing_model
 from collision_monitor.records import StateFlag
 from collision_monitor.session.history import Floats, History, Pair
 

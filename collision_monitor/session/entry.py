@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from operator import itemgetter
 from typing import Final, NamedTuple
 
-from collision_monitor.description import ObjectDescription
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.snapshot import Snapshot
 
 _OVERHEAD: Final = 128

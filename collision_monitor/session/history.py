@@ -25,8 +25,8 @@ from collision_monitor.codec import (
     decode_states,
     decode_status,
 )
-from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import InputError, MessageError, SessionError
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline import LIMIT, Outputs, Pipeline
 from collision_monitor.records import ContactStatus, Phase
 from collision_monitor.session.reader import Recorded, Session

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Final
 
 from collision_monitor.codec import encode_descriptions
-from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import SessionError
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session.definitions import definition
 from collision_monitor.session.entry import Entry, are_messages_alone
 from collision_monitor.session.event_window import EventWindow

@@ -10,8 +10,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final
 
-from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import SessionError
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session.entry import Entry
 from collision_monitor.session.parts import ONE_FILE, SNAPSHOT_PERIOD, Parts, Splitting
 from collision_monitor.session.rosbag2 import TYPES

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel
-from collision_monitor.description import ObjectDescription
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Sphere
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.world.collision_response import bounce_between_walls, collide
 from collision_monitor.world.scene import Array, Scene, States, object_count, positive_rate, state_array
 

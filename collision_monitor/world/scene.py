@@ -8,8 +8,8 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import InputError
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import STATE
 
 Array = NDArray[np.float64]

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.pose import from_rotation_vector, multiply
 from collision_monitor.geometry.shapes import Box, Cylinder, Shape
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
 from collision_monitor.world.scene import ROUND_OFF, Scene, States, positive_rate, state_array
 from collision_monitor.world.tracks import Tracks, read_tracks

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import collision_monitor as cm
 from collision_monitor import Pose, contact
-from collision_monitor.narrow_phase.models import containing_model
+from collision_monitor.objects.models import containing_model
 
 TORUS = trimesh.creation.torus(1.0, 0.25, major_sections=16, minor_sections=8)
 RING = cm.Mesh(TORUS.vertices, TORUS.faces)

@@ -9,8 +9,8 @@ import pytest
 from played_session import drive_states, record_drive, record_scene, record_states
 
 from collision_monitor import Pose, Sphere, contact
-from collision_monitor.description import ObjectDescription
 from collision_monitor.geometry.shapes import Box, HalfSpace, Polygon
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.report.facts import gather
 from collision_monitor.report.footprint import footprint
 from collision_monitor.report.verdict import verdict

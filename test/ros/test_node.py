@@ -13,9 +13,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from collision_monitor import codec, records
 from collision_monitor.codec import Removal
-from collision_monitor.description import ObjectDescription
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Sphere
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.plain import PlainMonitor
 from collision_monitor.ros import main, qos
 from collision_monitor.session import Session

@@ -16,10 +16,10 @@ import numpy as np
 
 from collision_monitor import records
 from collision_monitor.codec import Change, Removal, encode_descriptions, encode_states
-from collision_monitor.description import ObjectDescription
 from collision_monitor.errors import CollisionMonitorError, InputError, SessionError
 from collision_monitor.geometry.pose import Pose, rotation_matrix
 from collision_monitor.geometry.shapes import Shape
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
 from collision_monitor.session.foreign.mapping import HEADER, Mapping, Source
 from collision_monitor.session.foreign.markers import DELETE, DELETE_ALL, MarkerTable, marker_shape, source_of

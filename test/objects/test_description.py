@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from collision_monitor.description import ALL_GROUPS, ObjectDescription
 from collision_monitor.errors import InputError, ShapeError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Sphere
+from collision_monitor.objects.description import ALL_GROUPS, ObjectDescription
 from collision_monitor.records import Model
 
 

@@ -13,8 +13,8 @@ from scipy.spatial import cKDTree
 import collision_monitor as cm
 from collision_monitor import Mesh, Pose, Sphere, contact
 from collision_monitor.geometry.polyhedra import locate_in_polyhedron
-from collision_monitor.narrow_phase import convex_decomposition as module
-from collision_monitor.narrow_phase.models import containing_model
+from collision_monitor.objects import convex_decomposition as module
+from collision_monitor.objects.models import containing_model
 from collision_monitor.records import Model
 
 TORUS = trimesh.creation.torus(0.5, 0.2, major_sections=8, minor_sections=5)

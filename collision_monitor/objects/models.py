@@ -33,8 +33,8 @@ from collision_monitor.geometry.shapes import (
     Sphere,
     Triangle,
 )
-from collision_monitor.narrow_phase.convex_decomposition import convex_decomposition
 from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.objects.convex_decomposition import convex_decomposition
 from collision_monitor.records import Model
 
 Array = NDArray[np.float64]
