@@ -27,10 +27,10 @@ from numpy.typing import NDArray
 
 import collision_monitor as cm
 from collision_monitor._jit import kernel
-from collision_monitor.prediction.impact_methods import lay_out
 from collision_monitor.prediction.motion import relative_position
 from collision_monitor.prediction.time_of_impact import contact_at, make_scratch
-from collision_monitor.prediction.two_bodies import make_body
+from collision_monitor.query.impact_methods import lay_out
+from collision_monitor.query.moving_pair import make_body
 
 Array = NDArray[np.float64]
 Shape = cm.Sphere | cm.Box | cm.Capsule | cm.Cylinder | cm.Cone | cm.ConvexHull | cm.HalfSpace

@@ -40,19 +40,19 @@ _HOME = {
     "HalfSpace": "geometry.shapes",
     "Circle": "geometry.shapes",
     "Polygon": "geometry.shapes",
-    "contact": "narrow_phase.contact",
-    "Contact": "narrow_phase.contact",
-    "contact_features": "narrow_phase.features",
-    "overlap": "narrow_phase.overlap",
+    "contact": "query.contact",
+    "Contact": "query.contact",
+    "contact_features": "query.features",
+    "overlap": "query.overlap",
     "convex_decomposition": "objects.convex_decomposition",
     "Decomposition": "objects.convex_decomposition",
-    "time_of_impact": "prediction.impact",
-    "Impact": "prediction.impact",
-    "time_of_impact_batch": "prediction.impact_batch",
-    "Impacts": "prediction.impact_batch",
-    "vertex_face_impact": "prediction.feature_impact",
-    "edge_edge_impact": "prediction.feature_impact",
-    "FeatureImpact": "prediction.feature_impact",
+    "time_of_impact": "query.time_of_impact",
+    "Impact": "query.time_of_impact",
+    "time_of_impact_batch": "query.time_of_impact_batch",
+    "Impacts": "query.time_of_impact_batch",
+    "vertex_face_impact": "query.feature_impact",
+    "edge_edge_impact": "query.feature_impact",
+    "FeatureImpact": "query.feature_impact",
     "CollisionMonitorError": "errors",
     "InputError": "errors",
     "ShapeError": "errors",
@@ -90,20 +90,20 @@ if TYPE_CHECKING:
     from collision_monitor.monitor import Monitor as Monitor
     from collision_monitor.monitor import StepResult as StepResult
     from collision_monitor.monitor import StepStatus as StepStatus
-    from collision_monitor.narrow_phase.contact import Contact as Contact
-    from collision_monitor.narrow_phase.contact import contact as contact
-    from collision_monitor.narrow_phase.features import contact_features as contact_features
-    from collision_monitor.narrow_phase.overlap import overlap as overlap
     from collision_monitor.objects.convex_decomposition import Decomposition as Decomposition
     from collision_monitor.objects.convex_decomposition import convex_decomposition as convex_decomposition
     from collision_monitor.objects.description import ObjectDescription as ObjectDescription
-    from collision_monitor.prediction.feature_impact import FeatureImpact as FeatureImpact
-    from collision_monitor.prediction.feature_impact import edge_edge_impact as edge_edge_impact
-    from collision_monitor.prediction.feature_impact import vertex_face_impact as vertex_face_impact
-    from collision_monitor.prediction.impact import Impact as Impact
-    from collision_monitor.prediction.impact import time_of_impact as time_of_impact
-    from collision_monitor.prediction.impact_batch import Impacts as Impacts
-    from collision_monitor.prediction.impact_batch import time_of_impact_batch as time_of_impact_batch
+    from collision_monitor.query.contact import Contact as Contact
+    from collision_monitor.query.contact import contact as contact
+    from collision_monitor.query.feature_impact import FeatureImpact as FeatureImpact
+    from collision_monitor.query.feature_impact import edge_edge_impact as edge_edge_impact
+    from collision_monitor.query.feature_impact import vertex_face_impact as vertex_face_impact
+    from collision_monitor.query.features import contact_features as contact_features
+    from collision_monitor.query.overlap import overlap as overlap
+    from collision_monitor.query.time_of_impact import Impact as Impact
+    from collision_monitor.query.time_of_impact import time_of_impact as time_of_impact
+    from collision_monitor.query.time_of_impact_batch import Impacts as Impacts
+    from collision_monitor.query.time_of_impact_batch import time_of_impact_batch as time_of_impact_batch
     from collision_monitor.records import Model as Model
     from collision_monitor.settings.profile import Profile as Profile
 

@@ -14,9 +14,9 @@ from collision_monitor.errors import InputError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box
 from collision_monitor.monitor import Monitor, StepResult
-from collision_monitor.narrow_phase.contact import contact
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import containing_model, parse_model
+from collision_monitor.query.contact import contact
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
 from collision_monitor.tradeoff import Errors, Played, Row, Step, deepest, play

@@ -58,10 +58,10 @@ def warm_up_functions() -> None:
     """Call what can be called without a monitor, once with each kind of argument that has a kernel of its own."""
     # imported here: a node, which warms up the monitor when it starts, needs none of it
     from collision_monitor.detection import WORTH_THREADS, Detector, default_threads
-    from collision_monitor.narrow_phase.contact import contact
-    from collision_monitor.prediction.feature_impact import vertex_face_impact
-    from collision_monitor.prediction.impact import time_of_impact
-    from collision_monitor.prediction.impact_batch import time_of_impact_batch
+    from collision_monitor.query.contact import contact
+    from collision_monitor.query.feature_impact import vertex_face_impact
+    from collision_monitor.query.time_of_impact import time_of_impact
+    from collision_monitor.query.time_of_impact_batch import time_of_impact_batch
 
     box, ball = Box((1, 1, 1)), Sphere(0.5)
     for threads in sorted({1, default_threads()}):

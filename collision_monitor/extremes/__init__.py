@@ -18,8 +18,8 @@ from collision_monitor.extremes import exact
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import Box, Capsule, Sphere
 from collision_monitor.monitor import Monitor
-from collision_monitor.narrow_phase.contact import contact
-from collision_monitor.prediction.impact import time_of_impact
+from collision_monitor.query.contact import contact
+from collision_monitor.query.time_of_impact import time_of_impact
 
 Rng = np.random.Generator
 Floats = NDArray[np.float64]

@@ -13,11 +13,11 @@ from collision_monitor.errors import InputError, PoseError
 from collision_monitor.geometry.pieces import is_planar
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import HalfSpace, Mesh
-from collision_monitor.narrow_phase.contact import Compound
-from collision_monitor.prediction.impact import BUDGET, check_bounded, check_query, time_of_impact
-from collision_monitor.prediction.impact_rows import impacts_of_rows, impacts_of_spheres, normalise_states
 from collision_monitor.prediction.time_of_impact import IMPACT, make_scratch
-from collision_monitor.prediction.two_bodies import Body, Query, make_body, make_scene
+from collision_monitor.query.contact import Compound
+from collision_monitor.query.impact_rows import impacts_of_rows, impacts_of_spheres, normalise_states
+from collision_monitor.query.moving_pair import Body, Query, make_body, make_scene
+from collision_monitor.query.time_of_impact import BUDGET, check_bounded, check_query, time_of_impact
 from collision_monitor.tolerances import LARGEST_INPUT, TOUCHING, UNIT_QUATERNION
 
 Array = NDArray[np.float64]

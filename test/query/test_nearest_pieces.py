@@ -12,8 +12,8 @@ from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shape_table import join
 from collision_monitor.geometry.shapes import Box, Capsule, Circle, HalfSpace, Mesh, Polygon, Sphere
 from collision_monitor.narrow_phase.dispatch import contact_batch
-from collision_monitor.narrow_phase.nearest_pieces import ALL_PAIRS, NearestPieces
-from collision_monitor.narrow_phase.pieces import Pieces, as_pieces, exact_pieces
+from collision_monitor.query.nearest_pieces import ALL_PAIRS, NearestPieces
+from collision_monitor.query.piece_table import Pieces, as_pieces, exact_pieces
 
 
 def torus(major: int, minor: int) -> Mesh:

@@ -15,7 +15,7 @@ from collision_monitor.geometry.polyhedra import is_closed
 from collision_monitor.geometry.polyhedron_sat import sat_3d
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape
-from collision_monitor.narrow_phase.contact import Compound, contact
+from collision_monitor.query.contact import Compound, contact
 
 TESTS: Final = ("contact", "cascade", "sat")
 

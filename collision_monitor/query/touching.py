@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import Capsule, Circle, Cone, Cylinder, Sphere
-from collision_monitor.narrow_phase.contact import contact
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.prediction.time_of_impact import HIT
-from collision_monitor.prediction.two_bodies import Body, Query, Scene, first_impacts, make_scene
+from collision_monitor.query.contact import contact
+from collision_monitor.query.moving_pair import Body, Query, Scene, first_impacts, make_scene
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from collision_monitor._jit import allocating_kernel, device, inlined
 from collision_monitor.errors import InputError
-from collision_monitor.prediction.arguments import count, number
+from collision_monitor.query.arguments import count, number
 from collision_monitor.tolerances import EPSILON, LARGEST_INPUT
 
 BUDGET: Final = 8192

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from collision_monitor.broad_phase.boxes import ranges
 from collision_monitor.geometry.shape_table import ShapeTable, join
 from collision_monitor.narrow_phase.dispatch import contact_batch
-from collision_monitor.narrow_phase.pieces import Pieces
+from collision_monitor.query.piece_table import Pieces
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

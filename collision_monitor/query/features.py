@@ -12,7 +12,7 @@ from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.contact_features import Feature, FeatureContact, FeatureType, feature_at
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape
-from collision_monitor.narrow_phase.contact import Contact
+from collision_monitor.query.contact import Contact
 
 Array = NDArray[np.float64]
 

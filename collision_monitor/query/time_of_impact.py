@@ -11,11 +11,11 @@ import numpy as np
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.pose import Motion
 from collision_monitor.geometry.shapes import HalfSpace
-from collision_monitor.narrow_phase.contact import Compound, Contact, contact
-from collision_monitor.prediction.arguments import count, number
 from collision_monitor.prediction.time_of_impact import HIT
-from collision_monitor.prediction.touching import follow
-from collision_monitor.prediction.two_bodies import Body, Query, first_impacts, make_body, make_scene
+from collision_monitor.query.arguments import count, number
+from collision_monitor.query.contact import Compound, Contact, contact
+from collision_monitor.query.moving_pair import Body, Query, first_impacts, make_body, make_scene
+from collision_monitor.query.touching import follow
 from collision_monitor.tolerances import TOUCHING
 
 BUDGET: Final = 1000

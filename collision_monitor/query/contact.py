@@ -19,9 +19,9 @@ from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
-from collision_monitor.narrow_phase.nearest_pieces import NearestPieces
-from collision_monitor.narrow_phase.pieces import Pieces, as_pieces, exact_pieces
 from collision_monitor.objects.models import containing_model, parse_model
+from collision_monitor.query.nearest_pieces import NearestPieces
+from collision_monitor.query.piece_table import Pieces, as_pieces, exact_pieces
 from collision_monitor.records import Model
 from collision_monitor.tolerances import FEATURE_TIE, UNIT_QUATERNION
 

@@ -1,0 +1,1 @@
+"""Two shapes without a monitor: contact, overlap, features, time of impact."""
