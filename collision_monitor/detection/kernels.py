@@ -30,8 +30,8 @@ from collision_monitor.broad_phase.dense_grid import (
     sort_by_cell,
 )
 from collision_monitor.geometry.shape_table import ShapeTable
-from collision_monitor.narrow_phase.answer import CONTACT_SIZE, WORK_SIZE
 from collision_monitor.narrow_phase.box_box import axis_direction, sat, touching_features
+from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, WORK_SIZE
 from collision_monitor.narrow_phase.dispatch import contact_within
 from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION

@@ -10,7 +10,7 @@ from math import copysign, inf, sqrt
 from typing import Any
 
 from collision_monitor._jit import device
-from collision_monitor.narrow_phase.answer import EDGE, FACE, VERTEX, write
+from collision_monitor.narrow_phase.contact_row import EDGE, FACE, VERTEX, write
 from collision_monitor.narrow_phase.segment import segment_segment
 from collision_monitor.tolerances import FACE_PREFERENCE, FEATURE_TIE, PARALLEL_SIN2, SAT_ROUND_OFF
 

@@ -6,7 +6,7 @@ from math import copysign, sqrt
 from typing import Any
 
 from collision_monitor._jit import device
-from collision_monitor.narrow_phase.answer import SURFACE, write
+from collision_monitor.narrow_phase.contact_row import SURFACE, write
 from collision_monitor.narrow_phase.segment import across, segment_segment
 from collision_monitor.narrow_phase.sphere_sphere import direction
 from collision_monitor.tolerances import SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2, TOUCHING

@@ -11,7 +11,7 @@ from typing import Any
 
 from collision_monitor._jit import device
 from collision_monitor.geometry.shape_table import CONE, CYLINDER
-from collision_monitor.narrow_phase.answer import MAX_VERTICES, SIMPLEX, write
+from collision_monitor.narrow_phase.contact_row import MAX_VERTICES, SIMPLEX, write
 from collision_monitor.narrow_phase.epa import epa
 from collision_monitor.narrow_phase.gjk import WEIGHTS, gjk
 from collision_monitor.narrow_phase.parallel_axes import axes_are_parallel, parallel_axes_depth

@@ -11,7 +11,7 @@ from typing import Any
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.shape_table import CYLINDER, SPHERE
-from collision_monitor.narrow_phase.answer import SURFACE, write
+from collision_monitor.narrow_phase.contact_row import SURFACE, write
 from collision_monitor.narrow_phase.segment import across
 from collision_monitor.narrow_phase.support import core_radius
 from collision_monitor.tolerances import SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2

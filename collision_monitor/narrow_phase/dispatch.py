@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.geometry.shape_table import BOX, CAPSULE, CIRCLE, CONE, CYLINDER, HALF_SPACE, SPHERE
-from collision_monitor.narrow_phase.answer import CONTACT_SIZE, WORK_SIZE
 from collision_monitor.narrow_phase.box_box import axis_direction, box_box_separation, sat, touching_features
 from collision_monitor.narrow_phase.capsule_capsule import capsule_capsule_contact
+from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, WORK_SIZE
 from collision_monitor.narrow_phase.convex_convex import convex_contact, convex_separation
 from collision_monitor.narrow_phase.cylinder_cylinder import is_parallel, parallel_cylinders_contact
 from collision_monitor.narrow_phase.half_space import half_space_contact, half_spaces_contact

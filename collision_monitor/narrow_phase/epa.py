@@ -10,7 +10,7 @@ from math import inf, sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device
-from collision_monitor.narrow_phase.answer import EDGES, FACES, MAX_FACES, SIMPLEX
+from collision_monitor.narrow_phase.contact_row import EDGES, FACES, MAX_FACES, SIMPLEX
 from collision_monitor.narrow_phase.gjk import WEIGHTS, closest_on_triangle
 from collision_monitor.narrow_phase.segment import across
 from collision_monitor.narrow_phase.support import support_difference

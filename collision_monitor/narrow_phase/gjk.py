@@ -10,7 +10,7 @@ from math import inf, sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device
-from collision_monitor.narrow_phase.answer import SIMPLEX
+from collision_monitor.narrow_phase.contact_row import SIMPLEX
 from collision_monitor.narrow_phase.sphere_sphere import direction
 from collision_monitor.narrow_phase.support import support_difference
 from collision_monitor.tolerances import EPSILON, FLAT, GJK_RELATIVE, THIN_SIN2, TOUCHING

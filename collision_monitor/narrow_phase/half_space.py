@@ -6,7 +6,7 @@ from math import inf, sqrt
 from typing import Any
 
 from collision_monitor._jit import device
-from collision_monitor.narrow_phase.answer import FACE, write
+from collision_monitor.narrow_phase.contact_row import FACE, write
 from collision_monitor.narrow_phase.support import core_radius, support
 from collision_monitor.tolerances import OPPOSED, SAT_ROUND_OFF
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import device, kernel
 from collision_monitor.geometry.shape_table import BOX, CONVEX_HULL, HALF_SPACE, POLYGON
-from collision_monitor.narrow_phase.answer import work_array
+from collision_monitor.narrow_phase.contact_row import work_array
 from collision_monitor.records import MOST_POINTS
 from collision_monitor.tolerances import EPSILON, FEATURE_TIE, SAT_ROUND_OFF, TOUCHING
 

@@ -6,7 +6,7 @@ from math import copysign, sqrt
 from typing import Any
 
 from collision_monitor._jit import inlined
-from collision_monitor.narrow_phase.answer import EDGE, FACE, SURFACE, VERTEX, write
+from collision_monitor.narrow_phase.contact_row import EDGE, FACE, SURFACE, VERTEX, write
 from collision_monitor.narrow_phase.sphere_sphere import direction
 from collision_monitor.tolerances import EPSILON
 

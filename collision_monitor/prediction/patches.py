@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel
 from collision_monitor.geometry.shape_table import ShapeTable, take
-from collision_monitor.narrow_phase.answer import work_array
+from collision_monitor.narrow_phase.contact_row import work_array
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.narrow_phase.manifold import CORNERS, manifold_batch, reduce_points
 from collision_monitor.prediction.active_pairs import SHAPE_I, SHAPE_J, STATUS, TOUCHING, rotation_now

@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.narrow_phase.answer import WORK_SIZE
+from collision_monitor.narrow_phase.contact_row import WORK_SIZE
 from collision_monitor.narrow_phase.dispatch import contact, separation
 from collision_monitor.prediction.advance import Placed, advance
 from collision_monitor.prediction.motion import (
