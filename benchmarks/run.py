@@ -25,7 +25,7 @@ import numpy as np
 
 from collision_monitor._version import VERSION
 from collision_monitor.cli.bench import CHECKED
-from collision_monitor.detection import Detector
+from collision_monitor.detection.detector import Detector
 from collision_monitor.errors import CollisionMonitorError
 from collision_monitor.world.moving_bodies import SCENES, load_bodies, make_bodies
 

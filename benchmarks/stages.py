@@ -10,7 +10,7 @@ import numpy as np
 
 from collision_monitor._jit import kernel
 from collision_monitor.broad_phase.dense_grid import CLASSES, STARTING, partners, places, searches, sort_by_cell
-from collision_monitor.detection import Detector, kernels
+from collision_monitor.detection.detector import Detector, kernels
 from collision_monitor.world.moving_bodies import make_bodies
 
 

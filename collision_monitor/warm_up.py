@@ -57,7 +57,7 @@ def _step_uncertain(monitor: Monitor, poses: NDArray[np.float64]) -> None:
 def warm_up_functions() -> None:
     """Call what can be called without a monitor, once with each kind of argument that has a kernel of its own."""
     # imported here: a node, which warms up the monitor when it starts, needs none of it
-    from collision_monitor.detection import WORTH_THREADS, Detector, default_threads
+    from collision_monitor.detection.detector import WORTH_THREADS, Detector, default_threads
     from collision_monitor.query.contact import contact
     from collision_monitor.query.feature_impact import vertex_face_impact
     from collision_monitor.query.time_of_impact import time_of_impact

@@ -52,7 +52,7 @@ print(json.dumps({"compiled": compiled, "contacts": len(result.contacts), "first
 
 
 FUNCTIONS = START + """
-from collision_monitor.detection import Detector
+from collision_monitor.detection.detector import Detector
 rng = np.random.default_rng(0)
 solids = [cm.Sphere(0.5), cm.Box((1, 2, 3)), cm.Capsule(0.2, 1), cm.Cylinder(0.3, 1), cm.Cone(0.3, 1),
           cm.ConvexHull(rng.normal(size=(20, 3)))]

@@ -49,7 +49,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def bench(args: argparse.Namespace) -> int:
     """Run the benchmark. Raises InputError."""
-    from collision_monitor.detection import default_threads
+    from collision_monitor.detection.detector import default_threads
     from collision_monitor.world.moving_bodies import FRAMES, load_bodies, make_bodies
 
     if args.scene_file is None:
@@ -72,7 +72,7 @@ def measure(scene: Any, threads: int, frames: int | None = None) -> dict[str, An
     """Median and 99th percentile (ms) of a frame of a MovingBodies scene, and what was measured."""
     import numpy as np
 
-    from collision_monitor.detection import Detector
+    from collision_monitor.detection.detector import Detector
 
     detector = Detector(scene.shapes, threads=threads)
     detector.detect(scene.positions[0], scene.quaternions[0])  # compiles, where nothing is cached

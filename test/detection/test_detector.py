@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from collision_monitor.detection import Contacts, Detector
+from collision_monitor.detection.detector import Contacts, Detector
 from collision_monitor.errors import InputError, PoseError, UnsupportedError
 from collision_monitor.geometry.pose import rotation_matrix
 from collision_monitor.geometry.shape_table import ShapeTableBuilder

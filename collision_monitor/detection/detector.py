@@ -1,0 +1,169 @@
+"""Full detection: all poses in, all contacts out, frame by frame.
+
+    Detector(shapes).detect(positions, quaternions) -> Contacts
+
+For objects whose every pose is new in each frame. Monitor is what remembers and predicts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from collision_monitor.broad_phase.dense_grid import classify_bodies, make_grid
+from collision_monitor.detection import kernels
+from collision_monitor.errors import InputError, PoseError, UnsupportedError
+from collision_monitor.geometry.pieces import is_planar
+from collision_monitor.geometry.shape_table import BOX, SPHERE, ShapeTableBuilder
+from collision_monitor.geometry.shapes import Shape
+from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
+
+Array = NDArray[np.float64]
+
+WORTH_THREADS: Final = 3000
+"""Objects below which a frame is done before a second thread has woken up."""
+
+
+def default_threads() -> int:
+    """Two, or one where there is one core."""
+    return min(2, int(numba.config.NUMBA_NUM_THREADS))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contacts:
+    """M contacts, sorted by pair. `table` holds a row for each; the fields are views of it."""
+
+    pairs: NDArray[np.int32]
+    """(M, 2): numbers of the two shapes, the smaller first; A and B below."""
+    table: Array
+    """(M, 14): signed distance, error bound, normal, point, point on A, point on B."""
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+    @property
+    def signed_distance(self) -> Array:
+        """(M,) m: minus the depth where the shapes overlap."""
+        return self.table[:, 0]
+
+    @property
+    def error_bound(self) -> Array:
+        """(M,) m: how wrong the signed distance can be."""
+        return self.table[:, 1]
+
+    @property
+    def normal(self) -> Array:
+        """(M, 3): unit vector from A to B; B moved along it by the depth touches A."""
+        return self.table[:, 2:5]
+
+    @property
+    def point(self) -> Array:
+        """(M, 3) m: the middle between the witness points."""
+        return self.table[:, 5:8]
+
+    @property
+    def point_a(self) -> Array:
+        """(M, 3) m: the witness point on A, in the world."""
+        return self.table[:, 8:11]
+
+    @property
+    def point_b(self) -> Array:
+        """(M, 3) m: the witness point on B, in the world."""
+        return self.table[:, 11:14]
+
+
+class Detector:
+    """Finds every pair of shapes that is at most `margin` (m) apart.
+
+    shapes: one for each object. static: (N,) flags; pairs of two static objects are not looked at.
+    threads: how many a frame may use; the answer's bytes do not depend on it.
+    Raises ShapeError, UnsupportedError (a shape without narrow phase) or InputError.
+    """
+
+    def __init__(
+        self, shapes: Sequence[Shape], *, static: ArrayLike | None = None, margin: float = 0.0, threads: int = 1
+    ) -> None:
+        n = len(shapes)
+        if not (np.isfinite(margin) and margin >= 0.0):
+            raise InputError(f"margin: expected a finite number of metres >= 0, got {margin!r}")
+        if not 1 <= threads <= numba.config.NUMBA_NUM_THREADS:
+            most = numba.config.NUMBA_NUM_THREADS
+            raise InputError(f"threads: expected 1 to {most}, got {threads!r}")
+        resting = np.zeros(n, np.bool_) if static is None else np.asarray(static, dtype=np.bool_)
+        if resting.shape != (n,):
+            raise InputError(f"static: expected {n} flags, one for each shape, got an array of shape {resting.shape}")
+        builder = ShapeTableBuilder(slots=n)
+        for shape in shapes:
+            if is_planar(shape):
+                raise UnsupportedError(f"{type(shape).__name__}: the detector is for shapes of space; use Monitor")
+            builder.append(shape)
+        self._n = n
+        self._table = builder.table
+        kinds = set(self._table.kind[:n].tolist())
+        self._path = {(SPHERE,): kernels.SPHERES, (BOX,): kernels.BOXES}.get(tuple(kinds), kernels.ANY)
+        if self._path == kernels.BOXES and margin > 0.0:
+            self._path = kernels.ANY  # boxes that are apart need more than SAT
+        self._margin = float(margin)
+        self._threads = threads if n >= WORTH_THREADS else 1
+        # half of the margin on each; rounded up, so that no pair at the margin is lost
+        radius = (self._table.radius[:n] + 0.5 * margin) * (1.0 + 1e-15)
+        body = np.column_stack([self._table.size[:n, :3], radius])
+        if self._path == kernels.SPHERES:
+            body[:, 0] += self._table.margin[:n]
+        self._frame = kernels.make_frame(body, self._threads)
+        self._grid = make_grid(n)
+        classify_bodies(radius, ~resting, self._grid)
+        self._hits = kernels.make_hits(self._threads, max(n, 16))
+        self._memory = (*self._table, *self._grid, *self._frame, *self._hits)
+        self._room = max(n // 2, 16)
+
+    def __len__(self) -> int:
+        return self._n
+
+    def detect(self, positions: ArrayLike, quaternions: ArrayLike) -> Contacts:
+        """Contacts at these positions (N, 3) m and unit quaternions (N, 4) x, y, z, w.
+
+        Raises InputError for arrays of another shape, PoseError for numbers that are no pose.
+        """
+        positions = np.ascontiguousarray(positions, dtype=np.float64)
+        quaternions = np.ascontiguousarray(quaternions, dtype=np.float64)
+        n = self._n
+        if positions.shape != (n, 3) or quaternions.shape != (n, 4):
+            raise InputError(
+                f"expected positions of shape ({n}, 3) and quaternions of shape ({n}, 4), "
+                f"got {positions.shape} and {quaternions.shape}"
+            )
+        if self._threads > 1:
+            numba.set_num_threads(self._threads)
+            run = kernels.detect_parallel
+        else:
+            run = kernels.detect
+        while True:
+            pairs = np.empty((self._room, 2), np.int32)
+            table = np.empty((self._room, kernels.COLUMNS))
+            count = run(self._path, self._margin, positions, quaternions, pairs, table, *self._memory)
+            if count >= 0:
+                return Contacts(pairs[:count], table[:count])
+            if count >= kernels.BAD_QUATERNION:
+                raise PoseError(_what_is_wrong(positions, quaternions))
+            # more contacts than ever before: with room for them, the frame is done again
+            needed = kernels.BAD_QUATERNION - 1 - count
+            self._room = needed + needed // 4
+            self._hits = kernels.make_hits(self._threads, self._room)
+            self._memory = (*self._table, *self._grid, *self._frame, *self._hits)
+
+
+def _what_is_wrong(positions: Array, quaternions: Array) -> str:
+    """The first row that is no pose, in words."""
+    far = ~(np.abs(positions) <= LARGEST_INPUT).all(axis=1)
+    if far.any():
+        i = int(np.argmax(far))
+        return f"positions[{i}]: expected finite numbers up to {LARGEST_INPUT:g} m, got {positions[i].tolist()}"
+    bad = ~(np.abs(np.linalg.norm(quaternions, axis=1) - 1.0) <= UNIT_QUATERNION)
+    i = int(np.argmax(bad))
+    return f"quaternions[{i}]: expected unit length within {UNIT_QUATERNION:g}, got {quaternions[i].tolist()}"
