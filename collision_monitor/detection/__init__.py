@@ -1,1 +1,1 @@
-"""TODO."""
+"""All contacts of one frame: every pose in, every contact out."""
