@@ -4,7 +4,7 @@
     python benchmarks/scene_plan.py --objects 1000 --steps 200
 
 Both monitors see the same scene; the answers that the second gives beyond those of the first are about pairs that
-nobody asked for, and the others are the same (test/test_plan.py).
+nobody asked for, and the others are the same (test/monitor/test_scene_plan.py).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.geometry.shapes import Box, Circle, Mesh, Sphere
-from collision_monitor.monitor import Monitor
+from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.settings.profile import Profile
 from collision_monitor.world import make_scene

@@ -22,9 +22,9 @@ from typing import TYPE_CHECKING, Any
 from collision_monitor._version import VERSION as __version__  # noqa: N811
 
 _HOME = {
-    "Monitor": "monitor",
-    "StepResult": "monitor",
-    "StepStatus": "monitor",
+    "Monitor": "monitor.monitor",
+    "StepResult": "monitor.monitor",
+    "StepStatus": "monitor.monitor",
     "Profile": "settings.profile",
     "ObjectDescription": "objects.description",
     "Model": "records",
@@ -87,9 +87,9 @@ if TYPE_CHECKING:
     from collision_monitor.geometry.shapes import Mesh as Mesh
     from collision_monitor.geometry.shapes import Polygon as Polygon
     from collision_monitor.geometry.shapes import Sphere as Sphere
-    from collision_monitor.monitor import Monitor as Monitor
-    from collision_monitor.monitor import StepResult as StepResult
-    from collision_monitor.monitor import StepStatus as StepStatus
+    from collision_monitor.monitor.monitor import Monitor as Monitor
+    from collision_monitor.monitor.monitor import StepResult as StepResult
+    from collision_monitor.monitor.monitor import StepStatus as StepStatus
     from collision_monitor.objects.convex_decomposition import Decomposition as Decomposition
     from collision_monitor.objects.convex_decomposition import convex_decomposition as convex_decomposition
     from collision_monitor.objects.description import ObjectDescription as ObjectDescription

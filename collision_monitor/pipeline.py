@@ -28,12 +28,12 @@ from collision_monitor.codec import (
     encode_status,
 )
 from collision_monitor.errors import CollisionMonitorError, InputError, MessageError, ProfileError, Refusal
-from collision_monitor.freeze import freeze, thaw
-from collision_monitor.monitor import Monitor, StepResult
+from collision_monitor.monitor.freeze import freeze, thaw
+from collision_monitor.monitor.monitor import Monitor, StepResult
+from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.provenance import provenance
 from collision_monitor.settings.profile import Profile
-from collision_monitor.snapshot import Snapshot
 
 Records = NDArray[np.void]
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.monitor import Monitor, StepResult
+from collision_monitor.monitor.monitor import Monitor, StepResult
 from collision_monitor.records import Phase, PredictionStatus
 from collision_monitor.settings.profile import Profile
 

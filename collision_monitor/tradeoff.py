@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import InputError, MessageError
-from collision_monitor.monitor import Monitor, StepResult
+from collision_monitor.monitor.monitor import Monitor, StepResult
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.plain import PlainMonitor
 from collision_monitor.records import Phase, PredictionStatus

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box
-from collision_monitor.monitor import Monitor, StepResult
+from collision_monitor.monitor.monitor import Monitor, StepResult
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import containing_model, parse_model
 from collision_monitor.query.contact import contact

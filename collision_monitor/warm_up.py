@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import Box, Shape, Sphere
-from collision_monitor.monitor import Monitor
+from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.records import STATE
 
 OBJECTS = 70  # more than the arrays have room for at first: growing them is warmed up too

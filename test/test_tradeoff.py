@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from collision_monitor.cli.main import main
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.shapes import Sphere
-from collision_monitor.monitor import Monitor
+from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.plain import PlainMonitor
 from collision_monitor.records import PredictionStatus

@@ -104,7 +104,7 @@ def test_nothing_is_compiled_after_the_warm_up(session: str) -> None:
 def test_no_step_with_a_budget_is_the_first_to_load_a_kernel(when: str) -> None:
     """28 ms in a step of 1.6: what the first ones had no time for was loaded by the first that had."""
     program = (
-        "from collision_monitor.monitor import Monitor, Profile\n"
+        "from collision_monitor.monitor.monitor import Monitor, Profile\n"
         "from collision_monitor.prediction import coarse\n"
         "limited = Profile(budget_ms=1.0)\n"
         f"monitor = {when}\n"

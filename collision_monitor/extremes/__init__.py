@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from collision_monitor.extremes import exact
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import Box, Capsule, Sphere
-from collision_monitor.monitor import Monitor
+from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.query.contact import contact
 from collision_monitor.query.time_of_impact import time_of_impact
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from operator import itemgetter
 from typing import Final, NamedTuple
 
+from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.snapshot import Snapshot
 
 _OVERHEAD: Final = 128
 """Bytes that a waiting message costs beside its data, so that empty ones are bounded too."""

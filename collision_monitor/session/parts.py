@@ -15,13 +15,13 @@ from typing import Final
 
 from collision_monitor.codec import encode_descriptions
 from collision_monitor.errors import SessionError
+from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session.definitions import definition
 from collision_monitor.session.entry import Entry, are_messages_alone
 from collision_monitor.session.event_window import EventWindow
 from collision_monitor.session.rosbag2 import Extent, file_metadata, full_name
 from collision_monitor.session.session_file import SessionFile
-from collision_monitor.snapshot import Snapshot
 
 RECORDING, NUMBER, REPEATED = "recording", "file", "repeated"
 """Keys of a file's metadata: an id that the files of one recording share, its place among them from 0, and how many of

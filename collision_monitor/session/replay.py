@@ -12,12 +12,12 @@ import numpy as np
 
 from collision_monitor.codec import decode_states
 from collision_monitor.errors import InputError, MessageError, SessionError
+from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.pipeline import Pipeline
 from collision_monitor.provenance import provenance
 from collision_monitor.session.compare import Difference, compare_answers, compare_status, compare_within
 from collision_monitor.session.reader import Place, Recorded, RecordedSnapshot, Session
 from collision_monitor.settings.profile import Profile
-from collision_monitor.snapshot import Snapshot
 
 _HALF: Final = 1 << 31
 """Of the sequence numbers: what is farther ahead than this lies behind."""

@@ -211,7 +211,7 @@ def test_the_command_and_its_exit_codes(yard: Path, tmp_path: Path, capsys: pyte
 
 
 def test_the_example_of_the_docs_is_what_it_prints(yard: Path, tmp_path: Path) -> None:
-    page = (Path(__file__).parents[2] / "docs" / "check.md").read_text()
+    page = (Path(__file__).parents[3] / "docs" / "check.md").read_text()
     (expectations,) = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
     (printed,) = re.findall(r"echo \$\?\n(.*?)3\n```", page, re.DOTALL)
     (tmp_path / "yard.mcap").write_bytes(yard.read_bytes())

@@ -15,6 +15,7 @@ from session_scene import CONTACTS, STEP, record
 from collision_monitor.cli.main import main
 from collision_monitor.codec import decode_contacts, encode_contacts
 from collision_monitor.errors import InputError, SessionError
+from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.session import Recorded, Session, Splitting, parts, recorder
 from collision_monitor.session.definitions import definition
 from collision_monitor.session.entry import Entry
@@ -24,7 +25,6 @@ from collision_monitor.session.replay import Verdict, replay
 from collision_monitor.session.rosbag2 import full_name
 from collision_monitor.session.salvage import salvage
 from collision_monitor.session.session_file import SessionFile
-from collision_monitor.snapshot import Snapshot
 
 LENGTH = 0.54
 """s: 50 steps and the messages between them that are none."""
@@ -295,7 +295,7 @@ import os; os._exit(9)
 
 
 def test_a_recording_that_was_not_closed_has_its_snapshots(tmp_path: Path) -> None:
-    child = subprocess.run([sys.executable, "-c", KILLED, tmp_path / "run.mcap", Path(__file__).parent], check=False)
+    child = subprocess.run([sys.executable, "-c", KILLED, tmp_path / "run.mcap", Path(__file__).parents[2] / "helpers"], check=False)
     assert child.returncode == 9
     assert len(Session(tmp_path / "run.mcap").timeline().snapshots) == 5
     report = replay(Session(tmp_path / "run.mcap"), start=0.3)

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from collision_monitor import monitor as core
-from collision_monitor.monitor import Monitor
+from collision_monitor.monitor import monitor as core
+from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.settings.profile import Profile
 from collision_monitor.world import make_scene
 

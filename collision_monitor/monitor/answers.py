@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from collision_monitor._jit import kernel
-from collision_monitor.prediction.active_pairs import BEGIN, BOUND, CLOSING, END, PERSIST, SHAPE_I, SHAPE_J, STATUS
+from collision_monitor.monitor.active_pairs import BEGIN, BOUND, CLOSING, END, PERSIST, SHAPE_I, SHAPE_J, STATUS
 from collision_monitor.prediction.time_of_impact import BOUND_ONLY, TREE_BOUND
 from collision_monitor.records import CONTACT, PREDICTION, PredictionStatus
 

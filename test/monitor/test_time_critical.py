@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from collision_monitor import records
-from collision_monitor.budget import EXAMINE, FEWEST, TREES, PairBudget, StepClock, TimeBudget
 from collision_monitor.codec import encode_descriptions, encode_states
 from collision_monitor.errors import ProfileError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull
-from collision_monitor.monitor import Monitor, StepResult
+from collision_monitor.monitor.budget import EXAMINE, FEWEST, TREES, PairBudget, StepClock, TimeBudget
+from collision_monitor.monitor.monitor import Monitor, StepResult
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline import Pipeline
 from collision_monitor.plain import PlainMonitor, disagreements

@@ -12,7 +12,7 @@ from collision_monitor import records
 from collision_monitor.errors import ProfileError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, Sphere
-from collision_monitor.monitor import Monitor, StepResult
+from collision_monitor.monitor.monitor import Monitor, StepResult
 from collision_monitor.plain import PlainMonitor, disagreements
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
@@ -238,5 +238,5 @@ class TestCustomProfiles:
 
 @pytest.mark.parametrize("name", Profile.names())
 def test_the_profiles_in_config_are_those_of_their_name(name: str) -> None:
-    path = Path(__file__).parents[1] / "config" / f"{name}.yaml"
+    path = Path(__file__).parents[2] / "config" / f"{name}.yaml"
     assert Profile.named(str(path)) == Profile.named(name)

@@ -16,15 +16,15 @@ from collision_monitor import records
 from collision_monitor.broad_phase.hashed_grid import regridded
 from collision_monitor.errors import InputError, Refusal
 from collision_monitor.geometry.shape_table import LANES, POLYGON, ShapeTable, ShapeTableBuilder
-from collision_monitor.monitor import Monitor, StepResult, StepStatus
-from collision_monitor.prediction import active_pairs
+from collision_monitor.monitor import active_pairs
+from collision_monitor.monitor.monitor import Monitor, StepResult, StepStatus
+from collision_monitor.monitor.snapshot import Snapshot, check_range
+from collision_monitor.monitor.uncertain_predictions import ENTRY
 from collision_monitor.prediction.motion import Bodies, Parts, enlarge, make_bodies, make_parts
 from collision_monitor.prediction.spread import Spread
 from collision_monitor.prediction.time_of_impact import IMPACT
-from collision_monitor.prediction.uncertain_predictions import ENTRY
 from collision_monitor.records import ShapeType
 from collision_monitor.settings.profile import Profile
-from collision_monitor.snapshot import Snapshot, check_range
 
 MONITOR = "monitor"
 """Whose facts these are."""

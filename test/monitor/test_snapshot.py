@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from collision_monitor import monitor, records
+from collision_monitor import records
 from collision_monitor.codec import Removal, encode_descriptions, encode_states
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.pose import Pose
@@ -26,10 +26,11 @@ from collision_monitor.geometry.shapes import (
     Shape,
     Sphere,
 )
+from collision_monitor.monitor import monitor
+from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline import Pipeline
 from collision_monitor.settings.profile import Profile
-from collision_monitor.snapshot import Snapshot
 
 START, STEP = 1_000_000_000_000, 20_000_000
 Answers = list[bytes | None]

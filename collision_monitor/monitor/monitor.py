@@ -14,28 +14,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from collision_monitor import filters, records
+from collision_monitor import records
 from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.broad_phase.hashed_grid import make_hashed_grid, read_boxes, regridded, remove_boxes
-from collision_monitor.budget import EXAMINE, HANDFUL, REFINE, TREES, PairBudget, StepClock, TimeBudget
 from collision_monitor.errors import CollisionMonitorError, InputError, Refusal, UnsupportedError
 from collision_monitor.geometry.pieces import is_planar
 from collision_monitor.geometry.plane import flat_pose, flat_states
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shape_table import CIRCLE, SPHERE, ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Shape
+from collision_monitor.monitor import active_pairs, answers, candidates, filters, time_critical, tracking
+from collision_monitor.monitor.budget import EXAMINE, HANDFUL, REFINE, TREES, PairBudget, StepClock, TimeBudget
+from collision_monitor.monitor.event_list import EventList, count_until, keep_first
+from collision_monitor.monitor.patches import with_patches
+from collision_monitor.monitor.scene_plan import ScenePlan, scene_plan
+from collision_monitor.monitor.uncertain_predictions import Scene, UncertainPredictions
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import monitored_model, parse_model, shape_class
-from collision_monitor.plan import ScenePlan, scene_plan
-from collision_monitor.prediction import active_pairs, answers, candidates, coarse, tracking
-from collision_monitor.prediction.event_list import EventList, count_until, keep_first
 from collision_monitor.prediction.motion import Bodies, enlarge, make_bodies, make_parts
-from collision_monitor.prediction.patches import with_patches
 from collision_monitor.prediction.sphere_trees import Tree, Trees, body_tree, joined_trees
 from collision_monitor.prediction.spread import worst_stddevs
 from collision_monitor.prediction.time_of_impact import BOUND_ONLY, CLEAR, IMPACT, TREE_BOUND, Scratch, make_scratch
 from collision_monitor.prediction.turning import make_columns
-from collision_monitor.prediction.uncertain_predictions import Scene, UncertainPredictions
 from collision_monitor.records import Model
 from collision_monitor.rows import joined
 from collision_monitor.settings.profile import NO_BUDGET, NO_LIMIT, Profile
@@ -494,8 +494,8 @@ class Monitor:
     def _prepare_for_budget(self) -> None:
         """Let no step wait for what only some of those with a budget need: the trees, and kernels from the cache."""
         none, scratch = np.empty(0, IMPACT), self._scratch[0]
-        coarse.tighten(self._bodies, self._plant_trees(), none, 0.0, 0.0, scratch)
-        self._impacts(coarse.refine, none, 0.0, scratch)
+        time_critical.tighten(self._bodies, self._plant_trees(), none, 0.0, 0.0, scratch)
+        self._impacts(time_critical.refine, none, 0.0, scratch)
 
     def _plant_tree(self, i: int) -> None:
         self._tree_of[i] = body_tree(self._shapes.table, self._parts.next, int(self._bodies.first_shape[i]))
@@ -665,7 +665,7 @@ class Monitor:
         if self._uncertain.counts(p):
             self._uncertain.add_pairs(pairs, bodies, now)
         if bounds_only:  # what the bounding spheres say, where that is faster
-            events, queries = self._impacts(coarse.bound_pairs, pairs, now, self._scratch[0])
+            events, queries = self._impacts(time_critical.bound_pairs, pairs, now, self._scratch[0])
         else:
             events, queries = self._first_impacts(pairs, now)
         work["impact_queries"] += queries
@@ -801,7 +801,7 @@ class Monitor:
     ) -> int:
         """As `_examine`, the most urgent first, as long as the budget lasts; of the others, what their bounds say."""
         p = self._profile
-        order, at = coarse.urgency(self._bodies, pairs, events, self._step)
+        order, at = time_critical.urgency(self._bodies, pairs, events, self._step)
         n = self._examine(pairs, events, order[:at], now, results, later, work) if at else 0
         while at < len(order) and (count := budget.next(len(order) - at, EXAMINE)):
             n += self._examine(pairs, events, order[at : at + count], now, results, later[n:], work)
@@ -809,7 +809,7 @@ class Monitor:
         done, left = order[:at], order[at:]
         events["lower"][done[pairs["touching"][done] == 1]] = now  # since when nobody has looked at it
         work["deferred"] += len(left)
-        bounded = coarse.leave(
+        bounded = time_critical.leave(
             self._bodies, pairs, events, left, now, p.contact_margin, p.stale_acceleration, results, later[n:]
         )
         return n + int(bounded)
@@ -856,7 +856,8 @@ class Monitor:
         found, at = events.take(todo), 0
         while at < len(todo) and (count := budget.next(-(-(len(todo) - at) // HANDFUL), TREES)):
             end = min(at + count * HANDFUL, len(todo))
-            coarse.tighten(self._bodies, trees, found[at:end], now, self._profile.contact_margin, self._scratch[0])
+            margin = self._profile.contact_margin
+            time_critical.tighten(self._bodies, trees, found[at:end], now, margin, self._scratch[0])
             at = end
         return todo[:at], found[:at]
 
@@ -873,7 +874,7 @@ class Monitor:
         at = 0
         while at < len(todo) and (count := budget.next(len(todo) - at, REFINE)):
             bounds = pending.take(todo[at : at + count])
-            events, queries = self._impacts(coarse.refine, bounds, now, self._scratch[0])
+            events, queries = self._impacts(time_critical.refine, bounds, now, self._scratch[0])
             found.append(events)
             work["impact_queries"] += queries
             at += count

@@ -6,8 +6,8 @@ import numpy as np
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.broad_phase.hashed_grid import Region, overlap, query_box
+from collision_monitor.monitor.tracking import swept_box
 from collision_monitor.prediction.time_of_impact import CLEAR, body_impact
-from collision_monitor.prediction.tracking import swept_box
 
 
 @device

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.prediction.active_pairs import (
+from collision_monitor.monitor.active_pairs import (
     BOUND,
     CLOSING,
     SHAPE_I,
@@ -21,7 +21,7 @@ from collision_monitor.prediction.active_pairs import (
     UNRESOLVED,
     has_changed,
 )
-from collision_monitor.prediction.event_list import sort_order
+from collision_monitor.monitor.event_list import sort_order
 from collision_monitor.prediction.motion import (
     Bodies,
     half_acceleration,

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from collision_monitor import plan
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Circle, Cone, ConvexHull, Cylinder, HalfSpace, Sphere
-from collision_monitor.monitor import Monitor
+from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.monitor.scene_plan import KIND_NAMES, pair_test
 from collision_monitor.records import Phase, PredictionStatus
 from collision_monitor.settings.profile import Profile
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 import scene_plan
 
 TETRAHEDRON = ConvexHull([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
@@ -64,9 +64,9 @@ def test_cells_follow_size_and_speed() -> None:
     assert widest[0] < 10 < 100 < widest[1]
 
 
-@pytest.mark.parametrize("pair", [(a, b) for a in plan.KIND_NAMES for b in plan.KIND_NAMES if a <= b])
+@pytest.mark.parametrize("pair", [(a, b) for a in KIND_NAMES for b in KIND_NAMES if a <= b])
 def test_each_test_is_a_file_of_the_narrow_phase(pair: tuple[int, int]) -> None:
-    import_module(f"collision_monitor.narrow_phase.{plan.pair_test(*pair)}")
+    import_module(f"collision_monitor.narrow_phase.{pair_test(*pair)}")
 
 
 def test_it_counts_what_is_left_out() -> None:

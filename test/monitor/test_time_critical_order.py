@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from collision_monitor.prediction.active_pairs import PAIR
-from collision_monitor.prediction.coarse import urgency
-from collision_monitor.prediction.event_list import count_until
+from collision_monitor.monitor.active_pairs import PAIR
+from collision_monitor.monitor.event_list import count_until
+from collision_monitor.monitor.time_critical import urgency
 from collision_monitor.prediction.motion import make_bodies
 from collision_monitor.prediction.time_of_impact import IMPACT
 

@@ -1,0 +1,1 @@
+"""The monitor: a door, and the stages of a step."""
