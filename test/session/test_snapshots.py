@@ -295,7 +295,8 @@ import os; os._exit(9)
 
 
 def test_a_recording_that_was_not_closed_has_its_snapshots(tmp_path: Path) -> None:
-    child = subprocess.run([sys.executable, "-c", KILLED, tmp_path / "run.mcap", Path(__file__).parents[2] / "helpers"], check=False)
+    helpers = Path(__file__).parents[2] / "helpers"
+    child = subprocess.run([sys.executable, "-c", KILLED, tmp_path / "run.mcap", helpers], check=False)
     assert child.returncode == 9
     assert len(Session(tmp_path / "run.mcap").timeline().snapshots) == 5
     report = replay(Session(tmp_path / "run.mcap"), start=0.3)
