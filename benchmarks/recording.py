@@ -33,7 +33,7 @@ from collision_monitor import records
 from collision_monitor.codec import encode_descriptions, encode_states
 from collision_monitor.geometry.shapes import Box
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.pipeline import Pipeline
+from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorder, Session
 from collision_monitor.session.replay import replay
 

@@ -18,7 +18,7 @@ from visualization_msgs.msg import MarkerArray
 
 from collision_monitor import codec, warm_up
 from collision_monitor.errors import CollisionMonitorError, Refusal, SessionError
-from collision_monitor.pipeline import Outputs, Pipeline
+from collision_monitor.pipeline.pipeline import Outputs, Pipeline
 from collision_monitor.records import Phase
 from collision_monitor.ros import qos
 from collision_monitor.ros.live_settings import LiveSettings

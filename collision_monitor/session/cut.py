@@ -7,7 +7,7 @@ from pathlib import Path
 
 from collision_monitor.codec import encode_descriptions
 from collision_monitor.errors import SessionError
-from collision_monitor.pipeline import Pipeline
+from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session.definitions import definition
 from collision_monitor.session.entry import Entry
 from collision_monitor.session.parts import REPEATED

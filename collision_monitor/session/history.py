@@ -27,7 +27,7 @@ from collision_monitor.codec import (
 )
 from collision_monitor.errors import InputError, MessageError, SessionError
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.pipeline import LIMIT, Outputs, Pipeline
+from collision_monitor.pipeline.pipeline import LIMIT, Outputs, Pipeline
 from collision_monitor.records import ContactStatus, Phase
 from collision_monitor.session.reader import Recorded, Session
 from collision_monitor.settings.profile import Profile

@@ -13,8 +13,8 @@ import numpy as np
 from collision_monitor.codec import decode_states
 from collision_monitor.errors import InputError, MessageError, SessionError
 from collision_monitor.monitor.snapshot import Snapshot
-from collision_monitor.pipeline import Pipeline
-from collision_monitor.provenance import provenance
+from collision_monitor.pipeline.pipeline import Pipeline
+from collision_monitor.pipeline.provenance import provenance
 from collision_monitor.session.compare import Difference, compare_answers, compare_status, compare_within
 from collision_monitor.session.reader import Place, Recorded, RecordedSnapshot, Session
 from collision_monitor.settings.profile import Profile

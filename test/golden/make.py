@@ -14,7 +14,7 @@ sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "helpers")]
 
 from session_scene import record  # noqa: E402
 
-from collision_monitor.pipeline import Pipeline  # noqa: E402
+from collision_monitor.pipeline.pipeline import Pipeline  # noqa: E402
 
 STEPS: Final = 300
 PROFILES: Final = ("balanced", "exact")

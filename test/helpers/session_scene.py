@@ -13,7 +13,7 @@ from collision_monitor.codec import Removal, encode_descriptions, encode_states
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Capsule, Sphere
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.pipeline import Pipeline
+from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorder
 from collision_monitor.settings.profile import Profile
 

@@ -29,7 +29,7 @@ from collision_monitor.geometry.shapes import (
 from collision_monitor.monitor import monitor
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.pipeline import Pipeline
+from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.settings.profile import Profile
 
 START, STEP = 1_000_000_000_000, 20_000_000

@@ -17,7 +17,7 @@ from collision_monitor.geometry.shapes import Box, ConvexHull
 from collision_monitor.monitor.budget import EXAMINE, FEWEST, TREES, PairBudget, StepClock, TimeBudget
 from collision_monitor.monitor.monitor import Monitor, StepResult
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.pipeline import Pipeline
+from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.plain import PlainMonitor, disagreements
 from collision_monitor.prediction import sphere_trees
 from collision_monitor.settings.profile import Profile

@@ -20,7 +20,7 @@ from collision_monitor.cli.main import main
 from collision_monitor.codec import encode_descriptions, encode_states
 from collision_monitor.errors import InputError
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.pipeline import Pipeline
+from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorder, Session
 from collision_monitor.session.check import Checked, check_sessions, junit_xml
 from collision_monitor.session.expectations import Outcome, evaluate, parse_expectations, read_expectations

@@ -36,7 +36,7 @@ from collision_monitor.codec import (
     decode_status,
 )
 from collision_monitor.errors import InputError, SessionError
-from collision_monitor.pipeline import Pipeline
+from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.records import StateFlag
 from collision_monitor.session import Recorded, Session
 from collision_monitor.session.foreign import import_bag

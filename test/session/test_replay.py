@@ -13,7 +13,7 @@ from session_scene import CONTACTS, PREDICTIONS, STATES, STATUS, TYPES, record
 from collision_monitor.cli.main import main
 from collision_monitor.codec import decode_contacts, decode_status, encode_contacts, encode_status
 from collision_monitor.errors import SessionError
-from collision_monitor.pipeline import Pipeline
+from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorded, Recorder, Session
 from collision_monitor.session.replay import Verdict, replay
 

@@ -12,7 +12,7 @@ from session_scene import NODE, SETTINGS, START, STEP, record
 from collision_monitor.cli.main import main
 from collision_monitor.codec import decode_contacts, decode_parameter_event, decode_status, encode_parameter_event
 from collision_monitor.errors import MessageError
-from collision_monitor.pipeline import Pipeline
+from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Session, Splitting
 from collision_monitor.session.history import AS_RECORDED, read_history
 from collision_monitor.session.replay import Verdict, replay

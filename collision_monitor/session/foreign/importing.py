@@ -10,7 +10,7 @@ from typing import Final
 
 from collision_monitor.codec import decode_states
 from collision_monitor.errors import CollisionMonitorError, InputError, MessageError, Refusal, SessionError
-from collision_monitor.pipeline import Pipeline
+from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session.foreign.bag import Bag
 from collision_monitor.session.foreign.convert import TRANSFORMS, Converter, Input, put_transform
 from collision_monitor.session.foreign.mapping import Mapping

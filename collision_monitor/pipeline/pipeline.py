@@ -32,7 +32,7 @@ from collision_monitor.monitor.freeze import freeze, thaw
 from collision_monitor.monitor.monitor import Monitor, StepResult
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.provenance import provenance
+from collision_monitor.pipeline.provenance import provenance
 from collision_monitor.settings.profile import Profile
 
 Records = NDArray[np.void]

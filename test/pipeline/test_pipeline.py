@@ -22,7 +22,7 @@ from collision_monitor.errors import Refusal
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, HalfSpace, Sphere
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.pipeline import Outputs, Pipeline
+from collision_monitor.pipeline.pipeline import Outputs, Pipeline
 from collision_monitor.records import Model
 
 STEP = 10_000_000

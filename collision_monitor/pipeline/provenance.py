@@ -13,7 +13,7 @@ import numpy
 
 from collision_monitor._version import VERSION
 
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).parents[1]
 _NO_PART_OF_THE_ANSWERS = ("cli", "report", "ros", "session", "world")
 
 

@@ -1,0 +1,1 @@
+"""Message bytes in, the monitor, message bytes out; without ROS."""
