@@ -37,7 +37,7 @@ def add_parser(subparsers: Any) -> None:
 
 def salvage_command(args: argparse.Namespace) -> int:
     """Return the exit code. Raises SessionError."""
-    from collision_monitor.session.salvage import salvage
+    from collision_monitor.session.mcap.salvage import salvage
 
     result = salvage(args.session, args.output, unverified=args.unverified, overwrite=args.force)
     if args.json:

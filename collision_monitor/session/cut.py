@@ -8,12 +8,12 @@ from pathlib import Path
 from collision_monitor.codec import encode_descriptions
 from collision_monitor.errors import SessionError
 from collision_monitor.pipeline.pipeline import Pipeline
-from collision_monitor.session.definitions import definition
 from collision_monitor.session.entry import Entry
+from collision_monitor.session.mcap.definitions import definition
+from collision_monitor.session.mcap.rosbag2 import TYPES, full_name
 from collision_monitor.session.parts import REPEATED
 from collision_monitor.session.reader import Recorded, RecordedSnapshot, Session
 from collision_monitor.session.replay import replay
-from collision_monitor.session.rosbag2 import TYPES, full_name
 from collision_monitor.session.session_file import SessionFile
 
 

@@ -19,9 +19,9 @@ from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
 from collision_monitor.codec import Descriptions, States, decode_descriptions, decode_states
 from collision_monitor.errors import MessageError, ProfileError, SessionError
-from collision_monitor.session.mcap_records import McapRecords, Message
+from collision_monitor.session.mcap.records import McapRecords, Message
+from collision_monitor.session.mcap.rosbag2 import TYPES, full_name
 from collision_monitor.session.parts import NUMBER, RECORDING, REPEATED
-from collision_monitor.session.rosbag2 import TYPES, full_name
 from collision_monitor.session.session_file import METADATA, SNAPSHOT
 from collision_monitor.settings.profile import Profile
 

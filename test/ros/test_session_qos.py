@@ -8,7 +8,7 @@ qos = pytest.importorskip("collision_monitor.ros.qos")
 
 from rclpy.qos import qos_profile_parameter_events  # noqa: E402
 
-from collision_monitor.session.rosbag2 import TYPES, qos_profiles  # noqa: E402
+from collision_monitor.session.mcap.rosbag2 import TYPES, qos_profiles  # noqa: E402
 
 NODE = {
     "ObjectStateArray": qos.STATES,

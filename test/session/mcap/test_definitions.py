@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from collision_monitor.errors import SessionError
-from collision_monitor.session import definitions
-from collision_monitor.session.rosbag2 import TYPES, full_name
+from collision_monitor.session.mcap import definitions
+from collision_monitor.session.mcap.rosbag2 import TYPES, full_name
 
 
 @pytest.mark.parametrize("name", TYPES)

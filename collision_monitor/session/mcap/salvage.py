@@ -31,7 +31,7 @@ from mcap.writer import Writer
 
 from collision_monitor._version import VERSION
 from collision_monitor.errors import SessionError
-from collision_monitor.session.damaged_mcap import MESSAGE, Damage, Part, Place, Trust, walk
+from collision_monitor.session.mcap.damaged import MESSAGE, Damage, Part, Place, Trust, walk
 from collision_monitor.session.reader import SALVAGE
 
 LIBRARY: Final = "collision_monitor"

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import yaml
 
-from collision_monitor.session.definitions import type_hash
+from collision_monitor.session.mcap.definitions import type_hash
 
 VERSION: Final = 9
 """Of rosbag2's metadata, as Jazzy writes it."""

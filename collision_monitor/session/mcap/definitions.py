@@ -73,4 +73,4 @@ def _roots() -> Iterator[Path]:
     for prefix in [*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), sys.prefix]:
         if prefix:
             yield Path(prefix) / "share"
-    yield Path(__file__).parents[2]
+    yield Path(__file__).parents[3]

@@ -1,0 +1,1 @@
+"""MCAP files as rosbag2 writes them: reading, writing, salvaging."""
