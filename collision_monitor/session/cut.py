@@ -8,13 +8,13 @@ from pathlib import Path
 from collision_monitor.codec import encode_descriptions
 from collision_monitor.errors import SessionError
 from collision_monitor.pipeline.pipeline import Pipeline
-from collision_monitor.session.entry import Entry
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.session.mcap.rosbag2 import TYPES, full_name
-from collision_monitor.session.parts import REPEATED
 from collision_monitor.session.reader import Recorded, RecordedSnapshot, Session
+from collision_monitor.session.recording.entry import Entry
+from collision_monitor.session.recording.parts import REPEATED
+from collision_monitor.session.recording.session_file import SessionFile
 from collision_monitor.session.replay import replay
-from collision_monitor.session.session_file import SessionFile
 
 
 def cut(

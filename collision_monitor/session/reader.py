@@ -21,8 +21,8 @@ from collision_monitor.codec import Descriptions, States, decode_descriptions, d
 from collision_monitor.errors import MessageError, ProfileError, SessionError
 from collision_monitor.session.mcap.records import McapRecords, Message
 from collision_monitor.session.mcap.rosbag2 import TYPES, full_name
-from collision_monitor.session.parts import NUMBER, RECORDING, REPEATED
-from collision_monitor.session.session_file import METADATA, SNAPSHOT
+from collision_monitor.session.recording.parts import NUMBER, RECORDING, REPEATED
+from collision_monitor.session.recording.session_file import METADATA, SNAPSHOT
 from collision_monitor.settings.profile import Profile
 
 SALVAGE: Final = "collision_monitor_salvage"

@@ -16,15 +16,16 @@ from collision_monitor.cli.main import main
 from collision_monitor.codec import decode_contacts, encode_contacts
 from collision_monitor.errors import InputError, SessionError
 from collision_monitor.monitor.snapshot import Snapshot
-from collision_monitor.session import Recorded, Session, Splitting, parts, recorder
-from collision_monitor.session.entry import Entry
-from collision_monitor.session.event_window import EventWindow
+from collision_monitor.session import Recorded, Session, Splitting
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.session.mcap.rosbag2 import full_name
 from collision_monitor.session.mcap.salvage import salvage
 from collision_monitor.session.reader import RecordedSnapshot
+from collision_monitor.session.recording import parts, recorder
+from collision_monitor.session.recording.entry import Entry
+from collision_monitor.session.recording.event_window import EventWindow
+from collision_monitor.session.recording.session_file import SessionFile
 from collision_monitor.session.replay import Verdict, replay
-from collision_monitor.session.session_file import SessionFile
 
 LENGTH = 0.54
 """s: 50 steps and the messages between them that are none."""

@@ -16,7 +16,7 @@ from collision_monitor.session.foreign.convert import TRANSFORMS, Converter, Inp
 from collision_monitor.session.foreign.mapping import Mapping
 from collision_monitor.session.foreign.transforms import TransformTree
 from collision_monitor.session.mcap.rosbag2 import full_name
-from collision_monitor.session.recorder import Recorder, Recording
+from collision_monitor.session.recording.recorder import Recorder, Recording
 from collision_monitor.settings.profile import Profile
 
 NODE: Final = "/object_monitor"

@@ -17,11 +17,11 @@ from collision_monitor.codec import encode_descriptions
 from collision_monitor.errors import SessionError
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.session.entry import Entry, are_messages_alone
-from collision_monitor.session.event_window import EventWindow
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.session.mcap.rosbag2 import Extent, file_metadata, full_name
-from collision_monitor.session.session_file import SessionFile
+from collision_monitor.session.recording.entry import Entry, are_messages_alone
+from collision_monitor.session.recording.event_window import EventWindow
+from collision_monitor.session.recording.session_file import SessionFile
 
 RECORDING, NUMBER, REPEATED = "recording", "file", "repeated"
 """Keys of a file's metadata: an id that the files of one recording share, its place among them from 0, and how many of

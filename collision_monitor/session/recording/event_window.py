@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 
-from collision_monitor.session.entry import Entry
+from collision_monitor.session.recording.entry import Entry
 
 
 class EventWindow:

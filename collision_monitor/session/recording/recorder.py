@@ -13,10 +13,10 @@ from typing import Final
 from collision_monitor.errors import SessionError
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.session.entry import Entry
 from collision_monitor.session.mcap.rosbag2 import TYPES
-from collision_monitor.session.parts import ONE_FILE, SNAPSHOT_PERIOD, Parts, Splitting
-from collision_monitor.session.session_file import METADATA
+from collision_monitor.session.recording.entry import Entry
+from collision_monitor.session.recording.parts import ONE_FILE, SNAPSHOT_PERIOD, Parts, Splitting
+from collision_monitor.session.recording.session_file import METADATA
 
 __all__ = ["METADATA", "Recorder", "Recording", "Splitting"]
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Final
 
 from collision_monitor._version import VERSION
-from collision_monitor.session.entry import Entry
 from collision_monitor.session.mcap.rosbag2 import Extent, channel_metadata, file_metadata, full_name
 from collision_monitor.session.mcap.writer import McapWriter
+from collision_monitor.session.recording.entry import Entry
 
 METADATA: Final = "collision_monitor"
 """Name of the metadata record that makes an MCAP file a session."""

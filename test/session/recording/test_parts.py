@@ -16,8 +16,8 @@ from collision_monitor.codec import decode_contacts, decode_descriptions
 from collision_monitor.errors import SessionError
 from collision_monitor.records import Phase
 from collision_monitor.session import Recorded, Recording, Session, Splitting
-from collision_monitor.session.entry import Entry
-from collision_monitor.session.event_window import EventWindow
+from collision_monitor.session.recording.entry import Entry
+from collision_monitor.session.recording.event_window import EventWindow
 from collision_monitor.session.replay import Verdict, replay
 
 BY_TIME = Splitting(duration=0.26)
