@@ -35,7 +35,7 @@ from collision_monitor.geometry.shapes import Box
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorder, Session
-from collision_monitor.session.replay import replay
+from collision_monitor.session.replaying.replay import replay
 
 NODE = "/object_monitor"
 TYPES = {

@@ -19,7 +19,7 @@ from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
     from collision_monitor.session import Session
-    from collision_monitor.session.replay import Report
+    from collision_monitor.session.replaying.replay import Report
 
 EPILOG = """\
 exit codes: 0 the answers are identical, 1 the session cannot be read, 3 they differ (the first difference is named),
@@ -59,7 +59,7 @@ def replay_command(args: argparse.Namespace) -> int:
     """Return the exit code. Raises InputError, SessionError."""
     from collision_monitor.session import Session
     from collision_monitor.session.many import find_sessions
-    from collision_monitor.session.replay import replay
+    from collision_monitor.session.replaying.replay import replay
 
     paths = find_sessions(args.sessions)
     if len(paths) > 1:
@@ -70,7 +70,7 @@ def replay_command(args: argparse.Namespace) -> int:
     with _progress_bar(session) as progress:
         report = replay(session, **_options(args), progress=progress)
     if args.cut is not None and report.first_message is not None:
-        from collision_monitor.session.cut import cut
+        from collision_monitor.session.replaying.cut import cut
 
         count = cut(Session(paths[0]), report.first_message, args.cut, tolerance=args.tolerance, overwrite=args.force)
         report.notes.append(f"{count} messages that show the first difference are in {args.cut}")
@@ -92,7 +92,7 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
 
 def _replay_one(path: Path, options: dict[str, Any]) -> _Replayed:
     from collision_monitor.session import Session
-    from collision_monitor.session.replay import replay
+    from collision_monitor.session.replaying.replay import replay
 
     return _Replayed(replay(Session(path), **options))
 
@@ -160,7 +160,7 @@ def _progress_bar(session: Session) -> Iterator[Callable[[Report], None] | None]
 
 
 def _verdict(report: Report) -> str:
-    from collision_monitor.session.replay import Verdict
+    from collision_monitor.session.replaying.replay import Verdict
 
     if report.verdict is Verdict.DIVERGED:
         return f"diverged in {report.differing} of {report.steps} steps"

@@ -14,7 +14,7 @@ from collision_monitor.session.expectations import Outcome, evaluate, parse_expe
 from collision_monitor.session.history import read_history
 from collision_monitor.session.many import ALL_CORES, Engine, for_each
 from collision_monitor.session.reader import Session
-from collision_monitor.session.replay import replay
+from collision_monitor.session.replaying.replay import replay
 
 _NOT_XML: Final = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What a name may hold and XML may not."""

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from collision_monitor.session import Session
-from collision_monitor.session.replay import replay
+from collision_monitor.session.replaying.replay import replay
 
 SESSIONS = sorted(Path(__file__).parent.glob("*.mcap"))
 

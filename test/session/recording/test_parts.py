@@ -18,7 +18,7 @@ from collision_monitor.records import Phase
 from collision_monitor.session import Recorded, Recording, Session, Splitting
 from collision_monitor.session.recording.entry import Entry
 from collision_monitor.session.recording.event_window import EventWindow
-from collision_monitor.session.replay import Verdict, replay
+from collision_monitor.session.replaying.replay import Verdict, replay
 
 BY_TIME = Splitting(duration=0.26)
 

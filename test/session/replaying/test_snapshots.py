@@ -25,7 +25,7 @@ from collision_monitor.session.recording import parts, recorder
 from collision_monitor.session.recording.entry import Entry
 from collision_monitor.session.recording.event_window import EventWindow
 from collision_monitor.session.recording.session_file import SessionFile
-from collision_monitor.session.replay import Verdict, replay
+from collision_monitor.session.replaying.replay import Verdict, replay
 
 LENGTH = 0.54
 """s: 50 steps and the messages between them that are none."""

@@ -15,8 +15,8 @@ from collision_monitor.errors import InputError, MessageError, SessionError
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.provenance import provenance
-from collision_monitor.session.compare import Difference, compare_answers, compare_status, compare_within
 from collision_monitor.session.reader import Place, Recorded, RecordedSnapshot, Session
+from collision_monitor.session.replaying.difference import Difference, compare_answers, compare_status, compare_within
 from collision_monitor.settings.profile import Profile
 
 _HALF: Final = 1 << 31

@@ -15,7 +15,7 @@ from collision_monitor.codec import decode_contacts, decode_status, encode_conta
 from collision_monitor.errors import SessionError
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorded, Recorder, Session
-from collision_monitor.session.replay import Verdict, replay
+from collision_monitor.session.replaying.replay import Verdict, replay
 
 
 def rewritten(

@@ -14,7 +14,7 @@ from collision_monitor.session.reader import Recorded, RecordedSnapshot, Session
 from collision_monitor.session.recording.entry import Entry
 from collision_monitor.session.recording.parts import REPEATED
 from collision_monitor.session.recording.session_file import SessionFile
-from collision_monitor.session.replay import replay
+from collision_monitor.session.replaying.replay import replay
 
 
 def cut(

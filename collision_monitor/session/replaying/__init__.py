@@ -1,0 +1,1 @@
+"""From session files to the same answers again."""
