@@ -20,7 +20,7 @@ import pytest
 from collision_monitor.errors import CollisionMonitorError
 
 if TYPE_CHECKING:
-    from collision_monitor.session.history import Collision, History
+    from collision_monitor.session.history.history import Collision, History
 
 MARKER = "session(path, replay=False): the recorded session that the fixture `session` reads"
 
@@ -39,7 +39,7 @@ class RecordedSession:
 
     def __init__(self, path: Path, replay: bool | str = False) -> None:
         from collision_monitor.session import Session
-        from collision_monitor.session.history import AS_RECORDED, read_history
+        from collision_monitor.session.history.history import AS_RECORDED, read_history
 
         self.path = path
         again = replay if isinstance(replay, str) else AS_RECORDED if replay else None
@@ -61,13 +61,13 @@ class RecordedSession:
 
     def replay(self) -> str:
         """`identical`, `not comparable` or `diverged`, and in which way: today's answers against the recorded ones."""
-        from collision_monitor.session.check import replay_verdict
+        from collision_monitor.session.history.check import replay_verdict
 
         return replay_verdict(self.path)
 
     def check(self, expectations: str | Path | dict[str, Any]) -> None:
         """Assert what a YAML file, or a mapping like one, expects. A path is relative to the session's file."""
-        from collision_monitor.session.expectations import evaluate, parse_expectations, read_expectations
+        from collision_monitor.session.history.expectations import evaluate, parse_expectations, read_expectations
 
         if isinstance(expectations, dict):
             expected = parse_expectations(expectations)

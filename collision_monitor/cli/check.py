@@ -14,7 +14,7 @@ from collision_monitor.cli.progress import progress_bar
 from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
-    from collision_monitor.session.check import Checked
+    from collision_monitor.session.history.check import Checked
 
 EXIT_ERROR = 1
 EXIT_USAGE = 2
@@ -66,8 +66,8 @@ def add_parser(subparsers: Any) -> None:
 
 def check_command(args: argparse.Namespace) -> int:
     """Return the exit code. Raises InputError, UnsupportedError."""
-    from collision_monitor.session.check import check_sessions, junit_xml
-    from collision_monitor.session.expectations import read_expectations
+    from collision_monitor.session.history.check import check_sessions, junit_xml
+    from collision_monitor.session.history.expectations import read_expectations
     from collision_monitor.session.many import find_sessions
     from collision_monitor.settings.profile import Profile
 

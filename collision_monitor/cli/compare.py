@@ -15,8 +15,8 @@ from collision_monitor.cli.quantities import positive, whole
 from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
-    from collision_monitor.session.changes import Change, Changes, Event
-    from collision_monitor.session.history import History
+    from collision_monitor.session.history.changes import Change, Changes, Event
+    from collision_monitor.session.history.history import History
 
 EXIT_DIFFERENT: Final = 3
 EXIT_NOT_KNOWN: Final = 4
@@ -58,7 +58,7 @@ def add_parser(subparsers: Any) -> None:
 
 def compare_command(args: argparse.Namespace) -> int:
     """Return the exit code. Raises InputError, ProfileError, SessionError."""
-    from collision_monitor.session.changes import changes
+    from collision_monitor.session.history.changes import changes
 
     a, b = (_history(path, profile) for path, profile in _sides(args))
     found = changes(a, b, args.tolerance)
@@ -83,7 +83,7 @@ def _sides(args: argparse.Namespace) -> list[tuple[Path, str | None]]:
 
 def _history(path: Path, with_profile: str | None) -> History:
     from collision_monitor.session import Session
-    from collision_monitor.session.history import read_history
+    from collision_monitor.session.history.history import read_history
 
     session = Session(path)
     with session_bar(path.name, session) as show:

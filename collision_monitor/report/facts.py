@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from collision_monitor.report.tracks import Tracks
-from collision_monitor.session.alerts import Alert, Outcome, alert_before, alerts_of
-from collision_monitor.session.history import Collision, Floats, History, Pair
+from collision_monitor.session.history.alerts import Alert, Outcome, alert_before, alerts_of
+from collision_monitor.session.history.history import Collision, Floats, History, Pair
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from collision_monitor.geometry.qhull import qhull
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, Polygon, Shape, Triangle
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.session.history import Floats
+from collision_monitor.session.history.history import Floats
 
 DIRECTIONS: Final = 64
 """From which round shapes are looked at."""

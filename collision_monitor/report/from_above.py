@@ -12,7 +12,7 @@ from collision_monitor.report.facts import Facts
 from collision_monitor.report.footprint import footprint
 from collision_monitor.report.picture import INK, PALETTE, Size, shortened
 from collision_monitor.report.tracks import Track
-from collision_monitor.session.history import Collision, Floats, History
+from collision_monitor.session.history.history import Collision, Floats, History
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

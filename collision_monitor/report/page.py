@@ -15,7 +15,7 @@ from collision_monitor.report.figures import CURVES, PAIRS, drawn_collisions, fi
 from collision_monitor.report.from_above import AROUND, EVENTS
 from collision_monitor.report.picture import BROAD, NARROW, as_png, as_svg
 from collision_monitor.report.verdict import verdict
-from collision_monitor.session.history import Collision, History
+from collision_monitor.session.history.history import Collision, History
 
 ROWS: Final = 200
 """Collisions in the table."""

@@ -13,7 +13,7 @@ from collision_monitor.geometry.shape_table import ShapeTableBuilder, take
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.objects.models import Modelled, containing_model
 from collision_monitor.records import StateFlag
-from collision_monitor.session.history import Floats, History, Pair
+from collision_monitor.session.history.history import Floats, History, Pair
 
 PIECES: Final = 64
 """Most pairs of convex pieces that a distance is taken of; beyond, the objects' convex hulls stand for them."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from collision_monitor.errors import Refusal
 from collision_monitor.report.facts import Facts
-from collision_monitor.session.alerts import Outcome
-from collision_monitor.session.history import History
+from collision_monitor.session.history.alerts import Outcome
+from collision_monitor.session.history.history import History
 
 NAMED: Final = 3
 """Objects, gaps and problems that are named; of more than that the number is said."""

@@ -15,8 +15,8 @@ from collision_monitor.report.facts import gather
 from collision_monitor.report.footprint import footprint
 from collision_monitor.report.verdict import verdict
 from collision_monitor.session import Session
-from collision_monitor.session.alerts import Outcome, stated_error
-from collision_monitor.session.history import read_history
+from collision_monitor.session.history.alerts import Outcome, stated_error
+from collision_monitor.session.history.history import read_history
 from collision_monitor.world.crossing import Crossing
 
 STEP = 0.02

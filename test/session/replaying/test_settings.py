@@ -14,7 +14,7 @@ from collision_monitor.codec import decode_contacts, decode_parameter_event, dec
 from collision_monitor.errors import MessageError
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Session, Splitting
-from collision_monitor.session.history import AS_RECORDED, read_history
+from collision_monitor.session.history.history import AS_RECORDED, read_history
 from collision_monitor.session.replaying.replay import Verdict, replay
 from collision_monitor.settings.profile import Profile
 

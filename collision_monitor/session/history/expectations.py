@@ -16,7 +16,7 @@ import numpy as np
 import yaml
 
 from collision_monitor.errors import CollisionMonitorError, InputError
-from collision_monitor.session.history import ANY, History, Pair
+from collision_monitor.session.history.history import ANY, History, Pair
 
 
 @dataclass(frozen=True)

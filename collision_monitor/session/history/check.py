@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Final
 from xml.etree import ElementTree
 
-from collision_monitor.session.expectations import Outcome, evaluate, parse_expectations
-from collision_monitor.session.history import read_history
+from collision_monitor.session.history.expectations import Outcome, evaluate, parse_expectations
+from collision_monitor.session.history.history import read_history
 from collision_monitor.session.many import ALL_CORES, Engine, for_each
 from collision_monitor.session.reader import Session
 from collision_monitor.session.replaying.replay import replay

@@ -22,9 +22,9 @@ from collision_monitor.errors import InputError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorder, Session
-from collision_monitor.session.check import Checked, check_sessions, junit_xml
-from collision_monitor.session.expectations import Outcome, evaluate, parse_expectations, read_expectations
-from collision_monitor.session.history import History, read_history
+from collision_monitor.session.history.check import Checked, check_sessions, junit_xml
+from collision_monitor.session.history.expectations import Outcome, evaluate, parse_expectations, read_expectations
+from collision_monitor.session.history.history import History, read_history
 from collision_monitor.session.many import Engine, find_sessions
 
 PROGRAM = Path(sys.executable).with_name("collision-monitor")

@@ -10,8 +10,8 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from collision_monitor.records import Phase
-from collision_monitor.session.alerts import Outcome, alerts_of
-from collision_monitor.session.history import NANOSECOND, History, Pair
+from collision_monitor.session.history.alerts import Outcome, alerts_of
+from collision_monitor.session.history.history import NANOSECOND, History, Pair
 
 WITHIN: Final = 0.5
 """s: two collisions of a pair whose begins are further apart are two events, not one that was shifted."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.records import PredictionStatus
-from collision_monitor.session.history import Collision, Floats, History, Pair
+from collision_monitor.session.history.history import Collision, Floats, History, Pair
 
 
 class Outcome(Enum):
