@@ -26,6 +26,6 @@ setup(
             "world = collision_monitor.ros.main:world",
             "replay = collision_monitor.cli.main:replay_main",
         ],
-        "pytest11": ["collision_monitor = collision_monitor.pytest_plugin"],
+        "pytest11": ["collision_monitor = collision_monitor.session.pytest_plugin"],
     },
 )

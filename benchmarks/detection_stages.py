@@ -1,4 +1,4 @@
-"""Where the time of a frame goes on one thread, stage by stage: `stages.py [SCENE] [N]`, microseconds."""
+"""Where the time of a frame goes on one thread, stage by stage: `detection_stages.py [SCENE] [N]`, microseconds."""
 
 from __future__ import annotations
 
