@@ -21,9 +21,9 @@ from collision_monitor.geometry.pose import Pose, rotation_matrix
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
-from collision_monitor.session.foreign.mapping import HEADER, Mapping, Source
-from collision_monitor.session.foreign.markers import DELETE, DELETE_ALL, MarkerTable, marker_shape, source_of
-from collision_monitor.session.foreign.transforms import IDENTITY, Placement, TransformTree, frame_name, placement
+from collision_monitor.sources.mapping import HEADER, Mapping, Source
+from collision_monitor.sources.markers import DELETE, DELETE_ALL, MarkerTable, marker_shape, source_of
+from collision_monitor.sources.transforms import IDENTITY, Placement, TransformTree, frame_name, placement
 
 ODOMETRY: Final = "nav_msgs/msg/Odometry"
 POSE: Final = "geometry_msgs/msg/PoseStamped"

@@ -11,13 +11,13 @@ from typing import Final
 from collision_monitor.codec import decode_states
 from collision_monitor.errors import CollisionMonitorError, InputError, MessageError, Refusal, SessionError
 from collision_monitor.pipeline.pipeline import Pipeline
-from collision_monitor.session.foreign.bag import Bag
-from collision_monitor.session.foreign.convert import TRANSFORMS, Converter, Input, put_transform
-from collision_monitor.session.foreign.mapping import Mapping
-from collision_monitor.session.foreign.transforms import TransformTree
 from collision_monitor.session.mcap.rosbag2 import full_name
 from collision_monitor.session.recording.recorder import Recorder, Recording
 from collision_monitor.settings.profile import Profile
+from collision_monitor.sources.bag import Bag
+from collision_monitor.sources.convert import TRANSFORMS, Converter, Input, put_transform
+from collision_monitor.sources.mapping import Mapping
+from collision_monitor.sources.transforms import TransformTree
 
 NODE: Final = "/object_monitor"
 STATUS_PERIOD: Final = 50_000_000

@@ -40,8 +40,8 @@ from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.records import StateFlag
 from collision_monitor.session import Recorded, Session
 from collision_monitor.session.foreign import import_bag
-from collision_monitor.session.foreign.mapping import make_mapping
 from collision_monitor.session.replaying.replay import Verdict, replay
+from collision_monitor.sources.mapping import make_mapping
 
 STEP = 20_000_000
 CUBE, SPHERE, CYLINDER, LINE_STRIP = 1, 2, 3, 4

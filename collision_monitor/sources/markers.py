@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.shapes import Box, Cylinder, Shape, Sphere
-from collision_monitor.session.foreign.mapping import Source
+from collision_monitor.sources.mapping import Source
 
 DELETE, DELETE_ALL = 2, 3
 
