@@ -22,8 +22,8 @@ from rich.progress import track
 from rich.table import Table
 
 from collision_monitor import Box, Monitor, records
+from collision_monitor.accuracy.plain import PlainMonitor, disagreements
 from collision_monitor.geometry.pose import from_rotation_vector, multiply
-from collision_monitor.plain import PlainMonitor, disagreements
 from collision_monitor.settings.profile import Profile
 
 RATE = 100.0

@@ -25,7 +25,7 @@ from event_list import RATE, Boxes
 from numpy.typing import NDArray
 
 from collision_monitor import Box, ConvexHull, Monitor, StepResult, records
-from collision_monitor.plain import PlainMonitor
+from collision_monitor.accuracy.plain import PlainMonitor
 from collision_monitor.prediction import sphere_trees
 from collision_monitor.settings.profile import Profile
 from collision_monitor.world.arm import link

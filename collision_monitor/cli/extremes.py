@@ -44,7 +44,7 @@ def add_parser(subparsers: Any) -> None:
 
 def extremes_command(args: argparse.Namespace) -> int:
     """Return the exit code. Raises InputError."""
-    from collision_monitor import extremes
+    from collision_monitor.accuracy import extremes
 
     with progress_bar("extremes", extremes.steps()) as done:
         rows = extremes.run(args.samples, args.seed, done)

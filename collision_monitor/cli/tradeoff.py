@@ -17,8 +17,8 @@ from collision_monitor.cli.quantities import not_negative, positive, whole
 from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
+    from collision_monitor.accuracy.tradeoff import Row, Step
     from collision_monitor.objects.description import ObjectDescription
-    from collision_monitor.tradeoff import Row, Step
 
 MESHES: Final = "arm"
 """The scene whose shapes matter, not its profile: its rows are models."""
@@ -91,9 +91,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print. Raises InputError, ProfileError, SessionError."""
+    from collision_monitor.accuracy.tradeoff import recorded, tradeoff
+    from collision_monitor.accuracy.tradeoff_models import MODELS, SAMPLES, model_tradeoff
     from collision_monitor.settings.profile import Profile
-    from collision_monitor.tradeoff import recorded, tradeoff
-    from collision_monitor.tradeoff_models import MODELS, SAMPLES, model_tradeoff
 
     if args.session is not None and args.scene:
         raise InputError("tradeoff: expected a session or scenes, got both")

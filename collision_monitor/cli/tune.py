@@ -14,7 +14,7 @@ from collision_monitor.cli.tradeoff import draw
 from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
-    from collision_monitor.tune import Trial
+    from collision_monitor.accuracy.tune import Trial
 
 EXIT_NONE = 3
 
@@ -48,9 +48,9 @@ def add_parser(subparsers: Any) -> None:
 
 def tune_command(args: argparse.Namespace) -> int:
     """Return the exit code. Raises InputError, SessionError."""
+    from collision_monitor.accuracy.tradeoff import recorded
+    from collision_monitor.accuracy.tune import Demands, candidates, parameter_file, tune
     from collision_monitor.session import Session
-    from collision_monitor.tradeoff import recorded
-    from collision_monitor.tune import Demands, candidates, parameter_file, tune
 
     output = args.output or Path(f"{args.session.stem}.yaml")
     if output.exists() and not args.force:

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from collision_monitor import records
+from collision_monitor.accuracy.plain import PlainMonitor, disagreements
 from collision_monitor.errors import ProfileError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, HalfSpace, Sphere
 from collision_monitor.monitor.monitor import Monitor, StepResult
-from collision_monitor.plain import PlainMonitor, disagreements
 from collision_monitor.settings.profile import Profile
 from collision_monitor.world import make_scene
 

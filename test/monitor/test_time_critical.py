@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from collision_monitor import records
+from collision_monitor.accuracy.plain import PlainMonitor, disagreements
 from collision_monitor.codec import encode_descriptions, encode_states
 from collision_monitor.errors import ProfileError
 from collision_monitor.geometry.pose import Pose
@@ -18,7 +19,6 @@ from collision_monitor.monitor.budget import EXAMINE, FEWEST, TREES, PairBudget,
 from collision_monitor.monitor.monitor import Monitor, StepResult
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
-from collision_monitor.plain import PlainMonitor, disagreements
 from collision_monitor.prediction import sphere_trees
 from collision_monitor.settings.profile import Profile
 from collision_monitor.world import Scene, make_scene

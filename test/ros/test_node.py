@@ -12,11 +12,11 @@ from rosgraph_msgs.msg import Clock
 from visualization_msgs.msg import Marker, MarkerArray
 
 from collision_monitor import codec, records
+from collision_monitor.accuracy.plain import PlainMonitor
 from collision_monitor.codec import Removal
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.plain import PlainMonitor
 from collision_monitor.ros import main, qos
 from collision_monitor.session import Session
 from collision_monitor.session.replaying.replay import Verdict, replay

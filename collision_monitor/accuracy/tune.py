@@ -12,10 +12,10 @@ from typing import Final
 
 import yaml
 
+from collision_monitor.accuracy.tradeoff import Row, Step, tradeoff
 from collision_monitor.errors import InputError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.settings.profile import Profile
-from collision_monitor.tradeoff import Row, Step, tradeoff
 
 FACTORS: Final = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.01)
 """Of the tolerances of `balanced`, from loose to tight; `fast` is tried before them and `exact` after them."""

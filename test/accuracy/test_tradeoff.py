@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from collision_monitor.accuracy.plain import PlainMonitor
+from collision_monitor.accuracy.tradeoff import Step, tradeoff
 from collision_monitor.cli.main import main
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.shapes import Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.plain import PlainMonitor
 from collision_monitor.records import PredictionStatus
 from collision_monitor.settings.profile import Profile
-from collision_monitor.tradeoff import Step, tradeoff
 from collision_monitor.world.scene import state_array
 
 GOLDEN = Path(__file__).parent / "golden" / "balanced.mcap"

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from collision_monitor import Box, Capsule, Motion, Pose, Sphere, contact, extremes, time_of_impact
-from collision_monitor.extremes import exact
+from collision_monitor import Box, Capsule, Motion, Pose, Sphere, contact, time_of_impact
+from collision_monitor.accuracy import exact, extremes
 
 PROGRAM = Path(sys.executable).with_name("collision-monitor")
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.extremes import exact
+from collision_monitor.accuracy import exact
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import Box, Capsule, Sphere
 from collision_monitor.monitor.monitor import Monitor

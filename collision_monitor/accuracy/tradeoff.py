@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.accuracy.plain import PlainMonitor
 from collision_monitor.errors import InputError, MessageError
 from collision_monitor.monitor.monitor import Monitor, StepResult
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.plain import PlainMonitor
 from collision_monitor.records import Phase, PredictionStatus
 from collision_monitor.settings.profile import Profile
 

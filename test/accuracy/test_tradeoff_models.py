@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from collision_monitor.accuracy.tradeoff import Step
+from collision_monitor.accuracy.tradeoff_models import model_tradeoff
 from collision_monitor.cli.main import main
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.polyhedra import is_closed
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.tradeoff import Step
-from collision_monitor.tradeoff_models import model_tradeoff
 from collision_monitor.world import make_scene
 from collision_monitor.world.arm import lathe
 from collision_monitor.world.scene import state_array

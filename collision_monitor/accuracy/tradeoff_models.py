@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.accuracy.tradeoff import Errors, Played, Row, Step, deepest, play
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box
@@ -19,7 +20,6 @@ from collision_monitor.objects.models import containing_model, parse_model
 from collision_monitor.query.contact import contact
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
-from collision_monitor.tradeoff import Errors, Played, Row, Step, deepest, play
 
 NEAR: Final = 0.3
 """m: pairs up to this far apart are compared."""

@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 import yaml
 
+from collision_monitor.accuracy.tradeoff import Errors, recorded
+from collision_monitor.accuracy.tune import FACTORS, Demands, candidates, parameter_file, tune
 from collision_monitor.cli.main import main
 from collision_monitor.cli.parameter_file import check_parameter_file
 from collision_monitor.errors import InputError
 from collision_monitor.settings.profile import Profile
-from collision_monitor.tradeoff import Errors, recorded
-from collision_monitor.tune import FACTORS, Demands, candidates, parameter_file, tune
 
 GOLDEN = Path(__file__).parent / "golden" / "balanced.mcap"
 PROGRAM = Path(sys.executable).with_name("collision-monitor")

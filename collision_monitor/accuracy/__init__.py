@@ -1,0 +1,1 @@
+"""What speed costs: trade-off, tuning, extremes."""
