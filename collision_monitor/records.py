@@ -6,9 +6,11 @@ recorded without conversion. Units, frames and signs are written in `collision_m
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import IntEnum, IntFlag
 
 import numpy as np
+from numpy.typing import NDArray
 
 STATE = np.dtype(
     [
@@ -152,3 +154,12 @@ class ShapeType(IntEnum):
     HALF_SPACE = 8
     CIRCLE = 9
     POLYGON = 10
+
+
+Rows = NDArray[np.void]
+
+
+def joined(parts: Sequence[Rows]) -> Rows:
+    """`np.concatenate` of arrays of one structured type."""
+    kind = parts[0].dtype
+    return np.concatenate([part.view(f"V{kind.itemsize}") for part in parts]).view(kind)

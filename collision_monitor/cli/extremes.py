@@ -13,7 +13,7 @@ from collision_monitor.cli.quantities import whole
 from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
-    from collision_monitor.extremes import Row
+    from collision_monitor.accuracy.extremes import Row
 
 EXIT_OUTSIDE = 3
 
@@ -67,7 +67,7 @@ def _plain(row: Row) -> dict[str, Any]:
 
 
 def _as_text(rows: list[Row]) -> list[str]:
-    from collision_monitor.extremes import SWEEPS
+    from collision_monitor.accuracy.extremes import SWEEPS
 
     lines = [
         f"{'scale':<24} {'from':>7} {'to':>7}  {'answer':<16} {'samples':>7} {'error':>8} {'at':>7}  {'within':>8}"
@@ -90,7 +90,7 @@ def _draw(rows: list[Row], path: Path) -> None:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from collision_monitor.extremes import SWEEPS
+    from collision_monitor.accuracy.extremes import SWEEPS
 
     names = list(SWEEPS)
     with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collision_monitor.session.foreign import Imported
+    from collision_monitor.sources import Imported
 
 EXIT_LEFT_OUT = 3
 
@@ -57,7 +57,7 @@ def add_parser(subparsers: Any) -> None:
 
 def import_command(args: argparse.Namespace) -> int:
     """Return the exit code. Raises SessionError, InputError."""
-    from collision_monitor.session.foreign import import_bag, load_mapping
+    from collision_monitor.sources import import_bag, load_mapping
 
     mapping = None if args.map is None else load_mapping(args.map)
     with _progress() as progress:

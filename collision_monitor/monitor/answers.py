@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 
 from collision_monitor._jit import kernel
-from collision_monitor.monitor.active_pairs import BEGIN, BOUND, CLOSING, END, PERSIST, SHAPE_I, SHAPE_J, STATUS
-from collision_monitor.prediction.time_of_impact import BOUND_ONLY, TREE_BOUND
-from collision_monitor.records import CONTACT, PREDICTION, PredictionStatus
+from collision_monitor.prediction.body_contact import BOUND, CLOSING, SHAPE_I, SHAPE_J, STATUS
+from collision_monitor.prediction.impact_record import BOUND_ONLY, TREE_BOUND
+from collision_monitor.records import CONTACT, PREDICTION, Phase, PredictionStatus
 
 UNRESOLVED: Final = int(PredictionStatus.UNRESOLVED)
 
@@ -139,3 +139,12 @@ def chain_digest(digest, words):
         a = (a ^ lane) * prime
         a ^= a >> shift
     return a
+
+
+PERSIST: Final = int(Phase.PERSIST)
+
+
+BEGIN: Final = int(Phase.BEGIN)
+
+
+END: Final = int(Phase.END)

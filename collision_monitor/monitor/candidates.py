@@ -6,8 +6,7 @@ import numpy as np
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.broad_phase.hashed_grid import Region, overlap, query_box
-from collision_monitor.monitor.tracking import swept_box
-from collision_monitor.prediction.time_of_impact import CLEAR, body_impact
+from collision_monitor.prediction.motion import swept_box
 
 
 @device
@@ -100,23 +99,3 @@ def keep_checked(bodies, allowed, pairs):
         pairs[n, 0], pairs[n, 1] = i, j
         n += 1
     return n
-
-
-@kernel
-def predict_pairs(table, parts, bodies, pairs, now, margin, tolerance, budget, events, scratch):
-    """First impacts of pairs (P, 2) until both bodies' cover times, into events (IMPACT).
-
-    They are looked for from `now`, or from the time until which the pair was predicted before.
-    Returns (how many impacts, distance queries made).
-    """
-    n = queries = 0
-    for k in range(pairs.shape[0]):
-        i, j = pairs[k, 0], pairs[k, 1]
-        begin = max(now, min(bodies.motion[i].covered, bodies.motion[j].covered))
-        end = min(bodies.motion[i].cover, bodies.motion[j].cover)
-        if begin > now and begin >= end:
-            continue
-        queries += body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budget, scratch, events[n])
-        if events[n].status != CLEAR:
-            n += 1
-    return n, queries

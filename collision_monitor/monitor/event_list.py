@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
+from collision_monitor.prediction.impact_record import BOUND_ONLY, HIT, IMPACT, UNRESOLVED
+from collision_monitor.prediction.impact_record import holds as _holds
 from collision_monitor.prediction.motion import Bodies
-from collision_monitor.prediction.time_of_impact import BOUND_ONLY, HIT, IMPACT, UNRESOLVED
 
 Events = NDArray[np.void]
 Versions = NDArray[np.uint32]
@@ -56,12 +57,6 @@ def sort_order(events, order, spare):
         width *= 2
     for m in range(n):
         order[m] = source[m]
-
-
-@inlined
-def _holds(version, event):
-    """Does the event rest on motions that have not changed since?"""
-    return version[event.i] == event.version_i and version[event.j] == event.version_j
 
 
 @kernel

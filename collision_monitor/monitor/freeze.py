@@ -20,9 +20,9 @@ from collision_monitor.monitor import active_pairs
 from collision_monitor.monitor.monitor import Monitor, StepResult, StepStatus
 from collision_monitor.monitor.snapshot import Snapshot, check_range
 from collision_monitor.monitor.uncertain_predictions import ENTRY
+from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.prediction.motion import Bodies, Parts, enlarge, make_bodies, make_parts
 from collision_monitor.prediction.spread import Spread
-from collision_monitor.prediction.time_of_impact import IMPACT
 from collision_monitor.records import ShapeType
 from collision_monitor.settings.profile import Profile
 

@@ -23,21 +23,24 @@ from collision_monitor.geometry.plane import flat_pose, flat_states
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shape_table import CIRCLE, SPHERE, ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Shape
-from collision_monitor.monitor import active_pairs, answers, candidates, filters, time_critical, tracking
+from collision_monitor.monitor import active_pairs, answers, candidates, filters, intake, time_critical, tracking
 from collision_monitor.monitor.budget import EXAMINE, HANDFUL, REFINE, TREES, PairBudget, StepClock, TimeBudget
 from collision_monitor.monitor.event_list import EventList, count_until, keep_first
 from collision_monitor.monitor.patches import with_patches
+from collision_monitor.monitor.roster import count_bodies
 from collision_monitor.monitor.scene_plan import ScenePlan, scene_plan
 from collision_monitor.monitor.uncertain_predictions import Scene, UncertainPredictions
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import monitored_model, parse_model, shape_class
+from collision_monitor.prediction.body_contact import RESULT
+from collision_monitor.prediction.body_impact import Scratch, make_scratch
+from collision_monitor.prediction.impact_record import BOUND_ONLY, CLEAR, IMPACT, TREE_BOUND
 from collision_monitor.prediction.motion import Bodies, enlarge, make_bodies, make_parts
-from collision_monitor.prediction.sphere_trees import Tree, Trees, body_tree, joined_trees
+from collision_monitor.prediction.pairs import bound_pairs, predict_pairs, refine
+from collision_monitor.prediction.sphere_trees import Tree, Trees, body_tree, joined_trees, tighten
 from collision_monitor.prediction.spread import worst_stddevs
-from collision_monitor.prediction.time_of_impact import BOUND_ONLY, CLEAR, IMPACT, TREE_BOUND, Scratch, make_scratch
 from collision_monitor.prediction.turning import make_columns
-from collision_monitor.records import Model
-from collision_monitor.rows import joined
+from collision_monitor.records import Model, joined
 from collision_monitor.settings.profile import NO_BUDGET, NO_LIMIT, Profile
 
 NANOSECOND = 1e-9
@@ -66,14 +69,14 @@ PREDICTED_BY = frozenset(
 """The settings that predictions rest on: where one changes, all are made anew."""
 
 _VERDICTS = {
-    tracking.UNKNOWN_ID: (Refusal.UNKNOWN_ID, "expected the id of an object that was described, got {id}"),
-    tracking.NON_FINITE: (
+    intake.UNKNOWN_ID: (Refusal.UNKNOWN_ID, "expected the id of an object that was described, got {id}"),
+    intake.NON_FINITE: (
         Refusal.NON_FINITE,
         "object {id}: expected finite numbers up to 1e18 in pose and twist, standard deviations >= 0 and covariances "
         "that are positive semi-definite (a negative one here is minus the root of a negative eigenvalue), got {row}",
     ),
-    tracking.QUATERNION: (Refusal.QUATERNION, "object {id}: expected a unit quaternion within 1e-3, got {quaternion}"),
-    tracking.OLD: (
+    intake.QUATERNION: (Refusal.QUATERNION, "object {id}: expected a unit quaternion within 1e-3, got {quaternion}"),
+    intake.OLD: (
         Refusal.OLD,
         "object {id}: expected one state a message, newer than its last one, and none of a static object",
     ),
@@ -494,8 +497,8 @@ class Monitor:
     def _prepare_for_budget(self) -> None:
         """Let no step wait for what only some of those with a budget need: the trees, and kernels from the cache."""
         none, scratch = np.empty(0, IMPACT), self._scratch[0]
-        time_critical.tighten(self._bodies, self._plant_trees(), none, 0.0, 0.0, scratch)
-        self._impacts(time_critical.refine, none, 0.0, scratch)
+        tighten(self._bodies, self._plant_trees(), none, 0.0, 0.0, scratch)
+        self._impacts(refine, none, 0.0, scratch)
 
     def _plant_tree(self, i: int) -> None:
         self._tree_of[i] = body_tree(self._shapes.table, self._parts.next, int(self._bodies.first_shape[i]))
@@ -587,9 +590,9 @@ class Monitor:
         numbers = used.view(np.float64).reshape(len(states), -1)
         verdicts = np.empty(len(states), np.uint8)
         flags = np.ascontiguousarray(states["flags"])
-        accepted, uncertain = tracking.take_states(self._bodies, slots, numbers, flags, time, verdicts)
+        accepted, uncertain = intake.take_states(self._bodies, slots, numbers, flags, time, verdicts)
         if uncertain or self._uncertain.active:
-            taken = np.where(verdicts == tracking.ACCEPTED, slots, np.int32(-1))
+            taken = np.where(verdicts == intake.ACCEPTED, slots, np.int32(-1))
             self._uncertain.take(taken, numbers, covariances, self._planar)
         if accepted == len(states):
             return
@@ -665,7 +668,7 @@ class Monitor:
         if self._uncertain.counts(p):
             self._uncertain.add_pairs(pairs, bodies, now)
         if bounds_only:  # what the bounding spheres say, where that is faster
-            events, queries = self._impacts(time_critical.bound_pairs, pairs, now, self._scratch[0])
+            events, queries = self._impacts(bound_pairs, pairs, now, self._scratch[0])
         else:
             events, queries = self._first_impacts(pairs, now)
         work["impact_queries"] += queries
@@ -695,10 +698,10 @@ class Monitor:
     def _first_impacts(self, pairs: NDArray[np.int32], now: float) -> tuple[NDArray[np.void], int]:
         """First impacts (IMPACT) of pairs (P, 2) in their order, on all threads; and the distance queries made."""
         if self._pool is None or len(pairs) < FEWEST_PAIRS_FOR_THREADS:
-            return self._impacts(candidates.predict_pairs, pairs, now, self._scratch[0])
+            return self._impacts(predict_pairs, pairs, now, self._scratch[0])
 
         def part(pairs: NDArray[np.int32], scratch: Scratch) -> tuple[NDArray[np.void], int]:
-            return self._impacts(candidates.predict_pairs, pairs, now, scratch)
+            return self._impacts(predict_pairs, pairs, now, scratch)
 
         # the kernels hold no lock; the parts are put together in order, so the answer is the same for any number
         parts = list(self._pool.map(part, np.array_split(pairs, len(self._scratch)), self._scratch))
@@ -736,7 +739,7 @@ class Monitor:
         work["events_due"] = len(due)
         room = len(self._pairs) + len(due)
         pairs, events, later = np.empty(room, active_pairs.PAIR), np.empty(room, IMPACT), np.empty(room, IMPACT)
-        results = np.empty((room, active_pairs.RESULT))
+        results = np.empty((room, RESULT))
         order = np.argsort(due["key"], kind="stable")
         n = active_pairs.unite(bodies, self._pairs, self._pair_events, due, order, pairs, events)
         pending = new.compress(~is_due)
@@ -857,7 +860,7 @@ class Monitor:
         while at < len(todo) and (count := budget.next(-(-(len(todo) - at) // HANDFUL), TREES)):
             end = min(at + count * HANDFUL, len(todo))
             margin = self._profile.contact_margin
-            time_critical.tighten(self._bodies, trees, found[at:end], now, margin, self._scratch[0])
+            tighten(self._bodies, trees, found[at:end], now, margin, self._scratch[0])
             at = end
         return todo[:at], found[:at]
 
@@ -874,7 +877,7 @@ class Monitor:
         at = 0
         while at < len(todo) and (count := budget.next(len(todo) - at, REFINE)):
             bounds = pending.take(todo[at : at + count])
-            events, queries = self._impacts(time_critical.refine, bounds, now, self._scratch[0])
+            events, queries = self._impacts(refine, bounds, now, self._scratch[0])
             found.append(events)
             work["impact_queries"] += queries
             at += count
@@ -941,7 +944,7 @@ class Monitor:
     ) -> StepStatus:
         unresolved = np.count_nonzero(contacts["status"] == records.ContactStatus.UNRESOLVED)
         unresolved += np.count_nonzero(predictions["status"] == records.PredictionStatus.UNRESOLVED)
-        static, unseen, stale = tracking.count_bodies(self._bodies, self._top, now, self._profile.stale_after)
+        static, unseen, stale = count_bodies(self._bodies, self._top, now, self._profile.stale_after)
         return StepStatus(
             objects=len(self._slots),
             objects_static=int(static),

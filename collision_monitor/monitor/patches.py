@@ -13,13 +13,20 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel
 from collision_monitor.geometry.shape_table import ShapeTable, take
-from collision_monitor.monitor.active_pairs import SHAPE_I, SHAPE_J, STATUS, TOUCHING, rotation_now
-from collision_monitor.monitor.time_critical import relative_now
 from collision_monitor.narrow_phase.contact_row import work_array
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.narrow_phase.manifold import CORNERS, manifold_batch, reduce_points
-from collision_monitor.prediction.motion import Bodies, Parts, place_shape, position_now, relative_velocity_now
-from collision_monitor.prediction.time_of_impact import closing_speed
+from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUCHING
+from collision_monitor.prediction.body_impact import closing_speed
+from collision_monitor.prediction.motion import (
+    Bodies,
+    Parts,
+    place_shape,
+    position_now,
+    relative_now,
+    relative_velocity_now,
+    rotation_now,
+)
 from collision_monitor.records import MOST_POINTS
 from collision_monitor.tolerances import FEATURE_TIE
 

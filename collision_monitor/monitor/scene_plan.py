@@ -7,56 +7,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.hashed_grid import LEVEL_OFFSET, LEVELS, HashedGrid
-from collision_monitor.geometry.shape_table import (
-    BOX,
-    CAPSULE,
-    CIRCLE,
-    CONE,
-    CONVEX_HULL,
-    CYLINDER,
-    HALF_SPACE,
-    POLYGON,
-    SPHERE,
-)
+from collision_monitor.narrow_phase.dispatch import _METHODS, KIND_NAMES, pair_test
 from collision_monitor.prediction.motion import Bodies
-
-KIND_NAMES: Final = {
-    SPHERE: "sphere",
-    BOX: "box",
-    CAPSULE: "capsule",
-    CYLINDER: "cylinder",
-    CONE: "cone",
-    CONVEX_HULL: "convex hull",
-    HALF_SPACE: "half-space",
-    CIRCLE: "circle",
-    POLYGON: "polygon",
-}
-_TESTS: Final = {
-    (SPHERE, SPHERE): "sphere_sphere",
-    (SPHERE, BOX): "sphere_box",
-    (SPHERE, CAPSULE): "capsule_capsule",
-    (CAPSULE, CAPSULE): "capsule_capsule",
-    (SPHERE, CONE): "sphere_cone",
-    (SPHERE, CYLINDER): "cylinder_cylinder",
-    (BOX, BOX): "box_box",
-}
-_METHODS: Final = {
-    "sphere_sphere": "centres",
-    "sphere_box": "clamping",
-    "capsule_capsule": "closest points of segments",
-    "sphere_cone": "closed form",
-    "cylinder_cylinder": "closed form where the axes are parallel, else GJK and EPA",
-    "box_box": "SAT",
-    "half_space": "support distance",
-    "convex_convex": "GJK and EPA",
-    "polygon_polygon": "SAT in the plane",
-}
 
 
 @dataclass(frozen=True)
@@ -170,14 +128,3 @@ def _ignoring(filters: NDArray[np.uint32], counts: NDArray[np.int64]) -> int:
     ignoring = ~(meets & meets.T)
     pairs = counts[:, None] * counts - np.diag(counts)
     return int((pairs * ignoring).sum()) // 2
-
-
-def pair_test(kind_a: int, kind_b: int) -> str:
-    """The narrow phase test for two kinds, kind_a <= kind_b."""
-    if kind_b == HALF_SPACE:
-        return "half_space"
-    if kind_a >= CIRCLE:
-        return "polygon_polygon"
-    if kind_b == CYLINDER and kind_a in (CAPSULE, CYLINDER):
-        return "cylinder_cylinder"
-    return _TESTS.get((kind_a, kind_b), "convex_convex")

@@ -6,144 +6,22 @@ Approximating polyhedra with spheres for time-critical collision detection, 1996
 
 from __future__ import annotations
 
-from math import inf, isfinite, sqrt
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.monitor.active_pairs import (
-    BOUND,
-    CLOSING,
-    SHAPE_I,
-    SHAPE_J,
-    STATUS,
-    UNRESOLVED,
-    has_changed,
-)
+from collision_monitor._jit import device, kernel
 from collision_monitor.monitor.event_list import sort_order
+from collision_monitor.prediction.body_contact import BOUND, CLOSING, SHAPE_I, SHAPE_J, STATUS, UNRESOLVED
+from collision_monitor.prediction.impact_record import CLEAR, has_changed
 from collision_monitor.prediction.motion import (
     Bodies,
-    half_acceleration,
     position_now,
-    relative_position,
-    relative_position_now,
-    relative_velocity,
+    relative_now,
     relative_velocity_now,
 )
-from collision_monitor.prediction.sphere_trees import tree_meeting
-from collision_monitor.prediction.time_of_impact import (
-    BOUND_ONLY,
-    CLEAR,
-    TREE_BOUND,
-    body_impact,
-    meeting_of_spheres,
-    sphere_interval,
-)
-
-
-@inlined
-def is_cheap(bodies, i, j):
-    """Is the pair settled as fast as its bound? Two spheres, or one with a half-space, which has no bounding sphere."""
-    spheres = bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0
-    return spheres or not (isfinite(bodies.motion[i].radius) and isfinite(bodies.motion[j].radius))
-
-
-@inlined
-def bound_impact(bodies, i, j, begin, end, margin, event):
-    """Since when the pair's bounding spheres meet in [begin, end], into the IMPACT record `event`, UNRESOLVED.
-
-    event.status = CLEAR where they do not, and the bodies cannot.
-    """
-    if bodies.id[i] > bodies.id[j]:
-        i, j = j, i
-    A, B = bodies.motion[i], bodies.motion[j]
-    event.status = CLEAR
-    tube_1 = A.tube_1 + B.tube_1
-    tube_0 = A.tube_0 + B.tube_0 + A.tube_1 * (begin - A.tube_time) + B.tube_1 * (begin - B.tube_time)
-    px, py, pz = relative_position(A, B, begin)
-    vx, vy, vz = relative_velocity(A, B, begin)
-    bent = half_acceleration(A, B) * (end - begin)
-    reach = A.radius + B.radius + margin + tube_0
-    first, last = sphere_interval(px, py, pz, vx, vy, vz, reach, tube_1 + bent, end - begin, 1.0)
-    if first > last:
-        return
-    event.i, event.j = i, j
-    event.key = (np.uint64(bodies.id[i]) << np.uint64(32)) | np.uint64(bodies.id[j])
-    event.version_i, event.version_j = bodies.version[i], bodies.version[j]
-    event.shape_i, event.shape_j = bodies.first_shape[i], bodies.first_shape[j]
-    event.lower, event.upper = begin + first, inf
-    event.status, event.method = UNRESOLVED, BOUND_ONLY
-    meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, first, event)
-
-
-@kernel
-def bound_pairs(table, parts, bodies, pairs, now, margin, tolerance, budget, events, scratch):
-    """As `candidates.predict_pairs`, but of all pairs that are not cheap only the bound."""
-    n = queries = 0
-    for k in range(pairs.shape[0]):
-        i, j = pairs[k, 0], pairs[k, 1]
-        begin = max(now, min(bodies.motion[i].covered, bodies.motion[j].covered))
-        end = min(bodies.motion[i].cover, bodies.motion[j].cover)
-        if begin > now and begin >= end:
-            continue
-        if is_cheap(bodies, i, j):
-            queries += body_impact(
-                table, parts, bodies, i, j, begin, end, margin, tolerance, budget, scratch, events[n]
-            )
-        else:
-            bound_impact(bodies, i, j, begin, end, margin, events[n])
-        if events[n].status != CLEAR:
-            n += 1
-    return n, queries
-
-
-@kernel
-def tighten(bodies, trees, events, now, margin, scratch):
-    """Let events (IMPACT) of which only the bounding spheres are known begin when the sphere trees meet.
-
-    status = CLEAR where they do not, as long as the motions are predicted.
-    """
-    for k in range(events.size):
-        event = events[k]
-        A, B = bodies.motion[event.i], bodies.motion[event.j]
-        begin, end = max(now, event.lower), min(A.cover, B.cover)
-        if begin < end:
-            wait = tree_meeting(
-                bodies, trees, event.i, event.j, begin, end, margin, scratch.rotation[0], scratch.rotation[1]
-            )
-            if wait == inf:
-                event.status = CLEAR
-            elif wait > 0.0:
-                px, py, pz = relative_position(A, B, begin)
-                vx, vy, vz = relative_velocity(A, B, begin)
-                event.lower = begin + wait
-                meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, wait, event)
-        event.method = TREE_BOUND
-
-
-@kernel
-def refine(table, parts, bodies, bounds, now, margin, tolerance, budget, events, scratch):
-    """First impacts from `now` on of the pairs of `bounds` (IMPACT), into events; as `candidates.predict_pairs`."""
-    n = queries = 0
-    for k in range(bounds.size):
-        i, j = bounds[k].i, bounds[k].j
-        end = min(bodies.motion[i].cover, bodies.motion[j].cover)
-        queries += body_impact(table, parts, bodies, i, j, now, end, margin, tolerance, budget, scratch, events[n])
-        if events[n].status != CLEAR:
-            n += 1
-    return n, queries
-
-
-@device
-def relative_now(bodies, i, j, now):
-    """Position of j relative to i by their last states (m), and how old those are (s)."""
-    age_i = 0.0 if bodies.static[i] else now - bodies.time[i]
-    age_j = 0.0 if bodies.static[j] else now - bodies.time[j]
-    px = relative_position_now(bodies, i, age_i, j, age_j, 0)
-    py = relative_position_now(bodies, i, age_i, j, age_j, 1)
-    pz = relative_position_now(bodies, i, age_i, j, age_j, 2)
-    return px, py, pz, age_i, age_j
+from collision_monitor.prediction.pairs import bound_impact, is_cheap
 
 
 @kernel

@@ -12,20 +12,9 @@ import numpy as np
 
 from collision_monitor._jit import device, kernel
 from collision_monitor.broad_phase.hashed_grid import put_box
-from collision_monitor.prediction.motion import position_now, quaternion_to_matrix, turn_quaternion
+from collision_monitor.prediction.motion import position_now, quaternion_to_matrix, swept_box, turn_quaternion
 from collision_monitor.prediction.spread import surface_spread
 from collision_monitor.prediction.turning import BLOCK, COLUMNS, turned_away
-from collision_monitor.records import StateFlag
-from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
-
-ACCEPTED: Final = 0
-UNKNOWN_ID: Final = 1
-NON_FINITE: Final = 2
-QUATERNION: Final = 3
-OLD: Final = 4
-
-STATE_NUMBERS: Final = 20
-"""float64 numbers at the front of a records.STATE; id and flags follow."""
 
 FIRST_SLACK: Final = 0.5
 SHORTEST_SLACK: Final = 0.0625
@@ -38,100 +27,6 @@ WIDER: Final = 1.1
 GOLDEN_RATIO: Final = 0.6180339887498949
 PLASTIC_RATIO: Final = 0.7548776662466927
 """Multiples of these, modulo 1, fill the unit interval evenly."""
-
-_POSITION_STDDEV: Final = 16
-_ORIENTATION_STDDEV: Final = 17
-"""Where these are among the numbers of a records.STATE; those of their rates of change stand two behind."""
-
-_TWIST_UNKNOWN: Final = int(StateFlag.TWIST_UNKNOWN)
-_DISCONTINUITY: Final = int(StateFlag.DISCONTINUITY)
-_ACCELERATION_VALID: Final = int(StateFlag.ACCELERATION_VALID)
-
-
-@kernel
-def take_states(bodies, slots, numbers, flags, time, verdicts):
-    """Store states as the bodies' last ones.
-
-    slots (M,) int32, -1: unknown id; numbers (M, 21) float64: the rows of records.STATE; flags (M,) uint32;
-    time: of all states, in seconds. Where the twist is estimated, its standard deviations are written into numbers.
-    verdicts (M,) uint8: ACCEPTED or why not.
-    Returns (how many were accepted, whether any of them is uncertain).
-    """
-    accepted = 0
-    uncertain = False
-    for k in range(slots.size):
-        i = slots[k]
-        if i < 0:
-            verdicts[k] = UNKNOWN_ID
-            continue
-        known_twist = (flags[k] & _TWIST_UNKNOWN) == 0
-        usable = True
-        for c in range(13 if known_twist else 7):
-            usable &= abs(numbers[k, c]) <= LARGEST_INPUT
-        accelerates = (flags[k] & _ACCELERATION_VALID) != 0
-        for c in range(13, 16 if accelerates else 13):
-            usable &= abs(numbers[k, c]) <= LARGEST_INPUT
-        for c in range(16, STATE_NUMBERS):  # standard deviations; NaN: unknown
-            usable &= not (numbers[k, c] < 0.0 or numbers[k, c] > LARGEST_INPUT)
-        if not usable:
-            verdicts[k] = NON_FINITE
-            continue
-        x, y, z, w = numbers[k, 3], numbers[k, 4], numbers[k, 5], numbers[k, 6]
-        norm = sqrt(x * x + y * y + z * z + w * w)
-        if not abs(norm - 1.0) <= UNIT_QUATERNION:
-            verdicts[k] = QUATERNION
-            continue
-        if bodies.static[i] or (bodies.seen[i] and time <= bodies.time[i]):
-            verdicts[k] = OLD
-            continue
-        x, y, z, w = x / norm, y / norm, z / norm, w / norm
-        if known_twist:
-            for c in range(3):
-                bodies.linear[i, c] = numbers[k, 7 + c]
-                bodies.angular[i, c] = numbers[k, 10 + c]
-        elif bodies.seen[i] and (flags[k] & _DISCONTINUITY) == 0:
-            _estimate_twist(bodies, i, numbers, k, x, y, z, w, time - bodies.time[i])
-            for c in range(3 if accelerates else 0):
-                # what is estimated is the mean since the last state, and it was that fast half-way
-                bodies.linear[i, c] += 0.5 * numbers[k, 13 + c] * (time - bodies.time[i])
-            for c in (_POSITION_STDDEV, _ORIENTATION_STDDEV):
-                if numbers[k, c] > 0.0 and not numbers[k, c + 2] > 0.0:
-                    # of a difference of two poses, if the last one was as uncertain as this one
-                    numbers[k, c + 2] = sqrt(2.0) * numbers[k, c] / (time - bodies.time[i])
-        else:
-            bodies.linear[i] = 0.0
-            bodies.angular[i] = 0.0
-        for c in range(3):
-            bodies.acceleration[i, c] = numbers[k, 13 + c] if accelerates else 0.0
-            bodies.position[i, c] = numbers[k, c]
-        bodies.quaternion[i, 0], bodies.quaternion[i, 1] = x, y
-        bodies.quaternion[i, 2], bodies.quaternion[i, 3] = z, w
-        bodies.time[i] = time
-        bodies.seen[i] = True
-        verdicts[k] = ACCEPTED
-        accepted += 1
-        for c in range(16, STATE_NUMBERS):
-            uncertain |= numbers[k, c] > 0.0
-    return accepted, uncertain
-
-
-@device
-def _estimate_twist(bodies, i, numbers, k, x, y, z, w, elapsed):
-    """Twist from the last pose to this one: difference of positions, logarithm of the relative rotation."""
-    for c in range(3):
-        bodies.linear[i, c] = (numbers[k, c] - bodies.position[i, c]) / elapsed
-    px, py, pz = -bodies.quaternion[i, 0], -bodies.quaternion[i, 1], -bodies.quaternion[i, 2]
-    pw = bodies.quaternion[i, 3]
-    rx = w * px + x * pw + y * pz - z * py
-    ry = w * py - x * pz + y * pw + z * px
-    rz = w * pz + x * py - y * px + z * pw
-    rw = w * pw - x * px - y * py - z * pz
-    s = sqrt(rx * rx + ry * ry + rz * rz)
-    rate = 0.0
-    if s > 0.0:
-        sign = 1.0 if rw >= 0.0 else -1.0
-        rate = 2.0 * sign * np.arctan2(s, abs(rw)) / (s * elapsed)
-    bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2] = rate * rx, rate * ry, rate * rz
 
 
 @device
@@ -211,20 +106,6 @@ def remember_cover(bodies, which):
         bodies.motion[i].covered = bodies.motion[i].cover
 
 
-@kernel
-def count_bodies(bodies, count, now, stale_after):
-    """How many of the first `count` slots hold bodies that are static, that nothing was heard of, and that are stale:
-    that nothing was heard of for stale_after (s).
-    """
-    static = unseen = stale = 0
-    for i in range(count):
-        if bodies.used[i]:
-            static += bodies.static[i]
-            unseen += not bodies.seen[i]
-            stale += bodies.seen[i] and not bodies.static[i] and now - bodies.time[i] > stale_after
-    return static, unseen, stale
-
-
 @device
 def _is_covered(bodies, spread, sigmas, i, now, horizon, stale_acceleration):
     """Is body i as certain as its box allows for?"""
@@ -266,27 +147,6 @@ def _cover(bodies, i, now, horizon):
     else:
         share = 0.5 + 0.5 * share
     m.cover = now + horizon + bodies.slack[i] * share
-
-
-@device
-def swept_box(bodies, i, begin, margin):
-    """Centre and half extents (m) of a box that holds body i, and `margin` more, from `begin` until its cover time."""
-    m = bodies.motion[i]
-    sweep = 0.0 if bodies.static[i] else m.cover - begin
-    half = m.radius + margin + m.tube_0 + m.spread_0 + (m.tube_1 + m.spread_1) * (begin - m.tube_time + sweep)
-    ahead = 0.5 * sweep
-    middle = begin - m.time + ahead
-    # of a t^2 / 2 the middle of both ends, and half of what is between
-    first, last = 0.25 * (middle - ahead) ** 2, 0.25 * (middle + ahead) ** 2
-    between, bent = first + last, last - first
-    return (
-        m.x + middle * m.vx + between * m.ax,
-        m.y + middle * m.vy + between * m.ay,
-        m.z + middle * m.vz + between * m.az,
-        half + ahead * abs(m.vx) + bent * abs(m.ax),
-        half + ahead * abs(m.vy) + bent * abs(m.ay),
-        half + ahead * abs(m.vz) + bent * abs(m.az),
-    )  # fmt: skip
 
 
 @kernel

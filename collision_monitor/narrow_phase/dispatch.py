@@ -6,13 +6,23 @@ Pairs are brought into one order (by kind, then by slot) first, so that swapping
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.geometry.shape_table import BOX, CAPSULE, CIRCLE, CONE, CYLINDER, HALF_SPACE, SPHERE
+from collision_monitor.geometry.shape_table import (
+    BOX,
+    CAPSULE,
+    CIRCLE,
+    CONE,
+    CONVEX_HULL,
+    CYLINDER,
+    HALF_SPACE,
+    POLYGON,
+    SPHERE,
+)
 from collision_monitor.narrow_phase.box_box import axis_direction, box_box_separation, sat, touching_features
 from collision_monitor.narrow_phase.capsule_capsule import capsule_capsule_contact
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, WORK_SIZE
@@ -335,3 +345,51 @@ def separation_batch(
     out = np.zeros((len(pairs), 4))
     _separation_serial(table, position, rotation, pairs, out, np.zeros(WORK_SIZE))
     return out
+
+
+KIND_NAMES: Final = {
+    SPHERE: "sphere",
+    BOX: "box",
+    CAPSULE: "capsule",
+    CYLINDER: "cylinder",
+    CONE: "cone",
+    CONVEX_HULL: "convex hull",
+    HALF_SPACE: "half-space",
+    CIRCLE: "circle",
+    POLYGON: "polygon",
+}
+
+
+_TESTS: Final = {
+    (SPHERE, SPHERE): "sphere_sphere",
+    (SPHERE, BOX): "sphere_box",
+    (SPHERE, CAPSULE): "capsule_capsule",
+    (CAPSULE, CAPSULE): "capsule_capsule",
+    (SPHERE, CONE): "sphere_cone",
+    (SPHERE, CYLINDER): "cylinder_cylinder",
+    (BOX, BOX): "box_box",
+}
+
+
+_METHODS: Final = {
+    "sphere_sphere": "centres",
+    "sphere_box": "clamping",
+    "capsule_capsule": "closest points of segments",
+    "sphere_cone": "closed form",
+    "cylinder_cylinder": "closed form where the axes are parallel, else GJK and EPA",
+    "box_box": "SAT",
+    "half_space": "support distance",
+    "convex_convex": "GJK and EPA",
+    "polygon_polygon": "SAT in the plane",
+}
+
+
+def pair_test(kind_a: int, kind_b: int) -> str:
+    """The narrow phase test for two kinds, kind_a <= kind_b."""
+    if kind_b == HALF_SPACE:
+        return "half_space"
+    if kind_a >= CIRCLE:
+        return "polygon_polygon"
+    if kind_b == CYLINDER and kind_a in (CAPSULE, CYLINDER):
+        return "cylinder_cylinder"
+    return _TESTS.get((kind_a, kind_b), "convex_convex")

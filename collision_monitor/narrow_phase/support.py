@@ -7,11 +7,11 @@ Interactive 3D Environments, 4.3.4)
 
 from __future__ import annotations
 
-from math import copysign, sqrt
+from math import copysign, inf, sqrt
 from typing import Any
 
 from collision_monitor._jit import inlined
-from collision_monitor.geometry.shape_table import BOX, CAPSULE, CONE, CYLINDER, SPHERE
+from collision_monitor.geometry.shape_table import BOX, CAPSULE, CIRCLE, CONE, CONVEX_HULL, CYLINDER, POLYGON, SPHERE
 from collision_monitor.narrow_phase.vertex_scan import farthest_vertex
 
 
@@ -100,3 +100,54 @@ def support_difference(
     work[at + 6] = ia
     work[at + 7] = ib
     return x, y, z
+
+
+@inlined
+def is_centred_box(kind):
+    """Whether the core is a box about its origin: a segment for a capsule, a point for a sphere."""
+    return kind == BOX or kind == CAPSULE or kind == SPHERE
+
+
+@inlined
+def core_box(table, slot):
+    """Half extents (m) of such a core."""
+    if table.kind[slot] == BOX:
+        return table.size[slot, 0], table.size[slot, 1], table.size[slot, 2]
+    if table.kind[slot] == CAPSULE:
+        return 0.0, 0.0, table.size[slot, 1]
+    return 0.0, 0.0, 0.0
+
+
+@inlined
+def rounding(table, slot):
+    """Radius (m) of the sphere that rounds the core."""
+    if table.kind[slot] == CAPSULE or table.kind[slot] == SPHERE:
+        return table.size[slot, 0] + table.margin[slot]
+    return table.margin[slot]
+
+
+@inlined
+def core_support(table, slot, x, y, z):
+    """max of m . p over the points p of the core, for m = (x, y, z) of any length in the shape's own axes (m)."""
+    kind = table.kind[slot]
+    s0 = table.size[slot, 0]
+    s1 = table.size[slot, 1]
+    if kind == SPHERE:
+        return 0.0
+    if kind == BOX:
+        return abs(x) * s0 + abs(y) * s1 + abs(z) * table.size[slot, 2]
+    if kind == CAPSULE:
+        return abs(z) * s1
+    if kind == CYLINDER:
+        return abs(z) * s1 + s0 * sqrt(x * x + y * y)
+    if kind == CONE:
+        return max(z * s1, s0 * sqrt(x * x + y * y) - z * s1)
+    if kind == CIRCLE:
+        return s0 * sqrt(x * x + y * y)
+    if kind == CONVEX_HULL or kind == POLYGON:
+        best = -inf
+        first = table.vertex_start[slot]
+        for k in range(first, first + table.vertex_count[slot]):
+            best = max(best, x * table.vertices[0, k] + y * table.vertices[1, k] + z * table.vertices[2, k])
+        return best
+    return inf

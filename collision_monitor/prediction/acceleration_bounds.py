@@ -12,7 +12,8 @@ from math import inf
 from typing import Final
 
 from collision_monitor._jit import device, kernel
-from collision_monitor.prediction.time_of_impact import CLEAR, UNRESOLVED, contact_at, shape_impact
+from collision_monitor.prediction.body_impact import contact_at, shape_impact
+from collision_monitor.prediction.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.prediction.uncertainty import carry_on
 
 SEGMENTS: Final = 8

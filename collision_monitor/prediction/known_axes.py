@@ -10,8 +10,8 @@ from math import inf
 from typing import Final
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.narrow_phase.support import core_support, rounding
 from collision_monitor.prediction.motion import place_shape
-from collision_monitor.prediction.support import core_support, rounding
 
 AXES: Final = 8
 """Half of them of samples that passed, half of such that met. More: each costs 2 ns a sample."""

@@ -259,3 +259,44 @@ def chord_angle(ax, ay, az, aw, bx, by, bz, bw):
     dx, dy, dz, dw = ax - sign * bx, ay - sign * by, az - sign * bz, aw - sign * bw
     chord = sqrt(dx * dx + dy * dy + dz * dz + dw * dw)  # = 2 sin(angle / 4)
     return 2.0 * chord * (1.0 + 0.056 * chord * chord)  # >= 4 asin(chord / 2) up to angle pi
+
+
+@device
+def rotation_now(bodies, i, now, q, R):
+    """Rotation of body i at `now`, from its last state, into R; returns the time since that state."""
+    age = 0.0 if bodies.static[i] else now - bodies.time[i]
+    turn_quaternion(bodies.quaternion, i, bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2], age, q[0])
+    quaternion_to_matrix(q, 0, R)
+    return age
+
+
+@device
+def relative_now(bodies, i, j, now):
+    """Position of j relative to i by their last states (m), and how old those are (s)."""
+    age_i = 0.0 if bodies.static[i] else now - bodies.time[i]
+    age_j = 0.0 if bodies.static[j] else now - bodies.time[j]
+    px = relative_position_now(bodies, i, age_i, j, age_j, 0)
+    py = relative_position_now(bodies, i, age_i, j, age_j, 1)
+    pz = relative_position_now(bodies, i, age_i, j, age_j, 2)
+    return px, py, pz, age_i, age_j
+
+
+@device
+def swept_box(bodies, i, begin, margin):
+    """Centre and half extents (m) of a box that holds body i, and `margin` more, from `begin` until its cover time."""
+    m = bodies.motion[i]
+    sweep = 0.0 if bodies.static[i] else m.cover - begin
+    half = m.radius + margin + m.tube_0 + m.spread_0 + (m.tube_1 + m.spread_1) * (begin - m.tube_time + sweep)
+    ahead = 0.5 * sweep
+    middle = begin - m.time + ahead
+    # of a t^2 / 2 the middle of both ends, and half of what is between
+    first, last = 0.25 * (middle - ahead) ** 2, 0.25 * (middle + ahead) ** 2
+    between, bent = first + last, last - first
+    return (
+        m.x + middle * m.vx + between * m.ax,
+        m.y + middle * m.vy + between * m.ay,
+        m.z + middle * m.vz + between * m.az,
+        half + ahead * abs(m.vx) + bent * abs(m.ax),
+        half + ahead * abs(m.vy) + bent * abs(m.ay),
+        half + ahead * abs(m.vz) + bent * abs(m.az),
+    )  # fmt: skip

@@ -14,10 +14,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.geometry.shape_table import BOX, CONVEX_HULL
+from collision_monitor.prediction.impact_record import CLEAR, TREE_BOUND
 from collision_monitor.prediction.motion import half_acceleration, relative_position, relative_velocity, rotation_at
-from collision_monitor.prediction.time_of_impact import sphere_interval
+from collision_monitor.prediction.sphere_interval import meeting_of_spheres, sphere_interval
 
 Array = NDArray[np.float64]
 
@@ -191,3 +192,27 @@ def tree_meeting(bodies, trees, i, j, begin, end, margin, R_i, R_j):
         if best == 0.0:
             break
     return best + soonest
+
+
+@kernel
+def tighten(bodies, trees, events, now, margin, scratch):
+    """Let events (IMPACT) of which only the bounding spheres are known begin when the sphere trees meet.
+
+    status = CLEAR where they do not, as long as the motions are predicted.
+    """
+    for k in range(events.size):
+        event = events[k]
+        A, B = bodies.motion[event.i], bodies.motion[event.j]
+        begin, end = max(now, event.lower), min(A.cover, B.cover)
+        if begin < end:
+            wait = tree_meeting(
+                bodies, trees, event.i, event.j, begin, end, margin, scratch.rotation[0], scratch.rotation[1]
+            )
+            if wait == inf:
+                event.status = CLEAR
+            elif wait > 0.0:
+                px, py, pz = relative_position(A, B, begin)
+                vx, vy, vz = relative_velocity(A, B, begin)
+                event.lower = begin + wait
+                meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, wait, event)
+        event.method = TREE_BOUND

@@ -14,6 +14,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import allocating_kernel, device, inlined
+from collision_monitor.prediction.body_impact import Scratch, contact_at, make_scratch, shape_impact
+from collision_monitor.prediction.impact_record import CLEAR
 from collision_monitor.prediction.known_axes import AXES, parted_until, remember
 from collision_monitor.prediction.motion import (
     MOTION,
@@ -23,15 +25,8 @@ from collision_monitor.prediction.motion import (
     turn_quaternion,
 )
 from collision_monitor.prediction.normal_samples import PILOT
+from collision_monitor.prediction.sphere_interval import sphere_interval
 from collision_monitor.prediction.spread import FIFTH_ROOT, is_uncertain, surface_spread, unknown_acceleration
-from collision_monitor.prediction.time_of_impact import (
-    CLEAR,
-    Scratch,
-    contact_at,
-    make_scratch,
-    shape_impact,
-    sphere_interval,
-)
 
 EARLIEST: Final = 0
 MOST_LIKELY: Final = 1

@@ -18,8 +18,9 @@ from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.pose import Motion, Pose, rotation_matrix
 from collision_monitor.geometry.shapes import Box, HalfSpace, Shape, Sphere
+from collision_monitor.prediction.body_impact import contact_at, make_scratch
 from collision_monitor.prediction.motion import make_bodies
-from collision_monitor.prediction.time_of_impact import contact_at, make_scratch, sphere_interval
+from collision_monitor.prediction.sphere_interval import sphere_interval
 from collision_monitor.query.moving_pair import Body, Query, Scene, first_impacts, make_body, make_scene
 from collision_monitor.query.time_of_impact import BUDGET
 from collision_monitor.tolerances import PARALLEL_SIN2

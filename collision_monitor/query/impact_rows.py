@@ -6,8 +6,9 @@ from math import inf, sqrt
 from typing import Final
 
 from collision_monitor._jit import device, kernel
+from collision_monitor.prediction.body_impact import body_impact
+from collision_monitor.prediction.impact_record import CLEAR, HIT
 from collision_monitor.prediction.motion import quaternion_to_matrix
-from collision_monitor.prediction.time_of_impact import CLEAR, HIT, body_impact
 from collision_monitor.tolerances import EPSILON, LARGEST_INPUT, UNIT_QUATERNION
 
 _SMALLEST: Final = 1e-240

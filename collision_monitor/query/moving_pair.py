@@ -14,10 +14,11 @@ from collision_monitor.geometry.plane import flat_pose
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shape_table import CIRCLE, SPHERE, ShapeTable, ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Shape
-from collision_monitor.monitor.candidates import predict_pairs
 from collision_monitor.objects.models import Pieces, containing_model
+from collision_monitor.prediction.body_impact import make_scratch
+from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.prediction.motion import Bodies, Parts, make_bodies, make_parts
-from collision_monitor.prediction.time_of_impact import IMPACT, make_scratch
+from collision_monitor.prediction.pairs import predict_pairs
 from collision_monitor.query.contact import Compound
 
 

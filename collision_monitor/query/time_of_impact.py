@@ -11,7 +11,7 @@ import numpy as np
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.pose import Motion
 from collision_monitor.geometry.shapes import HalfSpace
-from collision_monitor.prediction.time_of_impact import HIT
+from collision_monitor.prediction.impact_record import HIT
 from collision_monitor.query.arguments import count, number
 from collision_monitor.query.contact import Compound, Contact, contact
 from collision_monitor.query.moving_pair import Body, Query, first_impacts, make_body, make_scene

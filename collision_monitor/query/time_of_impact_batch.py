@@ -13,7 +13,8 @@ from collision_monitor.errors import InputError, PoseError
 from collision_monitor.geometry.pieces import is_planar
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import HalfSpace, Mesh
-from collision_monitor.prediction.time_of_impact import IMPACT, make_scratch
+from collision_monitor.prediction.body_impact import make_scratch
+from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.query.contact import Compound
 from collision_monitor.query.impact_rows import impacts_of_rows, impacts_of_spheres, normalise_states
 from collision_monitor.query.moving_pair import Body, Query, make_body, make_scene

@@ -18,7 +18,7 @@ from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import Capsule, Circle, Cone, Cylinder, Sphere
 from collision_monitor.narrow_phase.dispatch import contact_batch
-from collision_monitor.prediction.time_of_impact import HIT
+from collision_monitor.prediction.impact_record import HIT
 from collision_monitor.query.contact import contact
 from collision_monitor.query.moving_pair import Body, Query, Scene, first_impacts, make_scene
 

@@ -1,1 +1,6 @@
-"""x"""
+"""Messages of other programs as those of this one: bags become sessions. Without ROS."""
+
+from collision_monitor.sources.importing import Imported, import_bag
+from collision_monitor.sources.mapping import Mapping, load_mapping
+
+__all__ = ["Imported", "Mapping", "import_bag", "load_mapping"]

@@ -12,7 +12,7 @@ import pytest
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Circle, Cone, ConvexHull, Cylinder, HalfSpace, Sphere
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.monitor.scene_plan import KIND_NAMES, pair_test
+from collision_monitor.narrow_phase.dispatch import KIND_NAMES, pair_test
 from collision_monitor.records import Phase, PredictionStatus
 from collision_monitor.settings.profile import Profile
 

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from collision_monitor.geometry.pose import from_rotation_vector, multiply, rotation_matrix
 from collision_monitor.geometry.shape_table import ShapeTableBuilder
 from collision_monitor.geometry.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, HalfSpace, Shape, Sphere
-from collision_monitor.monitor.candidates import predict_pairs
 from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.prediction.body_impact import make_scratch
+from collision_monitor.prediction.impact_record import HIT, IMPACT, UNRESOLVED
 from collision_monitor.prediction.motion import make_bodies, make_parts
-from collision_monitor.prediction.time_of_impact import HIT, IMPACT, UNRESOLVED, make_scratch
+from collision_monitor.prediction.pairs import predict_pairs
 from collision_monitor.records import ShapeType
 
 TOLERANCE = 1e-6

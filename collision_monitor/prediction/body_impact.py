@@ -7,7 +7,7 @@ Lecture topics: "predict the time to collide", "Compute fractional time at which
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import inf
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.narrow_phase.contact_row import WORK_SIZE
 from collision_monitor.narrow_phase.dispatch import contact, separation
 from collision_monitor.prediction.advance import Placed, advance
+from collision_monitor.prediction.impact_record import CLEAR, CLOSED_FORM, CONSERVATIVE_ADVANCEMENT, HIT, UNRESOLVED
 from collision_monitor.prediction.motion import (
     half_acceleration,
     place_shape,
@@ -23,52 +24,14 @@ from collision_monitor.prediction.motion import (
     relative_velocity,
     rotation_at,
 )
-from collision_monitor.records import Method, PredictionStatus
+from collision_monitor.prediction.sphere_interval import meeting_of_spheres, sphere_interval
 from collision_monitor.tolerances import EPSILON
-
-HIT: Final = int(PredictionStatus.HIT)
-UNRESOLVED: Final = int(PredictionStatus.UNRESOLVED)
-CLEAR: Final = 2
-CLOSED_FORM: Final = int(Method.CLOSED_FORM)
-CONSERVATIVE_ADVANCEMENT: Final = int(Method.CONSERVATIVE_ADVANCEMENT)
-
-BOUND_ONLY: Final = int(Method.BOUND)
-TREE_BOUND: Final = 255
-"""The same of a pair whose sphere trees were looked at; told as BOUND too."""
-
-IMPACT = np.dtype(
-    [
-        ("lower", np.float64),  # s after the monitor's origin, like all times here
-        ("upper", np.float64),
-        ("point_x", np.float64),
-        ("point_y", np.float64),
-        ("point_z", np.float64),
-        ("normal_x", np.float64),
-        ("normal_y", np.float64),
-        ("normal_z", np.float64),
-        ("closing_speed", np.float64),
-        ("key", np.uint64),  # (smaller id << 32) | larger id
-        ("i", np.int32),  # body slots; body i has the smaller id
-        ("j", np.int32),
-        ("version_i", np.uint32),
-        ("version_j", np.uint32),
-        ("shape_i", np.int32),  # slots in the shape table
-        ("shape_j", np.int32),
-        ("status", np.uint8),
-        ("method", np.uint8),
-    ]
-)
-"""One predicted impact. The versions tell whether the motions it rests on still hold."""
-
 
 AT_REST: Final = (0.0, 0.0, 0.0)
 
 FARTHER: Final = 4.0
 """How much farther than along an axis at rest it is looked for along one that turns. Larger: the bound on where the
 bodies are by then is worse. Smaller: it may stop short."""
-
-_SMALLEST: Final = 1e-240
-"""m^4/s^2: a product of a squared length and a squared speed whose round-off is near the smallest number there is."""
 
 
 class Scratch(NamedTuple):
@@ -83,66 +46,6 @@ class Scratch(NamedTuple):
 def make_scratch() -> Scratch:
     """Scratch for one thread."""
     return Scratch(np.zeros((4, 3, 3)), np.zeros((1, 4)), np.zeros(16), np.zeros(WORK_SIZE))
-
-
-@device
-def sphere_interval(dx, dy, dz, vx, vy, vz, reach, growth, end, outward):
-    """First and last time in [0, end] at which |d + v t| <= reach + growth t; (inf, -inf): never.
-
-    Rounded so that no such time is left out (outward = 1), or so that all between are such for certain (outward = -1).
-    Closed form: the discriminant as |reach v - growth d|^2 - |d x v|^2, the root as c / (-b + sqrt(D)): neither cancels
-    (Numerical Recipes 5.6; Haines et al., Precision improvements for ray/sphere intersection, 2019).
-    """
-    size = dx * dx + dy * dy + dz * dz + reach * reach
-    rate = vx * vx + vy * vy + vz * vz + growth * growth
-    if size * rate < _SMALLEST and rate > 0.0:
-        # what is made of these would underflow: in units of their own, which only the time knows of
-        length = 1.0 / max(abs(dx), abs(dy), abs(dz), reach, 1e-300)
-        speed = 1.0 / max(abs(vx), abs(vy), abs(vz), abs(growth), 1e-300)
-        unit = length / speed
-        until = end * unit
-        first, last = _interval(
-            dx * length, dy * length, dz * length, vx * speed, vy * speed, vz * speed, reach * length, growth * speed,
-            until, outward,
-        )  # fmt: skip
-        return first / unit, end if last == until else last / unit
-    return _interval(dx, dy, dz, vx, vy, vz, reach, growth, end, outward)
-
-
-@inlined
-def _interval(dx, dy, dz, vx, vy, vz, reach, growth, end, outward):
-    e = outward * EPSILON
-    pp = dx * dx + dy * dy + dz * dz
-    vv = vx * vx + vy * vy + vz * vz
-    qq = (pp + reach * reach) * (vv + growth * growth)
-    c = pp - reach * reach - 4.0 * e * (pp + reach * reach)
-    a = vv - growth * growth - 4.0 * e * (vv + growth * growth)
-    b = dx * vx + dy * vy + dz * vz - reach * growth
-    # most pairs part or pass, and need no root to see it
-    if c > 0.0 and a >= 0.0 and b > 0.0 and b * b > 100.0 * EPSILON * EPSILON * qq:
-        return inf, -inf
-    sx, sy, sz = reach * vx - growth * dx, reach * vy - growth * dy, reach * vz - growth * dz
-    ox, oy, oz = dy * vz - dz * vy, dz * vx - dx * vz, dx * vy - dy * vx
-    near, far = sx * sx + sy * sy + sz * sz, ox * ox + oy * oy + oz * oz
-    miss = far - near
-    if c > 0.0 and miss > 100.0 * EPSILON * EPSILON * qq and miss * miss > 1e4 * EPSILON * EPSILON * qq * (near + far):
-        return inf, -inf
-    q = sqrt(qq)
-    b -= 8.0 * e * q
-    if c > 0.0 and b >= 0.0 and a >= 0.0:
-        return inf, -inf
-    discriminant = near - far + 32.0 * e * q * (sqrt(near + far) + EPSILON * q)
-    first = 0.0
-    s = sqrt(max(discriminant, 0.0)) - b
-    if c > 0.0:
-        if discriminant < 0.0 or s <= 0.0:
-            return inf, -inf
-        first = c / s * (1.0 - 4.0 * e)
-        if first > end:
-            return inf, -inf
-    if a <= 0.0:
-        return first, end
-    return first, min(end, s / a * (1.0 + 4.0 * e))
 
 
 @inlined
@@ -357,24 +260,3 @@ def _sphere_impact(A, B, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, be
     event.status = HIT if sure < inf else UNRESOLVED
     event.upper = begin + sure if sure < inf else inf
     meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, first if sure == inf else sure, event)
-
-
-@inlined
-def meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, t, event):
-    """Where and how the bounding spheres of A and B meet, t seconds after begin."""
-    dx, dy, dz = (
-        relative_position(A, B, begin + t) if half_acceleration(A, B) > 0.0 else (px + vx * t, py + vy * t, pz + vz * t)
-    )
-    length = sqrt(dx * dx + dy * dy + dz * dz)
-    if length > 0.0:
-        nx, ny, nz = dx / length, dy / length, dz / length
-    else:
-        nx, ny, nz = 0.0, 0.0, 1.0
-    ta = begin + t - A.time
-    share = A.radius / (A.radius + B.radius) * length
-    event.point_x = A.x + (A.vx + 0.5 * A.ax * ta) * ta + share * nx
-    event.point_y = A.y + (A.vy + 0.5 * A.ay * ta) * ta + share * ny
-    event.point_z = A.z + (A.vz + 0.5 * A.az * ta) * ta + share * nz
-    event.normal_x, event.normal_y, event.normal_z = nx, ny, nz
-    vx, vy, vz = relative_velocity(A, B, begin + t)
-    event.closing_speed = -(vx * nx + vy * ny + vz * nz)

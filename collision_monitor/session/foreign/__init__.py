@@ -1,6 +1,0 @@
-"""Sessions from elsewhere: bags of other programs become sessions of this one. Without ROS."""
-
-from collision_monitor.sources.importing import Imported, import_bag
-from collision_monitor.sources.mapping import Mapping, load_mapping
-
-__all__ = ["Imported", "Mapping", "import_bag", "load_mapping"]
