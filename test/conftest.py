@@ -1,10 +1,11 @@
-"""What every test shares: reproducible examples and a ROS domain of its own."""
+"""What every test shares: reproducible examples, a recorded session and a ROS domain of its own."""
 
 from __future__ import annotations
 
 import os
 import socket
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -44,3 +45,13 @@ def ros_domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
             yield domain
         return
     raise RuntimeError("every ROS domain from 1 to 100 is claimed by another test")
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished session of 50 steps, which no test may change."""
+    from session_scene import record  # imports the kernels, which most tests do without
+
+    path = tmp_path_factory.mktemp("session") / "run.mcap"
+    record(path)
+    return path

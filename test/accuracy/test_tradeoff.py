@@ -21,7 +21,7 @@ from collision_monitor.records import PredictionStatus
 from collision_monitor.settings.profile import Profile
 from collision_monitor.world.scene import state_array
 
-GOLDEN = Path(__file__).parent / "golden" / "balanced.mcap"
+GOLDEN = Path(__file__).parents[1] / "golden" / "balanced.mcap"
 TWO = [ObjectDescription(1, Sphere(0.5)), ObjectDescription(2, Sphere(0.5))]
 
 

@@ -18,7 +18,7 @@ from collision_monitor.cli.parameter_file import check_parameter_file
 from collision_monitor.errors import InputError
 from collision_monitor.settings.profile import Profile
 
-GOLDEN = Path(__file__).parent / "golden" / "balanced.mcap"
+GOLDEN = Path(__file__).parents[1] / "golden" / "balanced.mcap"
 PROGRAM = Path(sys.executable).with_name("collision-monitor")
 
 

@@ -285,7 +285,7 @@ KILLED = """
 import sys
 sys.path.insert(0, sys.argv[2])
 from pathlib import Path
-from collision_monitor.session import parts, recorder
+from collision_monitor.session.recording import parts, recorder
 from session_scene import record
 parts.SNAPSHOT_PERIOD = recorder.SNAPSHOT_PERIOD = 0.1
 parts.SNAPSHOT_SHARE = 1e9
