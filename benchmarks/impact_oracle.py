@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 
 import collision_monitor as cm
 from collision_monitor._jit import kernel
-from collision_monitor.prediction.body_impact import contact_at, make_scratch
+from collision_monitor.prediction.bodies import Multibody
+from collision_monitor.prediction.body_impact import ShapePair, contact_at, make_scratch
 from collision_monitor.prediction.motion import relative_position
 from collision_monitor.query.impact_methods import lay_out
 from collision_monitor.query.moving_pair import make_body
@@ -68,12 +69,14 @@ def states(rng: np.random.Generator, shape: Shape) -> Array:
 
 @kernel
 def overlaps_before(
-    table: Any, parts: Any, bodies: Any, pairs: Any, step: float, until: Any, deep: float, scratch: Any, found: Any
+    multibody: Any, pairs: Any, step: float, until: Any, deep: float, scratch: Any, found: Any
 ) -> None:
     """The first sample (N,) before `until` (N,) at which the pairs are deeper than `deep` (m); infinite: none is."""
+    bodies = multibody.bodies
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
         A, B = bodies.motion[i], bodies.motion[j]
+        pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
         speed = math.sqrt((B.vx - A.vx) ** 2 + (B.vy - A.vy) ** 2 + (B.vz - A.vz) ** 2)
         for m in (A, B):
             turning = math.sqrt(m.wx**2 + m.wy**2 + m.wz**2)
@@ -86,7 +89,7 @@ def overlaps_before(
             px, py, pz = relative_position(A, B, t)
             gap = math.sqrt(px * px + py * py + pz * pz) - A.radius - B.radius
             if not gap > 0.0:
-                gap = contact_at(table, parts, A, B, bodies.first_shape[i], bodies.first_shape[j], t, scratch)
+                gap = contact_at(multibody, pair, t, scratch)
                 if gap < -deep:
                     found[k] = t
                     break
@@ -95,12 +98,13 @@ def overlaps_before(
 
 
 @kernel
-def distances(table: Any, parts: Any, bodies: Any, pairs: Any, times: Any, scratch: Any, found: Any) -> None:
+def distances(multibody: Any, pairs: Any, times: Any, scratch: Any, found: Any) -> None:
     """Signed distances (N,) of the pairs at a time (N,) of its own for each."""
+    bodies = multibody.bodies
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
-        A, B, a, b = bodies.motion[i], bodies.motion[j], bodies.first_shape[i], bodies.first_shape[j]
-        found[k] = contact_at(table, parts, A, B, a, b, times[k], scratch)
+        pair = ShapePair(bodies.motion[i], bodies.motion[j], bodies.first_shape[i], bodies.first_shape[j])
+        found[k] = contact_at(multibody, pair, times[k], scratch)
 
 
 def check(rng: np.random.Generator, kind_a: str, kind_b: str) -> NDArray[np.int_]:
@@ -111,9 +115,10 @@ def check(rng: np.random.Generator, kind_a: str, kind_b: str) -> NDArray[np.int_
     bodies = make_body(a_shape, cm.Motion(cm.Pose()), "A"), make_body(b_shape, cm.Motion(cm.Pose()), "B")
     scene, pairs = lay_out(*bodies, a, b, HORIZON)
     first, apart, scratch = np.empty(BATCH), np.empty(BATCH), make_scratch()
-    overlaps_before(*scene, pairs, STEP, np.minimum(answers.lower, HORIZON + STEP), ROUND_OFF, scratch, first)
+    multibody = Multibody(*scene)
+    overlaps_before(multibody, pairs, STEP, np.minimum(answers.lower, HORIZON + STEP), ROUND_OFF, scratch, first)
     hit = answers.status == "hit"
-    distances(*scene, pairs, np.where(hit, answers.upper, 0.0), scratch, apart)
+    distances(multibody, pairs, np.where(hit, answers.upper, 0.0), scratch, apart)
     return np.array(
         [
             hit.sum(),

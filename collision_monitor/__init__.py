@@ -23,8 +23,8 @@ from collision_monitor._version import VERSION as __version__  # noqa: N811
 
 _HOME = {
     "Monitor": "monitor.monitor",
-    "StepResult": "monitor.monitor",
-    "StepStatus": "monitor.monitor",
+    "StepResult": "monitor.result",
+    "StepStatus": "monitor.result",
     "Profile": "settings.profile",
     "ObjectDescription": "objects.description",
     "Model": "records",
@@ -88,8 +88,8 @@ if TYPE_CHECKING:
     from collision_monitor.geometry.shapes import Polygon as Polygon
     from collision_monitor.geometry.shapes import Sphere as Sphere
     from collision_monitor.monitor.monitor import Monitor as Monitor
-    from collision_monitor.monitor.monitor import StepResult as StepResult
-    from collision_monitor.monitor.monitor import StepStatus as StepStatus
+    from collision_monitor.monitor.result import StepResult as StepResult
+    from collision_monitor.monitor.result import StepStatus as StepStatus
     from collision_monitor.objects.convex_decomposition import Decomposition as Decomposition
     from collision_monitor.objects.convex_decomposition import convex_decomposition as convex_decomposition
     from collision_monitor.objects.description import ObjectDescription as ObjectDescription

@@ -105,10 +105,10 @@ def test_no_step_with_a_budget_is_the_first_to_load_a_kernel(when: str) -> None:
     """28 ms in a step of 1.6: what the first ones had no time for was loaded by the first that had."""
     program = (
         "from collision_monitor.monitor.monitor import Monitor, Profile\n"
-        "from collision_monitor.prediction import pairs, sphere_trees\n"
+        "from collision_monitor.prediction import pair_impacts, sphere_trees\n"
         "limited = Profile(budget_ms=1.0)\n"
         f"monitor = {when}\n"
-        "print(len(pairs.refine.signatures), len(sphere_trees.tighten.signatures))\n"
+        "print(len(pair_impacts.refine.signatures), len(sphere_trees.tighten.signatures))\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300)
     assert done.stdout.split() == ["1", "1"], done.stderr

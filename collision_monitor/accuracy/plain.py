@@ -7,7 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.monitor.monitor import Monitor, StepResult
+from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.monitor.result import StepResult
+from collision_monitor.monitor.step_context import StepContext
+from collision_monitor.monitor.tracking import Slots, Tracking
+from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.records import Phase, PredictionStatus
 from collision_monitor.settings.profile import Profile
 
@@ -24,9 +28,15 @@ class PlainMonitor(Monitor):
             velocity_tolerance=0.0,
             angular_velocity_tolerance=0.0,
         )
+        self._tracking = _RestartAll()
 
-    def _moved(self, now: float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        bodies, top = self._bodies, self._top
+
+class _RestartAll(Tracking):
+    """Starts every body anew at every step."""
+
+    def _moved(self, step: StepContext, uncertain: UncertainPredictions) -> tuple[Slots, Slots]:
+        roster = step.roster
+        bodies, top = roster.bodies, roster.top
         moved = np.flatnonzero(bodies.used[:top] & bodies.seen[:top] & ~bodies.static[:top]).astype(np.int32)
         return moved, np.zeros(0, np.int32)
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from collision_monitor.accuracy.plain import PlainMonitor
 from collision_monitor.errors import InputError, MessageError
-from collision_monitor.monitor.monitor import Monitor, StepResult
+from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.monitor.result import StepResult
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import Phase, PredictionStatus
 from collision_monitor.settings.profile import Profile

@@ -14,7 +14,8 @@ from collision_monitor.accuracy.tradeoff import Errors, Played, Row, Step, deepe
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box
-from collision_monitor.monitor.monitor import Monitor, StepResult
+from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.monitor.result import StepResult
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import containing_model, parse_model
 from collision_monitor.query.contact import contact

@@ -1,16 +1,24 @@
-"""The pairs that must be looked at in every step: those that touch, and those whose certified time has run out."""
+"""Stage 6, active pairs: those that touch, and those whose certified time has run out; each step looks at them all."""
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from collision_monitor import records
 from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.prefetch import prefetch
-from collision_monitor.prediction.body_contact import body_contact
-from collision_monitor.prediction.body_impact import body_impact
-from collision_monitor.prediction.impact_record import CLEAR, has_changed
+from collision_monitor.monitor.candidates import is_checked
+from collision_monitor.monitor.roster import Roster
+from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.step_context import StepContext
+from collision_monitor.prediction.body_contact import RESULT, body_contact
+from collision_monitor.prediction.body_impact import Scratch, Window, body_impact
+from collision_monitor.prediction.impact_record import CLEAR, IMPACT, holds, ids_of_keys, pair_key
+from collision_monitor.prediction.pair_impacts import cover_of
+from collision_monitor.records import Model, Phase
 
 PAIR = np.dtype(
     [
@@ -26,11 +34,132 @@ PAIR = np.dtype(
 
 
 AHEAD: Final = 2
-"""Pairs whose bodies are asked for while one is examined."""
+"""Pairs whose bodies are prefetched while one is examined."""
+
+Rows = NDArray[np.void]
+
+
+class Active(NamedTuple):
+    """The active pairs (n,), all that is known of a pair at one index."""
+
+    pairs: Any  # PAIR
+    events: Any  # IMPACT: when it may touch, or did
+    results: Any  # (n, RESULT): its contact in this step
+
+
+class ActivePairs(Stage):
+    """The pairs that are examined in every step, and the contacts whose object was removed since the last one."""
+
+    SAVED = ("pairs", "events", "_orphans")
+    CACHES = ("results",)
+
+    def __init__(self) -> None:
+        self.pairs: Rows = np.zeros(0, PAIR)
+        self.events: Rows = np.zeros(0, IMPACT)
+        self.results = np.empty((0, RESULT))
+        self._orphans: list[tuple[int, float]] = []  # contacts (key, since) that ended with their object
+
+    @property
+    def active(self) -> Active:
+        """The pairs as the kernels read them."""
+        return Active(self.pairs, self.events, self.results)
+
+    @property
+    def touching_keys(self) -> NDArray[np.uint64]:
+        """Keys of the pairs that touch."""
+        keys: NDArray[np.uint64] = self.pairs["key"][self.pairs["touching"] == 1]
+        return keys
+
+    # ------------------------------------------------------------------ leaving
+
+    def of_body(self, i: int) -> NDArray[np.intp]:
+        """Indices of the pairs of the body in slot i."""
+        return np.flatnonzero((self.pairs["i"] == i) | (self.pairs["j"] == i))
+
+    def end(self, indices: NDArray[np.intp]) -> None:
+        """Take pairs out; a contact among them is reported as ended in the next step."""
+        for pair in self.pairs[indices]:
+            if pair["touching"]:
+                self._orphans.append((int(pair["key"]), float(pair["since"])))
+        self.pairs = np.delete(self.pairs, indices)
+        self.events = np.delete(self.events, indices)
+
+    def end_unchecked(self, roster: Roster, i: int) -> None:
+        """End the pairs of body i that are not checked any more."""
+        of_body = self.of_body(i)
+        kept = [is_checked(roster, int(pair["i"]), int(pair["j"])) for pair in self.pairs[of_body]]
+        self.end(of_body[~np.array(kept, np.bool_)])
+
+    def end_of(self, is_out: NDArray[np.bool_]) -> None:
+        """End the pairs of the bodies that are marked."""
+        self.end(np.flatnonzero(is_out[self.pairs["i"]] | is_out[self.pairs["j"]]))
+
+    def end_all(self) -> None:
+        """End every pair; the times of their begin are of another clock."""
+        self.pairs["since"] = np.nan
+        self.end(np.arange(len(self.pairs)))
+
+    # ------------------------------------------------------------------ the step
+
+    def unite(self, step: StepContext, due: Rows) -> None:
+        """Take in the events (IMPACT) that came due; pairs whose motion has changed or that ended leave."""
+        room = len(self.pairs) + len(due)
+        pairs, events = np.empty(room, PAIR), np.empty(room, IMPACT)
+        order = np.argsort(due["key"], kind="stable")
+        n = _unite(step.roster.bodies, self.pairs, self.events, due, order, pairs, events)
+        self.pairs, self.events, self.results = pairs[:n], events[:n], np.empty((n, RESULT))
+
+    def keep(self, kept: NDArray[np.bool_]) -> None:
+        """Keep the pairs that are marked."""
+        self.pairs, self.events = self.pairs.compress(kept), self.events.compress(kept)
+        self.results = self.results[: len(self.pairs)]
+
+    def examine_all(self, step: StepContext, scratch: Scratch) -> Rows:
+        """Examine every pair; the events (IMPACT) of pairs that are certified apart for a while."""
+        later = np.empty(len(self.pairs), IMPACT)
+        return later[: self.examine(step, np.arange(len(self.pairs)), scratch, later)]
+
+    def examine(self, step: StepContext, which: NDArray[np.intp], scratch: Scratch, later: Rows) -> int:
+        """Examine the pairs `which` (M,); what is certified apart for a while goes into `later` (IMPACT): how many."""
+        n, tests, queries = _examine(
+            step.roster.multibody, self.active, which, step.now, (step.impact, step.contact), scratch, later
+        )
+        step.work.narrow_phase_tests += tests
+        step.work.impact_queries += queries
+        return int(n)
+
+    def take_orphans(self, now: float) -> Rows:
+        """The END (records.CONTACT) of the contacts whose object is gone, each reported once."""
+        ended = np.zeros(len(self._orphans), records.CONTACT)
+        if len(ended):
+            keys, since = zip(*self._orphans, strict=True)
+            for name in ("signed_distance", "error_bound", "point_a", "point_b", "normal", "closing_speed"):
+                ended[name] = np.nan
+            ended["id_a"], ended["id_b"] = ids_of_keys(np.array(keys, np.uint64))
+            ended["duration"] = now - np.array(since)
+            ended["phase"], ended["point_count"] = Phase.END, 1
+            ended["model_a"] = ended["model_b"] = Model.EXACT
+            self._orphans.clear()
+        return ended
+
+    # ------------------------------------------------------------------ snapshots
+
+    def save(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        snapshot.arrays.update(pairs=self.pairs.copy(), pair_events=self.events.copy())
+        facts["orphans"] = list(self._orphans)
+
+    def restore(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        self.pairs = snapshot.array("pairs", np.empty(0, PAIR))
+        self.events = snapshot.array("pair_events", np.empty(0, IMPACT), len(self.pairs))
+        snapshot.check_slots("pairs", self.pairs)
+        snapshot.check_slots("pair_events", self.events)
+        self._orphans = [(key, since) for key, since in facts["orphans"]]
 
 
 @kernel
-def unite(bodies, pairs, events, due, order, new_pairs, new_events):
+def _unite(bodies, pairs, events, due, order, new_pairs, new_events):
     """The active pairs with those that came due, by key; both have an event of their own at the same index.
 
     Left out are pairs that do not touch and whose motion has changed (they were predicted anew), and pairs of bodies
@@ -40,9 +169,9 @@ def unite(bodies, pairs, events, due, order, new_pairs, new_events):
     while k < pairs.size or m < order.size:
         if k < pairs.size:
             i, j = pairs[k].i, pairs[k].j
-            key = (np.uint64(bodies.id[i]) << np.uint64(32)) | np.uint64(bodies.id[j])
+            key = pair_key(bodies.id[i], bodies.id[j])
             gone = not (bodies.used[i] and bodies.used[j]) or key != pairs[k].key
-            changed = has_changed(bodies, events[k])
+            changed = not holds(bodies.version, events[k])
             if gone or pairs[k].leaving == 1 or (changed and pairs[k].touching == 0):
                 k += 1
                 continue
@@ -77,17 +206,17 @@ def _ask_for(table, bodies, i):
 
 
 @kernel
-def examine(
-    table, parts, bodies, pairs, events, which, now, margin, stale_acceleration, tolerance, budget, results, later,
-    scratch,
-):  # fmt: skip
-    """Look at the active pairs `which` (M,) at `now`: contact into results (n, RESULT), and what does not touch is
-    predicted on.
+def _examine(multibody, active, which, now, queries, scratch, later):
+    """Examine the active pairs `which` (M,) at `now`: a contact goes into the results, another pair is predicted on.
 
     All that is known of a pair stays at its index; it is `leaving` where it has just ended, or is certified apart for a
-    while: then its event goes into `later` (IMPACT). Returns (later, narrow-phase tests, impact queries).
+    while: then its event goes into `later` (IMPACT). queries: an ImpactQuery and a ContactQuery.
+    Returns (how many later, narrow-phase tests, impact queries).
     """
-    n_later = tests = queries = 0
+    table, bodies = multibody.table, multibody.bodies
+    pairs, events, results = active
+    impact, contact = queries
+    n_later = tests = made = 0
     for at in range(which.size):
         if at + AHEAD < which.size:
             _ask_for(table, bodies, pairs[which[at + AHEAD]].i)
@@ -95,22 +224,27 @@ def examine(
         k = which[at]
         pair, event = pairs[k], events[k]
         i, j = pair.i, pair.j
-        touching, made = body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, scratch, results[k])
-        tests += made
+        touching, count = body_contact(multibody, i, j, now, contact, scratch, results[k])
+        tests += count
         stays = touching
-        if not touching:
-            predicted = bodies.motion[i].time == now or bodies.motion[j].time == now
-            if not (predicted and has_changed(bodies, event)):
-                end = min(bodies.motion[i].cover, bodies.motion[j].cover)
-                queries += body_impact(table, parts, bodies, i, j, now, end, margin, tolerance, budget, scratch, event)
-                if event.status != CLEAR:
-                    if event.lower > now:
-                        later[n_later] = event
-                        n_later += 1
-                    else:
-                        stays = True
+        if not touching and not is_predicted_anew(bodies, i, j, now, event):
+            window = Window(now, cover_of(bodies, i, j))
+            made += body_impact(multibody, i, j, window, impact, scratch, event)
+            if event.status != CLEAR:
+                if event.lower > now:
+                    later[n_later] = event
+                    n_later += 1
+                else:
+                    stays = True
         if touching and pair.touched == 0:
             pair.since = now
         pair.touching = 1 if touching else 0
         pair.leaving = 0 if stays else 1
-    return n_later, tests, queries
+    return n_later, tests, made
+
+
+@inlined
+def is_predicted_anew(bodies, i, j, now, event):
+    """Whether this step has predicted the pair anew already, since a body left the motion that the event rests on."""
+    is_new = bodies.motion[i].time == now or bodies.motion[j].time == now
+    return is_new and not holds(bodies.version, event)

@@ -1,77 +1,200 @@
-"""From active pairs and pending events to the records that are published."""
+"""Stage 7, answers: from active pairs and pending events to the records that are published, and the status."""
 
 from __future__ import annotations
 
+import dataclasses
 from math import inf, nan
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from collision_monitor import records
 from collision_monitor._jit import kernel
-from collision_monitor.prediction.body_contact import BOUND, CLOSING, SHAPE_I, SHAPE_J, STATUS
-from collision_monitor.prediction.impact_record import BOUND_ONLY, TREE_BOUND
-from collision_monitor.records import CONTACT, PREDICTION, Phase, PredictionStatus
+from collision_monitor.monitor import filters
+from collision_monitor.monitor.active_pairs import ActivePairs
+from collision_monitor.monitor.event_list import EventList
+from collision_monitor.monitor.patches import with_patches
+from collision_monitor.monitor.result import StepResult, StepStatus
+from collision_monitor.monitor.roster import count_bodies
+from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.step_context import StepContext
+from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS
+from collision_monitor.prediction.body_impact import CLOSING
+from collision_monitor.prediction.impact_record import BOUND_ONLY, TREE_BOUND, UNRESOLVED, ids_of
+from collision_monitor.records import ContactStatus, Phase, PredictionStatus, joined
 
-UNRESOLVED: Final = int(PredictionStatus.UNRESOLVED)
+PERSIST: Final = int(Phase.PERSIST)
+BEGIN: Final = int(Phase.BEGIN)
+END: Final = int(Phase.END)
 
-CONTACT_NUMBERS: Final = 13
-"""float64 numbers at the front of a records.CONTACT; the first uint32 behind them has index 26."""
-PREDICTION_NUMBERS: Final = 13
-assert CONTACT.itemsize == 8 * CONTACT_NUMBERS + 32
-assert PREDICTION.itemsize == 8 * PREDICTION_NUMBERS + 24
+Rows = NDArray[np.void]
+
+
+class Answers(Stage):
+    """The last step's answers, and a digest of all that were given."""
+
+    SAVED = ("digest", "last", "step_count")
+
+    def __init__(self) -> None:
+        self.digest = 0
+        self.step_count = 0
+        self.last: StepResult | None = None
+
+    def contacts(self, step: StepContext, active: ActivePairs) -> Rows:
+        """The contacts (records.CONTACT) of the active pairs, by ids, with the END of those whose object is gone."""
+        roster, multibody = step.roster, step.roster.multibody
+        contacts = np.empty(len(active.pairs), records.CONTACT)
+        n = write_contacts(active.pairs, active.results, roster.bodies, roster.parts.index, step.now, contacts)
+        contacts = contacts[:n]
+        if step.profile.contact_points > 1:
+            contacts = with_patches(contacts, multibody, active.active, step.now, step.profile.contact_points)
+        ended = active.take_orphans(step.now)
+        if not len(ended):
+            return contacts
+        both = joined([contacts, ended])
+        begins = both["phase"] != Phase.END  # the END of what was comes before the BEGIN of what is
+        return both[np.lexsort((begins, both["id_b"], both["id_a"]))]
+
+    def predictions(self, step: StepContext, active: ActivePairs, events: EventList) -> tuple[Rows, NDArray[np.int32]]:
+        """The predictions (records.PREDICTION) of stated motions within the horizon, and the slots (n, 2) of each."""
+        p, roster = step.profile, step.roster
+        pending = events.until(step.now + p.horizon)
+        predictions = np.empty(len(pending) + len(active.pairs), records.PREDICTION)
+        slots = np.empty((len(predictions), 2), np.int32)
+        source = Source(active.pairs, active.events, pending)
+        times = Times(step.now, p.horizon, p.stale_after)
+        n = write_predictions(source, roster.bodies, roster.parts.index, times, predictions, slots)
+        return predictions[:n], slots[:n]
+
+    def filtered(self, step: StepContext, predictions: Rows) -> Rows:
+        """The predictions that the profile's filters leave."""
+        p = step.profile
+        if not (p.min_closing_speed > 0.0 or p.ignore_separating):
+            return predictions
+        kept = np.ones(len(predictions), np.bool_)
+        if p.min_closing_speed > 0.0:
+            kept &= filters.closes_fast(predictions, p.min_closing_speed)
+        if p.ignore_separating:
+            i, j = (step.roster.find_slots(predictions[name]) for name in ("id_a", "id_b"))
+            kept &= filters.approaches(step.roster.bodies, i, j, step.now)
+        return predictions[kept]
+
+    def finish(self, result: StepResult) -> StepResult:
+        """Make this the last result, and count it in the digest."""
+        for part in (result.contacts, result.predictions):
+            self.digest = int(chain_digest(np.uint64(self.digest), part.view(np.uint64)))
+        self.last, self.step_count = result, result.step
+        return result
+
+    def repeated(self) -> StepResult:
+        """The last result, as that of a step that was refused."""
+        assert self.last is not None, "the first stamp is always accepted"
+        return dataclasses.replace(self.last, accepted=False, cut=None)
+
+    def save(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        last = self.last
+        facts |= {"step": self.step_count, "digest": self.digest, "last": None}
+        if last is not None:
+            snapshot.arrays.update(contacts=last.contacts, predictions=last.predictions)  # made anew in every step
+            facts["last"] = [last.stamp_ns, last.step, dataclasses.asdict(last.status)]
+
+    def restore(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        self.step_count, self.digest = facts["step"], facts["digest"]
+        if facts["last"] is not None:
+            stamp_ns, step, status = facts["last"]
+            contacts = snapshot.array("contacts", np.empty(0, records.CONTACT))
+            predictions = snapshot.array("predictions", np.empty(0, records.PREDICTION))
+            self.last = StepResult(stamp_ns, step, contacts, predictions, StepStatus(**status))
+
+
+def step_status(
+    step: StepContext, active: ActivePairs, events: EventList, contacts: Rows, predictions: Rows
+) -> StepStatus:
+    """What the step did."""
+    roster = step.roster
+    unresolved = np.count_nonzero(contacts["status"] == ContactStatus.UNRESOLVED)
+    unresolved += np.count_nonzero(predictions["status"] == PredictionStatus.UNRESOLVED)
+    static, unseen, stale = count_bodies(roster.bodies, roster.top, step.now, step.profile.stale_after)
+    return StepStatus(
+        objects=len(roster),
+        objects_static=int(static),
+        objects_unseen=int(unseen),
+        objects_stale=int(stale),
+        contacts=int(np.count_nonzero(active.pairs["touching"])),
+        predictions=len(predictions),
+        unresolved=int(unresolved),
+        events_pending=len(events),
+        **vars(step.work),
+    )
 
 
 @kernel
-def write_contacts(pairs, results, bodies, shape_index, now, floats, words, octets):
-    """Contacts of the pairs that touch or have just ended; returns how many.
+def write_contacts(pairs, results, bodies, shape_index, now, contacts):
+    """Contacts (records.CONTACT) of the pairs that touch or have just ended; returns how many.
 
-    floats (n, 17), words (n, 34), octets (n, 136): one array of records.CONTACT seen as float64, uint32 and uint8.
+    results (n, RESULT): of the pairs; shape_index (S,): a shape's place in its object's description.
     """
     n = 0
     for k in range(pairs.size):
-        pair = pairs[k]
+        pair, row = pairs[k], results[k]
         if pair.touching == 0 and pair.touched == 0:
             continue
-        ids = pair.key
-        words[n, 26] = ids >> np.uint64(32)
-        words[n, 27] = ids & np.uint64(0xFFFFFFFF)
-        floats[n, 12] = now - pair.since
-        words[n, 28:32] = 0
-        octets[n, 128:136] = 0
-        octets[n, 130], octets[n, 131] = bodies.model[pair.i], bodies.model[pair.j]
-        octets[n, 135] = 1
+        contact = contacts[n]
+        contact.id_a, contact.id_b = ids_of(pair.key)
+        contact.duration = now - pair.since
+        contact.model_a, contact.model_b = bodies.model[pair.i], bodies.model[pair.j]
+        contact.point_index, contact.point_count = 0, 1
         if pair.touching == 1:
-            floats[n, 0] = results[k, 0]
-            floats[n, 1] = results[k, BOUND]
-            for c in range(6):
-                floats[n, 2 + c] = results[k, 4 + c]
+            contact.signed_distance = row[0]
+            contact.error_bound = row[10]
             for c in range(3):
-                floats[n, 8 + c] = results[k, 1 + c]
-            floats[n, 11] = results[k, CLOSING]
-            words[n, 28] = shape_index[int(results[k, SHAPE_I])]
-            words[n, 29] = shape_index[int(results[k, SHAPE_J])]
-            words[n, 30] = int(results[k, 12])
-            words[n, 31] = int(results[k, 14])
-            octets[n, 128] = PERSIST if pair.touched == 1 else BEGIN
-            octets[n, 129] = int(results[k, STATUS])
-            octets[n, 132] = int(results[k, 11])
-            octets[n, 133] = int(results[k, 13])
+                contact.point_a[c], contact.point_b[c] = row[4 + c], row[7 + c]
+                contact.normal[c] = row[1 + c]
+            contact.closing_speed = row[CLOSING]
+            contact.shape_a = shape_index[int(row[SHAPE_I])]
+            contact.shape_b = shape_index[int(row[SHAPE_J])]
+            contact.feature_type_a, contact.feature_index_a = int(row[11]), int(row[12])
+            contact.feature_type_b, contact.feature_index_b = int(row[13]), int(row[14])
+            contact.phase = PERSIST if pair.touched == 1 else BEGIN
+            contact.status = int(row[STATUS])
         else:
-            floats[n, 0:12] = nan
-            octets[n, 128] = END
+            contact.signed_distance = contact.error_bound = contact.closing_speed = nan
+            for c in range(3):
+                contact.point_a[c] = contact.point_b[c] = contact.normal[c] = nan
+            contact.shape_a = contact.shape_b = 0
+            contact.feature_type_a = contact.feature_index_a = contact.feature_type_b = contact.feature_index_b = 0
+            contact.phase, contact.status = END, 0
         n += 1
     return n
 
 
-@kernel
-def write_predictions(
-    pairs, active, pending, bodies, shape_index, now, horizon, stale_after, floats, words, octets, slots
-):  # fmt: skip
-    """Predictions of the active pairs that do not touch, then of the pending events within the horizon.
+class Source(NamedTuple):
+    """Where predictions come from."""
 
-    floats (n, 16), words (n, 32), octets (n, 128): one array of records.PREDICTION; slots (n, 2): of the bodies.
-    Returns how many.
+    pairs: Any  # (n,) PAIR: active pairs
+    active: Any  # (n,) IMPACT: their events
+    pending: Any  # IMPACT, sorted: events within the horizon
+
+
+class Times(NamedTuple):
+    """The times (s) that predictions are made at and until, and the age from which a state is stale."""
+
+    now: float
+    horizon: float
+    stale_after: float
+
+
+@kernel
+def write_predictions(source, bodies, shape_index, times, predictions, slots):
+    """Predictions (records.PREDICTION) of the active pairs that do not touch, then of the pending events.
+
+    shape_index (S,): a shape's place in its object's description; slots (n, 2): of the bodies. Returns how many.
     """
+    pairs, active, pending = source
+    now, horizon, stale_after = times
     n = 0
     for k in range(pairs.size + pending.size):
         if k < pairs.size:
@@ -84,28 +207,26 @@ def write_predictions(
                 break
         i, j = event.i, event.j
         slots[n, 0], slots[n, 1] = i, j
-        floats[n, 0] = max(event.lower - now, 0.0)
-        floats[n, 1] = max(event.upper - now, 0.0) if event.upper < inf else inf
-        floats[n, 2:6] = nan
-        floats[n, 6], floats[n, 7], floats[n, 8] = event.point_x, event.point_y, event.point_z
-        floats[n, 9], floats[n, 10], floats[n, 11] = event.normal_x, event.normal_y, event.normal_z
-        floats[n, 12] = event.closing_speed
-        words[n, 26] = event.key >> np.uint64(32)
-        words[n, 27] = event.key & np.uint64(0xFFFFFFFF)
-        words[n, 28] = shape_index[event.shape_i]
-        words[n, 29] = shape_index[event.shape_j]
-        status = event.status
+        row = predictions[n]
+        row.lower = max(event.lower - now, 0.0)
+        row.upper = max(event.upper - now, 0.0) if event.upper < inf else inf
+        row.earliest = row.most_likely = row.latest = row.probability = nan
+        row.point[0], row.point[1], row.point[2] = event.point_x, event.point_y, event.point_z
+        row.normal[0], row.normal[1], row.normal[2] = event.normal_x, event.normal_y, event.normal_z
+        row.closing_speed = event.closing_speed
+        row.id_a, row.id_b = ids_of(event.key)
+        row.shape_a, row.shape_b = shape_index[event.shape_i], shape_index[event.shape_j]
+        row.status = event.status
         if bodies.excess[i] + bodies.excess[j] > 0.0:
             # the models meet; whether and when the objects do is not known
-            status = UNRESOLVED
-            floats[n, 1] = inf
-        octets[n, 120] = status
-        octets[n, 121] = BOUND_ONLY if event.method == TREE_BOUND else event.method
-        octets[n, 122], octets[n, 123] = bodies.model[i], bodies.model[j]
+            row.status = UNRESOLVED
+            row.upper = inf
+        row.method = BOUND_ONLY if event.method == TREE_BOUND else event.method
+        row.model_a, row.model_b = bodies.model[i], bodies.model[j]
         stale_i = not bodies.static[i] and now - bodies.time[i] > stale_after
         stale_j = not bodies.static[j] and now - bodies.time[j] > stale_after
-        octets[n, 124] = 1 if stale_i or stale_j else 0
-        octets[n, 125:128] = 0
+        row.stale = 1 if stale_i or stale_j else 0
+        row.reserved[0] = row.reserved[1] = row.reserved[2] = 0
         n += 1
     return n
 
@@ -139,12 +260,3 @@ def chain_digest(digest, words):
         a = (a ^ lane) * prime
         a ^= a >> shift
     return a
-
-
-PERSIST: Final = int(Phase.PERSIST)
-
-
-BEGIN: Final = int(Phase.BEGIN)
-
-
-END: Final = int(Phase.END)

@@ -1,4 +1,4 @@
-"""The list of predicted impacts, ordered by the time until which each pair is certified apart.
+"""Stage 5, the event list: predicted impacts, ordered by the time until which each pair is certified apart.
 
 A sorted array instead of a heap: a step takes the due ones off the front, drops those whose motion has changed
 (lazy invalidation by version) and merges the new ones in, in one pass; what will be published is its front part.
@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.prediction.impact_record import BOUND_ONLY, HIT, IMPACT, UNRESOLVED
-from collision_monitor.prediction.impact_record import holds as _holds
-from collision_monitor.prediction.motion import Bodies
+from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.prediction.bodies import Bodies
+from collision_monitor.prediction.impact_record import BOUND_ONLY, HIT, IMPACT, UNRESOLVED, holds
 
 Events = NDArray[np.void]
 Versions = NDArray[np.uint32]
@@ -77,7 +77,7 @@ def take_due(events, version, now, due):
     """Events at the front (sorted) that are due by `now` and still hold, into due; returns (how many passed, due)."""
     passed = n = 0
     while passed < events.size and events[passed].lower <= now:
-        if _holds(version, events[passed]):
+        if holds(version, events[passed]):
             due[n] = events[passed]
             n += 1
         passed += 1
@@ -89,7 +89,7 @@ def merge(old, new, order, version, merged):
     """old, and new in its order, both sorted, into merged; what no longer holds is left out. Returns the length."""
     i = k = n = 0
     while i < old.size or k < new.size:
-        if i < old.size and not _holds(version, old[i]):
+        if i < old.size and not holds(version, old[i]):
             i += 1
         elif k >= new.size or (i < old.size and not _before(new[order[k]], old[i])):
             merged[n] = old[i]
@@ -117,18 +117,9 @@ def _place(key, new, place):
     return at
 
 
-def keep_first(new: Events, bodies: Bodies, pending: Events, pairs: NDArray[np.void]) -> int:
-    """Move those of `new` to the front that are the first impact of their pair; returns how many.
-
-    Where a pair was predicted further, it may have an earlier impact: in `pending`, or in the active pairs, which are
-    looked at in every step. An earlier one that was not sure to happen ends where the later one is sure.
-    """
-    room = np.empty(4 << (2 * len(new)).bit_length(), np.int32)
-    return int(_keep_first(new, bodies, pending, pairs, room, np.ones(len(new), np.bool_)))
-
-
 @kernel
-def _keep_first(new, bodies, pending, pairs, room, keep):
+def keep_first(new, bodies, pending, pairs, room, keep):
+    """`EventList.first_of_pairs`: returns how many. room (R,) int32: a hash table; keep (len(new),) bool: all True."""
     later = 0
     for k in range(new.size):
         later += _was_predicted(new[k], bodies)
@@ -144,7 +135,7 @@ def _keep_first(new, bodies, pending, pairs, room, keep):
             place[_place(new[k].key, new, place)] = k
     for k in range(pending.size):
         at = place[_place(pending[k].key, new, place)]
-        if at >= 0 and _holds(bodies.version, pending[k]):
+        if at >= 0 and holds(bodies.version, pending[k]):
             keep[at] = False
             if pending[k].status == UNRESOLVED and new[at].status == HIT:
                 lower = pending[k].lower
@@ -171,8 +162,11 @@ def _was_predicted(event, bodies):
     return min(bodies.motion[event.i].covered, bodies.motion[event.j].covered) > -inf
 
 
-class EventList:
-    """Predicted impacts (time_of_impact.IMPACT), sorted by (lower, key). Grows as needed."""
+class EventList(Stage):
+    """Predicted impacts (IMPACT), sorted by (lower, key). Grows as needed."""
+
+    SAVED = ("events",)
+    CACHES = ("_room", "_spare")
 
     def __init__(self) -> None:
         self._room: Events = np.empty(256, IMPACT)
@@ -188,13 +182,26 @@ class EventList:
         self.events = self._room[:0]
 
     def take_due(self, version: Versions, now: float) -> Events:
-        """Take off and return what is due by `now`, and what of it rests on motions that are still these, in order."""
+        """Take the events off that are due by `now`; return those whose motions still hold, in order."""
         due = np.empty(count_until(self.events, now), IMPACT)
         passed, n = take_due(self.events, version, now, due)
         self.events = self.events[passed:]
         return due[:n]
 
-    def replace(self, which: NDArray[np.int64], new: Events, version: Versions) -> None:
+    def until(self, time: float) -> Events:
+        """The events that begin by this time (s): a view."""
+        return self.events[: count_until(self.events, time)]
+
+    def first_of_pairs(self, new: Events, bodies: Bodies, active: NDArray[np.void]) -> Events:
+        """The events of `new` (IMPACT) that are the first impact of their pair; moves them to its front.
+
+        Where a pair was predicted further, it may have an earlier impact: among the pending events, or in the active
+        pairs (PAIR), which every step examines. An earlier one that is not certain ends where the later one is.
+        """
+        room = np.empty(4 << (2 * len(new)).bit_length(), np.int32)
+        return new[: keep_first(new, bodies, self.events, active, room, np.ones(len(new), np.bool_))]
+
+    def replace(self, which: NDArray[np.intp], new: Events, version: Versions) -> None:
         """`add`, in place of the events at the indices `which`."""
         kept = np.ones(len(self.events), np.bool_)
         kept[which] = False
@@ -202,7 +209,7 @@ class EventList:
         self.add(new, version)
 
     def add(self, new: Events, version: Versions) -> None:
-        """Merge `new` in, in any order, and drop what no longer holds."""
+        """Merge `new` in, in any order; pairs leave the list here whose motions no longer hold."""
         need = len(self.events) + len(new)
         if need > len(self._spare):
             self._spare = np.empty(2 * need, IMPACT)
@@ -211,3 +218,13 @@ class EventList:
         n = merge(self.events, new, order, version, self._spare)
         self._room, self._spare = self._spare, self._room
         self.events = self._room[:n]
+
+    def save(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        snapshot.arrays["events"] = self.events.copy()
+
+    def restore(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        events = snapshot.array("events", np.empty(0, IMPACT))
+        snapshot.check_slots("events", events)
+        self.events = events

@@ -1,49 +1,179 @@
-"""States in: which are accepted, and why the others are not."""
+"""Stage 1, states in: arguments become states, and each state is taken or refused with a reason."""
 
 from __future__ import annotations
 
 from math import sqrt
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from collision_monitor import records
 from collision_monitor._jit import device, kernel
+from collision_monitor.errors import InputError, Refusal
+from collision_monitor.geometry.plane import flat_states
+from collision_monitor.monitor.roster import Roster
+from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
+from collision_monitor.prediction.spread import worst_stddevs
 from collision_monitor.records import StateFlag
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 
 ACCEPTED: Final = 0
-
-
 UNKNOWN_ID: Final = 1
-
-
 NON_FINITE: Final = 2
-
-
 QUATERNION: Final = 3
-
-
 OLD: Final = 4
-
 
 STATE_NUMBERS: Final = 20
 """float64 numbers at the front of a records.STATE; id and flags follow."""
 
-
 _POSITION_STDDEV: Final = 16
-
-
 _ORIENTATION_STDDEV: Final = 17
-"""Where these are among the numbers of a records.STATE; those of their rates of change stand two behind."""
-
+"""Places of these among the numbers of a records.STATE; those of their rates of change stand two behind."""
 
 _TWIST_UNKNOWN: Final = int(StateFlag.TWIST_UNKNOWN)
-
-
 _DISCONTINUITY: Final = int(StateFlag.DISCONTINUITY)
-
-
 _ACCELERATION_VALID: Final = int(StateFlag.ACCELERATION_VALID)
+
+_VERDICTS: Final = {
+    UNKNOWN_ID: (Refusal.UNKNOWN_ID, "expected the id of an object that was described, got {id}"),
+    NON_FINITE: (
+        Refusal.NON_FINITE,
+        "object {id}: expected finite numbers up to 1e18 in pose and twist, standard deviations >= 0 and covariances "
+        "that are positive semi-definite (a negative one here is minus the root of a negative eigenvalue), got {row}",
+    ),
+    QUATERNION: (Refusal.QUATERNION, "object {id}: expected a unit quaternion within 1e-3, got {quaternion}"),
+    OLD: (
+        Refusal.OLD,
+        "object {id}: expected one state a message, newer than its last one, and none of a static object",
+    ),
+}
+
+States = NDArray[np.void]
+
+
+class Intake(Stage):
+    """Takes states into the roster; counts what is refused, by reason, and keeps the text of the last refusal."""
+
+    SAVED = ("refused", "last_refusal")
+    CACHES = ("_buffer",)
+
+    def __init__(self) -> None:
+        self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
+        self.last_refusal = ""
+        self._buffer = np.empty(64, records.STATE)
+
+    def refuse(self, reason: Refusal, text: str, count: int = 1) -> None:
+        """Count a refused input."""
+        self.refused[reason] += count
+        self.last_refusal = text
+
+    def states(
+        self, ids: ArrayLike, poses: Any, twists: Any, covariance: Any
+    ) -> tuple[States, NDArray[np.float64]]:
+        """The arguments of `Monitor.step` as states (N,) records.STATE and covariances (N, 12), or (0, 12) for none.
+
+        With covariances the states have their worst standard deviations. The caller's arrays stay as they are.
+        Raises InputError.
+        """
+        try:
+            given = np.asarray(ids)
+        except ValueError:
+            raise InputError(f"ids: expected one dimension of integers, got {ids!r}") from None
+        if given.size == 0:
+            states = np.zeros(0, records.STATE)
+        elif given.dtype == records.STATE:
+            states = self._own(given, is_written=covariance is not None)
+        else:
+            states = _states(given, poses, twists)
+        if covariance is None:
+            return states, np.empty((0, 12))
+        try:
+            covariances = np.asarray(covariance, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError("covariance: expected an array of numbers") from None
+        if covariances.shape != (len(states), 12):
+            raise InputError(f"covariance: expected shape ({len(states)}, 12), got {covariances.shape}")
+        known, stddevs = worst_stddevs(covariances)
+        states["position_stddev"], states["velocity_stddev"] = stddevs.T
+        return states, known
+
+    def _own(self, given: States, *, is_written: bool) -> States:
+        """The states themselves where they lie as the kernels read them and stay as they are, else a copy."""
+        if given.ndim != 1:
+            raise InputError(f"states: expected one dimension, got shape {given.shape}")
+        unknown = given["flags"] & StateFlag.TWIST_UNKNOWN  # the kernel writes their standard deviations
+        if given.flags.carray and not is_written and not unknown.any():
+            return given
+        if len(given) > len(self._buffer):
+            self._buffer = np.empty(len(given), records.STATE)
+        states = self._buffer[: len(given)]
+        states.view(np.uint8)[:] = np.ascontiguousarray(given).view(np.uint8)  # message bytes need not be aligned
+        return states
+
+    def take(
+        self,
+        states: States,
+        covariances: NDArray[np.float64],
+        time: float,
+        roster: Roster,
+        uncertain: UncertainPredictions,
+    ) -> None:
+        """Store states of `time` (s) as the bodies' last ones, with their uncertainties; refuse the others."""
+        if len(states) == 0:
+            return
+        slots = roster.slots_of(states["id"])
+        used = flat_states(states) if roster.planar else states
+        numbers = used.view(np.float64).reshape(len(states), -1)
+        verdicts = np.empty(len(states), np.uint8)
+        flags = np.ascontiguousarray(states["flags"])
+        accepted, is_uncertain = take_states(roster.bodies, slots, numbers, flags, time, verdicts)
+        if is_uncertain or uncertain.active:
+            taken = np.where(verdicts == ACCEPTED, slots, np.int32(-1))
+            uncertain.take(taken, numbers, covariances, roster.planar)
+        if accepted == len(states):
+            return
+        for verdict, (reason, text) in _VERDICTS.items():
+            rows = np.flatnonzero(verdicts == verdict)
+            if len(rows):
+                row = states[rows[0]]
+                values = {"id": int(row["id"]), "quaternion": row["quaternion"].tolist(), "row": row.item()[:-2]}
+                self.refuse(reason, text.format(**values), len(rows))
+
+    def save(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        facts["refused"] = {reason.value: count for reason, count in self.refused.items()}
+        facts["last_refusal"] = self.last_refusal
+
+    def restore(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        self.refused = {reason: facts["refused"][reason.value] for reason in Refusal}
+        self.last_refusal = facts["last_refusal"]
+
+
+def _states(ids: NDArray[Any], poses: Any, twists: Any) -> States:
+    """States of ids (N,), poses (N, 7) and twists (N, 6). Raises InputError."""
+    if ids.ndim != 1 or not np.issubdtype(ids.dtype, np.integer):
+        raise InputError(f"ids: expected one dimension of integers, got {ids.dtype} of shape {ids.shape}")
+    try:
+        pose = np.asarray(poses, dtype=np.float64)
+        twist = np.zeros((len(ids), 6)) if twists is None else np.asarray(twists, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("poses and twists: expected arrays of numbers") from None
+    n = len(ids)
+    if pose.shape != (n, 7) or twist.shape != (n, 6):
+        raise InputError(
+            "expected ids (N,), poses (N, 7) and twists (N, 6), "
+            f"got shapes {ids.shape}, {pose.shape} and {twist.shape}"
+        )
+    if ids.min() < 0 or ids.max() >= 2**32:
+        raise InputError(f"ids: expected integers from 0 to 4294967295, got {ids.min()} to {ids.max()}")
+    states = np.zeros(n, records.STATE)
+    states["id"] = ids
+    states["position"], states["quaternion"] = pose[:, :3], pose[:, 3:]
+    states["linear"], states["angular"] = twist[:, :3], twist[:, 3:]
+    return states
 
 
 @kernel
@@ -88,7 +218,7 @@ def take_states(bodies, slots, numbers, flags, time, verdicts):
                 bodies.linear[i, c] = numbers[k, 7 + c]
                 bodies.angular[i, c] = numbers[k, 10 + c]
         elif bodies.seen[i] and (flags[k] & _DISCONTINUITY) == 0:
-            _estimate_twist(bodies, i, numbers, k, x, y, z, w, time - bodies.time[i])
+            _estimate_twist(bodies, i, numbers[k, :3], (x, y, z, w), time - bodies.time[i])
             for c in range(3 if accelerates else 0):
                 # what is estimated is the mean since the last state, and it was that fast half-way
                 bodies.linear[i, c] += 0.5 * numbers[k, 13 + c] * (time - bodies.time[i])
@@ -114,10 +244,11 @@ def take_states(bodies, slots, numbers, flags, time, verdicts):
 
 
 @device
-def _estimate_twist(bodies, i, numbers, k, x, y, z, w, elapsed):
+def _estimate_twist(bodies, i, position, quaternion, elapsed):
     """Twist from the last pose to this one: difference of positions, logarithm of the relative rotation."""
+    x, y, z, w = quaternion
     for c in range(3):
-        bodies.linear[i, c] = (numbers[k, c] - bodies.position[i, c]) / elapsed
+        bodies.linear[i, c] = (position[c] - bodies.position[i, c]) / elapsed
     px, py, pz = -bodies.quaternion[i, 0], -bodies.quaternion[i, 1], -bodies.quaternion[i, 2]
     pw = bodies.quaternion[i, 3]
     rx = w * px + x * pw + y * pz - z * py

@@ -1,14 +1,323 @@
-"""Objects by id: slots, shapes, allowed pairs."""
+"""The objects by id: their slots, names, shapes and allowed pairs, and the bodies that the kernels read."""
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
 from collision_monitor._jit import kernel
+from collision_monitor.errors import CollisionMonitorError, InputError, UnsupportedError
+from collision_monitor.geometry.pieces import is_planar
+from collision_monitor.geometry.plane import flat_pose
+from collision_monitor.geometry.shape_table import LANES, POLYGON, ShapeTable, ShapeTableBuilder
+from collision_monitor.geometry.shapes import HalfSpace
+from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage, check_range
+from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.objects.models import monitored_model
+from collision_monitor.prediction.bodies import Bodies, Multibody, Parts, enlarge, make_bodies, make_parts
+from collision_monitor.prediction.body_layout import lay_out_body
+from collision_monitor.prediction.impact_record import pair_keys
+from collision_monitor.records import Model, ShapeType
+
+FIRST_CAPACITY = 64
+"""Slots of bodies at first; there are twice as many whenever they do not suffice."""
+
+
+class Roster(Stage):
+    """Which objects there are. A body's slot never changes while its object is described.
+
+    bodies, parts: as the kernels read them. top: slots below have been used. planar: the scene is one of the plane.
+    renewed: slots whose description changed, to be predicted anew in the next step.
+    """
+
+    SAVED = (
+        *("bodies", "parts", "top", "planar", "renewed"),
+        *("_shapes", "_slots", "_names", "_free", "_allowed", "_allowed_keys"),
+    )
+    CACHES = ("_last_ids", "_last_slots")
+
+    def __init__(self) -> None:
+        self.bodies: Bodies = make_bodies(FIRST_CAPACITY)
+        self.parts = make_parts(FIRST_CAPACITY)
+        self.top = 0
+        self.planar = False
+        self.renewed: set[int] = set()
+        self._shapes = ShapeTableBuilder()
+        self._slots: dict[int, int] = {}
+        self._names: dict[int, str] = {}
+        self._free: list[int] = []
+        self._allowed: dict[int, frozenset[int]] = {}
+        self._allowed_keys = np.zeros(0, np.uint64)
+        self._last_ids, self._last_slots = np.zeros(0, np.uint32), np.zeros(0, np.int32)
+
+    # ------------------------------------------------------------------ reading
+
+    @property
+    def multibody(self) -> Multibody:
+        """Shapes, parts and bodies as the kernels read them; to be fetched again after `describe`."""
+        return Multibody(self._shapes.table, self.parts, self.bodies)
+
+    @property
+    def capacity(self) -> int:
+        """How many bodies there is room for."""
+        return len(self.bodies.used)
+
+    @property
+    def allowed_keys(self) -> NDArray[np.uint64]:
+        """Keys of the pairs that are never checked, sorted."""
+        return self._allowed_keys
+
+    @property
+    def ids(self) -> list[int]:
+        """The ids of all described objects, ascending."""
+        return sorted(self._slots)
+
+    def __len__(self) -> int:
+        """How many objects are described."""
+        return len(self._slots)
+
+    def name(self, object_id: int) -> str:
+        """The object's name for people. Raises InputError for an unknown id."""
+        self.slot(object_id)
+        return self._names[object_id]
+
+    def slot(self, object_id: int) -> int:
+        """Slot of an object. Raises InputError for an unknown id."""
+        if object_id not in self._slots:
+            raise InputError(f"expected the id of an object that was described, got {object_id!r}")
+        return self._slots[object_id]
+
+    def slots_of(self, ids: NDArray[np.uint32]) -> NDArray[np.int32]:
+        """Slot of each id, -1 where unknown; messages usually name the same objects as the last one did."""
+        if not np.array_equal(ids, self._last_ids):
+            self._last_slots = self.find_slots(ids)
+            self._last_ids = ids.copy()
+        return self._last_slots
+
+    def find_slots(self, ids: NDArray[np.uint32]) -> NDArray[np.int32]:
+        """Slot of each id, -1 where unknown."""
+        known = np.fromiter(self._slots, np.uint32, len(self._slots))
+        slot_of = np.fromiter(self._slots.values(), np.int32, len(self._slots))
+        order = np.argsort(known)
+        known, slot_of = known[order], slot_of[order]
+        at = np.searchsorted(known, ids)
+        at[at == len(known)] = 0
+        found = known[at] == ids if len(known) else np.zeros(len(ids), bool)
+        return np.where(found, slot_of[at] if len(known) else -1, -1).astype(np.int32)
+
+    def used(self) -> NDArray[np.intp]:
+        """Slots of all described objects, ascending."""
+        return np.flatnonzero(self.bodies.used[: self.top])
+
+    # ------------------------------------------------------------------ changing
+
+    def describe(self, d: ObjectDescription, model: Model) -> int:
+        """Take in a new object, or the new description of a known one, whose state is kept; returns its slot.
+
+        Raises InputError, ShapeError; UnsupportedError for a shape or model that is not offered.
+        """
+        if not d.static and any(isinstance(shape, HalfSpace) for shape, _ in d.shapes):
+            raise UnsupportedError(f"object {d.object_id}: a HalfSpace has no end and can only be static")
+        planar = self._is_planar(d)
+        pose = flat_pose(d.pose) if planar and d.pose is not None else d.pose
+        modelled = monitored_model(d.shapes, model)
+        slots: list[int] = []
+        try:
+            for shape, offset in modelled.pieces:
+                slots.append(self._shapes.append(shape, flat_pose(offset) if planar else offset, d.padding))
+        except CollisionMonitorError:
+            for slot in slots:
+                self._shapes.remove(slot)
+            raise
+        i = self._slots.get(d.object_id)
+        if i is None:
+            i = self._slots[d.object_id] = self._new_body()
+        else:
+            self._drop_shapes(i)
+        if len(self.parts.next) < len(self._shapes.table.kind):
+            parts = make_parts(len(self._shapes.table.kind))
+            enlarge(self.parts, parts)
+            self.parts = parts
+        lay_out_body(self.multibody, i, slots, modelled.shapes)
+        self.planar = planar
+        bodies = self.bodies
+        bodies.used[i] = True
+        bodies.id[i] = d.object_id
+        bodies.group[i], bodies.mask[i] = d.group, d.mask
+        bodies.model[i], bodies.excess[i], bodies.concave[i] = modelled.model, modelled.excess, not modelled.convex
+        if d.static:
+            assert pose is not None
+            bodies.position[i], bodies.quaternion[i] = pose.position, pose.quaternion
+            bodies.linear[i] = bodies.angular[i] = bodies.acceleration[i] = 0.0
+            bodies.seen[i] = True
+        elif bodies.static[i]:
+            bodies.seen[i] = False  # it moves now, and where to is not known yet
+        bodies.static[i] = d.static
+        bodies.version[i] += 1
+        self._names[d.object_id] = d.name
+        self._allow(d.object_id, frozenset(d.allowed))
+        self.renewed.add(i)
+        self._forget_ids()
+        return i
+
+    def remove(self, object_id: int) -> None:
+        """Forget an object. Raises InputError for an unknown id."""
+        i = self.slot(object_id)
+        self._drop_shapes(i)
+        self.bodies.used[i] = self.bodies.seen[i] = self.bodies.static[i] = False
+        self.bodies.version[i] += 1
+        self.renewed.discard(i)
+        self._free.append(i)
+        del self._slots[object_id], self._names[object_id]
+        self._allow(object_id, frozenset())
+        self._forget_ids()
+
+    def renew_all(self) -> None:
+        """Let the next step predict every object anew."""
+        self.renewed.update(self.used().tolist())
+
+    def forget_states(self) -> None:
+        """Forget all states: every object is unseen until its next state, but for static ones."""
+        bodies = self.bodies
+        bodies.seen[:] = bodies.static & bodies.used
+        bodies.version[:] += 1
+        self.renewed = set(self.used().tolist())
+
+    def _is_planar(self, d: ObjectDescription) -> bool:
+        """Whether the object is one of the plane. Raises UnsupportedError where it meets objects of space."""
+        kinds = {is_planar(shape) for shape, _ in d.shapes}
+        if any(known != d.object_id for known in self._slots):
+            kinds.add(self.planar)
+        if len(kinds) > 1:
+            raise UnsupportedError(
+                f"object {d.object_id}: Circle and Polygon meet each other only; expected a scene in the plane or one "
+                "in space, got shapes of both"
+            )
+        return kinds.pop()
+
+    def _new_body(self) -> int:
+        if self._free:
+            return self._free.pop()
+        if self.top == self.capacity:
+            bodies = make_bodies(2 * self.top)
+            enlarge(self.bodies, bodies)
+            self.bodies = bodies
+        self.top += 1
+        return self.top - 1
+
+    def _drop_shapes(self, i: int) -> None:
+        slot = int(self.bodies.first_shape[i])
+        while slot >= 0:
+            self._shapes.remove(slot)
+            slot, self.parts.next[slot] = int(self.parts.next[slot]), -1
+        self.bodies.first_shape[i] = -1
+
+    def _allow(self, object_id: int, others: frozenset[int]) -> None:
+        if others == self._allowed.get(object_id, frozenset()):
+            return
+        self._allowed[object_id] = others
+        if not others:
+            del self._allowed[object_id]
+        pairs = {(min(a, b), max(a, b)) for a, others in self._allowed.items() for b in others}
+        self._allowed_keys = np.unique(pair_keys(*np.array(list(pairs), np.uint32).reshape(-1, 2).T))
+
+    def _forget_ids(self) -> None:
+        self._last_ids = np.zeros(0, np.uint32)
+
+    # ------------------------------------------------------------------ snapshots
+
+    def save(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        top, shapes = self.top, self._shapes.used
+        free_shapes, free_blocks = self._shapes.free
+        snapshot.arrays.update(
+            {
+                **{f"bodies.{name}": column[:top].copy() for name, column in self.bodies._asdict().items()},
+                **{f"parts.{name}": column[: len(shapes.kind)].copy() for name, column in self.parts._asdict().items()},
+                **{f"shapes.{name}": column.copy() for name, column in shapes._asdict().items()},
+                "shapes.vertices": shapes.vertices.T.copy(),
+            }
+        )
+        facts |= {
+            "names": {str(object_id): name for object_id, name in self._names.items()},
+            "allowed": {str(object_id): sorted(others) for object_id, others in self._allowed.items()},
+            "planar": self.planar,
+            "renewed": sorted(self.renewed),
+            "free": list(self._free),
+            "free_shapes": free_shapes,
+            "free_blocks": list(free_blocks.items()),
+        }
+
+    def restore(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        self._restore_shapes(snapshot, facts)
+        top = len(snapshot.array("bodies.used", self.bodies.used))
+        count, capacity = len(self._shapes.used.kind), self.capacity
+        while capacity < top:
+            capacity *= 2
+        bodies = Bodies(**snapshot.columns("bodies", self.bodies, top))
+        parts = Parts(**snapshot.columns("parts", self.parts, count))
+        _check_chains(bodies, parts, self._shapes.used.kind)
+        self.top, self.bodies, self.parts = top, make_bodies(capacity), make_parts(len(self._shapes.table.kind))
+        enlarge(bodies, self.bodies)
+        enlarge(parts, self.parts)
+        used = self.used()
+        self._slots = dict(zip(bodies.id[used].tolist(), used.tolist(), strict=True))
+        self._names = {object_id: facts["names"][str(object_id)] for object_id in self._slots}
+        for object_id, others in facts["allowed"].items():
+            self._allow(int(object_id), frozenset(others))
+        self.planar = facts["planar"]
+        self._free, self.renewed = list(facts["free"]), set(facts["renewed"])
+        if sorted([*self._free, *used.tolist()]) != list(range(top)) or not self.renewed <= set(used.tolist()):
+            raise InputError("snapshot: expected every slot of a body to be either used or free, got others")
+
+    def _restore_shapes(self, snapshot: Snapshot, facts: Facts) -> None:
+        like = self._shapes.table
+        kind = snapshot.array("shapes.kind", like.kind)
+        vertices = snapshot.array("shapes.vertices", like.vertices.T).T
+        index = snapshot.array("shapes.vertex_index", like.vertex_index, vertices.shape[1])
+        rows = {
+            name: snapshot.array(f"shapes.{name}", column, len(kind))
+            for name, column in like._asdict().items()
+            if name not in ("vertices", "vertex_index")
+        }
+        table = ShapeTable(**rows, vertices=vertices, vertex_index=index)
+        check_range("shapes.kind", table.kind, 0, max(ShapeType) + 1)
+        check_range("shapes.vertex_start", table.vertex_start, 0, len(index) + 1)
+        check_range("shapes.vertex_count", table.vertex_count, 0, len(index) + 1)
+        check_range("shapes.vertex_start", table.vertex_start + table.vertex_count, 0, len(index) + 1)
+        hulls = np.isin(table.kind, (ShapeType.CONVEX_HULL, POLYGON))
+        if (table.vertex_count[hulls] % LANES).any() or not table.vertex_count[hulls].all():
+            raise InputError(f"snapshot, shapes.vertex_count: expected multiples of {LANES}, got others")
+        corners = table.size[table.kind == POLYGON, 0]
+        if not ((corners >= 1) & (corners <= table.vertex_count[table.kind == POLYGON])).all():
+            raise InputError(f"snapshot, shapes.size: expected as many corners as there are, got {corners.tolist()}")
+        free_blocks = {count: list(starts) for count, starts in facts["free_blocks"]}
+        self._shapes = ShapeTableBuilder.restored(table, list(facts["free_shapes"]), free_blocks)
+
+
+def _check_chains(bodies: Bodies, parts: Parts, kind: NDArray[Any]) -> None:
+    """Every body in use has shapes, and no chain of them leads round in a circle. Raises InputError."""
+    check_range("bodies.first_shape", bodies.first_shape, -1, len(kind))
+    check_range("parts.next", parts.next, -1, len(kind))
+    following, left = parts.next.tolist(), len(kind)
+    for slot in bodies.first_shape[bodies.used].tolist():
+        if slot < 0:
+            raise InputError("snapshot, bodies.first_shape: expected a shape of each body, got none")
+        while slot >= 0:
+            left -= 1
+            if left < 0 or not kind[slot]:
+                raise InputError("snapshot, parts.next: expected chains of shapes, each of one body, got others")
+            slot = following[slot]
 
 
 @kernel
 def count_bodies(bodies, count, now, stale_after):
-    """How many of the first `count` slots hold bodies that are static, that nothing was heard of, and that are stale:
-    that nothing was heard of for stale_after (s).
+    """How many of the first `count` slots hold bodies that are static, unseen, and stale.
+
+    Unseen: without any state. Stale: without a state for stale_after (s).
     """
     static = unseen = stale = 0
     for i in range(count):

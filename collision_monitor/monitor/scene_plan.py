@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.hashed_grid import LEVEL_OFFSET, LEVELS, HashedGrid
+from collision_monitor.monitor.roster import Roster
 from collision_monitor.narrow_phase.dispatch import _METHODS, KIND_NAMES, pair_test
-from collision_monitor.prediction.motion import Bodies
 
 
 @dataclass(frozen=True)
@@ -74,17 +73,9 @@ class ScenePlan:
         return [reason for applies, reason in reasons if applies]
 
 
-def scene_plan(
-    table: Any,
-    bodies: Bodies,
-    next_part: NDArray[np.int32],
-    grid: HashedGrid,
-    *,
-    planar: bool,
-    uncertain: bool,
-    outside: int,
-) -> ScenePlan:
-    """The plan for what is described now. next_part (S,): the next shape slot of the same object, -1 after the last."""
+def scene_plan(roster: Roster, grid: HashedGrid, *, uncertain: bool, outside: int) -> ScenePlan:
+    """The plan for what is described now."""
+    table, parts, bodies = roster.multibody
     used = np.flatnonzero(bodies.used)
     static = bodies.static[used]
     kinds: dict[bool, list[int]] = {False: [], True: []}
@@ -92,7 +83,7 @@ def scene_plan(
         slot = int(bodies.first_shape[i])
         while slot >= 0:
             kinds[fixed].append(int(table.kind[slot]))
-            slot = int(next_part[slot])
+            slot = int(parts.next[slot])
     moving, fixed_kinds = set(kinds[False]), set(kinds[True])
     pairs = [*combinations_with_replacement(sorted(moving), 2)]
     if int(np.count_nonzero(~static)) == 1:
@@ -114,7 +105,7 @@ def scene_plan(
         cells={2.0 ** (k - LEVEL_OFFSET): int(grid.level_count[k]) for k in range(LEVELS) if grid.level_count[k]},
         groups=len(filters),
         never_meet=_ignoring(*of_groups[0]) - _ignoring(*of_groups[1]),
-        planar=planar,
+        planar=roster.planar,
         modelled=int(np.count_nonzero(bodies.excess[used])),
         uncertain=uncertain,
         outside=outside,

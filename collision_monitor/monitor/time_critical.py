@@ -1,4 +1,4 @@
-"""What bounding spheres and sphere trees say of pairs that nobody has time to look at: at once, and never too late.
+"""Stage 6b, active pairs within a budget: the most urgent first, and of the others what their bounds say.
 
 (Slides "Time-critical collision detection": from coarse to fine, and the answer so far whenever time is up. Hubbard,
 Approximating polyhedra with spheres for time-critical collision detection, 1996.)
@@ -11,72 +11,227 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, kernel
-from collision_monitor.monitor.event_list import sort_order
-from collision_monitor.prediction.body_contact import BOUND, CLOSING, SHAPE_I, SHAPE_J, STATUS, UNRESOLVED
-from collision_monitor.prediction.impact_record import CLEAR, has_changed
-from collision_monitor.prediction.motion import (
-    Bodies,
-    position_now,
-    relative_now,
-    relative_velocity_now,
-)
-from collision_monitor.prediction.pairs import bound_impact, is_cheap
+from collision_monitor._jit import kernel
+from collision_monitor.monitor.active_pairs import ActivePairs, is_predicted_anew
+from collision_monitor.monitor.budget import EXAMINE, HANDFUL, REFINE, TREES, PairBudget, StepClock, TimeBudget
+from collision_monitor.monitor.event_list import EventList, Events, sort_order
+from collision_monitor.monitor.first_impacts import FirstImpacts
+from collision_monitor.monitor.roster import Roster
+from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.step_context import StepContext
+from collision_monitor.prediction.bodies import Bodies
+from collision_monitor.prediction.body_contact import ROUND_OFF, bounded_contact, relative_now, widening
+from collision_monitor.prediction.body_impact import Window
+from collision_monitor.prediction.impact_record import BOUND_ONLY, CLEAR, IMPACT, TREE_BOUND
+from collision_monitor.prediction.pair_impacts import bound_impact, cover_of, is_cheap
+from collision_monitor.prediction.sphere_trees import Tree, Trees, body_tree, joined_trees, tighten
+from collision_monitor.records import joined
+from collision_monitor.settings.profile import NO_BUDGET, NO_LIMIT, Profile
+
+Indices = NDArray[np.intp]
+
+
+class TimeCritical(Stage):
+    """Examines active pairs as long as the budget of a step lasts.
+
+    clock: measures the steps. timed: whether a budget in time counts; else only the number of pairs does.
+    """
+
+    SAVED = ("_deferred",)
+    CACHES = ("clock", "_timed", "_tree_of", "_trees")
+
+    def __init__(self, *, timed: bool) -> None:
+        self.clock = StepClock()
+        self._timed = timed
+        self._deferred = 0  # pairs that the last step left
+        self._tree_of: dict[int, Tree | None] = {}  # by slot: of bodies that a step with a budget has met
+        self._trees: Trees | None = None  # all of them, until one changes
+
+    @staticmethod
+    def has_budget(profile: Profile) -> bool:
+        """Whether a step may have to leave pairs."""
+        return profile.budget_ms < NO_BUDGET or profile.pairs_per_step < NO_LIMIT
+
+    def budget(self, profile: Profile) -> PairBudget | None:
+        """The budget of a step; None: it does everything, and the last step left nothing."""
+        p = profile
+        if p.budget_ms < NO_BUDGET and self._timed:
+            return TimeBudget(self.clock, 1e-3 * p.budget_ms, p.pairs_per_step)
+        return PairBudget(p.pairs_per_step) if self.has_budget(p) or self._deferred else None
+
+    def end_step(self, step: StepContext) -> None:
+        """Remember what the step left."""
+        self._deferred = step.work.deferred
+
+    def prepare(self, step: StepContext, impacts: FirstImpacts) -> None:
+        """Make the trees and load the kernels that only some steps with a budget need: no step has to wait for them."""
+        none = np.empty(0, IMPACT)
+        self._tighten(step, none, impacts)
+        impacts.refine(step, none)
+
+    # ------------------------------------------------------------------ sphere trees
+
+    def describe(self, roster: Roster, i: int, profile: Profile) -> None:
+        """Body i has other shapes: its tree is made now where steps have a budget, so that none has to make it."""
+        self._tree_of.pop(i, None)
+        self._trees = None
+        if self.has_budget(profile):
+            self._plant(roster, i)
+
+    def _plant(self, roster: Roster, i: int) -> None:
+        table, parts, bodies = roster.multibody
+        self._tree_of[i] = body_tree(table, parts.next, int(bodies.first_shape[i]))
+
+    def _all_trees(self, roster: Roster) -> Trees:
+        """The sphere trees of all bodies; they depend on the shapes alone."""
+        if self._trees is None or len(self._trees.root) < roster.capacity:
+            for i in roster.used().tolist():
+                if i not in self._tree_of:
+                    self._plant(roster, i)
+            self._trees = joined_trees([self._tree_of.get(i) for i in range(roster.top)], roster.capacity)
+        return self._trees
+
+    def _can_tighten(self, step: StepContext, events: Events) -> NDArray[np.bool_]:
+        """Mask of the events that rest on bounding spheres alone, where a sphere tree may give a later begin."""
+        trees = self._all_trees(step.roster)
+        if not len(trees.radius):
+            return np.zeros(len(events), np.bool_)
+        has_tree = trees.root >= 0
+        mask: NDArray[np.bool_] = (events["method"] == BOUND_ONLY) & (has_tree[events["i"]] | has_tree[events["j"]])
+        return mask
+
+    def _tighten(self, step: StepContext, events: Events, impacts: FirstImpacts) -> None:
+        margin, rotation = step.profile.contact_margin, impacts.scratch.rotation
+        tighten(step.roster.bodies, self._all_trees(step.roster), events, step.now, margin, rotation)
+
+    def _tightened(
+        self, step: StepContext, events: Events, budget: PairBudget, impacts: FirstImpacts
+    ) -> tuple[Indices, Events]:
+        """Events that rest on bounding spheres alone with the begin by their sphere trees; soonest first, by budget.
+
+        Returns the indices of those that were done, and these events; CLEAR: the trees do not meet.
+        """
+        todo = np.flatnonzero(self._can_tighten(step, events))
+        todo = todo[np.lexsort((events["key"][todo], events["lower"][todo]))]
+        found, at = events.take(todo), 0
+        while at < len(todo) and (count := budget.next(-(-(len(todo) - at) // HANDFUL), TREES)):
+            end = min(at + count * HANDFUL, len(todo))
+            self._tighten(step, found[at:end], impacts)
+            at = end
+        return todo[:at], found[:at]
+
+    # ------------------------------------------------------------------ the step
+
+    def examine(
+        self, step: StepContext, active: ActivePairs, events: EventList, impacts: FirstImpacts, budget: PairBudget
+    ) -> None:
+        """Examine the active pairs, and refine the pending events, both by urgency and as long as the budget lasts."""
+        version = step.roster.bodies.version
+        self._let_pass(step, active, events, impacts, budget)
+        later = self._examine_urgent(step, active, impacts, budget)
+        which, found = self._tightened(step, events.events, budget, impacts)
+        if len(which):
+            events.replace(which, found.compress(found["status"] != CLEAR), version)
+        which, refined = self._refine(step, events.events, impacts, budget)
+        budget.stop()
+        events.replace(which, joined([later, refined]), version)
+
+    def _let_pass(
+        self, step: StepContext, active: ActivePairs, events: EventList, impacts: FirstImpacts, budget: PairBudget
+    ) -> None:
+        """Take out pairs that came due and whose sphere trees do not meet yet; they are events again."""
+        new = np.flatnonzero((active.pairs["touched"] == 0) & self._can_tighten(step, active.events))
+        if not len(new):
+            return
+        which, found = self._tightened(step, active.events.take(new), budget, impacts)
+        which = new[which]
+        active.events[which] = found
+        apart = (found["status"] == CLEAR) | (found["lower"] > step.now)
+        if not apart.any():
+            return
+        events.add(found.compress(apart & (found["status"] != CLEAR)), step.roster.bodies.version)
+        kept = np.ones(len(active.pairs), np.bool_)
+        kept[which[apart]] = False
+        active.keep(kept)
+
+    def _examine_urgent(
+        self, step: StepContext, active: ActivePairs, impacts: FirstImpacts, budget: PairBudget
+    ) -> Events:
+        """Examine pairs, the most urgent first, as long as the budget lasts; the others get what their bounds say.
+
+        Returns the events of pairs that are certified apart for a while.
+        """
+        later = np.empty(len(active.pairs), IMPACT)
+        order, at = urgency(step.roster.bodies, active.pairs, active.events, step.number)
+        n = active.examine(step, order[:at], impacts.scratch, later) if at else 0
+        while at < len(order) and (count := budget.next(len(order) - at, EXAMINE)):
+            n += active.examine(step, order[at : at + count], impacts.scratch, later[n:])
+            at += count
+        done, left = order[:at], order[at:]
+        active.events["lower"][done[active.pairs["touching"][done] == 1]] = step.now  # examined last at this time
+        step.work.deferred += len(left)
+        n += int(leave(step.roster.bodies, active.active, left, step.now, step.contact, later[n:]))
+        return later[:n]
+
+    def _refine(
+        self, step: StepContext, pending: Events, impacts: FirstImpacts, budget: PairBudget
+    ) -> tuple[Indices, Events]:
+        """Seek the first impacts of pending pairs of which only a bound is known, soonest first, by budget.
+
+        Returns the indices of the events that were done, and the events in place of them.
+        """
+        todo = np.flatnonzero((pending["method"] == BOUND_ONLY) | (pending["method"] == TREE_BOUND))
+        found = [np.zeros(0, IMPACT)]
+        at = 0
+        while at < len(todo) and (count := budget.next(len(todo) - at, REFINE)):
+            found.append(impacts.refine(step, pending.take(todo[at : at + count])))
+            at += count
+        step.work.deferred += len(todo) - at
+        return todo[:at], joined(found)
+
+    def save(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        facts["deferred"] = self._deferred
+
+    def restore(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        self._deferred = int(facts["deferred"])
 
 
 @kernel
-def leave(bodies, pairs, events, which, now, margin, stale_acceleration, results, later):
-    """As `active_pairs.examine`, for the pairs `which` (M,) that nobody looks at in this step.
+def leave(bodies, active, which, now, query, later):
+    """As `active_pairs.examine`, for the pairs `which` (M,) that this step does not examine.
 
-    Who touched goes on touching, UNRESOLVED, with the distance of the centres and a bound that holds whatever it is.
-    Who did not is UNRESOLVED from now on. Where the bounding spheres are apart, neither. Returns the number in `later`.
+    A pair that touched goes on touching, UNRESOLVED, with the distance of the centres and a bound that holds whatever
+    it is. A pair that did not is UNRESOLVED from now on. Where the bounding spheres are apart, neither.
+    query: ContactQuery. Returns the number of events in `later`.
     """
+    pairs, events, results = active
     n_later = 0
     for at in range(which.size):
         k = which[at]
         pair, event = pairs[k], events[k]
         i, j = pair.i, pair.j
-        px, py, pz, age_i, age_j = relative_now(bodies, i, j, now)
-        widen = 0.5 * stale_acceleration * (age_i * age_i + age_j * age_j)
-        reach = bodies.motion[i].radius + bodies.motion[j].radius + widen
-        distance = sqrt(px * px + py * py + pz * pz)
-        touching = pair.touched == 1 and distance <= (reach + margin) * (1.0 + 1e-14)
+        there = relative_now(bodies, i, j, now)
+        reach = bodies.motion[i].radius + bodies.motion[j].radius + widening(there, query.stale_acceleration)
+        distance = sqrt(there.p[0] * there.p[0] + there.p[1] * there.p[1] + there.p[2] * there.p[2])
+        touching = pair.touched == 1 and distance <= (reach + query.margin) * ROUND_OFF
         stays = touching
-        predicted = bodies.motion[i].time == now or bodies.motion[j].time == now
-        if not touching and not (predicted and has_changed(bodies, event)):
+        if not touching and not is_predicted_anew(bodies, i, j, now, event):
             since = event.lower
-            end = min(bodies.motion[i].cover, bodies.motion[j].cover)
-            bound_impact(bodies, i, j, now, end, margin, event)
+            bound_impact(bodies, i, j, Window(now, cover_of(bodies, i, j)), query.margin, event)
             if event.status != CLEAR:
                 if event.lower > now:
                     later[n_later] = event
                     n_later += 1
                 else:
-                    event.lower = min(since, now)  # who waits longest is looked at first
+                    event.lower = min(since, now)  # the pair that waits longest is examined first
                     stays = True
         if touching:
-            _write_bound(bodies, i, j, px, py, pz, distance, reach, age_i, age_j, results[k])
+            bounded_contact(bodies, i, j, there, reach, results[k])
         pair.touching = 1 if touching else 0
         pair.leaving = 0 if stays else 1
     return n_later
-
-
-@device
-def _write_bound(bodies, i, j, px, py, pz, distance, reach, age_i, age_j, result):
-    """A contact of which only the bounding spheres are known: the true distance is within reach of the centres'."""
-    result[:] = 0.0
-    result[0] = distance
-    result[1] = 1.0
-    if distance > 0.0:
-        result[1], result[2], result[3] = px / distance, py / distance, pz / distance
-    for c in range(3):
-        result[4 + c] = position_now(bodies, i, age_i, c)
-    result[7], result[8], result[9] = result[4] + px, result[5] + py, result[6] + pz
-    result[BOUND] = reach
-    for c in range(3):
-        result[CLOSING] -= relative_velocity_now(bodies, i, age_i, j, age_j, c) * result[1 + c]
-    result[SHAPE_I], result[SHAPE_J] = bodies.first_shape[i], bodies.first_shape[j]
-    result[STATUS] = UNRESOLVED
 
 
 _WAIT = np.dtype([("lower", np.float64), ("key", np.uint64)])

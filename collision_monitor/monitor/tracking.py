@@ -1,4 +1,4 @@
-"""Following the bodies: taking states in, noticing which left their predicted motion, and starting those anew.
+"""Stage 2, tracking: which bodies left their predicted motion, and the region of interest.
 
 A body that keeps its motion is never started anew: where its predictions end too soon, they are continued.
 """
@@ -6,15 +6,20 @@ A body that keeps its motion is never started anew: where its predictions end to
 from __future__ import annotations
 
 from math import sqrt
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from collision_monitor._jit import device, kernel
-from collision_monitor.broad_phase.hashed_grid import put_box
-from collision_monitor.prediction.motion import position_now, quaternion_to_matrix, swept_box, turn_quaternion
+from collision_monitor.broad_phase.hashed_grid import HashedGrid, put_box, remove_boxes
+from collision_monitor.monitor import filters
+from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.step_context import StepContext
+from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
+from collision_monitor.prediction.motion import age_of, position_now, quaternion_to_matrix, swept_box, turn_quaternion
 from collision_monitor.prediction.spread import surface_spread
-from collision_monitor.prediction.turning import BLOCK, COLUMNS, turned_away
+from collision_monitor.prediction.turning import BLOCK, COLUMNS, make_columns, turned_away
 
 FIRST_SLACK: Final = 0.5
 SHORTEST_SLACK: Final = 0.0625
@@ -28,6 +33,95 @@ GOLDEN_RATIO: Final = 0.6180339887498949
 PLASTIC_RATIO: Final = 0.7548776662466927
 """Multiples of these, modulo 1, fill the unit interval evenly."""
 
+Slots = NDArray[np.int32]
+
+
+class Uncertainty(NamedTuple):
+    """What declared uncertainty adds to the boxes of bodies."""
+
+    spread: Any  # prediction.spread.Spread
+    sigmas: float  # standard deviations by which boxes are widened; 0: nothing is uncertain
+
+
+class Tracking(Stage):
+    """Compares the bodies' states with their predicted motions, and starts those anew that left them."""
+
+    SAVED = ("_outside",)
+    CACHES = ("_columns",)
+
+    def __init__(self) -> None:
+        self._outside: NDArray[np.bool_] = np.zeros(0, np.bool_)  # bodies outside of the region, which rest
+        self._columns = make_columns()
+
+    @property
+    def outside(self) -> int:
+        """How many bodies are outside of the region of interest."""
+        return int(np.count_nonzero(self._outside))
+
+    def apply_region(self, step: StepContext, grid: HashedGrid) -> NDArray[np.bool_] | None:
+        """Let bodies rest that are outside of the region, in no grid and no event; start those anew that came in.
+
+        Returns which bodies (top,) are outside; None: no region leaves anything out.
+        """
+        p, roster = step.profile, step.roster
+        top, bodies = roster.top, roster.bodies
+        bounded = filters.is_bounded(p.region_min, p.region_max)
+        if not bounded and not len(self._outside):
+            return None
+        was = np.zeros(top, np.bool_)
+        was[: len(self._outside)] = self._outside
+        outside = np.zeros(top, np.bool_)
+        if bounded:
+            inside = filters.bodies_in(bodies, top, step.now, p.region_min, p.region_max, p.stale_acceleration)
+            outside = bodies.used[:top] & ~inside
+        roster.renewed.update(np.flatnonzero(was & ~outside & bodies.used[:top]).tolist())
+        remove_boxes(grid, np.flatnonzero(outside).astype(np.int32))
+        bodies.version[:top][outside & ~was] += 1
+        self._outside = outside if bounded else outside[:0]
+        return outside
+
+    def find(self, step: StepContext, uncertain: UncertainPredictions) -> tuple[Slots, Slots]:
+        """Slots of the bodies to predict anew, and of others that are not predicted far enough."""
+        roster = step.roster
+        moved, ending = self._moved(step, uncertain)
+        if roster.renewed:
+            renewed = np.array([i for i in roster.renewed if roster.bodies.seen[i]], np.int32)
+            moved, ending = np.union1d(moved, renewed).astype(np.int32), np.setdiff1d(ending, renewed)
+            roster.renewed.difference_update(renewed.tolist())
+        if len(self._outside):
+            moved, ending = moved[~self._outside[moved]], ending[~self._outside[ending]]
+        step.work.objects_moved = len(moved)
+        return moved, ending
+
+    def _moved(self, step: StepContext, uncertain: UncertainPredictions) -> tuple[Slots, Slots]:
+        """Slots of the bodies that left their predicted motion, and of others that are not predicted far enough."""
+        roster = step.roster
+        found = np.empty((2, roster.top), np.int32)
+        uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
+        n, m = find_moved(roster.bodies, uncertainty, roster.top, step.now, step.motion, self._columns, found)
+        return found[0, :n], found[1, :m]
+
+    def restart(
+        self, step: StepContext, moved: Slots, ending: Slots, uncertain: UncertainPredictions, grid: HashedGrid
+    ) -> None:
+        """Start `moved` anew from their last states, and predict `ending` further; their boxes go into the grid."""
+        bodies = step.roster.bodies
+        uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
+        restart_motion(bodies, uncertainty, grid, moved, step.now, step.motion)
+        continue_motion(bodies, uncertainty, grid, ending, step.now, step.motion)
+
+    def remember_cover(self, step: StepContext, which: Slots) -> None:
+        """The bodies `which` have been predicted until their cover times."""
+        remember_cover(step.roster.bodies, which)
+
+    def save(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        snapshot.arrays["outside"] = self._outside.copy()
+
+    def restore(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        self._outside = snapshot.array("outside", np.zeros(0, np.bool_))[: len(snapshot.arrays["bodies.used"])]
+
 
 @device
 def _turned_away(bodies, start, count, columns, angles):
@@ -40,15 +134,18 @@ def _turned_away(bodies, start, count, columns, angles):
 
 
 @kernel
-def find_moved(bodies, spread, sigmas, count, now, horizon, stale_acceleration, columns, moved, ending):
-    """Slots among the first `count` whose predictions no longer hold at `now`, into moved; returns how many.
+def find_moved(bodies, uncertainty, count, now, settings, columns, found):
+    """Slots among the first `count` whose predictions no longer hold at `now`, into found[0]; returns how many.
 
-    Those that hold but end within the horizon go into `ending`, their number is returned second.
+    Those that hold but end within the horizon go into found[1], their number is returned second.
     A body's surface may be off its reference by tube_0 now and drift by tube_1 a second; both are checked, with the
-    drift that an unheard-of body may have made; and so is whether it may be further off, by `sigmas` standard
-    deviations, than its box allows for. Its slack is halved where it left its motion and doubled where that held until
-    it was predicted no further: who turns often is not predicted far. columns: scratch, of `make_columns`.
+    drift that a body without a new state may have made; and so is whether it may be further off, by the uncertainty,
+    than its box allows for. Its slack is halved where it left its motion and doubled where that held until
+    it was predicted no further: a body that turns often is not predicted far. columns: scratch, of `make_columns`.
     """
+    sigmas = uncertainty.sigmas
+    horizon, stale_acceleration = settings.horizon, settings.stale_acceleration
+    moved, ending = found[0], found[1]
     n = n_ending = 0
     angles = columns[COLUMNS]
     for i in range(count):
@@ -89,7 +186,7 @@ def find_moved(bodies, spread, sigmas, count, now, horizon, stale_acceleration, 
                 bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
             moved[n] = i
             n += 1
-        elif sigmas > 0.0 and not _is_covered(bodies, spread, sigmas, i, now, horizon, stale_acceleration):
+        elif sigmas > 0.0 and not _is_covered(bodies, uncertainty, i, now, settings):
             moved[n] = i
             n += 1
         elif m.cover < now + horizon:
@@ -107,26 +204,29 @@ def remember_cover(bodies, which):
 
 
 @device
-def _is_covered(bodies, spread, sigmas, i, now, horizon, stale_acceleration):
+def _is_covered(bodies, uncertainty, i, now, settings):
     """Is body i as certain as its box allows for?"""
+    spread, sigmas = uncertainty
     m = bodies.motion[i]
     age = now - bodies.time[i]
-    off, growth = surface_spread(spread, i, bodies.spin_radius[i], age, horizon, stale_acceleration)
+    radius = bodies.spin_radius[i]
+    off, growth = surface_spread(spread, i, radius, age, settings.horizon, settings.stale_acceleration)
     return sigmas * off <= m.spread_0 + m.spread_1 * (now - m.tube_time) and sigmas * growth <= m.spread_1
 
 
 @device
-def _cover_spread(bodies, spread, sigmas, i, now, most_0, most_1, stale_acceleration):
-    """Let the box of body i allow for its uncertainty from now until its cover time: most_0 + most_1 t at most (m).
+def _cover_spread(bodies, uncertainty, i, now, most, stale_acceleration):
+    """Let the box of body i allow for its uncertainty from now until its cover time: most[0] + most[1] t at most (m).
 
     That holds until it has been silent for twice as long, and for states that are a little less certain.
     """
+    spread, sigmas = uncertainty
     m = bodies.motion[i]
     m.spread_0 = m.spread_1 = 0.0
     if sigmas > 0.0 and not bodies.static[i]:
         age = 2.0 * (now - bodies.time[i])
         off, growth = surface_spread(spread, i, bodies.spin_radius[i], age, m.cover - now, stale_acceleration)
-        m.spread_0, m.spread_1 = min(WIDER * sigmas * off, most_0), min(WIDER * sigmas * growth, most_1)
+        m.spread_0, m.spread_1 = min(WIDER * sigmas * off, most[0]), min(WIDER * sigmas * growth, most[1])
 
 
 @device
@@ -150,19 +250,17 @@ def _cover(bodies, i, now, horizon):
 
 
 @kernel
-def restart_motion(
-    bodies, spread, sigmas, grid, which, now, horizon, margin, stale_acceleration,
-    position_tolerance, velocity_tolerance, orientation_tolerance, angular_velocity_tolerance,
-):  # fmt: skip
+def restart_motion(bodies, uncertainty, grid, which, now, settings):
     """Make the last state of each body in `which` (M,) its reference; the grid gets what it sweeps from `now` on.
 
-    sigmas: by how many standard deviations that is widened; 0: nothing is uncertain.
+    A stale body's tube is widened here by what it may have accelerated since its last state.
     """
+    stale_acceleration = settings.stale_acceleration
     for k in range(which.size):
         i = which[k]
         m = bodies.motion[i]
         bodies.version[i] += np.uint32(1)
-        age = 0.0 if bodies.static[i] else now - bodies.time[i]
+        age = age_of(bodies, i, now)
         m.vx, m.vy, m.vz = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
         m.wx, m.wy, m.wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
         m.ax, m.ay, m.az = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
@@ -175,20 +273,20 @@ def restart_motion(
         m.time = m.tube_time = now
         m.covered = -np.inf
         m.tube_0 = m.tube_1 = 0.0
-        _cover(bodies, i, now, horizon)
+        _cover(bodies, i, now, settings.horizon)
         if not bodies.static[i]:
             r = bodies.spin_radius[i]
-            m.tube_0 = position_tolerance + r * orientation_tolerance
-            m.tube_1 = velocity_tolerance + r * angular_velocity_tolerance
+            m.tube_0 = settings.position_tolerance + r * settings.orientation_tolerance
+            m.tube_1 = settings.velocity_tolerance + r * settings.angular_velocity_tolerance
             if age > 0.0:
                 m.tube_0 += 2.0 * stale_acceleration * age * age
                 m.tube_1 += 2.0 * stale_acceleration * age
-        _cover_spread(bodies, spread, sigmas, i, now, np.inf, np.inf, stale_acceleration)
-        put_box(grid, i, *swept_box(bodies, i, now, margin))
+        _cover_spread(bodies, uncertainty, i, now, (np.inf, np.inf), stale_acceleration)
+        put_box(grid, i, *swept_box(bodies, i, now, settings.margin))
 
 
 @kernel
-def continue_motion(bodies, spread, sigmas, grid, which, now, horizon, margin, stale_acceleration):
+def continue_motion(bodies, uncertainty, grid, which, now, settings):
     """Predict each body in `which` (M,), which is on its reference, further; what it sweeps from `now` on in the grid.
 
     That it is within its tube at `now` is known again, so the tube starts to widen from here.
@@ -196,10 +294,10 @@ def continue_motion(bodies, spread, sigmas, grid, which, now, horizon, margin, s
     for k in range(which.size):
         i = which[k]
         m = bodies.motion[i]
-        allowed_0, allowed_1 = m.spread_0 + m.spread_1 * (now - m.tube_time), m.spread_1
+        allowed = (m.spread_0 + m.spread_1 * (now - m.tube_time), m.spread_1)
         m.tube_time = now
         m.covered = m.cover
-        _cover(bodies, i, now, horizon)
+        _cover(bodies, i, now, settings.horizon)
         # no more than it did: what it could meet until `covered` is known already
-        _cover_spread(bodies, spread, sigmas, i, now, allowed_0, allowed_1, stale_acceleration)
-        put_box(grid, i, *swept_box(bodies, i, now, margin))
+        _cover_spread(bodies, uncertainty, i, now, allowed, settings.stale_acceleration)
+        put_box(grid, i, *swept_box(bodies, i, now, settings.margin))

@@ -1,4 +1,4 @@
-"""What declared uncertainty adds to the predictions of a step: when and how likely, and pairs that may meet after all.
+"""Uncertain predictions: times and probabilities where states declare uncertainty, and pairs that may meet by it.
 
 Pairs whose stated motions pass each other are kept in a list like the event list: an entry holds as long as the
 motions of both bodies do. Nothing here runs before a state declares an uncertainty.
@@ -10,19 +10,27 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from math import inf, nan
 from statistics import NormalDist
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
+from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.prediction.acceleration_bounds import widen_intervals
-from collision_monitor.prediction.motion import Bodies, enlarge
+from collision_monitor.prediction.acceleration_bounds import Intervals, widen_intervals
+from collision_monitor.prediction.bodies import enlarge
+from collision_monitor.prediction.impact_record import holds, ids_of_keys, pair_keys, write_pair
 from collision_monitor.prediction.normal_samples import normal_samples
-from collision_monitor.prediction.spread import is_uncertain, make_spread, take_spread
-from collision_monitor.prediction.uncertainty import PROBABILITY, Room, impact_probabilities, make_room
+from collision_monitor.prediction.pair_impacts import cover_of
+from collision_monitor.prediction.spread import Spread, is_uncertain, make_spread, take_spread
+from collision_monitor.prediction.uncertainty import PROBABILITY, Room, Sampling, impact_probabilities, make_room
 from collision_monitor.records import PREDICTION, Method, PredictionStatus
+from collision_monitor.settings.profile import Profile
+
+Pool = ThreadPoolExecutor | None
+"""Threads to share work among; None: there is one."""
 
 ANSWERS: Final = ("earliest", "most_likely", "latest", "probability")
 FEWEST_PAIRS_FOR_THREADS: Final = 8
@@ -32,7 +40,7 @@ INTERVAL: Final = ("lower", "upper", "status")
 
 ENTRY = np.dtype(
     [
-        ("key", np.uint64),  # (smaller id << 32) | larger id
+        ("key", np.uint64),  # pair_key of the ids
         ("until", np.float64),  # s: looked for until then; what comes near each other later is found again
         ("i", np.int32),  # body slots; body i has the smaller id
         ("j", np.int32),
@@ -55,8 +63,7 @@ def renew(entries, pairs, bodies, spread, now, renewed):
     motion = bodies.motion
     for k in range(entries.size):
         entry = entries[k]
-        holds = bodies.version[entry.i] == entry.version_i and bodies.version[entry.j] == entry.version_j
-        if holds and entry.until >= now:
+        if holds(bodies.version, entry) and entry.until >= now:
             renewed[n] = entry
             n += 1
     for k in range(pairs.shape[0]):
@@ -66,11 +73,8 @@ def renew(entries, pairs, bodies, spread, now, renewed):
             continue
         if bodies.id[i] > bodies.id[j]:
             i, j = j, i
-        entry = renewed[n]
-        entry.key = (np.uint64(bodies.id[i]) << np.uint64(32)) | np.uint64(bodies.id[j])
-        entry.until = min(motion[i].cover, motion[j].cover)
-        entry.i, entry.j = i, j
-        entry.version_i, entry.version_j = bodies.version[i], bodies.version[j]
+        write_pair(bodies, i, j, renewed[n])
+        renewed[n].until = cover_of(bodies, i, j)
         n += 1
     return n
 
@@ -85,20 +89,11 @@ def sigmas_for(probability: float) -> float:
     return NormalDist().inv_cdf(1.0 - 0.25 * min(probability, 0.9))
 
 
-class Scene(NamedTuple):
-    """What is asked about: the shapes and bodies as the kernels read them, the time (s), the settings."""
-
-    table: Any
-    parts: Any
-    bodies: Bodies
-    now: float
-    profile: Any  # profiles.Profile
-    planar: bool
-    pool: ThreadPoolExecutor | None
-
-
-class UncertainPredictions:
+class UncertainPredictions(Stage):
     """The uncertainties of all bodies, and the pairs that only they could bring together."""
+
+    SAVED = ("active", "spread", "entries")
+    CACHES = ("_rooms",)
 
     def __init__(self, capacity: int) -> None:
         self.active = False
@@ -108,11 +103,14 @@ class UncertainPredictions:
         """The pairs, by key."""
         self._rooms = [make_room()]  # one for each thread
 
+    # ------------------------------------------------------------------ the bodies
+
     def enlarge(self, capacity: int) -> None:
-        """Room for more bodies; the slots stay."""
-        spread = make_spread(capacity)
-        enlarge(self.spread, spread)
-        self.spread = spread
+        """Make room for so many bodies; the slots stay."""
+        if len(self.spread.stddev) < capacity:
+            spread = make_spread(capacity)
+            enlarge(self.spread, spread)
+            self.spread = spread
 
     def describe(self, i: int, d: ObjectDescription) -> None:
         """Take in what the object in slot i has declared of its accelerations."""
@@ -131,97 +129,131 @@ class UncertainPredictions:
         take_spread(self.spread, slots, numbers, covariance, planar)
         self.active = True
 
-    def sigmas(self, profile: Any) -> float:
-        """By how many standard deviations swept boxes are widened; 0 while nobody is uncertain."""
+    def sigmas(self, profile: Profile) -> float:
+        """By how many standard deviations swept boxes are widened; 0 while nothing is uncertain."""
         return sigmas_for(profile.min_probability) if self.counts(profile) else 0.0
 
-    def counts(self, profile: Any) -> bool:
-        """Whether anything is uncertain, and the profile wants to know."""
-        return self.active and bool(profile.uncertainty)
+    def counts(self, profile: Profile) -> bool:
+        """Whether anything is uncertain, and the profile includes it."""
+        return self.active and profile.uncertainty
 
-    def add_pairs(self, pairs: Pairs, bodies: Bodies, now: float) -> None:
-        """Pairs (P, 2) whose swept boxes meet, found in this step; what no longer holds is dropped."""
+    # ------------------------------------------------------------------ the step
+
+    def add_pairs(self, step: StepContext, pairs: Pairs) -> None:
+        """Take in pairs (P, 2) whose swept boxes meet, found in this step; what no longer holds is dropped."""
+        if not self.counts(step.profile):
+            return
         renewed = np.empty(len(self.entries) + len(pairs), ENTRY)
-        entries = renewed[: renew(self.entries, pairs, bodies, self.spread, now, renewed)]
+        entries = renewed[: renew(self.entries, pairs, step.roster.bodies, self.spread, step.now, renewed)]
         if len(pairs):
             entries = entries[np.lexsort((entries["until"], entries["key"]))]
             entries = entries[np.append(entries["key"][1:] != entries["key"][:-1], True)[: len(entries)]]
         self.entries = entries
 
-    def complete(self, predictions: Records, slots: Pairs, touching: NDArray[np.uint64], scene: Scene) -> Records:
+    def complete(
+        self, step: StepContext, predictions: Records, slots: Pairs, touching: NDArray[np.uint64], pool: Pool
+    ) -> Records:
         """Fill in times and probabilities, and add the pairs that may meet though they are stated to pass.
 
         predictions (n,): of stated motions, with the body slots (n, 2); touching: keys of the pairs that touch now.
         Returns them soonest first.
         """
-        self._widen(predictions, slots, scene)
-        if not self.counts(scene.profile):
+        if not self.active or not step.profile.horizon > 0.0:
+            return predictions
+        self._widen(step, predictions, slots)
+        if not self.counts(step.profile):
             return _sorted(predictions)
-        for name, column in zip(ANSWERS, self._judge(slots, True, scene).T, strict=True):
+        for name, column in zip(ANSWERS, self._judge(step, slots, True, pool).T, strict=True):
             predictions[name] = column
-        self.add_pairs(np.empty((0, 2), np.int32), scene.bodies, scene.now)
-        known = (predictions["id_a"].astype(np.uint64) << np.uint64(32)) | predictions["id_b"]
+        self.add_pairs(step, np.empty((0, 2), np.int32))
+        known = pair_keys(predictions["id_a"], predictions["id_b"])
         entries = self.entries[~np.isin(self.entries["key"], np.concatenate([known, touching]))]
         if len(entries) == 0:
             return _sorted(predictions)
         slots = np.stack([entries["i"], entries["j"]], axis=1)
-        answers = self._judge(slots, False, scene)
-        kept = answers[:, PROBABILITY] >= scene.profile.min_probability
-        both = np.concatenate([predictions, _possible(entries["key"][kept], slots[kept], answers[kept], scene)])
+        answers = self._judge(step, slots, False, pool)
+        kept = answers[:, PROBABILITY] >= step.profile.min_probability
+        both = np.concatenate([predictions, _possible(step, entries["key"][kept], slots[kept], answers[kept])])
         return _sorted(both)
 
-    def _widen(self, predictions: Records, slots: Pairs, scene: Scene) -> None:
+    def _widen(self, step: StepContext, predictions: Records, slots: Pairs) -> None:
         """Widen the intervals of bodies that have declared how hard they may accelerate."""
         if not self.spread.acceleration.any():
             return
-        p = scene.profile
         ends = [np.ascontiguousarray(predictions[name]) for name in INTERVAL]
         widen_intervals(
-            scene.table, scene.parts, scene.bodies, self.spread, slots, scene.now, p.horizon, p.contact_margin,
-            p.impact_tolerance, p.impact_iterations, self._rooms[0], *ends,
+            step.roster.multibody, self.spread, Intervals(slots, *ends), step.now, step.profile.horizon, step.impact,
+            self._rooms[0],
         )  # fmt: skip
         for name, column in zip(INTERVAL, ends, strict=True):
             predictions[name] = column
 
-    def _judge(self, slots: Pairs, stated: bool, scene: Scene) -> NDArray[np.float64]:
+    def _judge(self, step: StepContext, slots: Pairs, stated: bool, pool: Pool) -> NDArray[np.float64]:
         """Answers (n, 4) for pairs of body slots (n, 2), on all threads; the same for any number of them."""
-        p = scene.profile
-        samples = normal_samples(p.uncertainty_samples)
-        sigmas, safe_sigmas = sigmas_for(p.min_probability), sigmas_for(p.min_probability * (1.0 - p.confidence))
+        p = step.profile
+        sampling = Sampling(
+            step.impact,
+            p.horizon,
+            p.stale_acceleration,
+            stated,
+            sigmas_for(p.min_probability),
+            sigmas_for(p.min_probability * (1.0 - p.confidence)),
+            p.min_probability,
+            p.confidence,
+            step.roster.planar,
+            *normal_samples(p.uncertainty_samples),
+        )
 
         def part(slots: Pairs, room: Room) -> NDArray[np.float64]:
             answers = np.empty((len(slots), len(ANSWERS)))
-            impact_probabilities(
-                scene.table, scene.parts, scene.bodies, self.spread, slots, stated, scene.now, p.horizon,
-                p.contact_margin, p.stale_acceleration, p.impact_tolerance, p.impact_iterations, p.confidence, sigmas,
-                safe_sigmas, p.min_probability, scene.planar, *samples, room, answers,
-            )  # fmt: skip
+            impact_probabilities(step.roster.multibody, self.spread, slots, step.now, sampling, room, answers)
             return answers
 
-        if scene.pool is None or len(slots) < FEWEST_PAIRS_FOR_THREADS:
+        if pool is None or len(slots) < FEWEST_PAIRS_FOR_THREADS:
             return part(slots, self._rooms[0])
         while len(self._rooms) < p.threads:
             self._rooms.append(make_room())
         rooms = self._rooms[: p.threads]
-        return np.concatenate(list(scene.pool.map(part, np.array_split(slots, len(rooms)), rooms)))
+        return np.concatenate(list(pool.map(part, np.array_split(slots, len(rooms)), rooms)))
+
+    # ------------------------------------------------------------------ snapshots
+
+    def save(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        top = len(snapshot.arrays["bodies.used"])
+        spread = {f"spread.{name}": column[:top].copy() for name, column in self.spread._asdict().items()}
+        snapshot.arrays.update(spread, possible=self.entries.copy())
+        facts["uncertain"] = self.active
+
+    def restore(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage."""
+        top = len(snapshot.arrays["bodies.used"])
+        saved = Spread(**snapshot.columns("spread", self.spread, top))
+        self.enlarge(top)
+        enlarge(saved, self.spread)
+        self.entries = snapshot.array("possible", np.empty(0, ENTRY))
+        snapshot.check_slots("possible", self.entries)
+        self.active = facts["uncertain"]
 
 
 def _sorted(predictions: Records) -> Records:
     return predictions[np.lexsort((predictions["id_b"], predictions["id_a"], predictions["lower"]))]
 
 
-def _possible(keys: NDArray[np.uint64], slots: Pairs, answers: NDArray[np.float64], scene: Scene) -> Records:
+def _possible(
+    step: StepContext, keys: NDArray[np.uint64], slots: Pairs, answers: NDArray[np.float64]
+) -> Records:
     """Predictions (records.PREDICTION) of pairs that may meet though they are stated to pass."""
-    p, bodies = scene.profile, scene.bodies
+    bodies = step.roster.bodies
     rows = np.zeros(len(keys), PREDICTION)
     for name, column in zip(ANSWERS, answers.T, strict=True):
         rows[name] = column
     rows["lower"], rows["upper"] = rows["earliest"], inf
     for name in ("point", "normal", "closing_speed"):
         rows[name] = nan
-    rows["id_a"], rows["id_b"] = keys >> np.uint64(32), keys & np.uint64(0xFFFFFFFF)
+    rows["id_a"], rows["id_b"] = ids_of_keys(keys)
     rows["status"], rows["method"] = PredictionStatus.POSSIBLE, Method.SAMPLING
     rows["model_a"], rows["model_b"] = bodies.model[slots].T
-    old = ~bodies.static[slots] & (scene.now - bodies.time[slots] > p.stale_after)
+    old = ~bodies.static[slots] & (step.now - bodies.time[slots] > step.profile.stale_after)
     rows["stale"] = old.any(axis=1)
     return rows

@@ -9,10 +9,11 @@ by more than that, there is.
 from __future__ import annotations
 
 from math import inf
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, kernel
-from collision_monitor.prediction.body_impact import contact_at, shape_impact
+from collision_monitor.prediction.bodies import next_pair
+from collision_monitor.prediction.body_impact import ShapePair, Tube, Window, contact_at, shape_impact
 from collision_monitor.prediction.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.prediction.uncertainty import carry_on
 
@@ -23,48 +24,53 @@ NODES: Final = 16
 """Times after the stated impact at which it is asked whether contact is certain."""
 
 
+class Intervals(NamedTuple):
+    """The predictions of pairs of bodies: ends of their intervals and statuses, to be widened in place."""
+
+    pairs: Any  # (P, 2) int32: body slots
+    lower: Any  # (P,) s
+    upper: Any  # (P,) s
+    status: Any  # (P,) PredictionStatus
+
+
 @device
-def _first_possible(table, parts, bodies, i, j, until, margin, off, tolerance, budget, room):
+def _first_possible(multibody, i, j, until, off, query, room):
     """A time in [0, until] before which the bodies cannot touch; off: coefficients of their deviation in t (m)."""
+    parts, bodies = multibody.parts, multibody.bodies
     A, B = room.motion[0], room.motion[1]
     first = until
     for segment in range(SEGMENTS):
         begin, end = until * segment / SEGMENTS, until * (segment + 1) / SEGMENTS
-        wide = off[0] + begin * (off[1] + begin * off[2])
-        growth = off[1] + (begin + end) * off[2]
-        a = bodies.first_shape[i]
+        tube = Tube(off[0] + begin * (off[1] + begin * off[2]), off[1] + (begin + end) * off[2])
+        a, first_b = bodies.first_shape[i], bodies.first_shape[j]
+        b = first_b
         while a >= 0:
-            b = bodies.first_shape[j]
-            while b >= 0:
-                status, t, _, _ = shape_impact(
-                    table, parts, A, B, a, b, begin, min(end, first), margin, wide, growth, tolerance, budget,
-                    room.scratch,
-                )  # fmt: skip
-                if status != CLEAR:
-                    first = min(first, t)
-                b = parts.next[b]
-            a = parts.next[a]
+            window = Window(begin, min(end, first))
+            status, t, _, _ = shape_impact(multibody, ShapePair(A, B, a, b), window, tube, query, room.scratch)
+            if status != CLEAR:
+                first = min(first, t)
+            a, b = next_pair(parts, first_b, a, b)
         if first < end:
             break
     return first
 
 
 @device
-def _first_certain(table, parts, bodies, i, j, begin, end, margin, off, room):
-    """A time in [begin, end] at which the bodies touch whatever they do; infinite: none is known."""
+def _first_certain(multibody, i, j, window, off, margin, room):
+    """A time in the window at which the bodies touch whatever they do; infinite: none is known."""
+    parts, bodies = multibody.parts, multibody.bodies
     A, B = room.motion[0], room.motion[1]
+    begin, end = window
     for node in range(NODES + 1):
         t = begin + (end - begin) * node / NODES
         wide = off[0] + t * (off[1] + t * off[2])
-        a = bodies.first_shape[i]
+        a, first_b = bodies.first_shape[i], bodies.first_shape[j]
+        b = first_b
         while a >= 0:
-            b = bodies.first_shape[j]
-            while b >= 0:
-                distance = contact_at(table, parts, A, B, a, b, t, room.scratch)
-                if distance + room.scratch.out[10] - margin + wide <= 0.0:
-                    return t
-                b = parts.next[b]
-            a = parts.next[a]
+            distance = contact_at(multibody, ShapePair(A, B, a, b), t, room.scratch)
+            if distance + room.scratch.out[10] - margin + wide <= 0.0:
+                return t
+            a, b = next_pair(parts, first_b, a, b)
     return inf
 
 
@@ -76,13 +82,13 @@ def _bound(bodies, spread, i):
 
 
 @kernel
-def widen_intervals(
-    table, parts, bodies, spread, pairs, now, horizon, margin, tolerance, budget, room, lower, upper, status
-):  # fmt: skip
-    """Widen [lower, upper] (P,) of the predictions of pairs (P, 2) of body slots by what they declared they may do.
+def widen_intervals(multibody, spread, intervals, now, horizon, query, room):
+    """Widen intervals (Intervals) by the accelerations that the bodies have declared. horizon: s after `now`.
 
-    Where that may avoid contact, the upper end becomes infinite and the status UNRESOLVED.
+    Where a body may avoid contact, the upper end becomes infinite and the status UNRESOLVED.
     """
+    bodies = multibody.bodies
+    pairs, lower, upper, status = intervals
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
         a_i, a_j = _bound(bodies, spread, i), _bound(bodies, spread, j)
@@ -95,9 +101,9 @@ def widen_intervals(
             a_i * age_i + a_j * age_j,
             0.5 * (a_i + a_j),
         )
-        lower[k] = _first_possible(table, parts, bodies, i, j, lower[k], margin, off, tolerance, budget, room)
+        lower[k] = _first_possible(multibody, i, j, lower[k], off, query, room)
         if upper[k] < inf:
             end = max(horizon, upper[k])
-            upper[k] = _first_certain(table, parts, bodies, i, j, upper[k], end, margin, off, room)
+            upper[k] = _first_certain(multibody, i, j, Window(upper[k], end), off, query.margin, room)
         if not upper[k] < inf:
             status[k] = UNRESOLVED

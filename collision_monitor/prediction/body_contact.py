@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from math import inf
-from typing import Final
+from math import inf, sqrt
+from typing import Any, Final, NamedTuple
 
-from collision_monitor._jit import device
+from collision_monitor._jit import device, inlined
+from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE
 from collision_monitor.narrow_phase.dispatch import contact_within
-from collision_monitor.prediction.body_impact import closing_speed
+from collision_monitor.prediction.bodies import next_pair, place_shape
+from collision_monitor.prediction.body_impact import CLOSING, closing_speed
 from collision_monitor.prediction.motion import (
-    place_shape,
+    age_of,
     position_now,
     relative_position_now,
     relative_velocity_now,
@@ -17,91 +19,141 @@ from collision_monitor.prediction.motion import (
 )
 from collision_monitor.records import ContactStatus
 
-RESULT: Final = 20
-"""Numbers for each pair: what narrow_phase.dispatch.contact gives relative to body i, then by name below."""
-
-
-CLOSING: Final = 15
-
-
-BOUND: Final = 10
-
-
-SHAPE_I: Final = 16
-
-
-SHAPE_J: Final = 17
-
-
-STATUS: Final = 18
-
+SHAPE_I: Final = CLOSING + 1
+SHAPE_J: Final = CLOSING + 2
+STATUS: Final = CLOSING + 3
+RESULT: Final = CLOSING + 4
+"""Numbers of a result row: a contact row about body i, the closing speed, the slots of the shapes, a ContactStatus."""
 
 TOUCHING: Final = int(ContactStatus.TOUCHING)
+UNSETTLED: Final = int(ContactStatus.UNRESOLVED)
+
+ROUND_OFF: Final = 1.0 + 1e-14
+"""Factor on the reach of two bounding spheres, so that no contact is lost to the rounding of their distance."""
 
 
-UNRESOLVED: Final = int(ContactStatus.UNRESOLVED)
+class ContactQuery(NamedTuple):
+    """What counts as a contact."""
+
+    margin: float  # m: pairs up to this far apart touch
+    stale_acceleration: float  # m/s^2: how hard a body may accelerate after its last state
 
 
-@device
-def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, scratch, result):
-    """Do bodies i and j touch at `now`, from their last states? The deepest contact of their shapes into result.
+class Now(NamedTuple):
+    """Body j relative to body i by their last states, carried on to one time."""
 
-    Not heard of for a time, a body may be off by what it could have accelerated, and a coarse model by its excess: the
-    bound says so, and a pair that may touch within it counts as touching, UNRESOLVED.
-    Returns (touching, narrow-phase tests made).
-    """
-    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
-    out = scratch.out
-    age_i = rotation_now(bodies, i, now, scratch.quaternion, R_i)
-    age_j = rotation_now(bodies, j, now, scratch.quaternion, R_j)
-    px = relative_position_now(bodies, i, age_i, j, age_j, 0)
-    py = relative_position_now(bodies, i, age_i, j, age_j, 1)
-    pz = relative_position_now(bodies, i, age_i, j, age_j, 2)
-    widen = 0.5 * stale_acceleration * (age_i * age_i + age_j * age_j)
-    wanted = margin + widen
-    best = inf
-    tests = 0
-    reach = bodies.motion[i].radius + bodies.motion[j].radius + wanted
-    if px * px + py * py + pz * pz > reach * reach * (1.0 + 1e-14):
-        return False, 0
-    a = bodies.first_shape[i]
-    while a >= 0:
-        oa = place_shape(table, parts, a, R_i, R_a)
-        b = bodies.first_shape[j]
-        while b >= 0:
-            ob = place_shape(table, parts, b, R_j, R_b)
-            x, y, z = px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]
-            tests += 1
-            limit = min(wanted, best)
-            if contact_within(table, a, b, R_a, R_b, x, y, z, limit, out, scratch.work) and out[0] < best:
-                best = out[0]
-                for c in range(3):
-                    out[4 + c] += oa[c]
-                    out[7 + c] += oa[c]
-                for c in range(15):
-                    result[c] = out[c]
-                result[SHAPE_I], result[SHAPE_J] = a, b
-            b = parts.next[b]
-        a = parts.next[a]
-    if best == inf:
-        return False, tests
+    p: Any  # (3,): position of j's origin from i's (m)
+    v: Any  # (3,): its velocity (m/s)
+    age_i: Any  # s since the last state; 0 for static bodies
+    age_j: Any
+
+
+@inlined
+def relative_now(bodies, i, j, time):
+    """Body j relative to body i at `time` (s), as Now."""
+    age_i, age_j = age_of(bodies, i, time), age_of(bodies, j, time)
+    p = (
+        relative_position_now(bodies, i, age_i, j, age_j, 0),
+        relative_position_now(bodies, i, age_i, j, age_j, 1),
+        relative_position_now(bodies, i, age_i, j, age_j, 2),
+    )
     v = (
         relative_velocity_now(bodies, i, age_i, j, age_j, 0),
         relative_velocity_now(bodies, i, age_i, j, age_j, 1),
         relative_velocity_now(bodies, i, age_i, j, age_j, 2),
     )
+    return Now(p, v, age_i, age_j)
+
+
+@inlined
+def widening(now, stale_acceleration):
+    """How far the bodies may be off by accelerations since their last states (m): here stale objects widen bounds."""
+    return 0.5 * stale_acceleration * (now.age_i * now.age_i + now.age_j * now.age_j)
+
+
+@inlined
+def closing_now(bodies, i, j, now, row):
+    """Speed (m/s) at which the witness points of a contact row about body i approach."""
     wa = (bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2])
     wb = (bodies.angular[j, 0], bodies.angular[j, 1], bodies.angular[j, 2])
-    result[CLOSING] = closing_speed(v, wa, wb, px, py, pz, result)
+    return closing_speed(now.v, wa, wb, now.p, row)
+
+
+@device
+def body_contact(multibody, i, j, time, query, scratch, result):
+    """The deepest contact of the shapes of bodies i and j at `time` (s), from their last states, into a result row.
+
+    The error bound holds what the bodies may have accelerated since then, and the excess of their models. A pair that
+    may touch within its bound counts as touching, with the status UNRESOLVED.
+    Returns (touching, narrow-phase tests made).
+    """
+    table, parts, bodies = multibody
+    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
+    out = scratch.out
+    rotation_now(bodies, i, time, scratch.quaternion, R_i)
+    rotation_now(bodies, j, time, scratch.quaternion, R_j)
+    now = relative_now(bodies, i, j, time)
+    px, py, pz = now.p
+    widen = widening(now, query.stale_acceleration)
+    wanted = query.margin + widen
+    best = inf
+    tests = 0
+    reach = bodies.motion[i].radius + bodies.motion[j].radius + wanted
+    if px * px + py * py + pz * pz > reach * reach * ROUND_OFF:
+        return False, 0
+    a, first_b = bodies.first_shape[i], bodies.first_shape[j]
+    b = first_b
+    oa = (0.0, 0.0, 0.0)
+    while a >= 0:
+        if b == first_b:
+            oa = place_shape(table, parts, a, R_i, R_a)
+        ob = place_shape(table, parts, b, R_j, R_b)
+        x, y, z = px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]
+        tests += 1
+        limit = min(wanted, best)
+        if contact_within(table, a, b, R_a, R_b, x, y, z, limit, out, scratch.work) and out[0] < best:
+            best = out[0]
+            for c in range(3):
+                out[4 + c] += oa[c]
+                out[7 + c] += oa[c]
+            for c in range(CONTACT_SIZE):
+                result[c] = out[c]
+            result[SHAPE_I], result[SHAPE_J] = a, b
+        a, b = next_pair(parts, first_b, a, b)
+    if best == inf:
+        return False, tests
+    result[CLOSING] = closing_now(bodies, i, j, now, result)
     excess = bodies.excess[i] + bodies.excess[j]
-    result[BOUND] += widen + excess
-    certain = best + excess <= margin
+    result[10] += widen + excess
+    certain = best + excess <= query.margin
     if excess > 0.0 and best <= 0.0 and (bodies.concave[i] or bodies.concave[j]):
-        result[BOUND] -= best
-        certain = excess <= margin
-    result[STATUS] = TOUCHING if certain else UNRESOLVED
+        result[10] -= best
+        certain = excess <= query.margin
+    result[STATUS] = TOUCHING if certain else UNSETTLED
     for c in range(3):
-        at = position_now(bodies, i, age_i, c)
+        at = position_now(bodies, i, now.age_i, c)
         result[4 + c] += at
         result[7 + c] += at
     return True, tests
+
+
+@device
+def bounded_contact(bodies, i, j, now, reach, result):
+    """A contact of bounding spheres alone, into a result row: the true distance is within `reach` (m) of the centres'.
+
+    now: the two bodies (Now).
+    """
+    distance = sqrt(now.p[0] * now.p[0] + now.p[1] * now.p[1] + now.p[2] * now.p[2])
+    result[:] = 0.0
+    result[0] = distance
+    result[1] = 1.0
+    if distance > 0.0:
+        result[1], result[2], result[3] = now.p[0] / distance, now.p[1] / distance, now.p[2] / distance
+    for c in range(3):
+        result[4 + c] = position_now(bodies, i, now.age_i, c)
+        result[7 + c] = result[4 + c] + now.p[c]
+    result[10] = reach
+    for c in range(3):
+        result[CLOSING] -= now.v[c] * result[1 + c]
+    result[SHAPE_I], result[SHAPE_J] = bodies.first_shape[i], bodies.first_shape[j]
+    result[STATUS] = UNSETTLED

@@ -16,22 +16,58 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.narrow_phase.contact_row import WORK_SIZE
 from collision_monitor.narrow_phase.dispatch import contact, separation
 from collision_monitor.prediction.advance import Placed, advance
-from collision_monitor.prediction.impact_record import CLEAR, CLOSED_FORM, CONSERVATIVE_ADVANCEMENT, HIT, UNRESOLVED
-from collision_monitor.prediction.motion import (
-    half_acceleration,
-    place_shape,
-    relative_position,
-    relative_velocity,
-    rotation_at,
+from collision_monitor.prediction.bodies import next_pair, place_shape
+from collision_monitor.prediction.impact_record import (
+    CLEAR,
+    CLOSED_FORM,
+    CONSERVATIVE_ADVANCEMENT,
+    HIT,
+    UNRESOLVED,
+    write_pair,
 )
-from collision_monitor.prediction.sphere_interval import meeting_of_spheres, sphere_interval
+from collision_monitor.prediction.motion import half_acceleration, relative_position, relative_velocity, rotation_at
+from collision_monitor.prediction.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
 from collision_monitor.tolerances import EPSILON
 
 AT_REST: Final = (0.0, 0.0, 0.0)
 
 FARTHER: Final = 4.0
-"""How much farther than along an axis at rest it is looked for along one that turns. Larger: the bound on where the
-bodies are by then is worse. Smaller: it may stop short."""
+"""Factor by which the search along a turning axis may exceed the advance along an axis at rest. Larger: the bound on
+where the bodies are by then is worse. Smaller: the search may stop short."""
+
+NEWTON_STEPS: Final = 12
+"""Steps towards a time of certain overlap; pairs that need more stay UNRESOLVED."""
+
+
+class ImpactQuery(NamedTuple):
+    """What a kernel searches for: the first time at which the gap is at most `margin`."""
+
+    margin: float  # m
+    tolerance: float  # m: gap beyond the margin at which the search ends
+    iterations: int  # most distance computations for a pair of shapes
+
+
+class Window(NamedTuple):
+    """The times to search (s after the monitor's origin)."""
+
+    begin: Any
+    end: Any
+
+
+class Tube(NamedTuple):
+    """How far the bodies together may be off their reference motions: start + growth t, t seconds after the begin."""
+
+    start: Any  # m
+    growth: Any  # m/s
+
+
+class ShapePair(NamedTuple):
+    """Shape a of a body in motion A and shape b of a body in motion B."""
+
+    A: Any  # MOTION
+    B: Any
+    a: Any  # slots in the shape table
+    b: Any
 
 
 class Scratch(NamedTuple):
@@ -39,13 +75,17 @@ class Scratch(NamedTuple):
 
     rotation: Any  # (4, 3, 3)
     quaternion: Any  # (1, 4)
-    out: Any  # (16,)
+    out: Any  # (16,): a contact row, and the closing speed
     work: Any  # (WORK_SIZE,)
+
+
+CLOSING: Final = 15
+"""Column of Scratch.out with the closing speed (m/s), behind the contact row."""
 
 
 def make_scratch() -> Scratch:
     """Scratch for one thread."""
-    return Scratch(np.zeros((4, 3, 3)), np.zeros((1, 4)), np.zeros(16), np.zeros(WORK_SIZE))
+    return Scratch(np.zeros((4, 3, 3)), np.zeros((1, 4)), np.zeros(CLOSING + 1), np.zeros(WORK_SIZE))
 
 
 @inlined
@@ -57,14 +97,17 @@ def _turning(before, n, elapsed):
 
 
 @device
-def shape_impact(table, parts, A, B, a, b, begin, end, margin, tube_0, tube_1, tolerance, budget, scratch):
-    """When the gap between shape a in motion A and shape b in motion B (MOTION) first is within the wanted one.
+def shape_impact(multibody, pair, window, tube, query, scratch):
+    """When the gap between the shapes of a pair (ShapePair) first is within the wanted one, in the window.
 
-    begin, end: seconds after the monitor's origin; the wanted gap is margin + tube_0 + tube_1 (t - begin) (m).
-    Returns (status, t, queries, guess): no time in [begin, t) is within the wanted gap; at t it is within tolerance of
-    it (HIT), t is end (CLEAR), or the budget of distance queries ran out (UNRESOLVED). guess: how long after t they
-    overlap by as much as they should, from how fast the gap closed last; 0 where nothing tells.
+    The wanted gap is query.margin plus the tube, whose time begins with the window.
+    Returns (status, t, queries, guess): the gap is wider at every time before t; at t it is within query.tolerance of
+    the wanted one (HIT), t is the window's end (CLEAR), or the iterations ran out (UNRESOLVED). guess: how long after t
+    the shapes overlap by as much as they should, from how fast the gap closed last; 0 where nothing indicates it.
     """
+    table, parts = multibody.table, multibody.parts
+    A, B, a, b = pair
+    begin, end = window
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
     acceleration = (B.ax - A.ax, B.ay - A.ay, B.az - A.az)
@@ -72,9 +115,9 @@ def shape_impact(table, parts, A, B, a, b, begin, end, margin, tube_0, tube_1, t
     n_before = AT_REST
     t = t_before = begin
     gap_before = inf
-    status, query, guess = UNRESOLVED, 0, 0.0
-    while query < budget:
-        query += 1
+    status, iteration, guess = UNRESOLVED, 0, 0.0
+    while iteration < query.iterations:
+        iteration += 1
         rotation_at(A, t, R_i)
         rotation_at(B, t, R_j)
         oa = place_shape(table, parts, a, R_i, R_a)
@@ -83,20 +126,20 @@ def shape_impact(table, parts, A, B, a, b, begin, end, margin, tube_0, tube_1, t
         gap = separation(
             table, a, b, R_a, R_b, px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2], out, scratch.work
         )
-        gap -= margin + tube_0 + tube_1 * (t - begin)
-        if gap <= tolerance:
+        gap -= query.margin + tube.start + tube.growth * (t - begin)
+        if gap <= query.tolerance:
             if t > t_before:
-                wanted = gap + tolerance + 2.0 * (tube_0 + tube_1 * (t - begin))
+                wanted = gap + query.tolerance + 2.0 * (tube.start + tube.growth * (t - begin))
                 guess = wanted * (t - t_before) / (gap_before - gap)
             status = HIT
             break
         n, v = (out[0], out[1], out[2]), relative_velocity(A, B, t)
         at = Placed(a, b, R_a, R_b, oa, ob, (px, py, pz), v, acceleration, w_a, w_b)
         # aim at half the tolerance, so that the last advance ends inside it
-        aim = gap - 0.5 * tolerance
+        aim = gap - 0.5 * query.tolerance
         d, m, until = 0.0, AT_REST, end - t
         for turns in range(2):
-            d = max(d, advance(table, at, n, m, -tube_1, aim, until))
+            d = max(d, advance(table, at, n, m, -tube.growth, aim, until))
             if turns or t == t_before or d >= until:
                 break
             m = _turning(n_before, n, t - t_before)
@@ -105,43 +148,45 @@ def shape_impact(table, parts, A, B, a, b, begin, end, margin, tube_0, tube_1, t
             until = min(until, FARTHER * d)
         t_before, gap_before, n_before = t, gap, n
         if d >= end - t:
-            return CLEAR, end, query, guess
+            return CLEAR, end, iteration, guess
         if t + d <= t:  # the resolution of the time is reached before the gap is
             break
         t += d
-    return status, t, query, guess
+    return status, t, iteration, guess
 
 
 @device
-def contact_at(table, parts, A, B, a, b, t, scratch):
-    """Contact of shape a in motion A with shape b in motion B at time t, into scratch.out; returns the signed distance.
+def contact_at(multibody, pair, t, scratch):
+    """Contact of a pair of shapes (ShapePair) at time t into scratch.out; returns the signed distance (m).
 
-    out as narrow_phase.dispatch.contact gives it, but relative to A's origin; out[15]: closing speed (m/s).
+    scratch.out is a contact row about A's origin, and behind it the closing speed.
     """
+    A, B, a, b = pair
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
     rotation_at(A, t, R_i)
     rotation_at(B, t, R_j)
-    oa = place_shape(table, parts, a, R_i, R_a)
-    ob = place_shape(table, parts, b, R_j, R_b)
-    px, py, pz = relative_position(A, B, t)
-    contact(table, a, b, R_a, R_b, px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2], out, scratch.work)
+    oa = place_shape(multibody.table, multibody.parts, a, R_i, R_a)
+    ob = place_shape(multibody.table, multibody.parts, b, R_j, R_b)
+    p = relative_position(A, B, t)
+    x, y, z = p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]
+    contact(multibody.table, a, b, R_a, R_b, x, y, z, out, scratch.work)
     for k in range(3):
         out[4 + k] += oa[k]
         out[7 + k] += oa[k]
     v = relative_velocity(A, B, t)
-    out[15] = closing_speed(v, (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz), px, py, pz, out)
+    out[CLOSING] = closing_speed(v, (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz), p, out)
     return out[0]
 
 
 @inlined
-def closing_speed(v, wa, wb, px, py, pz, out):
-    """Speed (m/s) at which the witness points of a contact (out) approach along its normal.
+def closing_speed(v, wa, wb, p, out):
+    """Speed (m/s) at which the witness points of a contact row `out` approach along its normal.
 
     v: velocity of B relative to A; wa, wb: angular velocities; p: position of B relative to A.
     """
     ax, ay, az = out[4], out[5], out[6]
-    bx, by, bz = out[7] - px, out[8] - py, out[9] - pz
+    bx, by, bz = out[7] - p[0], out[8] - p[1], out[9] - p[2]
     vx = v[0] + (wb[1] * bz - wb[2] * by) - (wa[1] * az - wa[2] * ay)
     vy = v[1] + (wb[2] * bx - wb[0] * bz) - (wa[2] * ax - wa[0] * az)
     vz = v[2] + (wb[0] * by - wb[1] * bx) - (wa[0] * ay - wa[1] * ax)
@@ -149,22 +194,23 @@ def closing_speed(v, wa, wb, px, py, pz, out):
 
 
 @inlined
-def _touching_by(table, parts, A, B, a, b, start, guess, end, tube_0, tube_1, begin, margin, tolerance, scratch):
-    """A time in [start, end] at which they overlap by more than the tube, whatever the motions inside it; inf: none.
+def _certain_overlap(multibody, pair, start, guess, window, tube, query, scratch):
+    """A time in [start, window.end] at which a pair overlaps by more than the tube; inf: none found.
 
     Newton steps on the signed distance, the first one to start + guess where that helps. The contact at the time found
-    is left in scratch.out.
+    stays in scratch.out. The tube's time begins with the window.
     """
+    begin, end = window
     guessed = 0.0 < guess < end - start
     t = start + guess if guessed else start
-    for _ in range(12):
-        distance = contact_at(table, parts, A, B, a, b, t, scratch)
-        excess = distance + scratch.out[10] - margin + tube_0 + tube_1 * (t - begin)
+    for _ in range(NEWTON_STEPS):
+        distance = contact_at(multibody, pair, t, scratch)
+        excess = distance + scratch.out[10] - query.margin + tube.start + tube.growth * (t - begin)
         if excess <= 0.0:
             return t
-        speed = scratch.out[15] - tube_1
+        speed = scratch.out[CLOSING] - tube.growth
         if speed > 0.0 and t < end:
-            t = min(end, t + 1.001 * (excess + tolerance) / speed)
+            t = min(end, t + 1.001 * (excess + query.tolerance) / speed)
         elif guessed:
             t = start
         else:
@@ -173,61 +219,65 @@ def _touching_by(table, parts, A, B, a, b, start, guess, end, tube_0, tube_1, be
     return inf
 
 
-@device
-def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budget, scratch, event):
-    """First impact of bodies i and j in [begin, end] into the IMPACT record `event`; returns distance queries made.
+@inlined
+def tube_of(A, B, begin):
+    """The tube of two motions (MOTION) whose time begins at `begin`."""
+    return Tube(
+        A.tube_0 + B.tube_0 + A.tube_1 * (begin - A.tube_time) + B.tube_1 * (begin - B.tube_time),
+        A.tube_1 + B.tube_1,
+    )
 
-    event.status = CLEAR where there is none. Overlapping or within `margin` (m) already is an impact at begin.
-    The reference motions and their tubes are read from `bodies`; ids decide which body counts as i.
+
+@device
+def body_impact(multibody, i, j, window, query, scratch, event):
+    """First impact of bodies i and j in the window into the IMPACT record `event`; returns distance queries made.
+
+    event.status = CLEAR where there is none. Overlapping or within query.margin already is an impact at the begin.
+    The reference motions and their tubes are read from `bodies`; the body with the smaller id is i in the record.
     """
+    bodies, parts = multibody.bodies, multibody.parts
+    begin, end = window
     if bodies.id[i] > bodies.id[j]:
         i, j = j, i
     A, B = bodies.motion[i], bodies.motion[j]
     event.status = CLEAR
-    tube_1 = A.tube_1 + B.tube_1
-    tube_0 = A.tube_0 + B.tube_0 + A.tube_1 * (begin - A.tube_time) + B.tube_1 * (begin - B.tube_time)
-    px, py, pz = relative_position(A, B, begin)
-    vx, vy, vz = relative_velocity(A, B, begin)
+    tube = tube_of(A, B, begin)
+    approach = approach_at(A, B, begin)
     bent = half_acceleration(A, B) * (end - begin)  # m/s: a path that bends is within that of its tangent
     # the time in which the bounding spheres overlap holds every impact
     first, last = 0.0, end - begin
-    reach = A.radius + B.radius + margin
+    reach = A.radius + B.radius + query.margin
     if reach < inf:
-        first, last = sphere_interval(px, py, pz, vx, vy, vz, reach + tube_0, tube_1 + bent, last, 1.0)
+        first, last = sphere_interval(approach.p, approach.v, reach + tube.start, tube.growth + bent, last, 1.0)
         if first > last:
             return 0
-    event.i, event.j = i, j
-    event.key = (np.uint64(bodies.id[i]) << np.uint64(32)) | np.uint64(bodies.id[j])
-    event.version_i, event.version_j = bodies.version[i], bodies.version[j]
-    a, b = bodies.first_shape[i], bodies.first_shape[j]
+    write_pair(bodies, i, j, event)
+    a, first_b = bodies.first_shape[i], bodies.first_shape[j]
+    b = first_b
     if bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0 and reach < inf and bent == 0.0:
-        _sphere_impact(A, B, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, begin, first, end, event)
+        _sphere_impact(ShapePair(A, B, a, b), approach, reach, tube, window, first, event)
         return 1
     event.method = CONSERVATIVE_ADVANCEMENT
     queries = 0
-    stop = begin + last
+    start, stop = begin + first, begin + last
+    there = Tube(tube.start + tube.growth * first, tube.growth)
     lower, guess = inf, 0.0
     while a >= 0:
-        b = bodies.first_shape[j]
-        while b >= 0:
-            status, t, n, soon = shape_impact(
-                table, parts, A, B, a, b, begin + first, stop,
-                margin, tube_0 + tube_1 * first, tube_1, tolerance, budget, scratch,
-            )  # fmt: skip
-            queries += n
-            if status != CLEAR and t < lower:
-                lower, guess = t, soon
-                event.status = status
-                event.shape_i, event.shape_j = a, b
-                stop = t
-            b = parts.next[b]
-        a = parts.next[a]
+        pair = ShapePair(A, B, a, b)
+        status, t, n, soon = shape_impact(multibody, pair, Window(start, stop), there, query, scratch)
+        queries += n
+        if status != CLEAR and t < lower:
+            lower, guess = t, soon
+            event.status = status
+            event.shape_i, event.shape_j = a, b
+            stop = t
+        a, b = next_pair(parts, first_b, a, b)
     if event.status == CLEAR:
         return queries
-    a, b = event.shape_i, event.shape_j
-    sure = _touching_by(table, parts, A, B, a, b, lower, guess, end, tube_0, tube_1, begin, margin, tolerance, scratch)
+    pair = ShapePair(A, B, event.shape_i, event.shape_j)
+    sure = _certain_overlap(multibody, pair, lower, guess, window, tube, query, scratch)
     if sure == inf:
-        contact_at(table, parts, A, B, a, b, lower, scratch)
+        contact_at(multibody, pair, lower, scratch)
     event.lower, event.upper = lower, sure
     event.status = HIT if sure < inf else UNRESOLVED
     _set_geometry(event, A, sure if sure < inf else lower, scratch.out)
@@ -236,27 +286,28 @@ def body_impact(table, parts, bodies, i, j, begin, end, margin, tolerance, budge
 
 @inlined
 def _set_geometry(event, A, t, out):
-    """Where and how they meet, from a contact at time t relative to A's origin."""
+    """Point, normal and closing speed of the impact, from a contact at time t about A's origin."""
     ta = t - A.time
     event.point_x = A.x + (A.vx + 0.5 * A.ax * ta) * ta + 0.5 * (out[4] + out[7])
     event.point_y = A.y + (A.vy + 0.5 * A.ay * ta) * ta + 0.5 * (out[5] + out[8])
     event.point_z = A.z + (A.vz + 0.5 * A.az * ta) * ta + 0.5 * (out[6] + out[9])
     event.normal_x, event.normal_y, event.normal_z = out[1], out[2], out[3]
-    event.closing_speed = out[15]
+    event.closing_speed = out[CLOSING]
 
 
 @inlined
-def _sphere_impact(A, B, a, b, px, py, pz, vx, vy, vz, reach, tube_0, tube_1, begin, first, end, event):
-    """Two spheres: closed form for both ends of the interval."""
+def _sphere_impact(pair, approach, reach, tube, window, first, event):
+    """Two spheres: closed form for both ends of the interval. first: of the lower end, s after the window's begin."""
+    begin, end = window
     event.method = CLOSED_FORM
-    event.shape_i, event.shape_j = a, b
+    event.shape_i, event.shape_j = pair.a, pair.b
     event.lower = begin + first
     sure = inf
-    certain = reach * (1.0 - 8.0 * EPSILON) - tube_0  # the radii are rounded up by nearly as much
+    certain = reach * (1.0 - 8.0 * EPSILON) - tube.start  # the radii are rounded up by nearly as much
     if certain > 0.0:
-        sure, _ = sphere_interval(px, py, pz, vx, vy, vz, certain, -tube_1, end - begin, -1.0)
-        if certain - tube_1 * sure <= 0.0:  # the tube has outgrown the spheres: nothing is sure any more
+        sure, _ = sphere_interval(approach.p, approach.v, certain, -tube.growth, end - begin, -1.0)
+        if certain - tube.growth * sure <= 0.0:  # the tube has outgrown the spheres: nothing is sure any more
             sure = inf
     event.status = HIT if sure < inf else UNRESOLVED
     event.upper = begin + sure if sure < inf else inf
-    meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, first if sure == inf else sure, event)
+    meeting_of_spheres(pair.A, pair.B, approach, begin, first if sure == inf else sure, event)

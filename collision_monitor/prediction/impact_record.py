@@ -1,35 +1,25 @@
-"""One predicted impact of two bodies as a record, and whether the motions it rests on still hold."""
+"""One predicted impact of two bodies as a record: its key, its status, and the motions that it rests on."""
 
 from __future__ import annotations
 
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import inlined
 from collision_monitor.records import Method, PredictionStatus
 
 HIT: Final = int(PredictionStatus.HIT)
-
-
 UNRESOLVED: Final = int(PredictionStatus.UNRESOLVED)
-
-
-CLEAR: Final = 2
-
+CLEAR: Final = 254
+"""No impact. Never published, and therefore apart from every PredictionStatus."""
 
 CLOSED_FORM: Final = int(Method.CLOSED_FORM)
-
-
 CONSERVATIVE_ADVANCEMENT: Final = int(Method.CONSERVATIVE_ADVANCEMENT)
-
-
 BOUND_ONLY: Final = int(Method.BOUND)
-
-
 TREE_BOUND: Final = 255
-"""The same of a pair whose sphere trees were looked at; told as BOUND too."""
-
+"""A bound by the bodies' sphere trees, which BOUND_ONLY has not used yet; published as BOUND too."""
 
 IMPACT = np.dtype(
     [
@@ -42,7 +32,7 @@ IMPACT = np.dtype(
         ("normal_y", np.float64),
         ("normal_z", np.float64),
         ("closing_speed", np.float64),
-        ("key", np.uint64),  # (smaller id << 32) | larger id
+        ("key", np.uint64),  # pair_key of the ids
         ("i", np.int32),  # body slots; body i has the smaller id
         ("j", np.int32),
         ("version_i", np.uint32),
@@ -53,16 +43,44 @@ IMPACT = np.dtype(
         ("method", np.uint8),
     ]
 )
-"""One predicted impact. The versions tell whether the motions it rests on still hold."""
-
-
-@device
-def has_changed(bodies, event):
-    """Does the event rest on a motion that no longer holds?"""
-    return bodies.version[event.i] != event.version_i or bodies.version[event.j] != event.version_j
+"""One predicted impact. The versions show whether the motions that it rests on still hold."""
 
 
 @inlined
-def holds(version, event):
-    """Does the event rest on motions that have not changed since?"""
-    return version[event.i] == event.version_i and version[event.j] == event.version_j
+def pair_key(id_a, id_b):
+    """Key of a pair: (smaller id << 32) | larger id. Pairs sorted by key are sorted by their ids."""
+    return (np.uint64(min(id_a, id_b)) << np.uint64(32)) | np.uint64(max(id_a, id_b))
+
+
+def pair_keys(id_a: NDArray[np.uint32], id_b: NDArray[np.uint32]) -> NDArray[np.uint64]:
+    """`pair_key` of arrays of ids (n,) with id_a < id_b."""
+    keys: NDArray[np.uint64] = (id_a.astype(np.uint64) << np.uint64(32)) | id_b
+    return keys
+
+
+@inlined
+def ids_of(key):
+    """The smaller and the larger id of a pair."""
+    return key >> np.uint64(32), key & np.uint64(0xFFFFFFFF)
+
+
+def ids_of_keys(keys: NDArray[np.uint64]) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+    """`ids_of` of an array of keys (n,)."""
+    return keys >> np.uint64(32), keys & np.uint64(0xFFFFFFFF)
+
+
+@inlined
+def write_pair(bodies, i, j, record):
+    """Key, slots and versions of the pair of bodies i and j into a record (IMPACT, or another with these fields).
+
+    id[i] < id[j].
+    """
+    record.key = pair_key(bodies.id[i], bodies.id[j])
+    record.i, record.j = i, j
+    record.version_i, record.version_j = bodies.version[i], bodies.version[j]
+
+
+@inlined
+def holds(version, record):
+    """Whether the motions that the record rests on are unchanged: version (N,) are the bodies' versions now."""
+    return version[record.i] == record.version_i and version[record.j] == record.version_j

@@ -11,18 +11,20 @@ from typing import Final
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.narrow_phase.support import core_support, rounding
-from collision_monitor.prediction.motion import place_shape
+from collision_monitor.prediction.bodies import place_shape
 
 AXES: Final = 8
 """Half of them of samples that passed, half of such that met. More: each costs 2 ns a sample."""
 
 
 @device
-def remember(table, parts, A, B, a, b, passed, n, scratch, axes):
-    """Keep the direction in scratch.out as one of the axes (AXES, 4) of shapes a and b, which move as A and B (MOTION).
+def remember(multibody, pair, passed, n, scratch, axes):
+    """Keep the direction in scratch.out as one of the axes (AXES, 4) of a pair of shapes (ShapePair).
 
     n: how many were before; passed: whether the sample passed.
     """
+    table, parts = multibody.table, multibody.parts
+    A, B, a, b = pair
     R_a, R_b, out = scratch.rotation[2], scratch.rotation[3], scratch.out
     oa = place_shape(table, parts, a, A.rotation, R_a)
     ob = place_shape(table, parts, b, B.rotation, R_b)

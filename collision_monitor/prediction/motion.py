@@ -7,7 +7,6 @@ of where the reference motion puts it. While that holds, what was predicted from
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,82 +40,6 @@ MOTION = np.dtype(
     ]
 )
 """The reference motion that predictions rest on, one record for each body: a prediction reads two of them whole."""
-
-
-class Bodies(NamedTuple):
-    """N slots of bodies, structure of arrays but for the motions. World frame."""
-
-    used: Any  # (N,) bool: the slot holds a body
-    id: Any  # (N,) uint32
-    version: Any  # (N,) uint32: counts up whenever the motion changes
-    static: Any  # (N,) bool
-    seen: Any  # (N,) bool: there is a state (always for static bodies)
-    group: Any  # (N,) uint32
-    mask: Any  # (N,) uint32
-    first_shape: Any  # (N,) int32: slot in the shape table; further shapes follow by Parts.next
-    spin_radius: Any  # (N,) float64: the farthest point that turning moves (m)
-    model: Any  # (N,) uint8: records.Model that stands for it
-    excess: Any  # (N,) float64: how far the model lies outside of the object at most (m)
-    concave: Any  # (N,) bool: a concave object has a convex model, which may overlap where the object is not
-    slack: Any  # (N,) float64: how far beyond the horizon it is predicted (s)
-    motion: Any  # (N,) MOTION
-    ref_quaternion: Any  # (N, 4): the reference motion's orientation at its time
-    # the last state
-    time: Any  # (N,) float64
-    position: Any  # (N, 3)
-    quaternion: Any  # (N, 4)
-    linear: Any  # (N, 3)
-    angular: Any  # (N, 3)
-    acceleration: Any  # (N, 3): where it is measured, else 0
-
-
-class Parts(NamedTuple):
-    """How the shapes in the table make up bodies; K slots like the table."""
-
-    next: Any  # (K,) int32: the body's next shape, -1 after the last
-    index: Any  # (K,) uint32: its place in the body's description
-    placed: Any  # (K,) bool: it has a pose of its own in the body's frame
-
-
-def make_bodies(capacity: int) -> Bodies:
-    """Empty slots."""
-    n = capacity
-    motion = np.zeros(n, MOTION)
-    motion["covered"] = -np.inf
-    return Bodies(
-        used=np.zeros(n, np.bool_),
-        id=np.zeros(n, np.uint32),
-        version=np.zeros(n, np.uint32),
-        static=np.zeros(n, np.bool_),
-        seen=np.zeros(n, np.bool_),
-        group=np.zeros(n, np.uint32),
-        mask=np.zeros(n, np.uint32),
-        first_shape=np.full(n, -1, np.int32),
-        spin_radius=np.zeros(n),
-        model=np.zeros(n, np.uint8),
-        excess=np.zeros(n),
-        concave=np.zeros(n, np.bool_),
-        slack=np.zeros(n),
-        motion=motion,
-        ref_quaternion=np.zeros((n, 4)),
-        time=np.zeros(n),
-        position=np.zeros((n, 3)),
-        quaternion=np.zeros((n, 4)),
-        linear=np.zeros((n, 3)),
-        angular=np.zeros((n, 3)),
-        acceleration=np.zeros((n, 3)),
-    )
-
-
-def make_parts(capacity: int) -> Parts:
-    """No shapes."""
-    return Parts(np.full(capacity, -1, np.int32), np.zeros(capacity, np.uint32), np.zeros(capacity, np.bool_))
-
-
-def enlarge(source: NamedTuple, target: NamedTuple) -> None:
-    """Copy the arrays of `source` to the front of those of `target`."""
-    for old, new in zip(source, target, strict=True):
-        new[: len(old)] = old
 
 
 @inlined
@@ -211,29 +134,6 @@ def relative_velocity_now(bodies, i, age_i, j, age_j, c):
     )
 
 
-@inlined
-def place_shape(table, parts, s, R_body, R_shape):
-    """Rotation of shape s of a body turned by R_body into R_shape; returns its offset from the body in the world."""
-    if not parts.placed[s]:
-        for r in range(3):
-            for c in range(3):
-                R_shape[r, c] = R_body[r, c]
-        return 0.0, 0.0, 0.0
-    x, y, z = table.local_position[s, 0], table.local_position[s, 1], table.local_position[s, 2]
-    for r in range(3):
-        for c in range(3):
-            R_shape[r, c] = (
-                R_body[r, 0] * table.local_rotation[s, 0, c]
-                + R_body[r, 1] * table.local_rotation[s, 1, c]
-                + R_body[r, 2] * table.local_rotation[s, 2, c]
-            )
-    return (
-        R_body[0, 0] * x + R_body[0, 1] * y + R_body[0, 2] * z,
-        R_body[1, 0] * x + R_body[1, 1] * y + R_body[1, 2] * z,
-        R_body[2, 0] * x + R_body[2, 1] * y + R_body[2, 2] * z,
-    )
-
-
 @device
 def turn_quaternion(q, i, wx, wy, wz, t, out):
     """out (4,) = the orientation q[i] after t seconds at angular velocity w in the world."""
@@ -261,24 +161,18 @@ def chord_angle(ax, ay, az, aw, bx, by, bz, bw):
     return 2.0 * chord * (1.0 + 0.056 * chord * chord)  # >= 4 asin(chord / 2) up to angle pi
 
 
+@inlined
+def age_of(bodies, i, now):
+    """Seconds since the last state of body i; 0 for a static one."""
+    return 0.0 if bodies.static[i] else now - bodies.time[i]
+
+
 @device
 def rotation_now(bodies, i, now, q, R):
-    """Rotation of body i at `now`, from its last state, into R; returns the time since that state."""
-    age = 0.0 if bodies.static[i] else now - bodies.time[i]
-    turn_quaternion(bodies.quaternion, i, bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2], age, q[0])
+    """Rotation of body i at `now`, from its last state, into R (3, 3); q (1, 4): scratch."""
+    wx, wy, wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
+    turn_quaternion(bodies.quaternion, i, wx, wy, wz, age_of(bodies, i, now), q[0])
     quaternion_to_matrix(q, 0, R)
-    return age
-
-
-@device
-def relative_now(bodies, i, j, now):
-    """Position of j relative to i by their last states (m), and how old those are (s)."""
-    age_i = 0.0 if bodies.static[i] else now - bodies.time[i]
-    age_j = 0.0 if bodies.static[j] else now - bodies.time[j]
-    px = relative_position_now(bodies, i, age_i, j, age_j, 0)
-    py = relative_position_now(bodies, i, age_i, j, age_j, 1)
-    pz = relative_position_now(bodies, i, age_i, j, age_j, 2)
-    return px, py, pz, age_i, age_j
 
 
 @device

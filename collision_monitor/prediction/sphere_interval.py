@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.prediction.motion import half_acceleration, relative_position, relative_velocity
@@ -13,14 +13,29 @@ _SMALLEST: Final = 1e-240
 """m^4/s^2: a product of a squared length and a squared speed whose round-off is near the smallest number there is."""
 
 
+class Approach(NamedTuple):
+    """Position (m) and velocity (m/s) of the second of two bodies relative to the first, at one time."""
+
+    p: Any  # (3,)
+    v: Any  # (3,)
+
+
+@inlined
+def approach_at(A, B, t):
+    """The approach of motion B to motion A (MOTION) at time t."""
+    return Approach(relative_position(A, B, t), relative_velocity(A, B, t))
+
+
 @device
-def sphere_interval(dx, dy, dz, vx, vy, vz, reach, growth, end, outward):
-    """First and last time in [0, end] at which |d + v t| <= reach + growth t; (inf, -inf): never.
+def sphere_interval(d, v, reach, growth, end, outward):
+    """First and last time in [0, end] at which |d + v t| <= reach + growth t; (inf, -inf): never. d, v: (3,).
 
     Rounded so that no such time is left out (outward = 1), or so that all between are such for certain (outward = -1).
     Closed form: the discriminant as |reach v - growth d|^2 - |d x v|^2, the root as c / (-b + sqrt(D)): neither cancels
     (Numerical Recipes 5.6; Haines et al., Precision improvements for ray/sphere intersection, 2019).
     """
+    dx, dy, dz = d
+    vx, vy, vz = v
     size = dx * dx + dy * dy + dz * dz + reach * reach
     rate = vx * vx + vy * vy + vz * vz + growth * growth
     if size * rate < _SMALLEST and rate > 0.0:
@@ -29,16 +44,17 @@ def sphere_interval(dx, dy, dz, vx, vy, vz, reach, growth, end, outward):
         speed = 1.0 / max(abs(vx), abs(vy), abs(vz), abs(growth), 1e-300)
         unit = length / speed
         until = end * unit
-        first, last = _interval(
-            dx * length, dy * length, dz * length, vx * speed, vy * speed, vz * speed, reach * length, growth * speed,
-            until, outward,
-        )  # fmt: skip
+        d = (dx * length, dy * length, dz * length)
+        v = (vx * speed, vy * speed, vz * speed)
+        first, last = _interval(d, v, reach * length, growth * speed, until, outward)
         return first / unit, end if last == until else last / unit
-    return _interval(dx, dy, dz, vx, vy, vz, reach, growth, end, outward)
+    return _interval(d, v, reach, growth, end, outward)
 
 
 @inlined
-def _interval(dx, dy, dz, vx, vy, vz, reach, growth, end, outward):
+def _interval(d, v, reach, growth, end, outward):
+    dx, dy, dz = d
+    vx, vy, vz = v
     e = outward * EPSILON
     pp = dx * dx + dy * dy + dz * dz
     vv = vx * vx + vy * vy + vz * vz
@@ -74,10 +90,16 @@ def _interval(dx, dy, dz, vx, vy, vz, reach, growth, end, outward):
 
 
 @inlined
-def meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, t, event):
-    """Where and how the bounding spheres of A and B meet, t seconds after begin."""
+def meeting_of_spheres(A, B, approach, begin, t, event):
+    """Point, normal and closing speed of the meeting of the bounding spheres of A and B, t seconds after begin.
+
+    approach: of B to A at begin. event: the IMPACT record to write.
+    """
+    p, v = approach
     dx, dy, dz = (
-        relative_position(A, B, begin + t) if half_acceleration(A, B) > 0.0 else (px + vx * t, py + vy * t, pz + vz * t)
+        relative_position(A, B, begin + t)
+        if half_acceleration(A, B) > 0.0
+        else (p[0] + v[0] * t, p[1] + v[1] * t, p[2] + v[2] * t)
     )
     length = sqrt(dx * dx + dy * dy + dz * dz)
     if length > 0.0:

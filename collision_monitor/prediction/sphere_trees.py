@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.geometry.shape_table import BOX, CONVEX_HULL
+from collision_monitor.prediction.body_impact import Window, tube_of
 from collision_monitor.prediction.impact_record import CLEAR, TREE_BOUND
-from collision_monitor.prediction.motion import half_acceleration, relative_position, relative_velocity, rotation_at
-from collision_monitor.prediction.sphere_interval import meeting_of_spheres, sphere_interval
+from collision_monitor.prediction.motion import half_acceleration, rotation_at
+from collision_monitor.prediction.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
 
 Array = NDArray[np.float64]
 
@@ -121,64 +122,81 @@ def joined_trees(trees: list[Tree | None], capacity: int) -> Trees:
     )
 
 
+class _Ball(NamedTuple):
+    """A sphere of a tree about its body's origin, in world axes, and how it goes on while the body turns."""
+
+    p: Any  # (3,): centre (m)
+    v: Any  # (3,): velocity of the centre relative to the body's origin (m/s)
+    radius: Any
+    growth: Any  # of the radius (m/s)
+
+
 @inlined
-def _sphere(trees, at, m, R, rate, span):
-    """Centre and its velocity relative to the body's, radius and how fast it grows, of a sphere of a turning body."""
+def _ball(trees, at, m, R, rate, span):
+    """Sphere `at` of a body in motion m (MOTION), turned by R, which turns at `rate` (rad/s) for `span` seconds.
+
+    at = -1: the body's bounding sphere.
+    """
     if at < 0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, m.radius, 0.0
+        return _Ball((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), m.radius, 0.0)
     cx, cy, cz = trees.center[at, 0], trees.center[at, 1], trees.center[at, 2]
     x = R[0, 0] * cx + R[0, 1] * cy + R[0, 2] * cz
     y = R[1, 0] * cx + R[1, 1] * cy + R[1, 2] * cz
     z = R[2, 0] * cx + R[2, 1] * cy + R[2, 2] * cz
     growth = rate * sqrt(cx * cx + cy * cy + cz * cz)
     if rate * span >= 2.0:
-        return x, y, z, 0.0, 0.0, 0.0, trees.radius[at], growth
+        return _Ball((x, y, z), (0.0, 0.0, 0.0), trees.radius[at], growth)
     # off its tangent by (rate t)^2 / 2 of the lever, whose chord over the span is
     growth *= 0.5 * rate * span
-    return x, y, z, m.wy * z - m.wz * y, m.wz * x - m.wx * z, m.wx * y - m.wy * x, trees.radius[at], growth
+    v = (m.wy * z - m.wz * y, m.wz * x - m.wx * z, m.wx * y - m.wy * x)
+    return _Ball((x, y, z), v, trees.radius[at], growth)
 
 
 @device
-def tree_meeting(bodies, trees, i, j, begin, end, margin, R_i, R_j):
-    """Seconds after `begin` before which the trees of bodies i and j cannot meet; infinite: not until `end`.
+def tree_meeting(bodies, trees, i, j, window, margin, rotation):
+    """Seconds after the window's begin before which the trees of bodies i and j cannot meet; inf: not within it.
 
     A sphere's centre moves straight on from where its body's bounding sphere meets the other, as fast as it does then;
-    by how much turning moves it off that way is a growth of its radius. R_i, R_j (3, 3): scratch.
+    by how much turning moves it off that way is a growth of its radius. rotation (2 or more, 3, 3): scratch.
     """
     A, B = bodies.motion[i], bodies.motion[j]
-    px, py, pz = relative_position(A, B, begin)
-    vx, vy, vz = relative_velocity(A, B, begin)
-    tube_1 = A.tube_1 + B.tube_1 + half_acceleration(A, B) * (end - begin)  # no more than that off its tangent
-    tube_0 = A.tube_0 + B.tube_0 + A.tube_1 * (begin - A.tube_time) + B.tube_1 * (begin - B.tube_time)
-    reach = A.radius + B.radius + margin + tube_0
-    soonest, last = sphere_interval(px, py, pz, vx, vy, vz, reach, tube_1, end - begin, 1.0)
+    R_i, R_j = rotation[0], rotation[1]
+    begin, end = window
+    tube = tube_of(A, B, begin)
+    p, v = approach_at(A, B, begin)
+    growth = tube.growth + half_acceleration(A, B) * (end - begin)  # no more than that off its tangent
+    reach = A.radius + B.radius + margin + tube.start
+    soonest, last = sphere_interval(p, v, reach, growth, end - begin, 1.0)
     if soonest > last:
         return inf
     span = last - soonest
-    tube_0 += tube_1 * soonest
-    px, py, pz = px + vx * soonest, py + vy * soonest, pz + vz * soonest
+    px, py, pz = p[0] + v[0] * soonest, p[1] + v[1] * soonest, p[2] + v[2] * soonest
     rotation_at(A, begin + soonest, R_i)
     rotation_at(B, begin + soonest, R_j)
-    wide = (margin + tube_0) * (1.0 + 1e-12)
+    wide = (margin + (tube.start + growth * soonest)) * (1.0 + 1e-12)
     rate_a = sqrt(A.wx * A.wx + A.wy * A.wy + A.wz * A.wz)
     rate_b = sqrt(B.wx * B.wx + B.wy * B.wy + B.wz * B.wz)
     stack = trees.stack
     stack[0, 0], stack[0, 1] = trees.root[i], trees.root[j]
     waiting, best = 1, inf
-    while waiting > 0:
+    while waiting > 0:  # each pair of spheres is taken off once, and puts its two halves on: as many as the trees have
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
-        ax, ay, az, aux, auy, auz, radius_a, growth_a = _sphere(trees, a, A, R_i, rate_a, span)
-        bx, by, bz, bux, buy, buz, radius_b, growth_b = _sphere(trees, b, B, R_j, rate_b, span)
+        ball_a, ball_b = _ball(trees, a, A, R_i, rate_a, span), _ball(trees, b, B, R_j, rate_b, span)
+        d = (px + (ball_b.p[0] - ball_a.p[0]), py + (ball_b.p[1] - ball_a.p[1]), pz + (ball_b.p[2] - ball_a.p[2]))
+        u = (
+            v[0] + (ball_b.v[0] - ball_a.v[0]),
+            v[1] + (ball_b.v[1] - ball_a.v[1]),
+            v[2] + (ball_b.v[2] - ball_a.v[2]),
+        )
         first, last = sphere_interval(
-            px + (bx - ax), py + (by - ay), pz + (bz - az), vx + (bux - aux), vy + (buy - auy), vz + (buz - auz),
-            wide + radius_a + radius_b, tube_1 + growth_a + growth_b, span, 1.0,
-        )  # fmt: skip
+            d, u, wide + ball_a.radius + ball_b.radius, growth + ball_a.growth + ball_b.growth, span, 1.0
+        )
         if first > last or first >= best:
             continue
         next_a = -1 if a < 0 else trees.child[a]
         next_b = -1 if b < 0 else trees.child[b]
-        if next_a >= 0 and (next_b < 0 or radius_a >= radius_b):
+        if next_a >= 0 and (next_b < 0 or ball_a.radius >= ball_b.radius):
             for k in range(2):
                 stack[waiting, 0], stack[waiting, 1] = next_a + k, b
                 waiting += 1
@@ -195,24 +213,20 @@ def tree_meeting(bodies, trees, i, j, begin, end, margin, R_i, R_j):
 
 
 @kernel
-def tighten(bodies, trees, events, now, margin, scratch):
+def tighten(bodies, trees, events, now, margin, rotation):
     """Let events (IMPACT) of which only the bounding spheres are known begin when the sphere trees meet.
 
-    status = CLEAR where they do not, as long as the motions are predicted.
+    status = CLEAR where they do not, as long as the motions are predicted. rotation (2 or more, 3, 3): scratch.
     """
     for k in range(events.size):
         event = events[k]
         A, B = bodies.motion[event.i], bodies.motion[event.j]
-        begin, end = max(now, event.lower), min(A.cover, B.cover)
-        if begin < end:
-            wait = tree_meeting(
-                bodies, trees, event.i, event.j, begin, end, margin, scratch.rotation[0], scratch.rotation[1]
-            )
+        window = Window(max(now, event.lower), min(A.cover, B.cover))
+        if window.begin < window.end:
+            wait = tree_meeting(bodies, trees, event.i, event.j, window, margin, rotation)
             if wait == inf:
                 event.status = CLEAR
             elif wait > 0.0:
-                px, py, pz = relative_position(A, B, begin)
-                vx, vy, vz = relative_velocity(A, B, begin)
-                event.lower = begin + wait
-                meeting_of_spheres(A, B, px, py, pz, vx, vy, vz, begin, wait, event)
+                event.lower = window.begin + wait
+                meeting_of_spheres(A, B, approach_at(A, B, window.begin), window.begin, wait, event)
         event.method = TREE_BOUND

@@ -14,7 +14,17 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import allocating_kernel, device, inlined
-from collision_monitor.prediction.body_impact import Scratch, contact_at, make_scratch, shape_impact
+from collision_monitor.prediction.bodies import next_pair
+from collision_monitor.prediction.body_impact import (
+    ImpactQuery,
+    Scratch,
+    ShapePair,
+    Tube,
+    Window,
+    contact_at,
+    make_scratch,
+    shape_impact,
+)
 from collision_monitor.prediction.impact_record import CLEAR
 from collision_monitor.prediction.known_axes import AXES, parted_until, remember
 from collision_monitor.prediction.motion import (
@@ -94,54 +104,52 @@ def carry_on(bodies, i, now, q, m):
 
 
 @device
-def _first_contact(table, parts, bodies, i, j, begin, end, margin, tube_0, tube_1, tolerance, budget, room):
-    """First time in [begin, end] at which bodies i and j are within margin + tube_0 + tube_1 t (m); infinite: never.
+def _first_contact(multibody, i, j, window, tube, query, room):
+    """First time in the window at which bodies i and j are within query.margin and the tube; infinite: never.
 
-    They move as in room.motion.
+    They move as in room.motion, whose time 0 is now; so is the tube's.
     """
+    parts, bodies = multibody.parts, multibody.bodies
     A, B = room.motion[0], room.motion[1]
+    begin, end = window
     first, last = begin, end
-    reach = A.radius + B.radius + margin + tube_0
+    reach = A.radius + B.radius + query.margin + tube.start
     if reach < inf:
-        vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
+        p, v = (B.x - A.x, B.y - A.y, B.z - A.z), (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
         bent = half_acceleration(A, B) * end
-        first, last = sphere_interval(B.x - A.x, B.y - A.y, B.z - A.z, vx, vy, vz, reach, tube_1 + bent, end, 1.0)
+        first, last = sphere_interval(p, v, reach, tube.growth + bent, end, 1.0)
         if bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0 and bent == 0.0:  # single spheres
             return first
         first = max(first, begin)
         if first > last:
             return inf
     best = inf
-    a = bodies.first_shape[i]
+    there = Tube(tube.start + tube.growth * first, tube.growth)
+    a, first_b = bodies.first_shape[i], bodies.first_shape[j]
+    b = first_b
     while a >= 0:
-        b = bodies.first_shape[j]
-        while b >= 0:
-            status, t, _, _ = shape_impact(
-                table, parts, A, B, a, b, first, last,
-                margin, tube_0 + tube_1 * first, tube_1, tolerance, budget, room.scratch,
-            )  # fmt: skip
-            if status != CLEAR:
-                best = last = t
-            b = parts.next[b]
-        a = parts.next[a]
+        pair = ShapePair(A, B, a, b)
+        status, t, _, _ = shape_impact(multibody, pair, Window(first, last), there, query, room.scratch)
+        if status != CLEAR:
+            best = last = t
+        a, b = next_pair(parts, first_b, a, b)
     return best
 
 
 @device
-def _gap_at(table, parts, first_a, first_b, t, room):
-    """Signed distance (m) of the bodies' shapes at t; its direction into room.block[0]."""
+def _gap_at(multibody, i, j, t, room):
+    """Signed distance (m) of the shapes of bodies i and j at t; its direction into room.block[0]."""
+    parts, bodies = multibody.parts, multibody.bodies
     A, B, out, normal = room.motion[0], room.motion[1], room.scratch.out, room.block[0]
     best = inf
-    a = first_a
+    a, first_b = bodies.first_shape[i], bodies.first_shape[j]
+    b = first_b
     while a >= 0:
-        b = first_b
-        while b >= 0:
-            gap = contact_at(table, parts, A, B, a, b, t, room.scratch)
-            if gap < best:
-                best = gap
-                normal[0], normal[1], normal[2] = out[1], out[2], out[3]
-            b = parts.next[b]
-        a = parts.next[a]
+        gap = contact_at(multibody, ShapePair(A, B, a, b), t, room.scratch)
+        if gap < best:
+            best = gap
+            normal[0], normal[1], normal[2] = out[1], out[2], out[3]
+        a, b = next_pair(parts, first_b, a, b)
     return best
 
 
@@ -233,8 +241,9 @@ def _take_root(joint):
 
 
 @inlined
-def _turn(m, R, w, off, x, y, z):
-    """Let the motion m (MOTION), which is R and turns at w (3,), be off by (x, y, z) times `off` (rad now, rad/s)."""
+def _turn(m, R, w, off, error):
+    """Let the motion m (MOTION), which is R and turns at w (3,), be off by error (3,) times `off` (rad now, rad/s)."""
+    x, y, z = error
     m.wx, m.wy, m.wz = w[0] + off[1] * x, w[1] + off[1] * y, w[2] + off[1] * z
     dx, dy, dz = off[0] * x, off[0] * y, off[0] * z
     angle = sqrt(dx * dx + dy * dy + dz * dz)
@@ -331,18 +340,19 @@ def _is_straight(parts, bodies, i, j, A, B):
 
 
 @device
-def _lay_along(table, parts, bodies, i, j, stated, margin, horizon, tube_0, tube_1, room):
+def _lay_along(multibody, i, j, tube, sampling, room):
     """The time that matters most, returned, and the frame to lay the samples along, into room.frame.
 
     Stated to meet, or two spheres: the closest approach of the centres, and the miss across the path. Else, and where
     a body has no end: where the gap is smallest in standard deviations, the design point of reliability theory.
     """
+    bodies, horizon = multibody.bodies, sampling.horizon
     A, B, frame, normal = room.motion[0], room.motion[1], room.frame, room.block[0]
     vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
     px, py, pz = B.x - A.x, B.y - A.y, B.z - A.z
     round = bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0
     t = 0.0
-    if (stated or round) and A.radius + B.radius < inf:
+    if (sampling.stated or round) and A.radius + B.radius < inf:
         vv = vx * vx + vy * vy + vz * vz
         if vv > 0.0:
             t = min(max(-(px * vx + py * vy + pz * vz) / vv, 0.0), horizon)
@@ -351,8 +361,8 @@ def _lay_along(table, parts, bodies, i, j, stated, margin, horizon, tube_0, tube
         least = inf
         for node in range(NODES):
             at = horizon * node / (NODES - 1)
-            gap = _gap_at(table, parts, bodies.first_shape[i], bodies.first_shape[j], at, room)
-            beta = (gap - margin) / max(tube_0 + at * tube_1, 1e-300)
+            gap = _gap_at(multibody, i, j, at, room)
+            beta = (gap - sampling.query.margin) / max(tube.start + at * tube.growth, 1e-300)
             if beta < least:
                 t, least = at, beta
                 frame[0, 0], frame[0, 1], frame[0, 2] = normal[0], normal[1], normal[2]
@@ -361,7 +371,7 @@ def _lay_along(table, parts, bodies, i, j, stated, margin, horizon, tube_0, tube
 
 
 @device
-def _shift(room, z, t, px, py, pz, vx, vy, vz):
+def _shift(room, z, t, p, v):
     """Put body j where sample z (12,) of the errors has it: position p + what is off at t, velocity v + what is off."""
     B, L, F, y = room.motion[1], room.joint, room.frame, room.block
     for r in range(6):
@@ -372,24 +382,38 @@ def _shift(room, z, t, px, py, pz, vx, vy, vz):
     dx = y[1, 0] * F[0, 0] + y[1, 1] * F[1, 0] + y[1, 2] * F[2, 0]
     dy = y[1, 0] * F[0, 1] + y[1, 1] * F[1, 1] + y[1, 2] * F[2, 1]
     dz = y[1, 0] * F[0, 2] + y[1, 1] * F[1, 2] + y[1, 2] * F[2, 2]
-    B.vx, B.vy, B.vz = vx + dx, vy + dy, vz + dz
-    B.x = px + y[0, 0] * F[0, 0] + y[0, 1] * F[1, 0] + y[0, 2] * F[2, 0] - t * dx
-    B.y = py + y[0, 0] * F[0, 1] + y[0, 1] * F[1, 1] + y[0, 2] * F[2, 1] - t * dy
-    B.z = pz + y[0, 0] * F[0, 2] + y[0, 1] * F[1, 2] + y[0, 2] * F[2, 2] - t * dz
+    B.vx, B.vy, B.vz = v[0] + dx, v[1] + dy, v[2] + dz
+    B.x = p[0] + y[0, 0] * F[0, 0] + y[0, 1] * F[1, 0] + y[0, 2] * F[2, 0] - t * dx
+    B.y = p[1] + y[0, 0] * F[0, 1] + y[0, 1] * F[1, 1] + y[0, 2] * F[2, 1] - t * dy
+    B.z = p[2] + y[0, 0] * F[0, 2] + y[0, 1] * F[1, 2] + y[0, 2] * F[2, 2] - t * dz
+
+
+class Sampling(NamedTuple):
+    """How pairs are judged."""
+
+    query: Any  # ImpactQuery
+    horizon: float  # s
+    stale_acceleration: float  # m/s^2
+    stated: bool  # the pairs meet as they are stated to move
+    sigmas: float  # standard deviations within which a pair that is not stated to meet has to come near
+    safe_sigmas: float  # standard deviations by which larger bodies meet before hardly any impact
+    min_probability: float
+    confidence: float
+    planar: bool
+    points: Any  # (S, 12): normal_samples
+    weights: Any  # (S,)
 
 
 @allocating_kernel
-def impact_probabilities(
-    table, parts, bodies, spread, pairs, stated, now, horizon, margin, stale_acceleration, tolerance, budget,
-    confidence, sigmas, safe_sigmas, least_probability, planar, points, weights, room, answers,
-):  # fmt: skip
+def impact_probabilities(multibody, spread, pairs, now, sampling, room, answers):
     """Times and probabilities of impact of pairs (P, 2) of body slots from `now` on into answers (P, 4).
 
-    stated: the pairs meet as they are stated to move; else those that do not within `sigmas` standard deviations, or
-    with much less than the least probability, are left out. Hardly any impact comes before bodies meet that are larger
-    by `safe_sigmas` standard deviations.
-    NaN: left out, or neither body has declared any uncertainty. points (S, 12), weights (S,): normal_samples.
+    Left out are pairs that are not stated to meet and do not within `sigmas` standard deviations, or with much less
+    than the least probability. NaN: left out, or neither body has declared any uncertainty.
     """
+    bodies = multibody.bodies
+    query, horizon, stated = sampling.query, sampling.horizon, sampling.stated
+    points, weights, stale_acceleration = sampling.points, sampling.weights, sampling.stale_acceleration
     times = np.empty(weights.size)
     A, B = room.motion[0], room.motion[1]
     for k in range(pairs.shape[0]):
@@ -402,64 +426,64 @@ def impact_probabilities(
         r_i, r_j = bodies.spin_radius[i], bodies.spin_radius[j]
         now_i, growth_i = surface_spread(spread, i, r_i, age_i, horizon, stale_acceleration)
         now_j, growth_j = surface_spread(spread, j, r_j, age_j, horizon, stale_acceleration)
-        tube_0, tube_1 = now_i + now_j, growth_i + growth_j
-        coarse = max(tolerance, SAMPLE_TOLERANCE * tube_0)
+        tube = Tube(now_i + now_j, growth_i + growth_j)
+        coarse = max(query.tolerance, SAMPLE_TOLERANCE * tube.start)
+        roughly, whole = ImpactQuery(query.margin, coarse, query.iterations), Window(0.0, horizon)
         if not stated:
-            wide_0, wide_1 = sigmas * tube_0, sigmas * tube_1
-            near = _first_contact(
-                table, parts, bodies, i, j, 0.0, horizon, margin, wide_0, wide_1, coarse, budget, room
-            )
-            if near == inf:
+            wide = Tube(sampling.sigmas * tube.start, sampling.sigmas * tube.growth)
+            if _first_contact(multibody, i, j, whole, wide, roughly, room) == inf:
                 continue
-        wide_0, wide_1 = safe_sigmas * tube_0, safe_sigmas * tube_1
-        safe = _first_contact(table, parts, bodies, i, j, 0.0, horizon, margin, wide_0, wide_1, coarse, budget, room)
-        t = _lay_along(table, parts, bodies, i, j, stated, margin, horizon, tube_0, tube_1, room)
+        wide = Tube(sampling.safe_sigmas * tube.start, sampling.safe_sigmas * tube.growth)
+        safe = _first_contact(multibody, i, j, whole, wide, roughly, room)
+        t = _lay_along(multibody, i, j, tube, sampling, room)
         room.joint[:] = 0.0
         if not bodies.static[i]:
-            _add_covariance(spread, i, age_i, t, stale_acceleration, planar, room)
+            _add_covariance(spread, i, age_i, t, stale_acceleration, sampling.planar, room)
         if not bodies.static[j]:
-            _add_covariance(spread, j, age_j, t, stale_acceleration, planar, room)
+            _add_covariance(spread, j, age_j, t, stale_acceleration, sampling.planar, room)
         _take_root(room.joint)
         turn_i, turn_j = _orientation_spread(spread, i, r_i, age_i, t), _orientation_spread(spread, j, r_j, age_j, t)
         for r in range(3):
             for c in range(3):
                 room.rotation[0, r, c] = A.rotation[r, c]
                 room.rotation[1, r, c] = B.rotation[r, c]
-        level = 0.0 if planar else 1.0
-        coarse = max(tolerance, SAMPLE_TOLERANCE * room.joint[0, 0])
+        level = 0.0 if sampling.planar else 1.0
+        coarse = max(query.tolerance, SAMPLE_TOLERANCE * room.joint[0, 0])
+        roughly = ImpactQuery(query.margin, coarse, query.iterations)
         begin = safe if safe < inf else 0.0
         bias = 0.0 if r_i == 0.0 and r_j == 0.0 else -0.75 * coarse
-        px, py, pz = B.x, B.y, B.z
-        vx, vy, vz = B.vx, B.vy, B.vz
+        p, v = (B.x, B.y, B.z), (B.vx, B.vy, B.vz)
         w_i, w_j = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
-        straight = _is_straight(parts, bodies, i, j, A, B) and turn_i[0] + turn_i[1] + turn_j[0] + turn_j[1] == 0.0
+        straight = (
+            _is_straight(multibody.parts, bodies, i, j, A, B)
+            and turn_i[0] + turn_i[1] + turn_j[0] + turn_j[1] == 0.0
+        )
         room.axes[:, 3] = inf  # none is known
         stride = max(1, weights.size // PILOT)
         seen = 0.0
         likely = True
         for first in range(stride):
-            likely = stated or first == 0 or seen * stride >= PILOT_PART * least_probability * first
+            likely = stated or first == 0 or seen * stride >= PILOT_PART * sampling.min_probability * first
             if not likely:
                 break
             for n in range(first, weights.size, stride):
                 z = points[n]
-                _shift(room, z, t, px, py, pz, vx, vy, vz)
+                _shift(room, z, t, p, v)
                 if turn_i[0] + turn_i[1] > 0.0:
-                    _turn(A, room.rotation[0], w_i, turn_i, level * z[6], level * z[7], z[8])
+                    _turn(A, room.rotation[0], w_i, turn_i, (level * z[6], level * z[7], z[8]))
                 if turn_j[0] + turn_j[1] > 0.0:
-                    _turn(B, room.rotation[1], w_j, turn_j, level * z[9], level * z[10], z[11])
+                    _turn(B, room.rotation[1], w_j, turn_j, (level * z[9], level * z[10], z[11]))
                 parted = 0.0
                 if straight:
-                    parted = parted_until(room.axes, A, B, horizon, margin + bias + 0.5 * coarse)
+                    parted = parted_until(room.axes, A, B, horizon, query.margin + bias + 0.5 * coarse)
                     if parted == inf:
                         times[n] = inf
                         continue
-                times[n] = _first_contact(
-                    table, parts, bodies, i, j, max(begin, parted), horizon, margin, bias, 0.0, coarse, budget, room
-                )
+                window = Window(max(begin, parted), horizon)
+                times[n] = _first_contact(multibody, i, j, window, Tube(bias, 0.0), roughly, room)
                 if straight:
-                    a, b = bodies.first_shape[i], bodies.first_shape[j]
-                    remember(table, parts, A, B, a, b, times[n] == inf, n, room.scratch, room.axes)
+                    pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
+                    remember(multibody, pair, times[n] == inf, n, room.scratch, room.axes)
                 seen += weights[n] if times[n] < inf else 0.0
         if likely:
-            _summarise(times, weights, np.argsort(times), confidence, safe, answers[k])
+            _summarise(times, weights, np.argsort(times), sampling.confidence, safe, answers[k])

@@ -18,8 +18,8 @@ from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.pose import Motion, Pose, rotation_matrix
 from collision_monitor.geometry.shapes import Box, HalfSpace, Shape, Sphere
-from collision_monitor.prediction.body_impact import contact_at, make_scratch
-from collision_monitor.prediction.motion import make_bodies
+from collision_monitor.prediction.bodies import Multibody, make_bodies
+from collision_monitor.prediction.body_impact import ShapePair, contact_at, make_scratch
 from collision_monitor.prediction.sphere_interval import sphere_interval
 from collision_monitor.query.moving_pair import Body, Query, Scene, first_impacts, make_body, make_scene
 from collision_monitor.query.time_of_impact import BUDGET
@@ -114,7 +114,7 @@ def bisection(
     """Step by step until they overlap, then back up, halving the step. What comes and goes within a step is missed."""
     scene, pairs = lay_out(*_bodies(shape_a, shape_b), a, b, horizon)
     times = np.empty(len(a))
-    _bisect(scene.table, scene.parts, scene.bodies, pairs, horizon, step, halvings, times, make_scratch())
+    _bisect(Multibody(*scene), pairs, horizon, step, halvings, times, make_scratch())
     return times
 
 
@@ -137,36 +137,25 @@ METHODS: Final[dict[str, Method]] = {
 def _swept_bounds(motion: Any, pairs: Any, horizon: float, times: Any) -> None:
     for k in range(len(pairs)):
         A, B = motion[pairs[k, 0]], motion[pairs[k, 1]]
-        times[k], _ = sphere_interval(
-            B.x - A.x, B.y - A.y, B.z - A.z, B.vx - A.vx, B.vy - A.vy, B.vz - A.vz,
-            A.radius + B.radius, 0.0, horizon, 1.0,
-        )  # fmt: skip
+        p, v = (B.x - A.x, B.y - A.y, B.z - A.z), (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
+        times[k], _ = sphere_interval(p, v, A.radius + B.radius, 0.0, horizon, 1.0)
 
 
 @kernel
-def _bisect(
-    table: Any,
-    parts: Any,
-    bodies: Any,
-    pairs: Any,
-    horizon: float,
-    step: float,
-    halvings: int,
-    times: Any,
-    scratch: Any,
-) -> None:
+def _bisect(multibody: Any, pairs: Any, horizon: float, step: float, halvings: int, times: Any, scratch: Any) -> None:
+    bodies = multibody.bodies
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
-        A, B, a, b = bodies.motion[i], bodies.motion[j], bodies.first_shape[i], bodies.first_shape[j]
+        pair = ShapePair(bodies.motion[i], bodies.motion[j], bodies.first_shape[i], bodies.first_shape[j])
         times[k] = math.inf
         count = math.ceil(horizon / step)
         for n in range(count + 1):
             late = min(n * step, horizon)
-            if contact_at(table, parts, A, B, a, b, late, scratch) <= 0.0:
+            if contact_at(multibody, pair, late, scratch) <= 0.0:
                 early = max((n - 1) * step, 0.0)
                 for _ in range(halvings if n > 0 else 0):
                     middle = 0.5 * (early + late)
-                    if contact_at(table, parts, A, B, a, b, middle, scratch) <= 0.0:
+                    if contact_at(multibody, pair, middle, scratch) <= 0.0:
                         late = middle
                     else:
                         early = middle

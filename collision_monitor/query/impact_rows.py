@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, kernel
-from collision_monitor.prediction.body_impact import body_impact
+from collision_monitor.prediction.body_impact import Window, body_impact
 from collision_monitor.prediction.impact_record import CLEAR, HIT
 from collision_monitor.prediction.motion import quaternion_to_matrix
 from collision_monitor.tolerances import EPSILON, LARGEST_INPUT, UNIT_QUATERNION
@@ -41,16 +41,27 @@ def _set_motion(motion, state, k):
     motion.wx, motion.wy, motion.wz = state[k, 10], state[k, 11], state[k, 12]
 
 
-@kernel
-def impacts_of_rows(
-    table, parts, bodies, state_a, state_b, rows, horizon, separation, deep, tolerance, budget, scratch, event,
-    lower, upper, left,
-):  # fmt: skip
-    """First impacts of the two bodies moving as in `rows` of the states (N, 13); the rest of lower, upper (N,) stays.
+class FirstImpacts(NamedTuple):
+    """Where the kernel writes; `left` marks rows that touch at the start and stay open."""
 
-    What overlaps by more than touching (within `deep`, m) at the start is at 0; left (N,) bool: touches there and is
-    left open.
+    event: Any  # (1,) IMPACT: scratch
+    lower: Any  # (N,) s
+    upper: Any  # (N,) s
+    left: Any  # (N,) bool
+
+
+@kernel
+def impacts_of_rows(multibody, states, rows, horizon, queries, scratch, found):
+    """First impacts of the two bodies moving as in `rows` of their states (2, N, 13), into found.
+
+    queries: the ImpactQuery, and the one for what overlaps at the start by more than touching, which is an impact at 0.
+    found: FirstImpacts; other rows stay.
     """
+    bodies = multibody.bodies
+    state_a, state_b = states
+    query, deep = queries
+    event, lower, upper, left = found
+    window = Window(0.0, horizon)
     q_a, q_b = state_a[:, 3:7], state_b[:, 3:7]
     for r in range(len(rows)):
         k = rows[r]
@@ -58,7 +69,7 @@ def impacts_of_rows(
         _set_motion(bodies.motion[1], state_b, k)
         quaternion_to_matrix(q_a, k, bodies.motion[0].rotation)
         quaternion_to_matrix(q_b, k, bodies.motion[1].rotation)
-        body_impact(table, parts, bodies, 0, 1, 0.0, horizon, separation, tolerance, budget, scratch, event[0])
+        body_impact(multibody, 0, 1, window, query, scratch, event[0])
         lower[k] = upper[k] = inf
         left[k] = False
         if event[0].status == CLEAR:
@@ -67,7 +78,7 @@ def impacts_of_rows(
         if event[0].status == HIT and event[0].upper <= horizon:
             upper[k] = event[0].upper
         if lower[k] <= 0.0:
-            body_impact(table, parts, bodies, 0, 1, 0.0, horizon, deep, tolerance, budget, scratch, event[0])
+            body_impact(multibody, 0, 1, window, deep, scratch, event[0])
             if event[0].status == HIT and event[0].upper <= 0.0:
                 upper[k] = 0.0
             else:

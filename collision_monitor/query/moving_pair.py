@@ -15,10 +15,10 @@ from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shape_table import CIRCLE, SPHERE, ShapeTable, ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Shape
 from collision_monitor.objects.models import Pieces, containing_model
-from collision_monitor.prediction.body_impact import make_scratch
+from collision_monitor.prediction.bodies import Bodies, Multibody, Parts, make_bodies, make_parts
+from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.impact_record import IMPACT
-from collision_monitor.prediction.motion import Bodies, Parts, make_bodies, make_parts
-from collision_monitor.prediction.pairs import predict_pairs
+from collision_monitor.prediction.pair_impacts import predict_pairs
 from collision_monitor.query.contact import Compound
 
 
@@ -109,5 +109,6 @@ def first_impacts(
     """
     events = np.zeros(len(pairs) + 1, IMPACT)
     wanted = query.separation if separation is None else separation
-    found, _ = predict_pairs(*scene, pairs, begin, wanted, query.tolerance, query.budget, events, make_scratch())
+    search = ImpactQuery(wanted, query.tolerance, query.budget)
+    found, _ = predict_pairs(Multibody(*scene), pairs, begin, search, events, make_scratch())
     return events[:found]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.codec import Descriptions, Removal
 from collision_monitor.geometry.pose import Pose, rotation_matrix
-from collision_monitor.monitor.monitor import StepResult
+from collision_monitor.monitor.result import StepResult
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import Phase
 from collision_monitor.ros.marker_bytes import Color, Kind, Marker, encode

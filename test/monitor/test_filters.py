@@ -13,7 +13,8 @@ from collision_monitor.accuracy.plain import PlainMonitor, disagreements
 from collision_monitor.errors import ProfileError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, HalfSpace, Sphere
-from collision_monitor.monitor.monitor import Monitor, StepResult
+from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.monitor.result import StepResult
 from collision_monitor.settings.profile import Profile
 from collision_monitor.world import make_scene
 

@@ -16,7 +16,8 @@ from collision_monitor.errors import ProfileError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull
 from collision_monitor.monitor.budget import EXAMINE, FEWEST, TREES, PairBudget, StepClock, TimeBudget
-from collision_monitor.monitor.monitor import Monitor, StepResult
+from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.monitor.result import StepResult
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.prediction import sphere_trees

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from collision_monitor.monitor.active_pairs import PAIR
 from collision_monitor.monitor.event_list import count_until
 from collision_monitor.monitor.time_critical import urgency
+from collision_monitor.prediction.bodies import make_bodies
 from collision_monitor.prediction.impact_record import IMPACT
-from collision_monitor.prediction.motion import make_bodies
 
 BODIES = 12
 

@@ -10,10 +10,10 @@ from collision_monitor.geometry.pose import from_rotation_vector, multiply, rota
 from collision_monitor.geometry.shape_table import ShapeTableBuilder
 from collision_monitor.geometry.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, HalfSpace, Shape, Sphere
 from collision_monitor.narrow_phase.dispatch import contact_batch
-from collision_monitor.prediction.body_impact import make_scratch
+from collision_monitor.prediction.bodies import Multibody, make_bodies, make_parts
+from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.impact_record import HIT, IMPACT, UNRESOLVED
-from collision_monitor.prediction.motion import make_bodies, make_parts
-from collision_monitor.prediction.pairs import predict_pairs
+from collision_monitor.prediction.pair_impacts import predict_pairs
 from collision_monitor.records import ShapeType
 
 TOLERANCE = 1e-6
@@ -59,7 +59,12 @@ class PairScene:
         m["rotation"] = rotation_matrix(self.quaternion)
         events = np.zeros(len(self.pairs) + 1, IMPACT)
         hits, _ = predict_pairs(
-            self.table, self.parts, self.bodies, self.pairs, 0.0, 0.0, tolerance, budget, events, make_scratch()
+            Multibody(self.table, self.parts, self.bodies),
+            self.pairs,
+            0.0,
+            ImpactQuery(0.0, tolerance, budget),
+            events,
+            make_scratch(),
         )
         return events[:hits]
 

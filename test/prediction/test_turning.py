@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from collision_monitor._jit import kernel
-from collision_monitor.prediction.motion import make_bodies
+from collision_monitor.prediction.bodies import make_bodies
 from collision_monitor.prediction.turning import BLOCK, COLUMNS, turned_away
 
 KERNEL = kernel(turned_away.py_func)

@@ -1,0 +1,87 @@
+"""Stage 4, first impacts: when each candidate pair meets first, on all threads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.step_context import StepContext
+from collision_monitor.prediction.body_impact import Scratch, make_scratch
+from collision_monitor.prediction.impact_record import IMPACT
+from collision_monitor.prediction.pair_impacts import bound_pairs, predict_pairs, refine
+from collision_monitor.records import joined
+
+FEWEST_PAIRS_FOR_THREADS: Final = 500
+"""Handing work to a thread costs as much as predicting some 100 pairs."""
+
+Events = NDArray[np.void]
+Pairs = NDArray[Any]
+
+
+class FirstImpacts(Stage):
+    """Predicts pairs; keeps nothing but its threads, and the scratch memory of each."""
+
+    CACHES = ("_scratch", "pool")
+
+    def __init__(self, threads: int) -> None:
+        self._scratch: list[Scratch] = []
+        self.pool: ThreadPoolExecutor | None = None
+        self.use_threads(threads)
+
+    def use_threads(self, threads: int) -> None:
+        """Work on so many threads from now on."""
+        if self.pool is not None:
+            self.pool.shutdown()
+        self._scratch = [make_scratch() for _ in range(threads)]
+        self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
+
+    @property
+    def scratch(self) -> Scratch:
+        """Scratch memory of the step's own thread."""
+        return self._scratch[0]
+
+    def predict(self, step: StepContext, pairs: Pairs) -> Events:
+        """First impacts (IMPACT) of pairs (P, 2) of body slots in their order; pairs without one are left out."""
+        if self.pool is None or len(pairs) < FEWEST_PAIRS_FOR_THREADS:
+            return self._find(predict_pairs, step, pairs)
+
+        def part(pairs: Pairs, scratch: Scratch) -> tuple[Events, int]:
+            return _impacts(predict_pairs, step, pairs, scratch)
+
+        # the kernels hold no lock; the parts are put together in order, so the answer is the same for any number
+        parts = list(self.pool.map(part, np.array_split(pairs, len(self._scratch)), self._scratch))
+        step.work.impact_queries += sum(queries for _, queries in parts)
+        return joined([events for events, _ in parts])
+
+    def bound(self, step: StepContext, pairs: Pairs) -> Events:
+        """As `predict`, but by the bounding spheres alone where that is faster."""
+        return self._find(bound_pairs, step, pairs)
+
+    def refine(self, step: StepContext, bounds: Events) -> Events:
+        """First impacts from now on of the pairs of events (IMPACT) of which only a bound is known."""
+        return self._find(refine, step, bounds)
+
+    def _find(self, kernel: Callable[..., tuple[int, int]], step: StepContext, pairs: Pairs) -> Events:
+        events, queries = _impacts(kernel, step, pairs, self.scratch)
+        step.work.impact_queries += queries
+        return events
+
+    def save(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage: there is nothing to save."""
+
+    def restore(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage: there is nothing to restore."""
+
+
+def _impacts(
+    kernel: Callable[..., tuple[int, int]], step: StepContext, pairs: Pairs, scratch: Scratch
+) -> tuple[Events, int]:
+    """Impacts (IMPACT) that a kernel finds for pairs, in their order, and the distance queries that it made."""
+    events = np.empty(len(pairs) + 1, IMPACT)
+    n, queries = kernel(step.roster.multibody, pairs, step.now, step.impact, events, scratch)
+    return events[:n], queries

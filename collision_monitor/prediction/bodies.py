@@ -1,0 +1,136 @@
+"""The bodies of a scene and their shapes as the kernels read them: structure of arrays."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from collision_monitor._jit import inlined
+from collision_monitor.prediction.motion import MOTION
+
+
+class Bodies(NamedTuple):
+    """N slots of bodies, structure of arrays but for the motions. World frame."""
+
+    used: Any  # (N,) bool: the slot holds a body
+    id: Any  # (N,) uint32
+    version: Any  # (N,) uint32: counts up whenever the motion changes
+    static: Any  # (N,) bool
+    seen: Any  # (N,) bool: there is a state (always for static bodies)
+    group: Any  # (N,) uint32
+    mask: Any  # (N,) uint32
+    first_shape: Any  # (N,) int32: slot in the shape table; further shapes follow by Parts.next
+    spin_radius: Any  # (N,) float64: the farthest point that turning moves (m)
+    model: Any  # (N,) uint8: records.Model that stands for it
+    excess: Any  # (N,) float64: how far the model lies outside of the object at most (m)
+    concave: Any  # (N,) bool: a concave object has a convex model, which may overlap where the object is not
+    slack: Any  # (N,) float64: how far beyond the horizon it is predicted (s)
+    motion: Any  # (N,) MOTION
+    ref_quaternion: Any  # (N, 4): the reference motion's orientation at its time
+    # the last state
+    time: Any  # (N,) float64
+    position: Any  # (N, 3)
+    quaternion: Any  # (N, 4)
+    linear: Any  # (N, 3)
+    angular: Any  # (N, 3)
+    acceleration: Any  # (N, 3): where it is measured, else 0
+
+
+class Parts(NamedTuple):
+    """How the shapes in the table make up bodies; K slots like the table."""
+
+    next: Any  # (K,) int32: the body's next shape, -1 after the last
+    index: Any  # (K,) uint32: its place in the body's description
+    placed: Any  # (K,) bool: it has a pose of its own in the body's frame
+
+
+class Multibody(NamedTuple):
+    """All bodies with their shapes: the argument that nearly every kernel takes first."""
+
+    table: Any  # geometry.shape_table.ShapeTable
+    parts: Parts
+    bodies: Bodies
+
+
+def make_bodies(capacity: int) -> Bodies:
+    """Empty slots."""
+    n = capacity
+    motion = np.zeros(n, MOTION)
+    motion["covered"] = -np.inf
+    return Bodies(
+        used=np.zeros(n, np.bool_),
+        id=np.zeros(n, np.uint32),
+        version=np.zeros(n, np.uint32),
+        static=np.zeros(n, np.bool_),
+        seen=np.zeros(n, np.bool_),
+        group=np.zeros(n, np.uint32),
+        mask=np.zeros(n, np.uint32),
+        first_shape=np.full(n, -1, np.int32),
+        spin_radius=np.zeros(n),
+        model=np.zeros(n, np.uint8),
+        excess=np.zeros(n),
+        concave=np.zeros(n, np.bool_),
+        slack=np.zeros(n),
+        motion=motion,
+        ref_quaternion=np.zeros((n, 4)),
+        time=np.zeros(n),
+        position=np.zeros((n, 3)),
+        quaternion=np.zeros((n, 4)),
+        linear=np.zeros((n, 3)),
+        angular=np.zeros((n, 3)),
+        acceleration=np.zeros((n, 3)),
+    )
+
+
+def make_parts(capacity: int) -> Parts:
+    """No shapes."""
+    return Parts(np.full(capacity, -1, np.int32), np.zeros(capacity, np.uint32), np.zeros(capacity, np.bool_))
+
+
+def enlarge(source: NamedTuple, target: NamedTuple) -> None:
+    """Copy the arrays of `source` to the front of those of `target`."""
+    for old, new in zip(source, target, strict=True):
+        new[: len(old)] = old
+
+
+@inlined
+def place_shape(table, parts, s, R_body, R_shape):
+    """Rotation of shape s of a body turned by R_body into R_shape; returns its offset from the body in the world."""
+    if not parts.placed[s]:
+        for r in range(3):
+            for c in range(3):
+                R_shape[r, c] = R_body[r, c]
+        return 0.0, 0.0, 0.0
+    x, y, z = table.local_position[s, 0], table.local_position[s, 1], table.local_position[s, 2]
+    for r in range(3):
+        for c in range(3):
+            R_shape[r, c] = (
+                R_body[r, 0] * table.local_rotation[s, 0, c]
+                + R_body[r, 1] * table.local_rotation[s, 1, c]
+                + R_body[r, 2] * table.local_rotation[s, 2, c]
+            )
+    return (
+        R_body[0, 0] * x + R_body[0, 1] * y + R_body[0, 2] * z,
+        R_body[1, 0] * x + R_body[1, 1] * y + R_body[1, 2] * z,
+        R_body[2, 0] * x + R_body[2, 1] * y + R_body[2, 2] * z,
+    )
+
+
+@inlined
+def next_pair(parts, first_b, a, b):
+    """The pair of shapes after (a, b) of two bodies, in the order of both chains; a is -1 after the last pair.
+
+    first_b: first shape of the second body. A loop over all pairs of shapes:
+
+        a, first_b = bodies.first_shape[i], bodies.first_shape[j]
+        b = first_b
+        while a >= 0:
+            if b == first_b: ...what depends on a alone
+            ...
+            a, b = next_pair(parts, first_b, a, b)
+    """
+    b = parts.next[b]
+    if b < 0:
+        a, b = parts.next[a], first_b
+    return a, b

@@ -1,0 +1,27 @@
+"""How shapes make up a body: the chain of its parts, its bounding sphere, and whether turning moves it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from collision_monitor.geometry.shape_table import CIRCLE, SPHERE
+from collision_monitor.prediction.bodies import Multibody
+
+
+def lay_out_body(multibody: Multibody, i: int, slots: Sequence[int], shape_of: Sequence[int]) -> None:
+    """Make the shapes in the table's `slots` those of body i. shape_of: the place of each in the description."""
+    table, parts, bodies = multibody
+    chain = np.asarray(slots)
+    bodies.first_shape[i] = slots[0]
+    parts.index[chain] = shape_of
+    parts.next[chain[:-1]] = chain[1:]
+    parts.next[chain[-1]] = -1
+    position = table.local_position[chain]
+    is_turned = (table.local_rotation[chain] != np.eye(3)).any(axis=(1, 2))
+    parts.placed[chain] = is_turned | position.any(axis=1)
+    radius = float((np.linalg.norm(position, axis=1) + table.radius[chain]).max())
+    bodies.motion["radius"][i] = radius
+    is_round = len(slots) == 1 and table.kind[slots[0]] in (SPHERE, CIRCLE) and not position.any()
+    bodies.spin_radius[i] = 0.0 if is_round else radius  # only one ball about the origin is never moved by turning

@@ -1,0 +1,110 @@
+"""First impacts of many pairs of bodies: sought exactly, or bounded by their bounding spheres."""
+
+from __future__ import annotations
+
+from math import inf, isfinite
+
+from collision_monitor._jit import inlined, kernel
+from collision_monitor.prediction.body_impact import Window, body_impact, tube_of
+from collision_monitor.prediction.impact_record import BOUND_ONLY, CLEAR, UNRESOLVED, write_pair
+from collision_monitor.prediction.motion import half_acceleration
+from collision_monitor.prediction.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
+
+
+@inlined
+def window_of(bodies, i, j, now):
+    """The times for which the pair has to be predicted now: until both cover times, from where it was predicted to.
+
+    Empty (begin >= end) where nothing is left of them.
+    """
+    begin = max(now, min(bodies.motion[i].covered, bodies.motion[j].covered))
+    return Window(begin, cover_of(bodies, i, j))
+
+
+@inlined
+def cover_of(bodies, i, j):
+    """Time until which both bodies are predicted (s)."""
+    return min(bodies.motion[i].cover, bodies.motion[j].cover)
+
+
+@kernel
+def predict_pairs(multibody, pairs, now, query, events, scratch):
+    """First impacts of pairs (P, 2) until both bodies' cover times, into events (IMPACT).
+
+    The search begins at `now`, or at the time until which the pair was predicted before.
+    Returns (how many impacts, distance queries made).
+    """
+    n = queries = 0
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        window = window_of(multibody.bodies, i, j, now)
+        if window.begin > now and window.begin >= window.end:
+            continue
+        queries += body_impact(multibody, i, j, window, query, scratch, events[n])
+        if events[n].status != CLEAR:
+            n += 1
+    return n, queries
+
+
+@inlined
+def is_cheap(bodies, i, j):
+    """Is the pair settled as fast as its bound? Two spheres, or one with a half-space, which has no bounding sphere."""
+    spheres = bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0
+    return spheres or not (isfinite(bodies.motion[i].radius) and isfinite(bodies.motion[j].radius))
+
+
+@inlined
+def bound_impact(bodies, i, j, window, margin, event):
+    """From when on the pair's bounding spheres meet in the window, into the IMPACT record `event`, UNRESOLVED.
+
+    event.status = CLEAR where they do not, and the bodies cannot.
+    """
+    begin, end = window
+    if bodies.id[i] > bodies.id[j]:
+        i, j = j, i
+    A, B = bodies.motion[i], bodies.motion[j]
+    event.status = CLEAR
+    tube = tube_of(A, B, begin)
+    approach = approach_at(A, B, begin)
+    bent = half_acceleration(A, B) * (end - begin)
+    reach = A.radius + B.radius + margin + tube.start
+    first, last = sphere_interval(approach.p, approach.v, reach, tube.growth + bent, end - begin, 1.0)
+    if first > last:
+        return
+    write_pair(bodies, i, j, event)
+    event.shape_i, event.shape_j = bodies.first_shape[i], bodies.first_shape[j]
+    event.lower, event.upper = begin + first, inf
+    event.status, event.method = UNRESOLVED, BOUND_ONLY
+    meeting_of_spheres(A, B, approach, begin, first, event)
+
+
+@kernel
+def bound_pairs(multibody, pairs, now, query, events, scratch):
+    """As `predict_pairs`, but of all pairs that are not cheap only the bound."""
+    bodies = multibody.bodies
+    n = queries = 0
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        window = window_of(bodies, i, j, now)
+        if window.begin > now and window.begin >= window.end:
+            continue
+        if is_cheap(bodies, i, j):
+            queries += body_impact(multibody, i, j, window, query, scratch, events[n])
+        else:
+            bound_impact(bodies, i, j, window, query.margin, events[n])
+        if events[n].status != CLEAR:
+            n += 1
+    return n, queries
+
+
+@kernel
+def refine(multibody, bounds, now, query, events, scratch):
+    """First impacts from `now` on of the pairs of `bounds` (IMPACT), into events; as `predict_pairs`."""
+    n = queries = 0
+    for k in range(bounds.size):
+        i, j = bounds[k].i, bounds[k].j
+        window = Window(now, cover_of(multibody.bodies, i, j))
+        queries += body_impact(multibody, i, j, window, query, scratch, events[n])
+        if events[n].status != CLEAR:
+            n += 1
+    return n, queries
