@@ -69,8 +69,8 @@ def rotation(objects: int) -> Item:
     """Spheres are followed and predicted as bodies that look different turned."""
     scene = make_scene("particles", objects=objects)
     item = Item(_monitor(scene.descriptions), _monitor(scene.descriptions), _played(scene))
-    bodies = item.on._bodies
-    bodies.spin_radius[: item.on._top] = bodies.motion["radius"][: item.on._top]
+    bodies = item.on._roster.bodies
+    bodies.spin_radius[: item.on._roster.top] = bodies.motion["radius"][: item.on._roster.top]
     return item
 
 
@@ -143,7 +143,7 @@ def region(objects: int) -> Item:
     high = 0.5 * float(scene.size)  # type: ignore[attr-defined]
     inside = Profile(region_min=(-9.0, -9.0, -9.0), region_max=(high, high, high))
     off, on = _monitor(scene.descriptions, inside), _monitor(scene.descriptions)
-    radius = off._bodies.motion["radius"][:objects]
+    radius = off._roster.bodies.motion["radius"][:objects]
 
     def both_inside(rows: Rows, states: States) -> NDArray[np.bool_]:
         nearest = np.clip(states["position"], -9.0, high)

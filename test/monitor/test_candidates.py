@@ -6,8 +6,10 @@ from typing import Any
 
 import pytest
 
-from collision_monitor.monitor import monitor as core
+from collision_monitor.monitor import candidates
+from collision_monitor.monitor.candidates import Candidates
 from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.settings.profile import Profile
 from collision_monitor.world import make_scene
 
@@ -15,19 +17,19 @@ from collision_monitor.world import make_scene
 @pytest.mark.parametrize("scene", ["clutter", "fleet"])
 def test_one_sweep_finds_the_pairs_that_looking_up_finds(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
     both: list[tuple[int, int]] = []
-    find = Monitor._partners
+    find = Candidates._partners
 
-    def compare(self: Monitor, which: Any, now: float) -> Any:
-        monkeypatch.setattr(core, "MOST_QUERIES", 2.0)
-        looked_up = {tuple(sorted(pair)) for pair in find(self, which, now).tolist()}
-        monkeypatch.setattr(core, "MOST_QUERIES", -1.0)
-        swept = find(self, which, now)
+    def compare(self: Candidates, step: StepContext, which: Any) -> Any:
+        monkeypatch.setattr(candidates, "MOST_QUERIES", 2.0)
+        looked_up = {tuple(sorted(pair)) for pair in find(self, step, which).tolist()}
+        monkeypatch.setattr(candidates, "MOST_QUERIES", -1.0)
+        swept = find(self, step, which)
         assert {tuple(sorted(pair)) for pair in swept.tolist()} == looked_up
         assert len(swept) == len(looked_up)
         both.append((len(which), len(swept)))
         return swept
 
-    monkeypatch.setattr(Monitor, "_partners", compare)
+    monkeypatch.setattr(Candidates, "_partners", compare)
     played = make_scene(scene)
     monitor = Monitor(Profile(horizon=1.0))
     for description in played.descriptions:

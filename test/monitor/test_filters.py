@@ -85,7 +85,7 @@ def test_region_of_interest() -> None:
     table = Monitor()
     for description in scene.descriptions:
         table.describe(description)
-    radius = table._bodies.motion["radius"][:60]
+    radius = table._roster.bodies.motion["radius"][:60]
     region = Profile(region_min=LOW, region_max=HIGH)
     answers = zip(play(PlainMonitor, Profile()), play(PlainMonitor, region), play(Monitor, region), strict=True)
     before: set[tuple[int, int]] = set()

@@ -176,13 +176,13 @@ def test_contacts_are_those_of_looking_at_every_pair() -> None:
     swarm = Swarm(48, seed=5)
     monitor = Monitor("fast")
     swarm.describe(monitor)
-    table = monitor._shapes.table
+    table, parts, bodies = monitor._roster.multibody
     owner = {}
     for i in range(swarm.n):
-        slot = int(monitor._bodies.first_shape[i])
+        slot = int(bodies.first_shape[i])
         while slot >= 0:
             owner[slot] = i
-            slot = int(monitor._parts.next[slot])
+            slot = int(parts.next[slot])
     slots = sorted(owner)
     pairs = np.array([p for p in itertools.combinations(slots, 2) if owner[p[0]] != owner[p[1]]], np.int32)
     found = 0
@@ -366,7 +366,7 @@ class TestRefusals:
             monitor.add(4, HalfSpace((0, 0, 1)))
         with pytest.raises(UnsupportedError, match="scene in the plane"):
             monitor.add(4, Circle(1))
-        assert monitor.ids == [1, 2, 3] and len(monitor._shapes) == 3
+        assert monitor.ids == [1, 2, 3] and len(monitor._roster._shapes) == 3
         assert touching(monitor.step(SECOND // 10, [1, 2], still(0, 0.9))) == {(1, 2)}
 
 
@@ -453,14 +453,14 @@ def test_objects_come_and_go_without_a_trace() -> None:
             fresh.describe(described := monitor_description(monitor, object_id))
             assert described.object_id == object_id
         assert touching(result) == touching(fresh.step(0, ids, poses))
-    assert monitor._top <= 40 and len(monitor._shapes) == len(monitor.ids)
+    assert monitor._roster.top <= 40 and len(monitor._roster._shapes) == len(monitor.ids)
 
 
 def monitor_description(monitor: Monitor, object_id: int):  # type: ignore[no-untyped-def]
     from collision_monitor.objects.description import ObjectDescription
 
-    slot = int(monitor._bodies.first_shape[monitor._slot(object_id)])
-    table = monitor._shapes.table
+    table, _, bodies = monitor._roster.multibody
+    slot = int(bodies.first_shape[monitor._roster.slot(object_id)])
     if table.kind[slot] == records.ShapeType.SPHERE:
         return ObjectDescription(object_id, Sphere(float(table.size[slot, 0])))
     return ObjectDescription(object_id, Box(2 * table.size[slot, :3]))

@@ -26,7 +26,7 @@ from collision_monitor.geometry.shapes import (
     Shape,
     Sphere,
 )
-from collision_monitor.monitor import monitor
+from collision_monitor.monitor import first_impacts
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
@@ -97,7 +97,7 @@ FENCE = ObjectDescription(90, Circle(1.0), name="post", static=True, pose=Pose()
 
 @pytest.mark.parametrize("planar", [False, True])
 def test_from_every_moment_the_bytes_are_the_same(planar: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(monitor, "FEWEST_PAIRS_FOR_THREADS", 2)
+    monkeypatch.setattr(first_impacts, "FEWEST_PAIRS_FOR_THREADS", 2)
     make, walls = (flats, [FENCE]) if planar else (solids, [WALL, FLOOR])
     messages = list(inputs(make(np.random.default_rng(3)), walls, steps=60, seed=5))
     pipeline = Pipeline(Profile(uncertainty_samples=64))  # 1,024 would take most of the time

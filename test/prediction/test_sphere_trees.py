@@ -16,7 +16,8 @@ TURNED = Pose((0.3, -2.0, 5.0), tuple(from_rotation_vector(np.array([0.4, 1.1, -
 def tree_of(*shapes: tuple[Shape, Pose], padding: float = 0.0):
     monitor = Monitor()
     monitor.add(1, shapes, padding=padding)
-    return body_tree(monitor._shapes.table, monitor._parts.next, int(monitor._bodies.first_shape[0]))
+    table, parts, bodies = monitor._roster.multibody
+    return body_tree(table, parts.next, int(bodies.first_shape[0]))
 
 
 @pytest.mark.parametrize("padding", [0.0, 0.05])
