@@ -122,9 +122,7 @@ def _naming(a: History, b: History) -> Callable[[History, Pair], Names]:
     return names
 
 
-def _events(
-    history: History, shift: float, names: Callable[[History, Pair], Names]
-) -> tuple[list[Event], list[Event]]:
+def _events(history: History, shift: float, names: Callable[[History, Pair], Names]) -> tuple[list[Event], list[Event]]:
     """Collisions, and warnings that no collision followed, by begin."""
     collisions = [
         Event(
@@ -155,9 +153,7 @@ def _events(
 _T = TypeVar("_T")
 
 
-def _matched(
-    a: Sequence[_T], b: Sequence[_T], begin: Callable[[_T], float]
-) -> Iterable[tuple[_T | None, _T | None]]:
+def _matched(a: Sequence[_T], b: Sequence[_T], begin: Callable[[_T], float]) -> Iterable[tuple[_T | None, _T | None]]:
     """Events of one pair, by begin, side by side where they begin within WITHIN of each other."""
     i = j = 0
     while i < len(a) or j < len(b):

@@ -15,7 +15,7 @@ from collision_monitor.errors import InputError, MessageError, SessionError
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.provenance import provenance
-from collision_monitor.session.reader import Place, Recorded, RecordedSnapshot, Session
+from collision_monitor.session.reader import Recorded, RecordedSnapshot, Session, SnapshotLocation
 from collision_monitor.session.replaying.difference import Difference, compare_answers, compare_status, compare_within
 from collision_monitor.settings.profile import Profile
 
@@ -157,7 +157,7 @@ class _Replay:
 
     # -- where it begins and goes on
 
-    def find_start(self, session: Session, start: float) -> Place | None:
+    def find_start(self, session: Session, start: float) -> SnapshotLocation | None:
         """The last snapshot before it (s); None: the start of the session. Raises InputError."""
         timeline = session.timeline()
         length = (timeline.end - timeline.begin) * 1e-9
