@@ -21,7 +21,7 @@ import lz4.frame  # type: ignore[import-untyped]
 import zstandard
 from mcap.opcode import Opcode
 
-from collision_monitor.session.mcap.layout import CHUNK, FIELDS, HEAD, LARGEST_CHUNK, MAGIC, MESSAGE, OPCODES
+from collision_monitor.session.mcap.layout import CHUNK_HEAD, FIELDS, HEAD, LARGEST_CHUNK, MAGIC, MESSAGE, OPCODES
 
 _EFFORT: Final = 8
 """How many times the file's size is spent at most on places that might be chunks and are none."""
@@ -202,7 +202,7 @@ def _next_record(data: mmap.mmap, at: int) -> int:
 def _chunk_at(data: mmap.mmap, at: int) -> tuple[_RecordSpan | None, int]:
     """A chunk whose checksum is right, whatever became of its opcode and one of its lengths; or the bytes spent."""
     begin = at + HEAD.size
-    if begin + CHUNK.size > len(data):
+    if begin + CHUNK_HEAD.size > len(data):
         return None, 0
     spent = 0
     for size in (_own_length(data, Opcode.CHUNK, begin), int(HEAD.unpack_from(data, at)[1])):
@@ -230,7 +230,7 @@ def _chunk(payload: bytes, at: int) -> Iterator[RecoveredRecord | Damage]:
 
 def _is_cut_chunk(data: mmap.mmap, at: int) -> bool:
     """Whether here begins a chunk, by both of its lengths, that the end of the file cuts off."""
-    sizes = at + HEAD.size + CHUNK.size
+    sizes = at + HEAD.size + CHUNK_HEAD.size
     if sizes + 4 > len(data) or data[at] != Opcode.CHUNK:
         return False
     name = int.from_bytes(data[sizes : sizes + 4], "little")
@@ -238,7 +238,7 @@ def _is_cut_chunk(data: mmap.mmap, at: int) -> bool:
         return False
     size = int.from_bytes(data[sizes + 4 + name : sizes + 12 + name], "little")
     length = int(HEAD.unpack_from(data, at)[1])
-    return length == CHUNK.size + 12 + name + size and at + HEAD.size + length > len(data)
+    return length == CHUNK_HEAD.size + 12 + name + size and at + HEAD.size + length > len(data)
 
 
 def _cut_chunk(data: mmap.mmap, at: int) -> Iterator[RecoveredRecord | Damage]:
@@ -253,11 +253,11 @@ def _cut_chunk(data: mmap.mmap, at: int) -> Iterator[RecoveredRecord | Damage]:
 def _unpacked(payload: bytes) -> tuple[bytes, Trust]:
     """A chunk's records as far as they can be unpacked, and how far they can be believed."""
     try:
-        _, _, size, checksum = CHUNK.unpack_from(payload)
-        (name,) = struct.unpack_from("<I", payload, CHUNK.size)
+        _, _, size, checksum = CHUNK_HEAD.unpack_from(payload)
+        (name,) = struct.unpack_from("<I", payload, CHUNK_HEAD.size)
     except struct.error:
         return b"", Trust.NONE
-    begin = CHUNK.size + 4 + name + 8
+    begin = CHUNK_HEAD.size + 4 + name + 8
     if name > 8 or begin > len(payload):
         return b"", Trust.NONE
     records, whole = _decompressed(payload[begin:])

@@ -50,7 +50,7 @@ LOG_TIME: Final = MESSAGE_HEAD.fields["log_time"][1] - HEAD.size  # type: ignore
 TIMES: Final = struct.Struct("<QQ")
 """Of a chunk: first and last log time. Of an attachment: log time and time of creation. ns."""
 
-CHUNK: Final = struct.Struct("<QQQI")
+CHUNK_HEAD: Final = struct.Struct("<QQQI")
 """The two times, unpacked size, checksum; the name of the compression and the packed records follow."""
 
 SPAN: Final = struct.Struct("<QQ")
@@ -72,7 +72,7 @@ FIELDS: Final[dict[int, tuple[int, ...]]] = {
     Opcode.FOOTER: (FOOTER.size,),
     Opcode.SCHEMA: (2, -4, -4, -4),
     Opcode.CHANNEL: (4, -4, -4, -4),
-    Opcode.CHUNK: (CHUNK.size, -4, -8),
+    Opcode.CHUNK: (CHUNK_HEAD.size, -4, -8),
     Opcode.MESSAGE_INDEX: (2, -4),
     Opcode.CHUNK_INDEX: (TIMES.size + SPAN.size, -4, 8, -4, 16),
     Opcode.ATTACHMENT: (TIMES.size, -4, -4, -8, 4),

@@ -19,7 +19,7 @@ from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from collision_monitor.session.mcap.layout import (
-    CHUNK,
+    CHUNK_HEAD,
     FOOTER,
     HEAD,
     MAGIC,
@@ -194,7 +194,7 @@ class McapWriter:
         columns = zip(_NO_MESSAGES, *chunk.index, strict=True)
         channels, log_times, offsets = (np.concatenate(column) for column in columns)
         begin, end = (int(log_times[0]), int(log_times[-1])) if len(log_times) else (0, 0)
-        head = CHUNK.pack(begin, end, chunk.size, zlib.crc32(records))
+        head = CHUNK_HEAD.pack(begin, end, chunk.size, zlib.crc32(records))
         fields = b"".join((head, _text(_COMPRESSION), struct.pack("<Q", len(packed))))
         start = self._at
         self._put(HEAD.pack(Opcode.CHUNK, len(fields) + len(packed)) + fields)
