@@ -18,7 +18,8 @@ from collision_monitor.records import Phase
 from collision_monitor.session import Recorded, Recording, Session, Splitting
 from collision_monitor.session.recording.event_window import EventWindow
 from collision_monitor.session.recording.queue_entry import QueueEntry
-from collision_monitor.session.replaying.replay import Verdict, replay
+from collision_monitor.session.replaying.replay import replay
+from collision_monitor.session.replaying.replay_report import Verdict
 
 BY_TIME = Splitting(duration=0.26)
 

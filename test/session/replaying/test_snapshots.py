@@ -25,7 +25,8 @@ from collision_monitor.session.recording import recorder, recording_files
 from collision_monitor.session.recording.event_window import EventWindow
 from collision_monitor.session.recording.queue_entry import QueueEntry
 from collision_monitor.session.recording.session_file import SessionFile
-from collision_monitor.session.replaying.replay import Verdict, replay
+from collision_monitor.session.replaying.replay import replay
+from collision_monitor.session.replaying.replay_report import Verdict
 
 LENGTH = 0.54
 """s: 50 steps and the messages between them that are none."""
