@@ -83,7 +83,7 @@ def _sides(args: argparse.Namespace) -> list[tuple[Path, str | None]]:
 
 def _history(path: Path, with_profile: str | None) -> History:
     from collision_monitor.session import Session
-    from collision_monitor.session.history.history import read_history
+    from collision_monitor.session.history.read_history import read_history
 
     session = Session(path)
     with session_bar(path.name, session) as show:

@@ -168,7 +168,8 @@ def _new_file(chosen: Path | None, scene: str) -> Path:
 def _replay(session: Path) -> int:
     """Replay without ROS and compare; the last lines of the demo."""
     from collision_monitor.session import Session
-    from collision_monitor.session.replaying.replay import Verdict, replay
+    from collision_monitor.session.replaying.replay import replay
+    from collision_monitor.session.replaying.replay_report import Verdict
 
     report = replay(Session(session))
     size = session.stat().st_size / 1e6

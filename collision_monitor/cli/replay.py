@@ -19,7 +19,7 @@ from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
     from collision_monitor.session import Session
-    from collision_monitor.session.replaying.replay import Report
+    from collision_monitor.session.replaying.replay_report import ReplayReport
 
 EPILOG = """\
 exit codes: 0 the answers are identical, 1 the session cannot be read, 3 they differ (the first difference is named),
@@ -82,7 +82,7 @@ def replay_command(args: argparse.Namespace) -> int:
 class _Replayed:
     """A session and what its replay came to, or why it could not be read."""
 
-    report: Report | None
+    report: ReplayReport | None
     error: str = ""
 
 
@@ -134,7 +134,7 @@ def _as_lines(path: Path, each: _Replayed) -> str:
 
 
 @contextmanager
-def _progress_bar(session: Session) -> Iterator[Callable[[Report], None] | None]:
+def _progress_bar(session: Session) -> Iterator[Callable[[ReplayReport], None] | None]:
     """A bar on stderr, where that is a terminal."""
     if not sys.stderr.isatty():
         yield None
@@ -147,7 +147,7 @@ def _progress_bar(session: Session) -> Iterator[Callable[[Report], None] | None]
         task = bar.add_task("", total=session.size, text="")
         shown = 0.0
 
-        def show(report: Report) -> None:
+        def show(report: ReplayReport) -> None:
             nonlocal shown
             if report.replay_duration - shown >= 0.1:
                 shown = report.replay_duration
@@ -159,8 +159,8 @@ def _progress_bar(session: Session) -> Iterator[Callable[[Report], None] | None]
         yield show
 
 
-def _verdict(report: Report) -> str:
-    from collision_monitor.session.replaying.replay import Verdict
+def _verdict(report: ReplayReport) -> str:
+    from collision_monitor.session.replaying.replay_report import Verdict
 
     if report.verdict is Verdict.DIVERGED:
         return f"diverged in {report.differing} of {report.steps} steps"
@@ -169,7 +169,7 @@ def _verdict(report: Report) -> str:
     return report.verdict.name.lower().replace("_", " ")
 
 
-def _as_text(report: Report) -> str:
+def _as_text(report: ReplayReport) -> str:
     lines = [
         *([f"from       {report.begin:.3f} s"] if report.begin else []),
         f"steps      {report.steps}",
@@ -185,7 +185,7 @@ def _as_text(report: Report) -> str:
     return "\n".join([*lines, f"verdict    {_verdict(report)}"])
 
 
-def _as_json(report: Report, session: Path) -> dict[str, Any]:
+def _as_json(report: ReplayReport, session: Path) -> dict[str, Any]:
     from dataclasses import asdict
 
     return {

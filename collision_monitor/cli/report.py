@@ -32,7 +32,7 @@ def report_command(args: argparse.Namespace) -> int:
     """Return the exit code. Raises SessionError, ProfileError."""
     from collision_monitor.report import check_outputs, write_report
     from collision_monitor.session import Session
-    from collision_monitor.session.history.history import read_history
+    from collision_monitor.session.history.read_history import read_history
 
     session = Session(args.session)
     output = args.output or Path(f"{args.session.resolve().stem}.html")

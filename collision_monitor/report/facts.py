@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from collision_monitor.report.tracks import Tracks
-from collision_monitor.session.history.alerts import Alert, Outcome, alert_before, alerts_of
-from collision_monitor.session.history.history import Collision, Floats, History, Pair
+from collision_monitor.session.history.alerts import Alert, AlertOutcome, alert_before, alerts_of
+from collision_monitor.session.history.history import CollisionEvent, Floats, History, Pair
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,13 +23,13 @@ class Facts:
 
     period: float
     gaps: list[tuple[float, float]]
-    collisions: list[Collision]
-    surprises: list[Collision]
-    possible: list[Collision]
+    collisions: list[CollisionEvent]
+    surprises: list[CollisionEvent]
+    possible: list[CollisionEvent]
     alerts: dict[Pair, list[Alert]]
     nothing: list[Alert]
     risky: list[Pair]
-    answered: dict[Collision, Alert]
+    answered: dict[CollisionEvent, Alert]
     tracks: Tracks
 
 
@@ -49,7 +49,7 @@ def gather(history: History) -> Facts:
         surprises=[each for each in certain if each.warned == 0.0],
         possible=[each for each in history.collisions if not each.certain],
         alerts=alerts,
-        nothing=[alert for alert in found if alert.certain and alert.outcome is Outcome.NOTHING],
+        nothing=[alert for alert in found if alert.certain and alert.outcome is AlertOutcome.NOTHING],
         risky=_riskiest(history, alerts),
         answered={collision: alert for collision, alert in before.items() if alert is not None},
         tracks=Tracks(history),

@@ -15,7 +15,7 @@ from collision_monitor.report.facts import Facts
 from collision_monitor.report.from_above import from_above
 from collision_monitor.report.picture import CONTACT, INK, PALETTE, POSSIBLE, STYLE, WARNING, Size, shortened
 from collision_monitor.session.history.alerts import stated_error
-from collision_monitor.session.history.history import Collision, Floats, History, Pair
+from collision_monitor.session.history.history import CollisionEvent, Floats, History, Pair
 
 PAIRS: Final = 16
 """Rows of the timeline."""
@@ -51,7 +51,7 @@ def pair_name(history: History, pair: Pair, longest: int = 18) -> str:
     return " – ".join(shortened(history.name_of(object_id), longest) for object_id in pair)
 
 
-def drawn_collisions(facts: Facts) -> list[Collision]:
+def drawn_collisions(facts: Facts) -> list[CollisionEvent]:
     """Those whose predictions are drawn: the ones that were most wrong, then the ones that were made longest before."""
     chosen = sorted(facts.answered, key=lambda c: (-_worst(facts, c), -c.warned, c.begin, c.pair))[:CURVES]
     return sorted(chosen, key=lambda c: (c.begin, c.pair))
@@ -62,7 +62,7 @@ def largest_error(facts: Facts) -> float:
     return max((_worst(facts, each) for each in facts.answered), default=0.0)
 
 
-def _worst(facts: Facts, collision: Collision) -> float:
+def _worst(facts: Facts, collision: CollisionEvent) -> float:
     return float(np.abs(stated_error(facts.answered[collision], collision, facts.period)).max())
 
 
@@ -76,7 +76,7 @@ def _timeline(history: History, facts: Facts, size: Size) -> Figure | None:
     pairs = facts.risky[:PAIRS]
     if not pairs:
         return None
-    of_pair: dict[Pair, list[Collision]] = {pair: [] for pair in pairs}
+    of_pair: dict[Pair, list[CollisionEvent]] = {pair: [] for pair in pairs}
     for each in history.collisions:
         if each.pair in of_pair:
             of_pair[each.pair].append(each)

@@ -12,7 +12,7 @@ from collision_monitor.report.facts import Facts
 from collision_monitor.report.footprint import footprint
 from collision_monitor.report.picture import INK, PALETTE, Size, shortened
 from collision_monitor.report.tracks import Track
-from collision_monitor.session.history.history import Collision, Floats, History
+from collision_monitor.session.history.history import CollisionEvent, Floats, History
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +27,7 @@ POINTS: Final = 400
 """Of a track, at most."""
 
 
-def chosen_events(facts: Facts) -> list[Collision]:
+def chosen_events(facts: Facts) -> list[CollisionEvent]:
     """The collisions that are drawn: not predicted ones first, those there from the start last; in order of time."""
     worst = sorted(facts.collisions, key=lambda c: (isnan(c.warned), c.warned > 0.0, c.deepest, c.begin, c.pair))
     worst = worst[:EVENTS]
@@ -51,7 +51,7 @@ def from_above(history: History, facts: Facts, size: Size) -> Figure | None:
     return figure
 
 
-def _panel(axes: Axes, history: History, facts: Facts, collision: Collision) -> None:
+def _panel(axes: Axes, history: History, facts: Facts, collision: CollisionEvent) -> None:
     now = np.array([collision.begin])
     middle = _middle(history, facts, collision)
     tracks: list[Floats] = []
@@ -85,7 +85,7 @@ def _panel(axes: Axes, history: History, facts: Facts, collision: Collision) -> 
     axes.tick_params(labelsize=8)
 
 
-def _middle(history: History, facts: Facts, collision: Collision) -> Floats:
+def _middle(history: History, facts: Facts, collision: CollisionEvent) -> Floats:
     """The point of contact (2,), or where it is not known, the first object that is."""
     rows = history.contacts[history.contact_step == collision.step]
     rows = rows[(rows["id_a"] == collision.pair[0]) & (rows["id_b"] == collision.pair[1])]

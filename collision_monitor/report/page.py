@@ -15,7 +15,7 @@ from collision_monitor.report.figures import CURVES, PAIRS, drawn_collisions, fi
 from collision_monitor.report.from_above import AROUND, EVENTS
 from collision_monitor.report.picture import BROAD, NARROW, as_png, as_svg
 from collision_monitor.report.verdict import verdict
-from collision_monitor.session.history.history import Collision, History
+from collision_monitor.session.history.history import CollisionEvent, History
 
 ROWS: Final = 200
 """Collisions in the table."""
@@ -208,7 +208,7 @@ def _steps_caption(history: History) -> str:
 
 # -- tables
 
-_COLUMNS: Final[tuple[tuple[str, Callable[[Collision, Facts], str]], ...]] = (
+_COLUMNS: Final[tuple[tuple[str, Callable[[CollisionEvent, Facts], str]], ...]] = (
     ("began<br>(s)", lambda each, facts: f"{each.begin:.3f}"),
     ("ended<br>(s)", lambda each, facts: f"after {each.last:.3f}" if each.end is None else f"{each.end:.3f}"),
     ("depth<br>(m)", lambda each, facts: f"{max(-each.deepest, 0.0):.3g}"),
@@ -217,13 +217,13 @@ _COLUMNS: Final[tuple[tuple[str, Callable[[Collision, Facts], str]], ...]] = (
 )
 
 
-def _warned(collision: Collision) -> str:
+def _warned(collision: CollisionEvent) -> str:
     if math.isnan(collision.warned):
         return "at start"
     return f"{collision.warned:.3f}" if collision.warned else '<span class="bad">not</span>'
 
 
-def _stated(collision: Collision, facts: Facts) -> str:
+def _stated(collision: CollisionEvent, facts: Facts) -> str:
     if collision not in facts.answered:
         return "–"
     low, high = facts.answered[collision].first_stated

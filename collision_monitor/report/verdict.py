@@ -9,7 +9,7 @@ import numpy as np
 
 from collision_monitor.errors import Refusal
 from collision_monitor.report.facts import Facts
-from collision_monitor.session.history.alerts import Outcome
+from collision_monitor.session.history.alerts import AlertOutcome
 from collision_monitor.session.history.history import History
 
 NAMED: Final = 3
@@ -69,7 +69,7 @@ def _findings(facts: Facts) -> list[str]:
             f"{_count(len(facts.nothing), 'warning')} of {_count(pairs, 'pair')} came to nothing: the objects moved "
             "otherwise, or passed within the tolerance"
         )
-    due = sum(each[-1].certain and each[-1].outcome is Outcome.OPEN for each in facts.alerts.values())
+    due = sum(each[-1].certain and each[-1].outcome is AlertOutcome.OPEN for each in facts.alerts.values())
     if due:
         lines.append(f"{_count(due, 'pair')} still predicted to touch when the session ended")
     if not facts.collisions and not facts.alerts:

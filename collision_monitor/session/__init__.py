@@ -1,7 +1,7 @@
 """Sessions: what the monitor saw and said, recorded, read again and replayed. Without ROS."""
 
 from collision_monitor.session.reader import Recorded, Session
-from collision_monitor.session.recording.parts import ONE_FILE, Splitting
 from collision_monitor.session.recording.recorder import Recorder, Recording
+from collision_monitor.session.recording.splitting import ONE_FILE, Splitting
 
 __all__ = ["ONE_FILE", "Recorded", "Recorder", "Recording", "Session", "Splitting"]

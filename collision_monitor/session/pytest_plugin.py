@@ -20,9 +20,9 @@ import pytest
 from collision_monitor.errors import CollisionMonitorError
 
 if TYPE_CHECKING:
-    from collision_monitor.session.history.history import Collision, History
+    from collision_monitor.session.history.history import CollisionEvent, History
 
-MARKER = "session(path, replay=False): the recorded session that the fixture `session` reads"
+_MARKER = "session(path, replay=False): the recorded session that the fixture `session` reads"
 
 
 class Prediction(NamedTuple):
@@ -39,13 +39,13 @@ class RecordedSession:
 
     def __init__(self, path: Path, replay: bool | str = False) -> None:
         from collision_monitor.session import Session
-        from collision_monitor.session.history.history import AS_RECORDED, read_history
+        from collision_monitor.session.history.read_history import AS_RECORDED, read_history
 
         self.path = path
         again = replay if isinstance(replay, str) else AS_RECORDED if replay else None
         self.history: History = read_history(Session(path), again)
 
-    def contacts(self, a: str | int = "*", b: str | int = "*") -> list[Collision]:
+    def contacts(self, a: str | int = "*", b: str | int = "*") -> list[CollisionEvent]:
         """The collisions between objects of such names, with wildcards, or ids. Raises InputError for unknown ones."""
         return self.history.collisions_of([a, b])
 
@@ -79,7 +79,7 @@ class RecordedSession:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Make the marker known."""
-    config.addinivalue_line("markers", MARKER)
+    config.addinivalue_line("markers", _MARKER)
 
 
 @pytest.fixture
@@ -87,7 +87,7 @@ def session(request: pytest.FixtureRequest) -> RecordedSession:
     """The recorded session that the test's marker names."""
     marker = request.node.get_closest_marker("session")
     if marker is None or len(marker.args) != 1 or set(marker.kwargs) - {"replay"}:
-        pytest.fail(f'expected a marker such as @pytest.mark.session("yard.mcap"): {MARKER}', pytrace=False)
+        pytest.fail(f'expected a marker such as @pytest.mark.session("yard.mcap"): {_MARKER}', pytrace=False)
     try:
         return RecordedSession(request.path.parent / marker.args[0], **marker.kwargs)
     except CollisionMonitorError as error:

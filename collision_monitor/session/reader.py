@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import re
-import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,27 +18,26 @@ from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
 from collision_monitor.codec import Descriptions, States, decode_descriptions, decode_states
 from collision_monitor.errors import MessageError, ProfileError, SessionError
-from collision_monitor.session.mcap.records import McapRecords, Message
-from collision_monitor.session.mcap.rosbag2 import TYPES, full_name
-from collision_monitor.session.recording.parts import NUMBER, RECORDING, REPEATED
-from collision_monitor.session.recording.session_file import METADATA, SNAPSHOT
+from collision_monitor.session.mcap.layout import (
+    LIBRARY,
+    LOG_TIME,
+    METADATA,
+    NUMBER,
+    RECORDING,
+    REPEATED,
+    SALVAGE,
+    SNAPSHOT,
+    TIMES,
+)
+from collision_monitor.session.mcap.record_reader import McapReader, Message
+from collision_monitor.session.mcap.rosbag2 import INPUT_TYPES, RECORDED_TYPES, full_name
 from collision_monitor.settings.profile import Profile
 
-SALVAGE: Final = "collision_monitor_salvage"
-"""Name of the metadata record that says what is missing in a file that was salvaged."""
-
-_NAMES: Final = {full_name(name): name for name in TYPES}
-_INPUTS: Final[dict[str, Callable[[bytes], States | Descriptions]]] = {
-    "ObjectStateArray": decode_states,
-    "ObjectDescriptionArray": decode_descriptions,
-}
-_OURS: Final = "collision_monitor"
-"""How the header names the writer of our files."""
-
+_SHORT_NAMES: Final = {full_name(name): name for name in RECORDED_TYPES}
+_INPUT_DECODERS: Final[dict[str, Callable[[bytes], States | Descriptions]]] = dict(
+    zip(INPUT_TYPES, (decode_states, decode_descriptions), strict=True)
+)
 _SNAPSHOT: Final = re.compile(re.escape(SNAPSHOT) + r"(\d{1,10})\.npz")
-_TIMES: Final = struct.Struct("<QQ")
-_LOG_TIME: Final = 6
-"""Where a message has it, and the index of a channel its first one; chunks and attachments begin with their times."""
 
 
 class Recorded(NamedTuple):
@@ -65,7 +63,7 @@ class RecordedSnapshot(NamedTuple):
     log_time: int
 
 
-class Place(NamedTuple):
+class SnapshotLocation(NamedTuple):
     """Where a snapshot is: which of the session's files, and the byte; and when it was taken (ns)."""
 
     file: int
@@ -80,7 +78,7 @@ class Timeline:
 
     begin: int
     end: int
-    snapshots: tuple[Place, ...]
+    snapshots: tuple[SnapshotLocation, ...]
 
 
 class Session:
@@ -96,32 +94,31 @@ class Session:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self.damage: list[str] = []
-        parts = [_Part(file) for file in _find(self.path)]
-        self._parts = _in_order(self.path, parts)
-        self.size = sum(part.records.size for part in parts)
-        self.foreign = self._parts[0].foreign
-        self.metadata = self._parts[0].metadata
+        self._files = _in_order(self.path, [_RecordedFile(file) for file in _find(self.path)])
+        self.size = sum(file.records.size for file in self._files)
+        self.foreign = self._files[0].foreign
+        self.metadata = self._files[0].metadata
         self.profile = Profile.named("balanced") if self.foreign else self._profile()
         self.frame_id = self.metadata.get("frame_id", "")
 
     @property
     def position(self) -> int:
         """Bytes that were read."""
-        return sum(part.records.position for part in self._parts)
+        return sum(file.records.position for file in self._files)
 
     def messages(self) -> Iterator[Recorded]:
         """All messages whose bytes are whole, in recorded order. Raises SessionError for a foreign encoding."""
         return (each for each in self.entries() if isinstance(each, Recorded))
 
-    def entries(self, begin: Place | None = None) -> Iterator[Recorded | RecordedSnapshot]:
+    def entries(self, begin: SnapshotLocation | None = None) -> Iterator[Recorded | RecordedSnapshot]:
         """The same with the snapshots between them; from the snapshot at `begin` on. Raises SessionError."""
         self.damage = [f"{name} is not there" for name in _absent(self.path)]
         last: int | None = None
         count = 0
-        for number, part in enumerate(self._parts):
+        for number, file in enumerate(self._files):
             if begin is not None and number < begin.file:
                 continue
-            for each in part.entries(begin.at if begin is not None and number == begin.file else 0):
+            for each in file.entries(begin.at if begin is not None and number == begin.file else 0):
                 if isinstance(each, Recorded):
                     if each.repeated and each.sequence == last:
                         continue  # it goes on where the last file ended
@@ -132,21 +129,21 @@ class Session:
                         if each.type == "ParameterEvent":  # of any node, and in no order that says when it took effect
                             each = each._replace(type=full_name(each.type))
                 yield each
-            prefix = f"{part.records.path.name}: " if len(self._parts) > 1 else ""
-            self.damage += [prefix + text for text in part.damage]
+            prefix = f"{file.records.path.name}: " if len(self._files) > 1 else ""
+            self.damage += [prefix + text for text in file.damage]
 
     def timeline(self) -> Timeline:
         """When it begins and ends and where its snapshots are, without unpacking any message."""
         times: list[int] = []  # of first and last messages; a chunk without any has 0 for both
-        snapshots: list[Place] = []
-        for number, part in enumerate(self._parts):
-            for at, opcode, data in part.records.glance():
-                if opcode == Opcode.CHUNK and len(data) >= _TIMES.size:
-                    times += _TIMES.unpack_from(data) if any(_TIMES.unpack_from(data)) else ()
-                elif opcode in (Opcode.MESSAGE, Opcode.MESSAGE_INDEX) and len(data) >= _LOG_TIME + _TIMES.size:
-                    times += _TIMES.unpack_from(data, _LOG_TIME)[:1]
+        snapshots: list[SnapshotLocation] = []
+        for number, file in enumerate(self._files):
+            for at, opcode, data in file.records.glance():
+                if opcode == Opcode.CHUNK and len(data) >= TIMES.size:
+                    times += TIMES.unpack_from(data) if any(TIMES.unpack_from(data)) else ()
+                elif opcode in (Opcode.MESSAGE, Opcode.MESSAGE_INDEX) and len(data) >= LOG_TIME + TIMES.size:
+                    times += TIMES.unpack_from(data, LOG_TIME)[:1]
                 elif opcode == Opcode.ATTACHMENT and (found := _SNAPSHOT.search(data.decode("latin-1"))):
-                    snapshots.append(Place(number, at, int(found[1]), *_TIMES.unpack_from(data)[:1]))
+                    snapshots.append(SnapshotLocation(number, at, int(found[1]), *TIMES.unpack_from(data)[:1]))
         begin, end = min(times, default=0), max(times, default=0)
         return Timeline(begin, end, tuple(snapshots))
 
@@ -162,11 +159,11 @@ class Session:
             raise SessionError(f"{self.path}: the profile in the session's metadata cannot be used: {error}") from None
 
 
-class _Part:
+class _RecordedFile:
     """One file of a session. Raises SessionError."""
 
     def __init__(self, path: Path) -> None:
-        self.records = McapRecords(path)
+        self.records = McapReader(path)
         self.damage: list[str] = []
         self.foreign = False
         self.metadata = self._read_metadata()
@@ -191,7 +188,7 @@ class _Part:
             elif isinstance(record, Channel):
                 self._check(record, schemas, inputs)
                 name = schemas.get(record.schema_id, "")
-                channels[record.id] = record.topic, _NAMES.get(name, name)
+                channels[record.id] = record.topic, _SHORT_NAMES.get(name, name)
             elif isinstance(record, Metadata) and record.name == SALVAGE:
                 losses = record.metadata.get("losses", "").splitlines()
                 self.damage += [f"lost before it was salvaged: {loss}" for loss in losses]
@@ -210,16 +207,16 @@ class _Part:
             if isinstance(record, Metadata) and record.name == METADATA:
                 return dict(record.metadata)
             if isinstance(record, Header):
-                ours = record.library.startswith(_OURS)  # then what it lacks was lost
+                ours = record.library.startswith(LIBRARY)  # then what it lacks was lost
             elif isinstance(record, Schema):
                 schemas[record.id] = record.name
             elif isinstance(record, Channel):
                 topics[record.id] = record.topic
                 unnamed += record.schema_id not in schemas
-                inputs[record.id] = _NAMES.get(schemas.get(record.schema_id, ""), "")
-            elif isinstance(record, Message) and not ours and inputs.get(record.channel_id) in _INPUTS:
+                inputs[record.id] = _SHORT_NAMES.get(schemas.get(record.schema_id, ""), "")
+            elif isinstance(record, Message) and not ours and inputs.get(record.channel_id) in _INPUT_DECODERS:
                 try:
-                    frame_id = _INPUTS[inputs[record.channel_id]](record.data).frame_id
+                    frame_id = _INPUT_DECODERS[inputs[record.channel_id]](record.data).frame_id
                 except MessageError:
                     continue
                 self.foreign = True
@@ -237,13 +234,13 @@ class _Part:
 
     def _check(self, channel: Channel, schemas: dict[int, str], inputs: dict[str, str]) -> None:
         """Raises SessionError for another encoding, and for the inputs of two monitors in one foreign file."""
-        name = _NAMES.get(schemas.get(channel.schema_id, ""), "")
+        name = _SHORT_NAMES.get(schemas.get(channel.schema_id, ""), "")
         if name and channel.message_encoding != "cdr":
             raise SessionError(
                 f"{self.records.path}: expected messages of {channel.topic} encoded as cdr, "
                 f"got {channel.message_encoding!r}"
             )
-        if self.foreign and name in _INPUTS and inputs.setdefault(name, channel.topic) != channel.topic:
+        if self.foreign and name in INPUT_TYPES and inputs.setdefault(name, channel.topic) != channel.topic:
             raise SessionError(
                 f"{self.records.path}: expected the inputs of one monitor, got {inputs[name]} and {channel.topic}; "
                 "take one out with `collision-monitor import --node NAME`"
@@ -279,11 +276,11 @@ def _absent(path: Path) -> list[str]:
         return []
 
 
-def _in_order(path: Path, parts: list[_Part]) -> list[_Part]:
+def _in_order(path: Path, files: list[_RecordedFile]) -> list[_RecordedFile]:
     """The files of one recording. Raises SessionError where they are of several."""
-    recordings = {part.metadata.get(RECORDING, "") for part in parts}
-    kinds = {part.foreign for part in parts}
-    if len(parts) > 1 and (len(recordings) > 1 or len(kinds) > 1 or (recordings == {""} and kinds == {False})):
-        names = ", ".join(part.records.path.name for part in parts)
+    recordings = {file.metadata.get(RECORDING, "") for file in files}
+    kinds = {file.foreign for file in files}
+    if len(files) > 1 and (len(recordings) > 1 or len(kinds) > 1 or (recordings == {""} and kinds == {False})):
+        names = ", ".join(file.records.path.name for file in files)
         raise SessionError(f"{path}: expected the files of one recording, got those of several; name one of {names}")
-    return sorted(parts, key=lambda part: part.number)
+    return sorted(files, key=lambda file: file.number)

@@ -15,8 +15,8 @@ from collision_monitor.report.facts import gather
 from collision_monitor.report.footprint import footprint
 from collision_monitor.report.verdict import verdict
 from collision_monitor.session import Session
-from collision_monitor.session.history.alerts import Outcome, stated_error
-from collision_monitor.session.history.history import read_history
+from collision_monitor.session.history.alerts import AlertOutcome, stated_error
+from collision_monitor.session.history.read_history import read_history
 from collision_monitor.world.crossing import Crossing
 
 STEP = 0.02
@@ -43,7 +43,7 @@ def test_an_alert_at_the_end_is_open(tmp_path: Path) -> None:
     history = read_history(Session(record_drive(tmp_path / "short.mcap", 0.4)))
     facts = gather(history)
     assert not facts.collisions and not facts.nothing
-    assert {alert.outcome for each in facts.alerts.values() for alert in each} == {Outcome.OPEN}
+    assert {alert.outcome for each in facts.alerts.values() for alert in each} == {AlertOutcome.OPEN}
     found = verdict(history, facts)
     assert (found.kind, found.answer) == ("clear", "No collisions")
     assert any("still predicted" in line for line in found.findings)

@@ -14,7 +14,7 @@ from collision_monitor.cli.main import main
 from collision_monitor.errors import SessionError
 from collision_monitor.report import write_report
 from collision_monitor.session import Session
-from collision_monitor.session.history.history import read_history
+from collision_monitor.session.history.read_history import read_history
 from collision_monitor.world.crossing import Crossing
 
 PROGRAM = Path(sys.executable).with_name("collision-monitor")

@@ -19,7 +19,8 @@ from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.ros import main, qos
 from collision_monitor.session import Session
-from collision_monitor.session.replaying.replay import Verdict, replay
+from collision_monitor.session.replaying.replay import replay
+from collision_monitor.session.replaying.replay_report import Verdict
 from collision_monitor.world import make_scene
 from collision_monitor_msgs.msg import Contact, MonitorStatus
 

@@ -8,7 +8,7 @@ qos = pytest.importorskip("collision_monitor.ros.qos")
 
 from rclpy.qos import qos_profile_parameter_events  # noqa: E402
 
-from collision_monitor.session.mcap.rosbag2 import TYPES, qos_profiles  # noqa: E402
+from collision_monitor.session.mcap.rosbag2 import RECORDED_TYPES, qos_profiles  # noqa: E402
 
 NODE = {
     "ObjectStateArray": qos.STATES,
@@ -20,7 +20,7 @@ NODE = {
 }
 
 
-@pytest.mark.parametrize("name", TYPES)
+@pytest.mark.parametrize("name", RECORDED_TYPES)
 def test_the_recorded_profile_is_the_nodes(name: str) -> None:
     (recorded,) = qos_profiles(name)
     profile = NODE[name]

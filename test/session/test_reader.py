@@ -40,7 +40,7 @@ def test_a_folder_with_one_file_is_read(tmp_path: Path, recorded: Path) -> None:
 
 def chunked(path: Path, messages: int = 60, per_chunk: int = 10) -> list[int]:
     """A session with several chunks; where each ends in the file."""
-    from collision_monitor.session.recording.recorder import METADATA
+    from collision_monitor.session.mcap.layout import METADATA
 
     with path.open("wb") as file:
         writer = Writer(file)

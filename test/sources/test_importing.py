@@ -39,7 +39,8 @@ from collision_monitor.errors import InputError, SessionError
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.records import StateFlag
 from collision_monitor.session import Recorded, Session
-from collision_monitor.session.replaying.replay import Verdict, replay
+from collision_monitor.session.replaying.replay import replay
+from collision_monitor.session.replaying.replay_report import Verdict
 from collision_monitor.sources import import_bag
 from collision_monitor.sources.mapping import make_mapping
 

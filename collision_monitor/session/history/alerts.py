@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.records import PredictionStatus
-from collision_monitor.session.history.history import Collision, Floats, History, Pair
+from collision_monitor.session.history.collisions import pair_keys
+from collision_monitor.session.history.history import CollisionEvent, Floats, History, Pair
 
 
-class Outcome(Enum):
+class AlertOutcome(Enum):
     """What became of an alert."""
 
     CONTACT = "the pair touched when it was due"
@@ -33,7 +34,7 @@ class Alert:
     lower: Floats
     upper: Floats
     certain: bool
-    outcome: Outcome
+    outcome: AlertOutcome
 
     @property
     def begin(self) -> float:
@@ -51,7 +52,7 @@ def alerts_of(history: History) -> list[Alert]:
     period, longest = history.period, history.longest_step
     unseen = np.append(np.diff(history.times) > longest, True)  # (n,): nothing is known of what comes after the step
     rows, steps = history.predictions, history.prediction_step
-    keys = (rows["id_a"].astype(np.uint64) << np.uint64(32)) | rows["id_b"].astype(np.uint64)
+    keys = pair_keys(rows)
     order = np.lexsort((steps, keys))
     apart = (np.diff(steps[order]) != 1) | unseen[steps[order][:-1]]
     breaks = np.flatnonzero((np.diff(keys[order]) != 0) | apart) + 1
@@ -72,21 +73,21 @@ def alerts_of(history: History) -> list[Alert]:
                 lower=lower,
                 upper=upper,
                 certain=bool((rows["status"][run] == PredictionStatus.HIT).any()),
-                outcome=Outcome.CONTACT if touched else Outcome.OPEN if last else Outcome.NOTHING,
+                outcome=AlertOutcome.CONTACT if touched else AlertOutcome.OPEN if last else AlertOutcome.NOTHING,
             )
         )
     return sorted(found, key=lambda alert: (alert.begin, alert.pair))
 
 
-def alert_before(alerts: list[Alert], collision: Collision) -> Alert | None:
+def alert_before(alerts: list[Alert], collision: CollisionEvent) -> Alert | None:
     """The alert, of those of its pair, that went on until the collision began."""
     if not collision.warned > 0.0:
         return None
-    before = [alert for alert in alerts if alert.begin < collision.begin and alert.outcome is Outcome.CONTACT]
+    before = [alert for alert in alerts if alert.begin < collision.begin and alert.outcome is AlertOutcome.CONTACT]
     return before[-1] if before else None
 
 
-def stated_error(alert: Alert, collision: Collision, period: float) -> NDArray[np.float64]:
+def stated_error(alert: Alert, collision: CollisionEvent, period: float) -> NDArray[np.float64]:
     """How far each stated interval is from the step in which the contact began, (n,) s; negative: too early.
 
     0 where they overlap: when within that step it began, nobody saw.

@@ -10,7 +10,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from collision_monitor.records import Phase
-from collision_monitor.session.history.alerts import Outcome, alerts_of
+from collision_monitor.session.history.alerts import AlertOutcome, alerts_of
 from collision_monitor.session.history.history import NANOSECOND, History, Pair
 
 WITHIN: Final = 0.5
@@ -19,7 +19,7 @@ WITHIN: Final = 0.5
 EXACT: Final = 1e-9
 """s: times are differences of whole nanoseconds."""
 
-Names = tuple[str, str]
+PairNames = tuple[str, str]
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Event:
     """
 
     what: str
-    pair: Names
+    pair: PairNames
     begin: float
     end: float | None
     warned: float | None
@@ -55,7 +55,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Side:
+class SessionSummary:
     """One of the two, in numbers. contacts, predictions: pairs, counted at each step. Step times in s, NaN: unknown."""
 
     session: str
@@ -79,8 +79,8 @@ class Side:
 class Changes:
     """The two sides and what changed, collisions first; by_stamps: else B's times count from its own first step."""
 
-    a: Side
-    b: Side
+    a: SessionSummary
+    b: SessionSummary
     changes: list[Change]
     by_stamps: bool
 
@@ -106,14 +106,14 @@ def changes(a: History, b: History, tolerance: float = 0.0) -> Changes:
                 if fields or one is None or two is None:
                     found.append(Change(one, two, fields))
     found.sort(key=lambda change: (change.event.what, change.event.begin, change.event.pair))
-    return Changes(_side(a), _side(b), found, by_stamps)
+    return Changes(_summary(a), _summary(b), found, by_stamps)
 
 
-def _naming(a: History, b: History) -> Callable[[History, Pair], Names]:
+def _naming(a: History, b: History) -> Callable[[History, Pair], PairNames]:
     """How objects are called in both: by their names where they are unique, else with their ids."""
     unique = all(len({o.name for o in h.objects.values()}) == len(h.objects) for h in (a, b))
 
-    def names(history: History, pair: Pair) -> Names:
+    def names(history: History, pair: Pair) -> PairNames:
         first, second = (
             history.name_of(i) if unique and i in history.objects else f"{history.name_of(i)} ({i})" for i in pair
         )
@@ -123,7 +123,7 @@ def _naming(a: History, b: History) -> Callable[[History, Pair], Names]:
 
 
 def _events(
-    history: History, shift: float, names: Callable[[History, Pair], Names]
+    history: History, shift: float, names: Callable[[History, Pair], PairNames]
 ) -> tuple[list[Event], list[Event]]:
     """Collisions, and warnings that no collision followed, by begin."""
     collisions = [
@@ -142,12 +142,12 @@ def _events(
             what="warning",
             pair=names(history, each.pair),
             begin=each.begin + shift,
-            end=None if each.outcome is Outcome.OPEN else float(each.time[-1]) + shift,
+            end=None if each.outcome is AlertOutcome.OPEN else float(each.time[-1]) + shift,
             warned=None,
             certain=True,
         )
         for each in alerts_of(history)
-        if each.certain and each.outcome is not Outcome.CONTACT
+        if each.certain and each.outcome is not AlertOutcome.CONTACT
     ]
     return collisions, warnings
 
@@ -155,9 +155,7 @@ def _events(
 _T = TypeVar("_T")
 
 
-def _matched(
-    a: Sequence[_T], b: Sequence[_T], begin: Callable[[_T], float]
-) -> Iterable[tuple[_T | None, _T | None]]:
+def _matched(a: Sequence[_T], b: Sequence[_T], begin: Callable[[_T], float]) -> Iterable[tuple[_T | None, _T | None]]:
     """Events of one pair, by begin, side by side where they begin within WITHIN of each other."""
     i = j = 0
     while i < len(a) or j < len(b):
@@ -179,13 +177,13 @@ def _differing(a: Event, b: Event, tolerance: float) -> tuple[str, ...]:
     return tuple(name for name in ("begin", "end", "warned", "certain") if not same(getattr(a, name), getattr(b, name)))
 
 
-def _side(history: History) -> Side:
+def _summary(history: History) -> SessionSummary:
     problems = list(history.problems)
     if history.status is not None and history.status.recording_dropped:
         problems.append(f"{history.status.recording_dropped} messages could not be recorded")
     # The first step of a replay compiles, or loads what was compiled.
     durations = history.durations[1:] if history.replayed else history.durations
-    return Side(
+    return SessionSummary(
         session=history.name,
         profile=history.profile.name,
         version=history.metadata.get("version", ""),
@@ -195,7 +193,7 @@ def _side(history: History) -> Side:
         objects=len(history.objects),
         collisions=len(history.collisions),
         not_predicted=sum(each.warned == 0.0 for each in history.collisions),
-        in_vain=sum(each.certain and each.outcome is Outcome.NOTHING for each in alerts_of(history)),
+        in_vain=sum(each.certain and each.outcome is AlertOutcome.NOTHING for each in alerts_of(history)),
         contacts=int(np.count_nonzero(history.contacts["phase"] != Phase.END)),
         predictions=len(history.predictions),
         step_median=float(np.median(durations)) if len(durations) else math.nan,

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Final
 from xml.etree import ElementTree
 
-from collision_monitor.session.history.expectations import Outcome, evaluate, parse_expectations
-from collision_monitor.session.history.history import read_history
+from collision_monitor.session.history.expectations import ExpectationResult, evaluate, parse_expectations
+from collision_monitor.session.history.read_history import read_history
 from collision_monitor.session.many import ALL_CORES, Engine, for_each
 from collision_monitor.session.reader import Session
 from collision_monitor.session.replaying.replay import replay
@@ -25,7 +25,7 @@ class Checked:
     """A session and its outcomes, or why it could not be read."""
 
     session: str
-    outcomes: list[Outcome] = field(default_factory=list)
+    outcomes: list[ExpectationResult] = field(default_factory=list)
     error: str = ""
 
     @property

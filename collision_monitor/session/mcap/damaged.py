@@ -21,43 +21,16 @@ import lz4.frame  # type: ignore[import-untyped]
 import zstandard
 from mcap.opcode import Opcode
 
-MAGIC: Final = b"\x89MCAP0\r\n"
-LARGEST: Final = 1 << 30
-"""Bytes that a chunk is unpacked to at most, so that no damaged one takes all memory; rosbag2 writes under 1 MiB."""
+from collision_monitor.session.mcap.layout import CHUNK_HEAD, FIELDS, HEAD, LARGEST_CHUNK, MAGIC, MESSAGE, OPCODES
 
 _EFFORT: Final = 8
 """How many times the file's size is spent at most on places that might be chunks and are none."""
 
-MESSAGE: Final = struct.Struct("<HIQQ")
-"""Channel, sequence, log time, publish time; the data follows."""
-
-_HEAD: Final = struct.Struct("<BQ")
-_CHUNK: Final = struct.Struct("<QQQI")  # start time, end time, unpacked size, checksum
 _PIECE: Final = 1 << 12
 """Bytes that a chunk is unpacked by: what comes before damage in it is had to this."""
 
 _CANDIDATE: Final = re.compile(rb"[\x01-\x0f](?=.{5}\x00\x00\x00)", re.DOTALL)
 """Where a record may begin: a known opcode, and a length below 2^40."""
-
-_LAYOUT: Final[dict[int, tuple[int, ...]]] = {
-    Opcode.HEADER: (-4, -4),
-    Opcode.FOOTER: (20,),
-    Opcode.SCHEMA: (2, -4, -4, -4),
-    Opcode.CHANNEL: (4, -4, -4, -4),
-    Opcode.CHUNK: (_CHUNK.size, -4, -8),
-    Opcode.MESSAGE_INDEX: (2, -4),
-    Opcode.CHUNK_INDEX: (32, -4, 8, -4, 16),
-    Opcode.ATTACHMENT: (16, -4, -4, -8, 4),
-    Opcode.ATTACHMENT_INDEX: (40, -4, -4),
-    Opcode.STATISTICS: (42, -4),
-    Opcode.METADATA: (-4, -4),
-    Opcode.METADATA_INDEX: (16, -4),
-    Opcode.SUMMARY_OFFSET: (17,),
-    Opcode.DATA_END: (4,),
-}
-"""Bytes of each field; negative: a length of so many bytes, then what it counts. A message alone has no own length."""
-
-_KINDS: Final = {*_LAYOUT, Opcode.MESSAGE}
 
 _MISTAKABLE: Final = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA_INDEX)
 """What one flipped bit of the opcode makes a message of."""
@@ -73,7 +46,7 @@ class Trust(IntEnum):
     CHECKED = 2  # in a chunk whose checksum is right
 
 
-class Place(IntEnum):
+class Section(IntEnum):
     """Where a record stands."""
 
     DATA = 0  # by itself
@@ -82,13 +55,13 @@ class Place(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class RecoveredRecord:
     """A record of the file."""
 
     opcode: int
     payload: bytes
     trust: Trust
-    place: Place
+    section: Section
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,13 +72,13 @@ class Damage:
 
 
 @dataclass(frozen=True, slots=True)
-class _Record:
+class _RecordSpan:
     opcode: int
     begin: int  # of the payload
     end: int
 
 
-def walk(data: mmap.mmap) -> Iterator[Part | Damage]:
+def walk(data: mmap.mmap) -> Iterator[RecoveredRecord | Damage]:
     """All records that are whole, in the order of the file, those of chunks one by one, and what lies between them."""
     at = len(MAGIC)
     if data[:at] != MAGIC:
@@ -117,7 +90,7 @@ def walk(data: mmap.mmap) -> Iterator[Part | Damage]:
         if closed and _is_end(data, at):
             return
         record = _record(data, at)
-        if record is None or record.opcode not in _KINDS:
+        if record is None or record.opcode not in OPCODES:
             chunk, spent = _chunk_at(data, at) if effort > 0 else (None, 0)
             effort -= spent
             record = chunk or record
@@ -137,13 +110,13 @@ def walk(data: mmap.mmap) -> Iterator[Part | Damage]:
         if record.opcode == Opcode.CHUNK:
             chunked = True
             yield from _chunk(data[record.begin : record.end], at)
-        elif record.opcode not in _KINDS:
+        elif record.opcode not in OPCODES:
             yield Damage(f"a record of unknown kind {record.opcode}, {record.end - at} bytes at byte {at}, is left out")
         elif record.opcode in (Opcode.DATA_END, Opcode.FOOTER):
             closed = True
         elif record.opcode != Opcode.MESSAGE or not closed:
-            place = Place.SUMMARY if closed else Place.DATA
-            yield Part(record.opcode, data[record.begin : record.end], Trust.WHOLE, place)
+            section = Section.SUMMARY if closed else Section.DATA
+            yield RecoveredRecord(record.opcode, data[record.begin : record.end], Trust.WHOLE, section)
         at = following
     if not closed:
         yield Damage("the file was not closed: what came after its last byte is not known")
@@ -152,34 +125,34 @@ def walk(data: mmap.mmap) -> Iterator[Part | Damage]:
 # -- one record
 
 
-def _record(data: mmap.mmap, at: int) -> _Record | None:
+def _record(data: mmap.mmap, at: int) -> _RecordSpan | None:
     """The record at a place, if it is whole and its content agrees with its length."""
-    if at + _HEAD.size > len(data):
+    if at + HEAD.size > len(data):
         return None
-    opcode, length = _HEAD.unpack_from(data, at)
-    if opcode in _KINDS:
+    opcode, length = HEAD.unpack_from(data, at)
+    if opcode in OPCODES:
         return _known(data, at)
     # of a kind that a newer or private writer knows: to be stepped over, if that leads anywhere
-    end = at + _HEAD.size + int(length)
-    return _Record(opcode, at + _HEAD.size, end) if opcode and end < len(data) and _known(data, end) else None
+    end = at + HEAD.size + int(length)
+    return _RecordSpan(opcode, at + HEAD.size, end) if opcode and end < len(data) and _known(data, end) else None
 
 
-def _known(data: mmap.mmap, at: int) -> _Record | None:
+def _known(data: mmap.mmap, at: int) -> _RecordSpan | None:
     """The same for the kinds that are known."""
-    if at + _HEAD.size > len(data):
+    if at + HEAD.size > len(data):
         return None
-    opcode, length = _HEAD.unpack_from(data, at)
-    begin = at + _HEAD.size
+    opcode, length = HEAD.unpack_from(data, at)
+    begin = at + HEAD.size
     if length > len(data) - begin:
         return None
     whole = length >= MESSAGE.size if opcode == Opcode.MESSAGE else _own_length(data, opcode, begin) == length
-    return _Record(opcode, begin, begin + length) if whole else None
+    return _RecordSpan(opcode, begin, begin + length) if whole else None
 
 
 def _own_length(data: mmap.mmap, opcode: int, begin: int) -> int | None:
     """Bytes of the record as its content has it; None where that is not in the file."""
     at = begin
-    for size in _LAYOUT.get(opcode, (len(data),)):
+    for size in FIELDS.get(opcode, (len(data),)):
         if size < 0:
             length = int.from_bytes(data[at : at - size], "little")
             at += length - size
@@ -190,12 +163,12 @@ def _own_length(data: mmap.mmap, opcode: int, begin: int) -> int | None:
     return at - begin
 
 
-def _is_message(data: mmap.mmap, record: _Record, chunked: bool) -> bool:
+def _is_message(data: mmap.mmap, record: _RecordSpan, chunked: bool) -> bool:
     """Whether what says so is a message, and leads to a next record."""
     return _only_a_message(data, record, chunked) and _leads_on(data, record.end, 0)
 
 
-def _only_a_message(data: mmap.mmap, record: _Record, chunked: bool) -> bool:
+def _only_a_message(data: mmap.mmap, record: _RecordSpan, chunked: bool) -> bool:
     """Whether it is not another record whose opcode has a flipped bit."""
     others = (*_MISTAKABLE, Opcode.MESSAGE_INDEX) if chunked else _MISTAKABLE
     return all(_own_length(data, other, record.begin) != record.end - record.begin for other in others)
@@ -226,65 +199,65 @@ def _next_record(data: mmap.mmap, at: int) -> int:
 # -- chunks
 
 
-def _chunk_at(data: mmap.mmap, at: int) -> tuple[_Record | None, int]:
+def _chunk_at(data: mmap.mmap, at: int) -> tuple[_RecordSpan | None, int]:
     """A chunk whose checksum is right, whatever became of its opcode and one of its lengths; or the bytes spent."""
-    begin = at + _HEAD.size
-    if begin + _CHUNK.size > len(data):
+    begin = at + HEAD.size
+    if begin + CHUNK_HEAD.size > len(data):
         return None, 0
     spent = 0
-    for size in (_own_length(data, Opcode.CHUNK, begin), int(_HEAD.unpack_from(data, at)[1])):
+    for size in (_own_length(data, Opcode.CHUNK, begin), int(HEAD.unpack_from(data, at)[1])):
         if size is not None and size <= len(data) - begin:
             if _unpacked(data[begin : begin + size])[1] is Trust.CHECKED:
-                return _Record(Opcode.CHUNK, begin, begin + size), 0
+                return _RecordSpan(Opcode.CHUNK, begin, begin + size), 0
             spent += size
     return None, spent
 
 
-def _chunk(payload: bytes, at: int) -> Iterator[Part | Damage]:
+def _chunk(payload: bytes, at: int) -> Iterator[RecoveredRecord | Damage]:
     """The records of a chunk."""
     records, trust = _unpacked(payload)
     if trust is Trust.NONE:
-        parts = list(_inner(records, trust))
-        messages = sum(part.opcode == Opcode.MESSAGE for part in parts)
+        found = list(_inner(records, trust))
+        messages = sum(each.opcode == Opcode.MESSAGE for each in found)
         yield Damage(
             f"the chunk of {len(payload)} bytes at byte {at} is not as it was written: {messages} messages in it are "
             "complete and cannot be trusted"
         )
-        yield from parts
+        yield from found
     else:
         yield from _inner(records, trust)
 
 
 def _is_cut_chunk(data: mmap.mmap, at: int) -> bool:
     """Whether here begins a chunk, by both of its lengths, that the end of the file cuts off."""
-    sizes = at + _HEAD.size + _CHUNK.size
+    sizes = at + HEAD.size + CHUNK_HEAD.size
     if sizes + 4 > len(data) or data[at] != Opcode.CHUNK:
         return False
     name = int.from_bytes(data[sizes : sizes + 4], "little")
     if name > 8 or sizes + 12 + name > len(data):
         return False
     size = int.from_bytes(data[sizes + 4 + name : sizes + 12 + name], "little")
-    length = int(_HEAD.unpack_from(data, at)[1])
-    return length == _CHUNK.size + 12 + name + size and at + _HEAD.size + length > len(data)
+    length = int(HEAD.unpack_from(data, at)[1])
+    return length == CHUNK_HEAD.size + 12 + name + size and at + HEAD.size + length > len(data)
 
 
-def _cut_chunk(data: mmap.mmap, at: int) -> Iterator[Part | Damage]:
+def _cut_chunk(data: mmap.mmap, at: int) -> Iterator[RecoveredRecord | Damage]:
     """Its complete records: what is there is as it was written."""
-    parts = list(_inner(_unpacked(data[at + _HEAD.size :])[0], Trust.WHOLE))
-    messages = sum(part.opcode == Opcode.MESSAGE for part in parts)
+    found = list(_inner(_unpacked(data[at + HEAD.size :])[0], Trust.WHOLE))
+    messages = sum(each.opcode == Opcode.MESSAGE for each in found)
     if messages:
         yield Damage(f"of the chunk that is cut off at byte {at}, {messages} messages are complete and kept")
-    yield from parts
+    yield from found
 
 
 def _unpacked(payload: bytes) -> tuple[bytes, Trust]:
     """A chunk's records as far as they can be unpacked, and how far they can be believed."""
     try:
-        _, _, size, checksum = _CHUNK.unpack_from(payload)
-        (name,) = struct.unpack_from("<I", payload, _CHUNK.size)
+        _, _, size, checksum = CHUNK_HEAD.unpack_from(payload)
+        (name,) = struct.unpack_from("<I", payload, CHUNK_HEAD.size)
     except struct.error:
         return b"", Trust.NONE
-    begin = _CHUNK.size + 4 + name + 8
+    begin = CHUNK_HEAD.size + 4 + name + 8
     if name > 8 or begin > len(payload):
         return b"", Trust.NONE
     records, whole = _decompressed(payload[begin:])
@@ -299,7 +272,7 @@ def _decompressed(packed: bytes) -> tuple[bytes, bool]:
     """As much as can be unpacked, by what the bytes say they are packed with; whether that was all and nothing else."""
     unpacker: Any
     if packed.startswith(b"\x28\xb5\x2f\xfd"):
-        unpacker = zstandard.ZstdDecompressor(max_window_size=LARGEST).decompressobj()
+        unpacker = zstandard.ZstdDecompressor(max_window_size=LARGEST_CHUNK).decompressobj()
     elif packed.startswith(b"\x04\x22\x4d\x18"):
         unpacker = lz4.frame.LZ4FrameDecompressor()
     else:
@@ -307,20 +280,20 @@ def _decompressed(packed: bytes) -> tuple[bytes, bool]:
     out = bytearray()
     end = 0
     with suppress(zstandard.ZstdError, RuntimeError, EOFError):
-        while end < len(packed) and not unpacker.eof and len(out) <= LARGEST:
+        while end < len(packed) and not unpacker.eof and len(out) <= LARGEST_CHUNK:
             out += unpacker.decompress(packed[end : end + _PIECE])
             end += _PIECE
     return bytes(out), bool(unpacker.eof and not unpacker.unused_data and end >= len(packed))
 
 
-def _inner(records: bytes, trust: Trust) -> Iterator[Part]:
+def _inner(records: bytes, trust: Trust) -> Iterator[RecoveredRecord]:
     """The complete records in the bytes of a chunk."""
     at = 0
-    while at + _HEAD.size <= len(records):
-        opcode, length = _HEAD.unpack_from(records, at)
-        at += _HEAD.size
+    while at + HEAD.size <= len(records):
+        opcode, length = HEAD.unpack_from(records, at)
+        at += HEAD.size
         if opcode == 0 or length > len(records) - at:
             return
         if opcode in _IN_CHUNKS and (opcode != Opcode.MESSAGE or length >= MESSAGE.size):
-            yield Part(opcode, records[at : at + length], trust, Place.CHUNK)
+            yield RecoveredRecord(opcode, records[at : at + length], trust, Section.CHUNK)
         at += length

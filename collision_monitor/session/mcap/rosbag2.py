@@ -10,7 +10,7 @@ import yaml
 
 from collision_monitor.session.mcap.definitions import type_hash
 
-VERSION: Final = 9
+_METADATA_VERSION: Final = 9
 """Of rosbag2's metadata, as Jazzy writes it."""
 
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
@@ -22,8 +22,11 @@ _QOS: Final = {  # type: depth, reliability, durability; as the node offers and 
     "MonitorStatus": (1, "reliable", "transient_local"),
     "ParameterEvent": (1000, "reliable", "volatile"),
 }
-TYPES: Final = tuple(_QOS)
-"""The messages that a session holds."""
+RECORDED_TYPES: Final = tuple(_QOS)
+"""The message types that a session holds."""
+
+INPUT_TYPES: Final = ("ObjectStateArray", "ObjectDescriptionArray")
+"""Those that the monitor subscribes to; all others are its answers and settings."""
 
 
 def full_name(name: str) -> str:
@@ -58,7 +61,7 @@ def channel_metadata(name: str) -> dict[str, str]:
 
 
 @dataclass(frozen=True)
-class Extent:
+class FileInformation:
     """When a recording begins and ends (ns) and the number of messages of each topic."""
 
     begin: int
@@ -71,11 +74,11 @@ class Extent:
         return sum(self.counts.values())
 
 
-def file_metadata(files: Mapping[str, Extent], types: Mapping[str, str]) -> str:
+def file_metadata(files: Mapping[str, FileInformation], types: Mapping[str, str]) -> str:
     """metadata.yaml; files: by name, in their order; types: topic -> name of its message."""
-    filled = [extent for extent in files.values() if extent.count]
-    begin = min((extent.begin for extent in filled), default=0)
-    end = max((extent.end for extent in filled), default=0)
+    filled = [information for information in files.values() if information.count]
+    begin = min((information.begin for information in filled), default=0)
+    end = max((information.end for information in filled), default=0)
     topics = [
         {
             "topic_metadata": {
@@ -85,16 +88,16 @@ def file_metadata(files: Mapping[str, Extent], types: Mapping[str, str]) -> str:
                 "offered_qos_profiles": qos_profiles(name),
                 "type_description_hash": type_hash(full_name(name)),
             },
-            "message_count": sum(extent.counts.get(topic, 0) for extent in files.values()),
+            "message_count": sum(information.counts.get(topic, 0) for information in files.values()),
         }
         for topic, name in types.items()
     ]
-    information = {
-        "version": VERSION,
+    content = {
+        "version": _METADATA_VERSION,
         "storage_identifier": "mcap",
         "duration": {"nanoseconds": end - begin},
         "starting_time": {"nanoseconds_since_epoch": begin},
-        "message_count": sum(extent.count for extent in files.values()),
+        "message_count": sum(information.count for information in files.values()),
         "topics_with_message_count": topics,
         "compression_format": "",
         "compression_mode": "",
@@ -102,14 +105,14 @@ def file_metadata(files: Mapping[str, Extent], types: Mapping[str, str]) -> str:
         "files": [
             {
                 "path": name,
-                "starting_time": {"nanoseconds_since_epoch": extent.begin},
-                "duration": {"nanoseconds": extent.end - extent.begin},
-                "message_count": extent.count,
+                "starting_time": {"nanoseconds_since_epoch": information.begin},
+                "duration": {"nanoseconds": information.end - information.begin},
+                "message_count": information.count,
             }
-            for name, extent in files.items()
+            for name, information in files.items()
         ],
         "custom_data": None,
         "ros_distro": "jazzy",
     }
-    text: str = yaml.safe_dump({"rosbag2_bagfile_information": information}, sort_keys=False)
+    text: str = yaml.safe_dump({"rosbag2_bagfile_information": content}, sort_keys=False)
     return text

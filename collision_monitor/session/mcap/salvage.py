@@ -31,13 +31,10 @@ from mcap.writer import Writer
 
 from collision_monitor._version import VERSION
 from collision_monitor.errors import SessionError
-from collision_monitor.session.mcap.damaged import MESSAGE, Damage, Part, Place, Trust, walk
-from collision_monitor.session.reader import SALVAGE
+from collision_monitor.session.mcap.damaged import Damage, RecoveredRecord, Section, Trust, walk
+from collision_monitor.session.mcap.layout import LIBRARY, MESSAGE, SALVAGE, SEQUENCE_HALF
 
-LIBRARY: Final = "collision_monitor"
-"""In the header of what this package writes."""
-
-_KINDS: Final[dict[int, Any]] = {
+_DECODERS: Final[dict[int, Any]] = {
     Opcode.HEADER: Header,
     Opcode.SCHEMA: Schema,
     Opcode.CHANNEL: Channel,
@@ -114,10 +111,10 @@ def _write(data: mmap.mmap, source: Path, target: Path, unverified: bool) -> Sal
     return result
 
 
-def _read(part: Part) -> Any:
+def _read(record: RecoveredRecord) -> Any:
     """The record, or None where the bytes are not one."""
     try:
-        return _KINDS[part.opcode].read(ReadDataStream(BytesIO(part.payload)))
+        return _DECODERS[record.opcode].read(ReadDataStream(BytesIO(record.payload)))
     except Exception:  # whatever the library raises for bytes that are not as they should be
         return None
 
@@ -134,25 +131,25 @@ class _Contents:
         self.statistics: Statistics | None = None
         self.names: list[str] = []  # of metadata and attachments, as the summary has them
         trust: dict[tuple[int, int], Trust] = {}  # by opcode and id: the best copy counts
-        for part in walk(data):
-            if isinstance(part, Damage) or part.opcode not in _KINDS or part.opcode == Opcode.MESSAGE_INDEX:
+        for each in walk(data):
+            if isinstance(each, Damage) or each.opcode not in _DECODERS or each.opcode == Opcode.MESSAGE_INDEX:
                 continue
-            self.chunked |= part.place is Place.CHUNK
-            match _read(part):
+            self.chunked |= each.section is Section.CHUNK
+            match _read(each):
                 case Header() as header:
                     self.profile = header.profile
                     self.library = header.library
-                case (Schema() | Channel()) as record if part.trust > trust.get((part.opcode, record.id), -1):
+                case (Schema() | Channel()) as record if each.trust > trust.get((each.opcode, record.id), -1):
                     if isinstance(record, Schema) and record.name and record.id:
                         self.schemas[record.id] = record
                     elif isinstance(record, Channel) and record.topic and record.message_encoding:
                         self.channels[record.id] = record
                     else:
                         continue
-                    trust[part.opcode, record.id] = part.trust
-                case Statistics() as statistics if part.place is Place.SUMMARY:
+                    trust[each.opcode, record.id] = each.trust
+                case Statistics() as statistics if each.section is Section.SUMMARY:
                     self.statistics = statistics
-                case (MetadataIndex() | AttachmentIndex()) as index if part.place is Place.SUMMARY:
+                case (MetadataIndex() | AttachmentIndex()) as index if each.section is Section.SUMMARY:
                     self.names.append(index.name)
 
 
@@ -186,18 +183,18 @@ class _Copy:
 
     def run(self, data: mmap.mmap) -> Salvaged:
         """Copy everything and settle the account."""
-        for part in walk(data):
-            if isinstance(part, Damage):
+        for each in walk(data):
+            if isinstance(each, Damage):
                 self._settle_chunk()
                 self._damaged = True
-                self._result.losses.append(part.text)
-            elif part.opcode == Opcode.MESSAGE:
-                self._message(part)
-            elif part.opcode == Opcode.MESSAGE_INDEX:
-                if self._damaged and (index := _read(part)) is not None:
+                self._result.losses.append(each.text)
+            elif each.opcode == Opcode.MESSAGE:
+                self._message(each)
+            elif each.opcode == Opcode.MESSAGE_INDEX:
+                if self._damaged and (index := _read(each)) is not None:
                     self._indexed[index.channel_id] += len(index.records)
-            elif part.opcode in (Opcode.METADATA, Opcode.ATTACHMENT):
-                self._by_name(_read(part))
+            elif each.opcode in (Opcode.METADATA, Opcode.ATTACHMENT):
+                self._by_name(_read(each))
         self._settle_chunk()
         self._settle()
         return self._result
@@ -219,28 +216,28 @@ class _Copy:
         if record is not None:
             self._names.append(record.name)
 
-    def _message(self, part: Part) -> None:
+    def _message(self, each: RecoveredRecord) -> None:
         # by itself, among the damage of a file that has its messages in chunks: the rest of a chunk
-        stray = part.place is Place.DATA and self._damaged and self._contents.chunked
+        stray = each.section is Section.DATA and self._damaged and self._contents.chunked
         self._stray += stray
-        if (stray or part.trust is Trust.NONE) and not self._unverified:
+        if (stray or each.trust is Trust.NONE) and not self._unverified:
             return
-        channel, sequence, log_time, publish_time = MESSAGE.unpack_from(part.payload)
-        if part.trust is Trust.CHECKED:
+        channel, sequence, log_time, publish_time = MESSAGE.unpack_from(each.payload)
+        if each.trust is Trust.CHECKED:
             self._settle_chunk()
         if channel not in self._ids:
             self._nameless += 1
             return
         self._begin = log_time if self._begin is None else self._begin
         self._note_gap(sequence, log_time)
-        self._writer.add_message(self._ids[channel], log_time, part.payload[MESSAGE.size :], publish_time, sequence)
+        self._writer.add_message(self._ids[channel], log_time, each.payload[MESSAGE.size :], publish_time, sequence)
         topic = self._contents.channels[channel].topic
         self._result.messages += 1
         self._result.topics[topic] = self._result.topics.get(topic, 0) + 1
         self._counts[channel] += 1
         self._kept[channel] += self._damaged
         self._last = sequence, log_time
-        if part.trust is Trust.CHECKED:
+        if each.trust is Trust.CHECKED:
             self._settle_doubt()
         else:
             self._result.unverified += 1
@@ -256,7 +253,7 @@ class _Copy:
         if self._last is None and not self._result.losses:
             return  # a later file of a recording in several
         first = 0 if self._last is None else self._last[0] + 1
-        if self._contents.library.startswith(LIBRARY) and 0 < sequence - first < 1 << 31:
+        if self._contents.library.startswith(LIBRARY) and 0 < sequence - first < SEQUENCE_HALF:
             since = "the beginning" if self._last is None else self._seconds(self._last[1])
             self._result.losses.append(
                 f"messages {first} to {sequence - 1}, from {since} to {self._seconds(log_time)}, are not there"

@@ -15,29 +15,26 @@ from typing import Any, BinaryIO, Final
 
 import numpy as np
 import zstandard
+from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-_MAGIC: Final = b"\x89MCAP0\r\n"
+from collision_monitor.session.mcap.layout import (
+    CHUNK_HEAD,
+    FOOTER,
+    HEAD,
+    MAGIC,
+    MESSAGE,
+    MESSAGE_HEAD,
+    SPAN,
+    STATISTICS,
+    SUMMARY_OFFSET,
+    TIMES,
+)
+
 _CHUNK_BYTES: Final = 8 << 20
 """Bytes of a chunk before it is packed. rosbag2 has 1 MiB; but each chunk takes Python's lock from the monitor several
 times, whatever its size, and a recorder that flushes four times a second ends most of them sooner."""
 
-_HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX, _CHUNK_INDEX = range(1, 9)
-_ATTACHMENT, _ATTACHMENT_INDEX = 9, 10
-_STATISTICS, _METADATA, _METADATA_INDEX, _SUMMARY_OFFSET, _DATA_END = range(11, 16)
-
-_HEAD: Final = struct.Struct("<BQ")
-_MESSAGE_HEAD: Final = np.dtype(
-    [
-        ("opcode", "u1"),
-        ("length", "<u8"),
-        ("channel", "<u2"),
-        ("sequence", "<u4"),
-        ("log_time", "<u8"),
-        ("publish_time", "<u8"),
-    ]
-)
-_MESSAGE_FIELDS: Final = _MESSAGE_HEAD.itemsize - _HEAD.size
 _COMPRESSION: Final = "zstd"
 _LEVEL: Final = -1
 """Of sessions: 1.7 to 2.2 times as fast as zstd's own choice, 3, for files 1 % larger."""
@@ -73,21 +70,21 @@ class McapWriter:
         self._metadata_indexes: list[bytes] = []
         self.counts: dict[int, int] = {}
         self.begin = self.end = 0
-        self._put(_MAGIC)
-        self._put(_record(_HEADER, _text(profile), _text(library)))
+        self._put(MAGIC)
+        self._put(_record(Opcode.HEADER, _text(profile), _text(library)))
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """A metadata record, behind all messages so far."""
         self._close_chunk()
-        record = _record(_METADATA, _text(name), _text_map(values))
-        self._metadata_indexes.append(_record(_METADATA_INDEX, struct.pack("<QQ", self._at, len(record)), _text(name)))
+        record = _record(Opcode.METADATA, _text(name), _text_map(values))
+        self._metadata_indexes.append(_record(Opcode.METADATA_INDEX, SPAN.pack(self._at, len(record)), _text(name)))
         self._put(record)
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Its id."""
         number = len(self._schemas) + 1
         parts = (struct.pack("<H", number), _text(name), _text(encoding), struct.pack("<I", len(data)), data)
-        self._schemas.append(_record(_SCHEMA, *parts))
+        self._schemas.append(_record(Opcode.SCHEMA, *parts))
         self._add(self._schemas[-1])
         return number
 
@@ -95,7 +92,7 @@ class McapWriter:
         """Its id."""
         number = len(self._channels)
         parts = (struct.pack("<HH", number, schema), _text(topic), _text(encoding), _text_map(metadata))
-        self._channels.append(_record(_CHANNEL, *parts))
+        self._channels.append(_record(Opcode.CHANNEL, *parts))
         self._add(self._channels[-1])
         self.counts[number] = 0
         return number
@@ -111,16 +108,16 @@ class McapWriter:
         """Messages, one of each sequence for each. Times in ns; log times must not decrease."""
         if not data:
             return
-        heads = np.empty(len(data), _MESSAGE_HEAD)
+        heads = np.empty(len(data), MESSAGE_HEAD)
         sizes = np.fromiter(map(len, data), np.int64, len(data))
-        heads["opcode"], heads["length"] = _MESSAGE, sizes + _MESSAGE_FIELDS
+        heads["opcode"], heads["length"] = Opcode.MESSAGE, sizes + MESSAGE.size
         heads["channel"] = channels
         for name, values in (("sequence", sequences), ("log_time", log_times), ("publish_time", publish_times)):
             heads[name] = np.fromiter(values, np.uint64, len(data))
         records = [b""] * (2 * len(data))  # head, data, head, data …
-        records[0::2] = heads.view(f"V{_MESSAGE_HEAD.itemsize}").tolist()
+        records[0::2] = heads.view(f"V{MESSAGE_HEAD.itemsize}").tolist()
         records[1::2] = data
-        ends = np.cumsum(sizes + _MESSAGE_HEAD.itemsize)
+        ends = np.cumsum(sizes + MESSAGE_HEAD.itemsize)
         begins = np.concatenate([[0], ends[:-1]])
         done = 0
         while done < len(data):  # each time as many as fill the chunk
@@ -138,11 +135,12 @@ class McapWriter:
     def add_attachment(self, name: str, media_type: str, data: bytes, log_time: int) -> None:
         """A file within the file, behind all messages so far."""
         self._close_chunk()
-        times, size = struct.pack("<QQ", log_time, 0), struct.pack("<Q", len(data))  # 0: when it was made is not known
-        content = b"".join((times, _text(name), _text(media_type), size, data))
-        record = _record(_ATTACHMENT, content, struct.pack("<I", zlib.crc32(content)))
-        place = struct.pack("<QQ", self._at, len(record))
-        self._attachment_indexes.append(_record(_ATTACHMENT_INDEX, place, times, size, _text(name), _text(media_type)))
+        times, size = TIMES.pack(log_time, 0), struct.pack("<Q", len(data))  # 0: when it was made is not known
+        names = _text(name) + _text(media_type)
+        content = b"".join((times, names, size, data))
+        record = _record(Opcode.ATTACHMENT, content, struct.pack("<I", zlib.crc32(content)))
+        span = SPAN.pack(self._at, len(record))
+        self._attachment_indexes.append(_record(Opcode.ATTACHMENT_INDEX, span, times, size, names))
         self._put(record)
 
     def flush(self) -> None:
@@ -153,29 +151,30 @@ class McapWriter:
     def finish(self) -> None:
         """Write the summary."""
         self._close_chunk()
-        self._put(_record(_DATA_END, bytes(4)))  # without a checksum: the chunks have theirs
+        self._put(_record(Opcode.DATA_END, bytes(4)))  # without a checksum: the chunks have theirs
         counts = [(number, count) for number, count in self.counts.items() if count]
-        statistics = struct.pack(
-            "<QHIIIIQQ", sum(self.counts.values()), len(self._schemas), len(self._channels),
+        statistics = STATISTICS.pack(
+            sum(self.counts.values()), len(self._schemas), len(self._channels),
             len(self._attachment_indexes), len(self._metadata_indexes), len(self._chunk_indexes), self.begin, self.end,
         )  # fmt: skip
         groups = {
-            _SCHEMA: self._schemas,
-            _CHANNEL: self._channels,
-            _STATISTICS: [_record(_STATISTICS, statistics, _number_map(counts))],
-            _CHUNK_INDEX: self._chunk_indexes,
-            _ATTACHMENT_INDEX: self._attachment_indexes,
-            _METADATA_INDEX: self._metadata_indexes,
+            Opcode.SCHEMA: self._schemas,
+            Opcode.CHANNEL: self._channels,
+            Opcode.STATISTICS: [_record(Opcode.STATISTICS, statistics, _number_map(counts))],
+            Opcode.CHUNK_INDEX: self._chunk_indexes,
+            Opcode.ATTACHMENT_INDEX: self._attachment_indexes,
+            Opcode.METADATA_INDEX: self._metadata_indexes,
         }
         summary, offsets = b"", b""
         for opcode, records in groups.items():
             if records:
                 group = b"".join(records)
-                offsets += _record(_SUMMARY_OFFSET, struct.pack("<BQQ", opcode, self._at + len(summary), len(group)))
+                offset = SUMMARY_OFFSET.pack(opcode, self._at + len(summary), len(group))
+                offsets += _record(Opcode.SUMMARY_OFFSET, offset)
                 summary += group
-        footer = _HEAD.pack(_FOOTER, 20) + struct.pack("<QQ", self._at, self._at + len(summary))
-        checked = summary + offsets + footer
-        self._put(checked + struct.pack("<I", zlib.crc32(checked)) + _MAGIC)
+        footer = _record(Opcode.FOOTER, FOOTER.pack(self._at, self._at + len(summary), 0))
+        checked = summary + offsets + footer[:-4]  # all but the checksum itself
+        self._put(checked + struct.pack("<I", zlib.crc32(checked)) + MAGIC)
         self._stream.flush()
 
     def _put(self, data: bytes) -> None:
@@ -195,11 +194,10 @@ class McapWriter:
         columns = zip(_NO_MESSAGES, *chunk.index, strict=True)
         channels, log_times, offsets = (np.concatenate(column) for column in columns)
         begin, end = (int(log_times[0]), int(log_times[-1])) if len(log_times) else (0, 0)
-        times = struct.pack("<QQ", begin, end)
-        head = struct.pack("<QI", chunk.size, zlib.crc32(records))
-        fields = b"".join((times, head, _text(_COMPRESSION), struct.pack("<Q", len(packed))))
+        head = CHUNK_HEAD.pack(begin, end, chunk.size, zlib.crc32(records))
+        fields = b"".join((head, _text(_COMPRESSION), struct.pack("<Q", len(packed))))
         start = self._at
-        self._put(_HEAD.pack(_CHUNK, len(fields) + len(packed)) + fields)
+        self._put(HEAD.pack(Opcode.CHUNK, len(fields) + len(packed)) + fields)
         self._put(packed)  # not joined with what comes before it: that would be a copy
         after = self._at
         if len(channels):
@@ -210,13 +208,13 @@ class McapWriter:
             indexes.append((channel, self._at))
             its = channels == channel
             rows = np.stack([log_times[its], offsets[its]], axis=1, dtype="<u8").tobytes()
-            self._put(_record(_MESSAGE_INDEX, struct.pack("<HI", channel, len(rows)), rows))
+            self._put(_record(Opcode.MESSAGE_INDEX, struct.pack("<HI", channel, len(rows)), rows))
             self.counts[channel] += len(rows) // 16
         self._chunk_indexes.append(
             _record(
-                _CHUNK_INDEX,
-                times,
-                struct.pack("<QQ", start, after - start),
+                Opcode.CHUNK_INDEX,
+                TIMES.pack(begin, end),
+                SPAN.pack(start, after - start),
                 _number_map(indexes),
                 struct.pack("<Q", self._at - after),
                 _text(_COMPRESSION),
@@ -227,7 +225,7 @@ class McapWriter:
 
 def _record(opcode: int, *parts: bytes) -> bytes:
     content = b"".join(parts)
-    return _HEAD.pack(opcode, len(content)) + content
+    return HEAD.pack(opcode, len(content)) + content
 
 
 def _text(text: str) -> bytes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 
-from collision_monitor.session.recording.entry import Entry
+from collision_monitor.session.recording.queue_entry import QueueEntry
 
 
 class EventWindow:
@@ -21,12 +21,12 @@ class EventWindow:
         self._after = round(after * 1e9)
         self._limit = limit
         self._from_snapshots = from_snapshots
-        self._held: deque[Entry] = deque()
-        self._snapshots: deque[Entry] = deque()  # of those held
+        self._held: deque[QueueEntry] = deque()
+        self._snapshots: deque[QueueEntry] = deque()  # of those held
         self._bytes = 0
         self._until = -1
 
-    def take(self, entry: Entry) -> Iterator[tuple[Entry, bool]]:
+    def take(self, entry: QueueEntry) -> Iterator[tuple[QueueEntry, bool]]:
         """What is decided now, and whether it is kept: each entry comes out once, in order. Times never decrease."""
         if entry.event:
             self._until = entry.log_time + self._after
@@ -50,7 +50,7 @@ class EventWindow:
         following = next((each for each in self._snapshots if each is not first), None)
         return following is not None and following.log_time < oldest
 
-    def _pop(self) -> Entry:
+    def _pop(self) -> QueueEntry:
         entry = self._held.popleft()
         self._bytes -= entry.cost
         if entry.snapshot is not None:

@@ -13,12 +13,11 @@ from typing import Final
 from collision_monitor.errors import SessionError
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.session.mcap.rosbag2 import TYPES
-from collision_monitor.session.recording.entry import Entry
-from collision_monitor.session.recording.parts import ONE_FILE, SNAPSHOT_PERIOD, Parts, Splitting
-from collision_monitor.session.recording.session_file import METADATA
-
-__all__ = ["METADATA", "Recorder", "Recording", "Splitting"]
+from collision_monitor.session.mcap.layout import SEQUENCE_MASK
+from collision_monitor.session.mcap.rosbag2 import RECORDED_TYPES
+from collision_monitor.session.recording.queue_entry import QueueEntry
+from collision_monitor.session.recording.recording_files import SNAPSHOT_PERIOD, RecordingFiles
+from collision_monitor.session.recording.splitting import ONE_FILE, Splitting
 
 FLUSH_PERIOD: Final = 0.25
 """s between two flushes: with the grace and the time that a flush takes, a killed process loses less than 0.5 s."""
@@ -28,7 +27,6 @@ QUEUE_BYTES: Final = 256 << 20
 
 _WAKE_BYTES: Final = 8 << 20
 """Waiting bytes that wake the thread before the next flush is due."""
-
 
 EVENT_SNAPSHOT_PERIODS: Final = (0.1, 1.0)
 """s between two snapshots of a recording on events, at least and at most, and half of what is wanted before each event
@@ -80,9 +78,9 @@ class Recorder:
         patient: bool = False,
         snapshots: bool = False,
     ) -> None:
-        unknown = [name for name in types.values() if name not in TYPES]
+        unknown = [name for name in types.values() if name not in RECORDED_TYPES]
         if unknown:
-            raise SessionError(f"message type: expected one of {', '.join(TYPES)}, got {', '.join(unknown)}")
+            raise SessionError(f"message type: expected one of {', '.join(RECORDED_TYPES)}, got {', '.join(unknown)}")
         self.path = Path(path)
         self._topics = frozenset(types)
         self._queue_bytes = queue_bytes
@@ -93,7 +91,7 @@ class Recorder:
         self._is_full = False
 
         self._wake = threading.Condition()
-        self._queue: list[Entry] = []
+        self._queue: list[QueueEntry] = []
         self._waiting = 0
         self._closing = False
         self._next_sequence = 0
@@ -107,7 +105,7 @@ class Recorder:
         self._taken = 0  # by the thread, written or not kept
         self._unflushed = self._unflushed_written = 0  # taken, and written, since the last flush
         bytes(_LARGE)
-        self._parts = _create(self.path, types, metadata, splitting, overwrite, snapshots)
+        self._files = _create(self.path, types, metadata, splitting, overwrite, snapshots)
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 
@@ -135,12 +133,12 @@ class Recorder:
         if topic not in self._topics:
             raise KeyError(topic)
         with self._wake:
-            sequence = self._next_sequence & 0xFFFFFFFF
+            sequence = self._next_sequence & SEQUENCE_MASK
             self._last_log_time = max(self._last_log_time, log_time)
             if self._last_snapshot is None:
                 self._last_snapshot = self._last_log_time
             fields = topic, data, self._last_log_time, max(0, publish_time), sequence, event, objects, None, settings
-            entry = Entry._make(fields)  # at a fourth of what its constructor takes
+            entry = QueueEntry._make(fields)  # at a fourth of what its constructor takes
             cost = entry.cost
             while self._patient and self._state is Recording.ON and self._waiting + cost > self._queue_bytes:
                 self._wake.notify()
@@ -166,8 +164,8 @@ class Recorder:
         with self._wake:
             self._last_snapshot = self._last_log_time
             self._is_full = False
-            sequence = self._next_sequence & 0xFFFFFFFF
-            entry = Entry("", b"", self._last_log_time, 0, sequence, snapshot=snapshot)
+            sequence = self._next_sequence & SEQUENCE_MASK
+            entry = QueueEntry("", b"", self._last_log_time, 0, sequence, snapshot=snapshot)
             if not self._closing and self._state is Recording.ON and self._waiting + entry.cost <= self._queue_bytes:
                 self._queue.append(entry)
                 self._waiting += entry.cost
@@ -205,9 +203,9 @@ class Recorder:
         try:
             while self._write_what_waits():
                 pass
-            self._parts.finish()
+            self._files.finish()
             with self._wake:
-                self._recorded_bytes = self._parts.size
+                self._recorded_bytes = self._files.size
         except Exception as error:  # whatever it is: the caller goes on, and the status says it
             reason = error.strerror if isinstance(error, OSError) and error.strerror else repr(error)
             with self._wake:
@@ -216,7 +214,7 @@ class Recorder:
                 self._dropped = self._next_sequence - self._taken
                 self._queue.clear()
         finally:
-            self._parts.close()
+            self._files.close()
 
     def _write_what_waits(self) -> bool:
         """Sleep until there is something to do, then write. False: the session is closed and nothing is left."""
@@ -227,7 +225,7 @@ class Recorder:
             size, closing = self._waiting, self._closing
         for begin in range(0, len(batch), _TURN):
             turn = batch[begin : begin + _TURN]
-            self._unflushed_written += self._parts.write(turn)
+            self._unflushed_written += self._files.write(turn)
             self._unflushed += sum(entry.snapshot is None for entry in turn)
             if time.monotonic() >= self._flush_due:
                 self._flush()
@@ -237,17 +235,17 @@ class Recorder:
             self._flush()
         with self._wake:
             self._waiting -= size
-            self._is_full = self._parts.is_full
+            self._is_full = self._files.is_full
             self._wake.notify_all()
         return not closing
 
     def _flush(self) -> None:
         if self._unflushed:
-            self._parts.flush()
+            self._files.flush()
         with self._wake:
             self._taken += self._unflushed
             self._recorded += self._unflushed_written
-            self._recorded_bytes = self._parts.size
+            self._recorded_bytes = self._files.size
             self._flush_due = time.monotonic() + FLUSH_PERIOD
         self._unflushed = self._unflushed_written = 0
 
@@ -266,10 +264,10 @@ def _create(
     splitting: Splitting,
     overwrite: bool,
     snapshots: bool,
-) -> Parts:
+) -> RecordingFiles:
     """The new file, in a new folder unless the path ends in `.mcap`. Raises SessionError."""
     try:
-        return Parts(path, types, metadata, splitting, overwrite=overwrite, snapshots=snapshots)
+        return RecordingFiles(path, types, metadata, splitting, overwrite=overwrite, snapshots=snapshots)
     except FileExistsError:
         raise SessionError(
             f"{path}: expected a new file, got one that exists; choose another name or remove it"

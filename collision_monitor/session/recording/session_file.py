@@ -5,18 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
 
 from collision_monitor._version import VERSION
-from collision_monitor.session.mcap.rosbag2 import Extent, channel_metadata, file_metadata, full_name
+from collision_monitor.session.mcap.layout import LIBRARY, METADATA, SNAPSHOT
+from collision_monitor.session.mcap.rosbag2 import FileInformation, channel_metadata, file_metadata, full_name
 from collision_monitor.session.mcap.writer import McapWriter
-from collision_monitor.session.recording.entry import Entry
-
-METADATA: Final = "collision_monitor"
-"""Name of the metadata record that makes an MCAP file a session."""
-
-SNAPSHOT: Final = "snapshot_before_"
-"""How the names of snapshots begin; the number of the message that follows comes next."""
+from collision_monitor.session.recording.queue_entry import QueueEntry
 
 
 class SessionFile:
@@ -36,7 +30,7 @@ class SessionFile:
         self._begin: int | None = None
         self._stream = path.open("wb" if overwrite else "xb")
         try:
-            self._writer = McapWriter(self._stream, profile="ros2", library=f"collision_monitor {VERSION}")
+            self._writer = McapWriter(self._stream, profile="ros2", library=f"{LIBRARY} {VERSION}")
             self._writer.add_metadata(METADATA, metadata)
             schemas = {
                 name: self._writer.add_schema(full_name(name), "ros2msg", text) for name, text in definitions.items()
@@ -62,12 +56,12 @@ class SessionFile:
         return self._begin
 
     @property
-    def extent(self) -> Extent:
+    def information(self) -> FileInformation:
         """What was flushed of it."""
         counts = {topic: self._writer.counts[channel] for topic, channel in self._channels.items()}
-        return Extent(self._writer.begin, self._writer.end, counts)
+        return FileInformation(self._writer.begin, self._writer.end, counts)
 
-    def write(self, entries: Sequence[Entry]) -> None:
+    def write(self, entries: Sequence[QueueEntry]) -> None:
         """Append messages; log times must not decrease."""
         if not entries:
             return
@@ -87,7 +81,7 @@ class SessionFile:
     def finish(self) -> None:
         """Write the summary, with rosbag2's metadata as a record, and close the file."""
         self.flush()
-        text = file_metadata({self.path.name: self.extent}, self._types)
+        text = file_metadata({self.path.name: self.information}, self._types)
         self._writer.add_metadata("rosbag2", {"serialized_metadata": text})
         self._writer.finish()
         self._stream.close()

@@ -9,10 +9,10 @@ from collision_monitor.codec import encode_descriptions
 from collision_monitor.errors import SessionError
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session.mcap.definitions import definition
-from collision_monitor.session.mcap.rosbag2 import TYPES, full_name
+from collision_monitor.session.mcap.layout import REPEATED
+from collision_monitor.session.mcap.rosbag2 import RECORDED_TYPES, full_name
 from collision_monitor.session.reader import Recorded, RecordedSnapshot, Session
-from collision_monitor.session.recording.entry import Entry
-from collision_monitor.session.recording.parts import REPEATED
+from collision_monitor.session.recording.queue_entry import QueueEntry
 from collision_monitor.session.recording.session_file import SessionFile
 from collision_monitor.session.replaying.replay import replay
 
@@ -55,7 +55,7 @@ def _until(session: Session, sequence: int) -> Iterator[Recorded | RecordedSnaps
 
 def _write(session: Session, found: Sequence[Recorded | RecordedSnapshot], start: int, target: Path) -> int:
     """From the snapshot at `start` on, behind a message that says what the objects are then; or all of it."""
-    types = {each.topic: each.type for each in found if isinstance(each, Recorded) and each.type in TYPES}
+    types = {each.topic: each.type for each in found if isinstance(each, Recorded) and each.type in RECORDED_TYPES}
     definitions = {name: definition(full_name(name)).encode() for name in types.values()}
     metadata = {**session.metadata, REPEATED: "1"} if start else session.metadata
     file = SessionFile(target, types, metadata, definitions, overwrite=True)
@@ -67,7 +67,7 @@ def _write(session: Session, found: Sequence[Recorded | RecordedSnapshot], start
             if isinstance(each, RecordedSnapshot):
                 file.write_snapshot(each.data, each.sequence, each.log_time)
             elif each.topic in types:
-                file.write([Entry(each.topic, each.data, each.log_time, each.publish_time, each.sequence)])
+                file.write([QueueEntry(each.topic, each.data, each.log_time, each.publish_time, each.sequence)])
                 count += not each.repeated
         file.finish()
     finally:
@@ -75,7 +75,7 @@ def _write(session: Session, found: Sequence[Recorded | RecordedSnapshot], start
     return count
 
 
-def _objects(session: Session, before: Sequence[Recorded | RecordedSnapshot], types: dict[str, str]) -> Entry:
+def _objects(session: Session, before: Sequence[Recorded | RecordedSnapshot], types: dict[str, str]) -> QueueEntry:
     """All that were described, in one message; there is a step that differs, so there is one that described them."""
     pipeline = Pipeline(session.profile, session.frame_id)
     messages = [each for each in before if isinstance(each, Recorded)]
@@ -85,4 +85,4 @@ def _objects(session: Session, before: Sequence[Recorded | RecordedSnapshot], ty
     last = messages[-1]
     topic = next(topic for topic, name in types.items() if name == "ObjectDescriptionArray")
     data = encode_descriptions(last.log_time, session.frame_id, list(pipeline.objects.values()), snapshot=True)
-    return Entry(topic, data, last.log_time, last.log_time, last.sequence)
+    return QueueEntry(topic, data, last.log_time, last.log_time, last.sequence)

@@ -11,7 +11,7 @@ from played_session import NASTY, START, played, record_drive, record_scene, rec
 from collision_monitor.cli.main import main
 from collision_monitor.session import Session
 from collision_monitor.session.history.changes import changes
-from collision_monitor.session.history.history import read_history
+from collision_monitor.session.history.read_history import read_history
 from collision_monitor.world import make_scene
 
 STEP = 0.02

@@ -23,8 +23,14 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorder, Session
 from collision_monitor.session.history.check import Checked, check_sessions, junit_xml
-from collision_monitor.session.history.expectations import Outcome, evaluate, parse_expectations, read_expectations
-from collision_monitor.session.history.history import History, read_history
+from collision_monitor.session.history.expectations import (
+    ExpectationResult,
+    evaluate,
+    parse_expectations,
+    read_expectations,
+)
+from collision_monitor.session.history.history import History
+from collision_monitor.session.history.read_history import read_history
 from collision_monitor.session.many import Engine, find_sessions
 
 PROGRAM = Path(sys.executable).with_name("collision-monitor")
@@ -231,7 +237,7 @@ def test_objects_of_one_name_are_all_meant(yard: Path) -> None:
 
 
 def test_junit_is_xml_whatever_the_names_are() -> None:
-    text = junit_xml([Checked("a\x00.mcap", [Outcome("no_contact: \x1b[1m", False, "\ud800 <&")])])
+    text = junit_xml([Checked("a\x00.mcap", [ExpectationResult("no_contact: \x1b[1m", False, "\ud800 <&")])])
     (case,) = ElementTree.fromstring(text)[0]
     assert case.get("name") == "no_contact: \ufffd[1m"
 

@@ -10,10 +10,10 @@ import pytest
 
 from collision_monitor.errors import SessionError
 from collision_monitor.session.mcap import definitions
-from collision_monitor.session.mcap.rosbag2 import TYPES, full_name
+from collision_monitor.session.mcap.rosbag2 import RECORDED_TYPES, full_name
 
 
-@pytest.mark.parametrize("name", TYPES)
+@pytest.mark.parametrize("name", RECORDED_TYPES)
 def test_rosbags_parses_every_definition(name: str) -> None:
     from rosbags.typesys import get_types_from_msg
 
@@ -22,7 +22,7 @@ def test_rosbags_parses_every_definition(name: str) -> None:
     assert "builtin_interfaces/msg/Time" in types
 
 
-@pytest.mark.parametrize("name", TYPES)
+@pytest.mark.parametrize("name", RECORDED_TYPES)
 def test_mcap_ros2_makes_a_decoder_of_every_definition(name: str) -> None:
     from mcap_ros2._dynamic import generate_dynamic
 
@@ -45,7 +45,7 @@ def test_every_nested_type_comes_once() -> None:
     }
 
 
-@pytest.mark.parametrize("name", TYPES)
+@pytest.mark.parametrize("name", RECORDED_TYPES)
 def test_the_hash_is_that_of_the_installed_type(name: str) -> None:
     path = Path(sys.prefix) / "share" / f"{full_name(name)}.json"
     if not path.is_file():
@@ -57,9 +57,9 @@ def test_the_hash_is_that_of_the_installed_type(name: str) -> None:
 
 def test_a_machine_without_ros_has_the_same_definitions(monkeypatch: pytest.MonkeyPatch) -> None:
     """The copy in the package is made anew with `python test/session/test_definitions.py`."""
-    with_ros = {name: definitions.definition(full_name(name)) for name in TYPES}
+    with_ros = {name: definitions.definition(full_name(name)) for name in RECORDED_TYPES}
     monkeypatch.setattr(definitions, "_roots", lambda: iter(()))
-    assert {name: definitions.definition(full_name(name)) for name in TYPES} == with_ros
+    assert {name: definitions.definition(full_name(name)) for name in RECORDED_TYPES} == with_ros
 
 
 def test_an_unknown_type_is_named() -> None:
@@ -70,7 +70,8 @@ def test_an_unknown_type_is_named() -> None:
 
 if __name__ == "__main__":
     texts = [
-        f"MSG: {full_name(each).replace('/msg/', '/')}\n{definitions.definition(full_name(each))}" for each in TYPES
+        f"MSG: {full_name(each).replace('/msg/', '/')}\n{definitions.definition(full_name(each))}"
+        for each in RECORDED_TYPES
     ]
     titles = {line.removeprefix("MSG: ") for text in texts for line in text.splitlines() if line.startswith("MSG: ")}
     sections = [

@@ -18,9 +18,10 @@ from session_scene import record
 
 from collision_monitor.errors import SessionError
 from collision_monitor.session import Session
+from collision_monitor.session.mcap.layout import SALVAGE
 from collision_monitor.session.mcap.salvage import salvage
-from collision_monitor.session.reader import SALVAGE
-from collision_monitor.session.replaying.replay import Verdict, replay
+from collision_monitor.session.replaying.replay import replay
+from collision_monitor.session.replaying.replay_report import Verdict
 
 STEP = 10_000_000
 """ns between two messages."""

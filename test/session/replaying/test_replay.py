@@ -15,7 +15,8 @@ from collision_monitor.codec import decode_contacts, decode_status, encode_conta
 from collision_monitor.errors import SessionError
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorded, Recorder, Session
-from collision_monitor.session.replaying.replay import Verdict, replay
+from collision_monitor.session.replaying.replay import replay
+from collision_monitor.session.replaying.replay_report import Verdict
 
 
 def rewritten(

@@ -14,8 +14,9 @@ from collision_monitor.codec import decode_contacts, decode_parameter_event, dec
 from collision_monitor.errors import MessageError
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Session, Splitting
-from collision_monitor.session.history.history import AS_RECORDED, read_history
-from collision_monitor.session.replaying.replay import Verdict, replay
+from collision_monitor.session.history.read_history import AS_RECORDED, read_history
+from collision_monitor.session.replaying.replay import replay
+from collision_monitor.session.replaying.replay_report import Verdict
 from collision_monitor.settings.profile import Profile
 
 FAST = Profile.named("fast").replace(horizon=1.0, contact_margin=0.01, contact_points=4, model_primitive="kdop14")

@@ -21,11 +21,12 @@ from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.session.mcap.rosbag2 import full_name
 from collision_monitor.session.mcap.salvage import salvage
 from collision_monitor.session.reader import RecordedSnapshot
-from collision_monitor.session.recording import parts, recorder
-from collision_monitor.session.recording.entry import Entry
+from collision_monitor.session.recording import recorder, recording_files
 from collision_monitor.session.recording.event_window import EventWindow
+from collision_monitor.session.recording.queue_entry import QueueEntry
 from collision_monitor.session.recording.session_file import SessionFile
-from collision_monitor.session.replaying.replay import Verdict, replay
+from collision_monitor.session.replaying.replay import replay
+from collision_monitor.session.replaying.replay_report import Verdict
 
 LENGTH = 0.54
 """s: 50 steps and the messages between them that are none."""
@@ -34,10 +35,10 @@ LENGTH = 0.54
 @pytest.fixture
 def often(monkeypatch: pytest.MonkeyPatch) -> None:
     """A snapshot every 0.1 s, however small the session."""
-    for module in (parts, recorder):
+    for module in (recording_files, recorder):
         monkeypatch.setattr(module, "SNAPSHOT_PERIOD", 0.1)
     monkeypatch.setattr(recorder, "EVENT_SNAPSHOT_PERIODS", (0.02, 0.02))
-    monkeypatch.setattr(parts, "SNAPSHOT_SHARE", 1e9)
+    monkeypatch.setattr(recording_files, "SNAPSHOT_SHARE", 1e9)
 
 
 @pytest.fixture
@@ -107,7 +108,7 @@ def test_a_timeline_may_begin_at_zero(tmp_path: Path, times: list[int]) -> None:
 
 
 def test_quiet_sessions_have_few_snapshots(tmp_path: Path, often: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parts, "SNAPSHOT_SHARE", 0.05)
+    monkeypatch.setattr(recording_files, "SNAPSHOT_SHARE", 0.05)
     record(tmp_path / "run.mcap", snapshots=True)
     data = [each.data for each in Session(tmp_path / "run.mcap").entries() if isinstance(each, RecordedSnapshot)]
     assert len(data) == 1, "the first comes at once"
@@ -160,11 +161,11 @@ def test_each_window_of_a_recording_on_events_replays_alone(recorded: Path, tmp_
 def test_a_window_begins_with_a_snapshot_and_holds_no_more_than_it_must() -> None:
     snapshot = Snapshot({}, {})
     window = EventWindow(before=10e-9, after=0.0, limit=1 << 30, from_snapshots=True)
-    decided: list[tuple[Entry, bool]] = []
+    decided: list[tuple[QueueEntry, bool]] = []
     for k in range(100):
         if k % 7 == 3:
-            decided += window.take(Entry("", b"", k, 0, k, snapshot=snapshot))
-        decided += window.take(Entry("/x", b"", k, 0, k, event=k == 60))
+            decided += window.take(QueueEntry("", b"", k, 0, k, snapshot=snapshot))
+        decided += window.take(QueueEntry("/x", b"", k, 0, k, event=k == 60))
     kept = [entry for entry, is_kept in decided if is_kept]
     assert kept[0].snapshot is not None
     assert kept[0].log_time == 45, "52 is within the 10 that are wanted"
@@ -187,7 +188,7 @@ def rewritten(
             file.write_snapshot(each.data, each.sequence, each.log_time)
         elif each.sequence not in without:
             data = spoiled(each.data, by) if each.sequence == spoil else each.data
-            file.write([Entry(each.topic, data, each.log_time, each.publish_time, each.sequence)])
+            file.write([QueueEntry(each.topic, data, each.log_time, each.publish_time, each.sequence)])
     file.finish()
 
 
@@ -285,10 +286,10 @@ KILLED = """
 import sys
 sys.path.insert(0, sys.argv[2])
 from pathlib import Path
-from collision_monitor.session.recording import parts, recorder
+from collision_monitor.session.recording import recorder, recording_files
 from session_scene import record
-parts.SNAPSHOT_PERIOD = recorder.SNAPSHOT_PERIOD = 0.1
-parts.SNAPSHOT_SHARE = 1e9
+recording_files.SNAPSHOT_PERIOD = recorder.SNAPSHOT_PERIOD = 0.1
+recording_files.SNAPSHOT_SHARE = 1e9
 run = record(Path(sys.argv[1]), snapshots=True, close=False)
 while run.status()["recorded_messages"] < 150: pass
 import os; os._exit(9)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 import zlib
 from collections.abc import Callable, Iterator
 from io import BytesIO
@@ -15,12 +14,7 @@ from mcap.records import Attachment, Channel, Chunk, Header, Metadata, Schema
 from mcap.stream_reader import get_chunk_data_stream
 
 from collision_monitor.errors import SessionError
-
-_MAGIC: Final = b"\x89MCAP0\r\n"
-_HEAD: Final = struct.Struct("<BQ")
-_MESSAGE: Final = struct.Struct("<HIQQ")
-_LARGEST_CHUNK: Final = 1 << 30
-"""Bytes, unpacked. rosbag2 writes less than 1 MiB; what claims more than this is damaged."""
+from collision_monitor.session.mcap.layout import HEAD, LARGEST_CHUNK, MAGIC, MESSAGE
 
 _GLANCE: Final = 256
 """Bytes of a record that show when it is from and what its name is."""
@@ -36,7 +30,7 @@ class Message(NamedTuple):
     data: bytes
 
 
-class McapRecords:
+class McapReader:
     """A file. damage: what is missing or broken, one sentence each, and position: bytes read, of the last reading.
 
     Raises SessionError for what is no MCAP file, or cannot be read.
@@ -49,10 +43,10 @@ class McapRecords:
         try:
             self.size = path.stat().st_size
             with path.open("rb") as file:
-                magic = file.read(len(_MAGIC))
+                magic = file.read(len(MAGIC))
         except OSError as error:
             raise SessionError(f"{path}: expected a file that can be read, got: {error.strerror}") from None
-        if magic != _MAGIC:
+        if magic != MAGIC:
             what = f"it begins with {magic!r}" if magic else "the file is empty"
             raise SessionError(f"{path}: expected an MCAP file, but {what}")
 
@@ -87,7 +81,7 @@ class McapRecords:
         with self.path.open("rb") as file:
             for start, opcode, length in self._heads(file):
                 yield start, opcode, file.read(min(length, _GLANCE))
-                file.seek(start + _HEAD.size + length)
+                file.seek(start + HEAD.size + length)
 
     def _whole(self, file: BinaryIO) -> Iterator[tuple[int, int, bytes]]:
         """Where each record starts, its opcode and its payload."""
@@ -96,15 +90,15 @@ class McapRecords:
 
     def _heads(self, file: BinaryIO) -> Iterator[tuple[int, int, int]]:
         """Where each record starts, its opcode and its length, up to the end of the data or of what is there."""
-        file.seek(len(_MAGIC))
+        file.seek(len(MAGIC))
         while True:
             self.position = start = file.tell()
-            head = file.read(_HEAD.size)
+            head = file.read(HEAD.size)
             if not head:
                 self.damage.append("the recording was not closed: it ends without a summary")
                 return
-            opcode, length = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, self.size)
-            if length > self.size - start - _HEAD.size:
+            opcode, length = HEAD.unpack(head) if len(head) == HEAD.size else (0, self.size)
+            if length > self.size - start - HEAD.size:
                 self.damage.append(
                     f"the recording was cut off: its last {self.size - start} bytes are an incomplete record"
                 )
@@ -122,13 +116,13 @@ def _unpack(opcode: int, payload: bytes) -> list[Any]:
     stream = ReadDataStream(BytesIO(payload))
     if opcode == Opcode.CHUNK:
         chunk = Chunk.read(stream)
-        if chunk.uncompressed_size > _LARGEST_CHUNK:
+        if chunk.uncompressed_size > LARGEST_CHUNK:
             raise ValueError(f"it claims {chunk.uncompressed_size} bytes")
         records, size = get_chunk_data_stream(chunk, validate_crc=True)
         return _in_chunk(records.read(size))
     if opcode == Opcode.ATTACHMENT and int.from_bytes(payload[-4:], "little") not in (0, zlib.crc32(payload[:-4])):
         raise ValueError("its checksum is wrong")
-    return [_KINDS[opcode](stream)] if opcode in _KINDS else []
+    return [_DECODERS[opcode](stream)] if opcode in _DECODERS else []
 
 
 def _in_chunk(data: bytes) -> list[Any]:
@@ -136,8 +130,8 @@ def _in_chunk(data: bytes) -> list[Any]:
     records: list[Any] = []
     at = 0
     while at < len(data):
-        opcode, length = _HEAD.unpack_from(data, at)
-        begin, at = at + _HEAD.size, at + _HEAD.size + length
+        opcode, length = HEAD.unpack_from(data, at)
+        begin, at = at + HEAD.size, at + HEAD.size + length
         if at > len(data):
             raise ValueError(f"a record of {length} bytes in it is cut off")
         if opcode == Opcode.MESSAGE:
@@ -148,13 +142,13 @@ def _in_chunk(data: bytes) -> list[Any]:
 
 
 def _message(data: bytes, begin: int, end: int) -> Message:
-    if end - begin < _MESSAGE.size:
+    if end - begin < MESSAGE.size:
         raise ValueError(f"a message of {end - begin} bytes is none")
-    channel_id, sequence, log_time, publish_time = _MESSAGE.unpack_from(data, begin)
-    return Message(channel_id, sequence, log_time, publish_time, data[begin + _MESSAGE.size : end])
+    channel_id, sequence, log_time, publish_time = MESSAGE.unpack_from(data, begin)
+    return Message(channel_id, sequence, log_time, publish_time, data[begin + MESSAGE.size : end])
 
 
-_KINDS: Final[dict[int, Callable[[ReadDataStream], Any]]] = {
+_DECODERS: Final[dict[int, Callable[[ReadDataStream], Any]]] = {
     Opcode.HEADER: Header.read,
     Opcode.METADATA: Metadata.read,
     Opcode.SCHEMA: Schema.read,

@@ -16,9 +16,10 @@ from collision_monitor.codec import decode_contacts, decode_descriptions
 from collision_monitor.errors import SessionError
 from collision_monitor.records import Phase
 from collision_monitor.session import Recorded, Recording, Session, Splitting
-from collision_monitor.session.recording.entry import Entry
 from collision_monitor.session.recording.event_window import EventWindow
-from collision_monitor.session.replaying.replay import Verdict, replay
+from collision_monitor.session.recording.queue_entry import QueueEntry
+from collision_monitor.session.replaying.replay import replay
+from collision_monitor.session.replaying.replay_report import Verdict
 
 BY_TIME = Splitting(duration=0.26)
 
@@ -153,7 +154,7 @@ def test_the_window_keeps_what_is_near_an_event_and_nothing_else(
     time, entries = START, []
     for k, (gap, event) in enumerate(gaps):
         time += gap
-        entries.append(Entry("/x", b"", time, 0, k, event and k % 4 == 0))
+        entries.append(QueueEntry("/x", b"", time, 0, k, event and k % 4 == 0))
     decided = [each for entry in entries for each in window.take(entry)]
     assert [entry for entry, _ in decided] == entries[: len(decided)]
     events = [(k, e.log_time) for k, e in enumerate(entries) if e.event]
@@ -167,10 +168,10 @@ def test_the_window_keeps_what_is_near_an_event_and_nothing_else(
 
 
 def test_the_oldest_that_is_held_back_goes_where_there_is_too_much() -> None:
-    window = EventWindow(1e6, 1.0, 10 * Entry("", bytes(100), 0, 0, 0).cost)
-    decided = [each for k in range(30) for each in window.take(Entry("", bytes(100), k, 0, k))]
+    window = EventWindow(1e6, 1.0, 10 * QueueEntry("", bytes(100), 0, 0, 0).cost)
+    decided = [each for k in range(30) for each in window.take(QueueEntry("", bytes(100), k, 0, k))]
     assert [(entry.sequence, kept) for entry, kept in decided] == [(k, False) for k in range(20)]
-    rest = list(window.take(Entry("", b"", 30, 0, 30, event=True)))
+    rest = list(window.take(QueueEntry("", b"", 30, 0, 30, event=True)))
     assert [(entry.sequence, kept) for entry, kept in rest] == [(k, True) for k in range(20, 31)]
 
 

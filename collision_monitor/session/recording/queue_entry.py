@@ -13,7 +13,7 @@ _OVERHEAD: Final = 128
 """Bytes that a waiting message costs beside its data, so that empty ones are bounded too."""
 
 
-class Entry(NamedTuple):
+class QueueEntry(NamedTuple):
     """event: a collision begins in it. objects: all that are described once it was taken in, where it changed them.
 
     snapshot: then it is no message but the monitor as it is before message `sequence`. settings: the profile (JSON)
@@ -36,9 +36,9 @@ class Entry(NamedTuple):
         return len(self.data) + _OVERHEAD + (self.snapshot.nbytes if self.snapshot else 0)
 
 
-_MARKS: Final = tuple(itemgetter(Entry._fields.index(name)) for name in ("objects", "snapshot", "settings"))
+_MARKS: Final = tuple(itemgetter(QueueEntry._fields.index(name)) for name in ("objects", "snapshot", "settings"))
 
 
-def are_messages_alone(entries: Sequence[Entry]) -> bool:
+def are_messages_alone(entries: Sequence[QueueEntry]) -> bool:
     """Whether none of them changes objects or settings, and none is a snapshot: 50 ns for each."""
     return all(list(map(get, entries)).count(None) == len(entries) for get in _MARKS)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -18,14 +17,12 @@ from collision_monitor.errors import SessionError
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session.mcap.definitions import definition
-from collision_monitor.session.mcap.rosbag2 import Extent, file_metadata, full_name
-from collision_monitor.session.recording.entry import Entry, are_messages_alone
+from collision_monitor.session.mcap.layout import NUMBER, RECORDING, REPEATED, SEQUENCE_MASK
+from collision_monitor.session.mcap.rosbag2 import INPUT_TYPES, FileInformation, file_metadata, full_name
 from collision_monitor.session.recording.event_window import EventWindow
+from collision_monitor.session.recording.queue_entry import QueueEntry, are_messages_alone
 from collision_monitor.session.recording.session_file import SessionFile
-
-RECORDING, NUMBER, REPEATED = "recording", "file", "repeated"
-"""Keys of a file's metadata: an id that the files of one recording share, its place among them from 0, and how many of
-its first messages only repeat what was in force when it begins."""
+from collision_monitor.session.recording.splitting import Splitting
 
 SNAPSHOT_PERIOD: Final = 10.0
 """s between two snapshots in a file: a replay from the last one is 5 s away on average, at its own speed."""
@@ -36,39 +33,8 @@ SNAPSHOT_SHARE: Final = 0.05
 HELD_BYTES: Final = 256 << 20
 """Most bytes that wait for an event."""
 
-_INPUTS: Final = ("ObjectStateArray", "ObjectDescriptionArray")
 
-
-@dataclass(frozen=True)
-class Splitting:
-    """When a recording goes on in another file, and whether it is made around events only.
-
-    size: bytes from which on a file is followed by another; duration: the same in s; 0: never. on_event: only `before`
-    seconds before each collision begins and `after` seconds after it are kept. Raises SessionError.
-    """
-
-    size: int = 0
-    duration: float = 0.0
-    on_event: bool = False
-    before: float = 10.0
-    after: float = 5.0
-
-    def __post_init__(self) -> None:
-        for name in ("size", "duration", "before", "after"):
-            value = getattr(self, name)
-            if not 0 <= value < float("inf"):
-                raise SessionError(f"recording, {name}: expected a finite number, at least 0, got {value!r}")
-
-    @property
-    def makes_files(self) -> bool:
-        """Whether there may be more than one."""
-        return bool(self.size or self.duration or self.on_event)
-
-
-ONE_FILE: Final = Splitting()
-
-
-class Parts:
+class RecordingFiles:
     """The file that is being written, and those before it. Raises SessionError, and OSError where the disk says no."""
 
     def __init__(
@@ -91,10 +57,10 @@ class Parts:
         self._last_time = 0  # of what was put into a file
         self._next_snapshot = (0, 0)  # log time and bytes of the file from which on it takes another
         self._definitions = {name: definition(full_name(name)).encode() for name in self._types.values()}
-        self._inputs = {topic for topic, name in self._types.items() if name in _INPUTS}
+        self._inputs = {topic for topic, name in self._types.items() if name in INPUT_TYPES}
         self._shapes = next((topic for topic, name in self._types.items() if name == "ObjectDescriptionArray"), None)
         self._objects: Sequence[ObjectDescription] = ()
-        self._extents: dict[str, Extent] = {}
+        self._finished: dict[str, FileInformation] = {}
         self._finished_bytes = 0
         self._file: SessionFile | None = None
         self._window = (
@@ -123,11 +89,11 @@ class Parts:
         """Whether another file is to follow, once there is a snapshot to begin it with."""
         return self._splits and self._is_full(self._last_time)
 
-    def write(self, entries: Sequence[Entry]) -> int:
+    def write(self, entries: Sequence[QueueEntry]) -> int:
         """Take in what comes next; how many messages were written for it, of those that came before too."""
         if self._window is None:
             return self._put(entries)
-        written, kept = 0, list[Entry]()
+        written, kept = 0, list[QueueEntry]()
         for entry in entries:
             for each, is_kept in self._window.take(entry):
                 if is_kept:
@@ -147,7 +113,7 @@ class Parts:
     def finish(self) -> None:
         """Write the summary of the last file, and rosbag2's metadata.yaml into a folder."""
         self._finish()
-        if self._folder is not None and not self._extents:
+        if self._folder is not None and not self._finished:
             self._write_metadata()
 
     def close(self) -> None:
@@ -155,11 +121,11 @@ class Parts:
         if self._file is not None:
             self._file.close()
 
-    def _put(self, entries: Sequence[Entry]) -> int:
+    def _put(self, entries: Sequence[QueueEntry]) -> int:
         """Into as few calls as there are files and snapshots between them."""
         if self._file is not None and not self._splits and are_messages_alone(entries):
             return self._put_run(entries)
-        run: list[Entry] = []
+        run: list[QueueEntry] = []
         written = 0
         for entry in entries:
             if entry.snapshot is not None or (self._splits and not self._snapshots and entry.topic in self._inputs):
@@ -176,14 +142,14 @@ class Parts:
             self._note(entry)
         return written + self._put_run(run)
 
-    def _put_run(self, run: Sequence[Entry]) -> int:
+    def _put_run(self, run: Sequence[QueueEntry]) -> int:
         if run:
             assert self._file is not None
             self._file.write(run)
             self._last_time = run[-1].log_time
         return len(run)
 
-    def _put_snapshot(self, entry: Entry, snapshot: Snapshot) -> None:
+    def _put_snapshot(self, entry: QueueEntry, snapshot: Snapshot) -> None:
         """As the beginning of a file, or into the one there is, if that did not have one for long enough."""
         if self._file is None:
             self._open(entry)
@@ -192,14 +158,14 @@ class Parts:
         if entry.log_time >= time and self._file.size >= size:
             self._write_snapshot(self._file, entry, snapshot)
 
-    def _note(self, entry: Entry) -> None:
+    def _note(self, entry: QueueEntry) -> None:
         """What is in force after the message, for the start of the next file."""
         if entry.objects is not None:
             self._objects = entry.objects
         if entry.settings is not None:
             self._metadata["profile"] = entry.settings
 
-    def _write_snapshot(self, file: SessionFile, entry: Entry, snapshot: Snapshot) -> None:
+    def _write_snapshot(self, file: SessionFile, entry: QueueEntry, snapshot: Snapshot) -> None:
         data = snapshot.encode()
         file.write_snapshot(data, entry.sequence, entry.log_time)
         self._next_snapshot = (
@@ -213,7 +179,7 @@ class Parts:
         size, duration = self._splitting.size, self._splitting.duration
         return bool(size and self._file.size >= size) or bool(duration and now - self._file.begin >= duration * 1e9)
 
-    def _open(self, first: Entry | None) -> None:
+    def _open(self, first: QueueEntry | None) -> None:
         """The next file; first: the message or snapshot that it begins with, None for the first file of all."""
         if self._folder is None:
             self._file = SessionFile(
@@ -221,7 +187,7 @@ class Parts:
             )
             return
         repeated = bool(first is not None and self._shapes and self._objects)
-        number = len(self._extents)
+        number = len(self._finished)
         metadata = {**self._metadata, NUMBER: str(number), REPEATED: str(int(repeated))}
         path = self._folder / f"{self._folder.name}_{number}.mcap"
         self._file = SessionFile(path, self._types, metadata, self._definitions)
@@ -232,7 +198,7 @@ class Parts:
             assert self._shapes is not None
             frame_id, at = self._metadata.get("frame_id", ""), first.log_time
             data = encode_descriptions(at, frame_id, self._objects, snapshot=True)
-            self._file.write([Entry(self._shapes, data, at, at, (first.sequence - 1) & 0xFFFFFFFF)])
+            self._file.write([QueueEntry(self._shapes, data, at, at, (first.sequence - 1) & SEQUENCE_MASK)])
         if first.snapshot is not None:
             self._write_snapshot(self._file, first, first.snapshot)
 
@@ -241,14 +207,14 @@ class Parts:
             return
         self._file.finish()
         self._finished_bytes += self._file.path.stat().st_size
-        self._extents[self._file.path.name] = self._file.extent
+        self._finished[self._file.path.name] = self._file.information
         self._file = None
         if self._folder is not None:  # after each, as rosbag2: what is finished is a bag also if the rest is lost
             self._write_metadata()
 
     def _write_metadata(self) -> None:
         assert self._folder is not None
-        text = file_metadata(self._extents, self._types)
+        text = file_metadata(self._finished, self._types)
         (self._folder / "metadata.yaml").write_text(text, encoding="utf-8")
 
 

@@ -1,0 +1,54 @@
+"""An array whose rows arrive message by message."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.session.history.history import Records
+
+_BLOCK: Final = 1 << 16
+"""Rows that are made room for at a time."""
+
+
+class GrowingRows:
+    """Rows that grow message by message, each with the key of its message; a message is not kept."""
+
+    def __init__(self, dtype: np.dtype[np.void]) -> None:
+        self.keys: list[int] = []
+        self._dtype = dtype
+        self._counts: list[int] = []
+        self._blocks: list[Records] = []
+        self._room = 0
+
+    def append(self, key: int, rows: Records) -> None:
+        """A copy of the rows."""
+        self.keys.append(key)
+        self._counts.append(len(rows))
+        if len(rows) > self._room:
+            self._close()
+            self._room = max(_BLOCK, len(rows))
+            self._blocks.append(np.empty(self._room, self._dtype))
+        block = self._blocks[-1] if self._blocks else np.empty(0, self._dtype)
+        begin = len(block) - self._room
+        block[begin : begin + len(rows)] = rows
+        self._room -= len(rows)
+
+    def joined(self) -> tuple[Records, NDArray[np.int64]]:
+        """All rows and their keys. Blocks are let go as they are copied: a long session is not there twice."""
+        self._close()
+        keys = np.repeat(np.array(self.keys, np.int64), self._counts)
+        joined = np.empty(len(keys), self._dtype)
+        end = len(joined)
+        while self._blocks:
+            block = self._blocks.pop()
+            joined[end - len(block) : end] = block
+            end -= len(block)
+        return joined, keys
+
+    def _close(self) -> None:
+        if self._blocks and self._room:
+            self._blocks[-1] = self._blocks[-1][: -self._room]
+        self._room = 0

@@ -1,0 +1,106 @@
+"""The layout of an MCAP file: magic bytes, records and their fields; and the names of a session's own records.
+
+Source: the MCAP specification, version 0 (mcap.dev/spec). All numbers are little-endian. A uint32 or uint64 length
+precedes each text, map, list and block of data.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Final
+
+import numpy as np
+from mcap.opcode import Opcode
+
+MAGIC: Final = b"\x89MCAP0\r\n"
+"""The first and the last bytes of a file."""
+
+LARGEST_CHUNK: Final = 1 << 30
+"""Most bytes that a chunk is unpacked to, so that a damaged one cannot take all memory; rosbag2 writes under 1 MiB."""
+
+SEQUENCE_MASK: Final = 0xFFFFFFFF
+"""The sequence numbers of messages are uint32 and wrap."""
+
+SEQUENCE_HALF: Final = 1 << 31
+"""A sequence number that is farther ahead than this lies behind."""
+
+# -- fixed fields
+
+_HEAD_FIELDS: Final = (("opcode", "<u1"), ("length", "<u8"))
+_MESSAGE_FIELDS: Final = (("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8"))
+
+MESSAGE_HEAD: Final = np.dtype([*_HEAD_FIELDS, *_MESSAGE_FIELDS])
+"""All of a message's record before its data."""
+
+
+def _struct(fields: tuple[tuple[str, str], ...]) -> struct.Struct:
+    codes = {"<u1": "B", "<u2": "H", "<u4": "I", "<u8": "Q"}
+    return struct.Struct("<" + "".join(codes[kind] for _, kind in fields))
+
+
+HEAD: Final = _struct(_HEAD_FIELDS)
+"""Of every record: opcode, length of the content that follows."""
+
+MESSAGE: Final = _struct(_MESSAGE_FIELDS)
+"""Channel, sequence, log time, publish time; the data follows."""
+
+LOG_TIME: Final = MESSAGE_HEAD.fields["log_time"][1] - HEAD.size  # type: ignore[index]
+"""Offset of the log time in a message, and of the first log time in a message index."""
+
+TIMES: Final = struct.Struct("<QQ")
+"""Of a chunk: first and last log time. Of an attachment: log time and time of creation. ns."""
+
+CHUNK_HEAD: Final = struct.Struct("<QQQI")
+"""The two times, unpacked size, checksum; the name of the compression and the packed records follow."""
+
+SPAN: Final = struct.Struct("<QQ")
+"""Where a record is in the file: offset and length."""
+
+STATISTICS: Final = struct.Struct("<QHIIIIQQ")
+"""Numbers of messages, schemas, channels, attachments, metadata records and chunks; first and last log time."""
+
+SUMMARY_OFFSET: Final = struct.Struct("<BQQ")
+"""Opcode of a group of records, its offset and length."""
+
+FOOTER: Final = struct.Struct("<QQI")
+"""Offsets of the summary and of the summary's offsets, checksum."""
+
+# -- all fields
+
+FIELDS: Final[dict[int, tuple[int, ...]]] = {
+    Opcode.HEADER: (-4, -4),
+    Opcode.FOOTER: (FOOTER.size,),
+    Opcode.SCHEMA: (2, -4, -4, -4),
+    Opcode.CHANNEL: (4, -4, -4, -4),
+    Opcode.CHUNK: (CHUNK_HEAD.size, -4, -8),
+    Opcode.MESSAGE_INDEX: (2, -4),
+    Opcode.CHUNK_INDEX: (TIMES.size + SPAN.size, -4, 8, -4, 16),
+    Opcode.ATTACHMENT: (TIMES.size, -4, -4, -8, 4),
+    Opcode.ATTACHMENT_INDEX: (SPAN.size + TIMES.size + 8, -4, -4),
+    Opcode.STATISTICS: (STATISTICS.size, -4),
+    Opcode.METADATA: (-4, -4),
+    Opcode.METADATA_INDEX: (SPAN.size, -4),
+    Opcode.SUMMARY_OFFSET: (SUMMARY_OFFSET.size,),
+    Opcode.DATA_END: (4,),
+}
+"""Bytes of each field; negative: a length of so many bytes, then what it counts. A message alone has no own length."""
+
+OPCODES: Final = frozenset({*FIELDS, Opcode.MESSAGE})
+
+# -- a session's own records
+
+LIBRARY: Final = "collision_monitor"
+"""The first word of the library in the header of every file that this package writes."""
+
+METADATA: Final = "collision_monitor"
+"""Name of the metadata record that makes an MCAP file a session."""
+
+RECORDING, NUMBER, REPEATED = "recording", "file", "repeated"
+"""Keys of that record: an id that the files of one recording share, its place among them from 0, and how many of its
+first messages only repeat what was in force when it begins."""
+
+SNAPSHOT: Final = "snapshot_before_"
+"""How the names of the attachments with snapshots begin; the number of the message that follows comes next."""
+
+SALVAGE: Final = "collision_monitor_salvage"
+"""Name of the metadata record that says what is missing in a file that was salvaged."""
