@@ -11,7 +11,7 @@ import numpy as np
 from collision_monitor._jit import kernel
 from collision_monitor.broad_phase.dense_grid import CLASSES, STARTING, partners, places, searches, sort_by_cell
 from collision_monitor.detection.detector import Detector, kernels
-from collision_monitor.world.moving_bodies import make_bodies
+from collision_monitor.world.moving_bodies import make_moving_bodies
 
 
 @kernel
@@ -79,7 +79,7 @@ def best(action: Callable[[], object], repeats: int = 30) -> float:
 
 def main(name: str = "boxes", n: str = "10000") -> None:
     """Print the table."""
-    scene = make_bodies(name, int(n))
+    scene = make_moving_bodies(name, int(n))
     positions, quaternions = scene.positions[4], scene.quaternions[4]
     detector = Detector(scene.shapes)
     contacts = detector.detect(positions, quaternions)

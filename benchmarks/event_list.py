@@ -22,7 +22,7 @@ from rich.progress import track
 from rich.table import Table
 
 from collision_monitor import Box, Monitor, records
-from collision_monitor.accuracy.plain import PlainMonitor, disagreements
+from collision_monitor.accuracy.reference_monitor import ReferenceMonitor, disagreements
 from collision_monitor.geometry.pose import from_rotation_vector, multiply
 from collision_monitor.settings.profile import Profile
 
@@ -79,7 +79,7 @@ def run(move: str, args: argparse.Namespace) -> dict[str, object]:
     # noise of half the declared tolerances: two noisy states are then within them
     noise = 0.49 * profile.position_tolerance if move == "noise" else 0.0
     turning = {"turns": 0.01, "jumps": 1.0}.get(move, 0.0)
-    mine, plain = Monitor(profile), PlainMonitor(profile)
+    mine, plain = Monitor(profile), ReferenceMonitor(profile)
     for monitor in (mine, plain):
         for i, size in enumerate(boxes.size):
             monitor.add(i, Box(size))

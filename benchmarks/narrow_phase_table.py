@@ -335,7 +335,7 @@ def fcl_distance(a: Any, X_A: Any, b: Any, X_B: Any) -> float:
 
 def conformance() -> dict[tuple[str, str], tuple[int, int]]:
     """Passed and all cases by kinds of shape, by the project's own test of them, also swapped and moved."""
-    sys.path.insert(0, str(ROOT / "test" / "narrow_phase"))
+    sys.path[:0] = [str(ROOT / "test" / folder) for folder in ("narrow_phase", "helpers")]
     import test_conformance as conformance_test
 
     names = {"halfspace": "half-space"}

@@ -25,7 +25,7 @@ from event_list import RATE, Boxes
 from numpy.typing import NDArray
 
 from collision_monitor import Box, ConvexHull, Monitor, StepResult, records
-from collision_monitor.accuracy.plain import PlainMonitor
+from collision_monitor.accuracy.reference_monitor import ReferenceMonitor
 from collision_monitor.prediction import sphere_trees
 from collision_monitor.settings.profile import Profile
 from collision_monitor.world.arm import link
@@ -82,7 +82,7 @@ def describe(monitor: Monitor, boxes: Boxes, shape: str) -> None:
 def run(args: argparse.Namespace) -> dict[str, Any]:
     """Measure."""
     boxes = Boxes(args.objects, args.seed)
-    free, plain = Monitor(), PlainMonitor()
+    free, plain = Monitor(), ReferenceMonitor()
     for monitor in (free, plain):
         describe(monitor, boxes, args.shapes)
     full = []

@@ -24,10 +24,10 @@ from typing import Any
 import numpy as np
 
 from collision_monitor._version import VERSION
-from collision_monitor.cli.bench import CHECKED
+from collision_monitor.accuracy.detection_time import CHECKED_FRAME
 from collision_monitor.detection.detector import Detector
 from collision_monitor.errors import CollisionMonitorError
-from collision_monitor.world.moving_bodies import SCENES, load_bodies, make_bodies
+from collision_monitor.world.moving_bodies import BENCHMARK_SCENES, load_moving_bodies, make_moving_bodies
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -67,8 +67,8 @@ def run_ours(file: Path, threads: int) -> dict[str, Any]:
 
 def check(runner: Path, file: Path, folder: Path) -> dict[str, Any]:
     """Our pairs and depths against the peers' reference."""
-    scene = load_bodies(file)
-    contacts = Detector(scene.shapes).detect(scene.positions[CHECKED], scene.quaternions[CHECKED])
+    scene = load_moving_bodies(file)
+    contacts = Detector(scene.shapes).detect(scene.positions[CHECKED_FRAME], scene.quaternions[CHECKED_FRAME])
     ours = folder / "ours.npz"
     np.savez(ours, pairs=contacts.pairs, depth=-contacts.signed_distance)
     command = [peers_python(), str(ROOT / "benchmarks" / "check_pairs.py"), str(runner), str(file), str(ours)]
@@ -105,7 +105,7 @@ def plot(results: list[dict[str, Any]], file: Path) -> None:
     matplotlib.use("agg")
     from matplotlib import pyplot
 
-    scenes = [scene for scene in SCENES if any(entry["scene"] == scene for entry in results)]
+    scenes = [scene for scene in BENCHMARK_SCENES if any(entry["scene"] == scene for entry in results)]
     figure, axes = pyplot.subplots(
         1, len(scenes), figsize=(3.6 * len(scenes) + 1.6, 4.6), sharey=True, squeeze=False, layout="constrained"
     )
@@ -140,7 +140,7 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help=f"100 and 1,000 objects, {QUICK}")
     parser.add_argument("--peers", type=Path, default=ROOT.parent / "shared" / "bench" / "peers.py", metavar="PEERS.PY")
     parser.add_argument("--only", metavar="A,B", help="these peers (default: all)")
-    parser.add_argument("--scenes", default=",".join(SCENES), metavar="A,B")
+    parser.add_argument("--scenes", default=",".join(BENCHMARK_SCENES), metavar="A,B")
     parser.add_argument("--n", metavar="N,M", help="numbers of objects (default: 100,1000,10000)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--budget", type=float, help="seconds of frames for each peer and scene (default: 20)")
@@ -162,7 +162,7 @@ def main() -> int:
                 peers = run_peers(args.peers, scene, n, args, folder) if there else []
                 file = folder / f"{scene}_{n}_seed{args.seed}.npz"
                 if not file.exists():
-                    make_bodies(scene, n, args.seed).save(file)
+                    make_moving_bodies(scene, n, args.seed).save(file)
                 ours = [run_ours(file, count) for count in threads]
                 checked = check(args.peers, file, folder) if there else {}
             show(scene, n, ours, peers, checked)

@@ -12,7 +12,9 @@ from typing import Final
 
 import yaml
 
-from collision_monitor.accuracy.tradeoff import Row, Step, tradeoff
+from collision_monitor.accuracy.measurement import Measurement
+from collision_monitor.accuracy.playback import Step
+from collision_monitor.accuracy.profile_tradeoff import profile_tradeoff
 from collision_monitor.errors import InputError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.settings.profile import Profile
@@ -20,7 +22,7 @@ from collision_monitor.settings.profile import Profile
 FACTORS: Final = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.01)
 """Of the tolerances of `balanced`, from loose to tight; `fast` is tried before them and `exact` after them."""
 
-NOISE: Final = 1.05
+TIMING_NOISE: Final = 1.05
 """Times that differ by less than this factor count as the same."""
 
 TOLERANCES: Final = (
@@ -43,7 +45,7 @@ class Demands:
     ttc_error: float | None = None
     budget_ms: float | None = None
 
-    def failures(self, row: Row) -> list[str]:
+    def failures(self, row: Measurement) -> list[str]:
         """The demands that a row does not meet, in words: what was asked and what is there."""
         found = []
         if row.misses:
@@ -65,7 +67,7 @@ class Trial:
     """One profile on the recording; failures: the demands that it does not meet."""
 
     profile: Profile
-    row: Row
+    measurement: Measurement
     failures: list[str]
 
 
@@ -106,12 +108,12 @@ def tune(
         if value is not None and not value > 0.0:
             raise InputError(f"{name}: expected a number above 0, got {value!r}")
     profiles = candidates(horizon, contact_margin)
-    rows = tradeoff(scene, descriptions, steps, profiles, progress)
+    rows = profile_tradeoff(scene, descriptions, steps, profiles, progress)
     trials = [Trial(profile, row, demands.failures(row)) for profile, row in zip(profiles, rows, strict=True)]
     good = [trial for trial in trials if not trial.failures]
     # what costs the same but for the clock's noise may as well be the tightest
-    least = min((trial.row.step_ms for trial in good), default=0.0)
-    cheap = [trial for trial in good if trial.row.step_ms <= NOISE * least]
+    least = min((trial.measurement.step_ms for trial in good), default=0.0)
+    cheap = [trial for trial in good if trial.measurement.step_ms <= TIMING_NOISE * least]
     return (cheap[-1].profile if cheap else None), trials
 
 

@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import time
 from pathlib import Path
-from typing import Any, Final
 
-from collision_monitor._version import VERSION
+from collision_monitor.accuracy.detection_time import WARM_UP_FRAMES
+from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.quantities import whole
-
-WARM_UP: Final = 2
-"""Frames at the start that are not counted."""
-CHECKED: Final = 4
-"""The frame whose number of pairs is told; the one that other systems' answers are compared at."""
 
 DESCRIPTION = """\
 Time full detection: NumPy poses in, NumPy pairs, distances, normals and points out, every pose new in each frame.
@@ -41,22 +35,25 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--n", type=whole(1), default=10_000, metavar="N", help="how many objects (default: 10000)")
     parser.add_argument("--seed", type=whole(0), default=1, metavar="S", help="of the random scene (default: 1)")
     parser.add_argument("--scene-file", type=Path, metavar="FILE", help="a saved scene (.npz) instead")
-    parser.add_argument("--frames", type=whole(1), metavar="F", help=f"frames, {WARM_UP} uncounted (default: 12)")
+    parser.add_argument(
+        "--frames", type=whole(1), metavar="F", help=f"frames, {WARM_UP_FRAMES} uncounted (default: 12)"
+    )
     parser.add_argument("--threads", type=whole(1), metavar="T", help="default: 2, or 1 where there is one core")
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
-    parser.set_defaults(command=bench)
+    parser.set_defaults(command=bench_command)
 
 
-def bench(args: argparse.Namespace) -> int:
+def bench_command(args: argparse.Namespace) -> int:
     """Run the benchmark. Raises InputError."""
+    from collision_monitor.accuracy.detection_time import time_detection
     from collision_monitor.detection.detector import default_threads
-    from collision_monitor.world.moving_bodies import FRAMES, load_bodies, make_bodies
+    from collision_monitor.world.moving_bodies import FRAMES, load_moving_bodies, make_moving_bodies
 
     if args.scene_file is None:
-        scene = make_bodies(args.scene, args.n, args.seed, args.frames or FRAMES)
+        scene = make_moving_bodies(args.scene, args.n, args.seed, args.frames or FRAMES)
     else:
-        scene = load_bodies(args.scene_file)
-    result = measure(scene, default_threads() if args.threads is None else args.threads, args.frames)
+        scene = load_moving_bodies(args.scene_file)
+    result = time_detection(scene, default_threads() if args.threads is None else args.threads, args.frames)
     if args.json:
         print(json.dumps(result))
     else:
@@ -65,37 +62,4 @@ def bench(args: argparse.Namespace) -> int:
             f"{result['median_ms']:.3f} ms per frame (p99 {result['p99_ms']:.3f} ms over {result['frames']} frames), "
             f"{result['pairs']} colliding pairs"
         )
-    return 0
-
-
-def measure(scene: Any, threads: int, frames: int | None = None) -> dict[str, Any]:
-    """Median and 99th percentile (ms) of a frame of a MovingBodies scene, and what was measured."""
-    import numpy as np
-
-    from collision_monitor.detection.detector import Detector
-
-    detector = Detector(scene.shapes, threads=threads)
-    detector.detect(scene.positions[0], scene.quaternions[0])  # compiles, where nothing is cached
-    count = min(frames or len(scene.positions), len(scene.positions))
-    warm_up = min(WARM_UP, count - 1)
-    milliseconds, pairs = [], 0
-    for frame in range(count):
-        begin = time.perf_counter_ns()
-        contacts = detector.detect(scene.positions[frame], scene.quaternions[frame])
-        _ = contacts.pairs, contacts.signed_distance, contacts.normal, contacts.point
-        milliseconds.append((time.perf_counter_ns() - begin) / 1e6)
-        if frame <= CHECKED:
-            pairs = len(contacts)
-    counted = np.array(milliseconds[warm_up:])
-    return {
-        "scene": scene.name,
-        "n": len(scene.shapes),
-        "seed": scene.seed,
-        "threads": threads,
-        "frames": len(counted),
-        "median_ms": float(np.median(counted)),
-        "p99_ms": float(np.percentile(counted, 99)),
-        "min_ms": float(counted.min()),
-        "pairs": pairs,
-        "version": VERSION,
-    }
+    return ExitCode.DONE

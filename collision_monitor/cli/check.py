@@ -10,15 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.engines import add_engine, engine_of
+from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.output_file import writing
 from collision_monitor.cli.progress import progress_bar
 from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
     from collision_monitor.session.history.check import Checked
-
-EXIT_ERROR = 1
-EXIT_USAGE = 2
-EXIT_FAILED = 3
 
 EXAMPLE = """\
 expect:
@@ -77,10 +75,11 @@ def check_command(args: argparse.Namespace) -> int:
             Profile.named(args.replay)
     except InputError as error:
         print(f"collision-monitor: error: {error}", file=sys.stderr)
-        return EXIT_USAGE
+        return ExitCode.USAGE
     paths = find_sessions(args.sessions)
     if args.junit is not None:
-        _write(args.junit, "", "a")  # told before the work is done, not after it
+        with writing(args.junit):  # an error comes before the work is done, not after it
+            args.junit.open("a").close()
     results = []
     with progress_bar("check", len(paths)) as done:
         for each in check_sessions(paths, expectations, with_profile=args.replay, engine=engine_of(args)):
@@ -89,23 +88,16 @@ def check_command(args: argparse.Namespace) -> int:
             if not args.json:
                 print(_as_text(each), flush=True)
     if args.junit is not None:
-        _write(args.junit, junit_xml(results))
+        with writing(args.junit):
+            args.junit.write_text(junit_xml(results), encoding="utf-8")
     if args.json:
         print(json.dumps({"sessions": [asdict(each) | {"holds": each.holds} for each in results]}, indent=2))
     else:
         failed, broken = sum(not r.holds and not r.error for r in results), sum(bool(r.error) for r in results)
         print(f"{len(results)} sessions: {len(results) - failed - broken} hold, {failed} fail, {broken} cannot be read")
     if any(each.error for each in results):
-        return EXIT_ERROR
-    return 0 if all(each.holds for each in results) else EXIT_FAILED
-
-
-def _write(path: Path, text: str, mode: str = "w") -> None:
-    try:
-        with path.open(mode, encoding="utf-8") as file:
-            file.write(text)
-    except OSError as error:
-        raise InputError(f"{path}: expected a file that can be written, got: {error.strerror}") from None
+        return ExitCode.ERROR
+    return ExitCode.DONE if all(each.holds for each in results) else ExitCode.NOT_AS_EXPECTED
 
 
 def _as_text(each: Checked) -> str:

@@ -8,8 +8,9 @@ import math
 from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
+from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.progress import session_bar
 from collision_monitor.cli.quantities import positive, whole
 from collision_monitor.errors import InputError
@@ -17,9 +18,6 @@ from collision_monitor.errors import InputError
 if TYPE_CHECKING:
     from collision_monitor.session.history.changes import Change, Changes, Event
     from collision_monitor.session.history.history import History
-
-EXIT_DIFFERENT: Final = 3
-EXIT_NOT_KNOWN: Final = 4
 
 EPILOG = """\
 examples:
@@ -63,7 +61,9 @@ def compare_command(args: argparse.Namespace) -> int:
     a, b = (_history(path, profile) for path, profile in _sides(args))
     found = changes(a, b, args.tolerance)
     print(json.dumps(_as_json(found), indent=2) if args.json else _as_text(found, args.limit))
-    return EXIT_DIFFERENT if found.changes else 0 if found.known else EXIT_NOT_KNOWN
+    if found.changes:
+        return ExitCode.NOT_AS_EXPECTED
+    return ExitCode.DONE if found.known else ExitCode.NOT_KNOWN
 
 
 def _sides(args: argparse.Namespace) -> list[tuple[Path, str | None]]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from collision_monitor.cli.child import Child, ProcessError
+from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.quantities import positive, whole
 from collision_monitor.errors import InputError
 from collision_monitor.ros.domain import free_domain
@@ -25,9 +26,6 @@ FRAME = 0.25
 """s between two pictures."""
 LINE = 1.0
 """s between two lines where the output is no terminal."""
-
-EXIT_OTHER_ANSWERS = 3
-EXIT_INTERRUPTED = 130
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -46,10 +44,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--noise", type=positive, metavar="S", help="of the states, see `world --help`")
     parser.add_argument("--output", type=Path, metavar="PATH", help="session file (default: sessions/SCENE-DATE.mcap)")
     parser.add_argument("--capture", type=Path, metavar="FILE", help="save the last picture of the table as SVG")
-    parser.set_defaults(command=demo)
+    parser.set_defaults(command=demo_command)
 
 
-def demo(args: argparse.Namespace) -> int:
+def demo_command(args: argparse.Namespace) -> int:
     """Exit code 0 only where everything worked and the replay gave the same bytes. Raises ProcessError, InputError."""
     stop = StopRequest().install()
     from collision_monitor.world import describe
@@ -62,7 +60,7 @@ def demo(args: argparse.Namespace) -> int:
     recorded = _watch(args, session, stop)
     if stop.received:
         print(f"interrupted; the session is finished: {session}" if recorded else "interrupted before the scene began")
-        return EXIT_INTERRUPTED
+        return ExitCode.INTERRUPTED
     return _replay(session)
 
 
@@ -179,7 +177,7 @@ def _replay(session: Path) -> int:
             f"replay   bit-identical: {report.steps} steps in {report.replay_duration:.1f} s without ROS "
             f"({report.speed:.0f} × real time), digest {report.digest:016x}"
         )
-        return 0
+        return ExitCode.DONE
     for line in (report.first_difference, *report.notes):
         if line is not None:
             print(f"replay   {line}")

@@ -8,14 +8,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.output_file import writing
 from collision_monitor.cli.progress import progress_bar
 from collision_monitor.cli.quantities import whole
-from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
-    from collision_monitor.accuracy.extremes import Row
-
-EXIT_OUTSIDE = 3
+    from collision_monitor.accuracy.extremes import WorstCase
 
 EPILOG = """\
 error: worst distance of a number from the exact one (60 digits), as a part of the sizes involved; of a time, as a part
@@ -49,24 +48,24 @@ def extremes_command(args: argparse.Namespace) -> int:
     with progress_bar("extremes", extremes.steps()) as done:
         rows = extremes.run(args.samples, args.seed, done)
     if args.json:
-        print(json.dumps({"rows": [_plain(row) for row in rows]}))
+        print(json.dumps({"rows": [_as_json(row) for row in rows]}))
     else:
         print("\n".join(_as_text(rows)))
     if args.png is not None:
-        try:
-            _draw(rows, args.png)
-        except OSError as error:
-            raise InputError(f"{args.png}: expected a file that can be written, got: {error.strerror}") from None
-    return 0 if all(row.holds for row in rows) else EXIT_OUTSIDE
+        from collision_monitor.accuracy.pictures import draw_extremes
+
+        with writing(args.png):
+            draw_extremes(rows, args.png)
+    return ExitCode.DONE if all(row.holds for row in rows) else ExitCode.NOT_AS_EXPECTED
 
 
-def _plain(row: Row) -> dict[str, Any]:
+def _as_json(row: WorstCase) -> dict[str, Any]:
     values = asdict(row) | {"holds": row.holds}
     values["curve"] = [[x, y] for x, y in row.curve.items()]
     return values
 
 
-def _as_text(rows: list[Row]) -> list[str]:
+def _as_text(rows: list[WorstCase]) -> list[str]:
     from collision_monitor.accuracy.extremes import SWEEPS
 
     lines = [
@@ -84,29 +83,3 @@ def _as_text(rows: list[Row]) -> list[str]:
     samples = sum(row.samples for row in rows)
     verdict = "every truth is within its stated bound" if not bad else f"{bad} of {len(rows)} rows do not hold"
     return [*lines, f"{samples} answers: {verdict}"]
-
-
-def _draw(rows: list[Row], path: Path) -> None:
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    from collision_monitor.accuracy.extremes import SWEEPS
-
-    names = list(SWEEPS)
-    with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
-        figure = Figure(figsize=(13, 6.2), layout="constrained")
-        panels = figure.subplots(2, (len(names) + 1) // 2, sharey=True).ravel()
-        for axes, name in zip(panels, names, strict=False):
-            for row in (row for row in rows if row.sweep == name):
-                x = [value or min(v for v in row.curve if v) / 10 for value in row.curve]
-                axes.plot(x, [max(error, 1e-18) for error in row.curve.values()], ".-", label=row.quantity, linewidth=1)
-            unit = SWEEPS[name][0]
-            axes.set_xscale("log")
-            axes.set_yscale("log")
-            axes.set_xlabel(f"{name} ({unit})" if unit else name)
-            axes.axhline(2.2e-16, color="black", linewidth=0.6, linestyle=":")
-        for axes in panels[:: len(panels) // 2]:
-            axes.set_ylabel("worst relative error")
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=6)
-        figure.savefig(path, dpi=110)

@@ -11,10 +11,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from collision_monitor.cli.exit_codes import ExitCode
+
 if TYPE_CHECKING:
     from collision_monitor.sources import Imported
-
-EXIT_LEFT_OUT = 3
 
 DESCRIPTION = """\
 Make a session of a bag that holds nav_msgs/Odometry, geometry_msgs/PoseStamped (or WithCovariance), tf2_msgs/TFMessage
@@ -74,7 +74,7 @@ def import_command(args: argparse.Namespace) -> int:
         print(json.dumps({"bag": str(args.bag), "output": str(args.output), **asdict(result)}, indent=2))
     else:
         print(_as_text(result, args.output))
-    return 0 if result.whole else EXIT_LEFT_OUT
+    return ExitCode.DONE if result.whole else ExitCode.NOT_AS_EXPECTED
 
 
 @contextmanager

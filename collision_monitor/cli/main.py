@@ -11,6 +11,7 @@ from keyword import iskeyword
 from typing import Final
 
 from collision_monitor._version import VERSION
+from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.errors import CollisionMonitorError
 
 COMMANDS: Final = (
@@ -18,10 +19,6 @@ COMMANDS: Final = (
     "check", "salvage", "import", "tradeoff", "tune", "extremes", "bench",
 )  # fmt: skip
 """In the order of `--help`. Each is a module of this package (`import_` for import) with `add_parser(subparsers)`."""
-
-EXIT_ERROR: Final = 1
-EXIT_INTERRUPTED: Final = 128 + 2  # what a shell reports for SIGINT
-EXIT_BROKEN_PIPE: Final = 128 + 13
 
 DESCRIPTION = "What touches now, what will touch next, when, and how sure that is: a ROS 2 collision monitor."
 
@@ -75,16 +72,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return code
     except CollisionMonitorError as error:
         print(f"collision-monitor: error: {error}", file=sys.stderr)
-        return EXIT_ERROR
+        return ExitCode.ERROR
     except MemoryError as error:
         print(f"collision-monitor: error: there is not enough memory for that: {error}", file=sys.stderr)
-        return EXIT_ERROR
+        return ExitCode.ERROR
     except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
+        return ExitCode.INTERRUPTED
     except BrokenPipeError:
         # The reader (head, less) went away. Point stdout elsewhere, or Python complains again when it exits.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return EXIT_BROKEN_PIPE
+        return ExitCode.BROKEN_PIPE
 
 
 def replay_main() -> int:

@@ -24,24 +24,27 @@ def whole(least: int) -> Callable[[str], int]:
 
 def positive(text: str) -> float:
     """A finite number above 0."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 < value < math.inf:
+    value = _finite(text)
+    if not value > 0.0:
         raise argparse.ArgumentTypeError(f"expected a number above 0, got {text!r}")
     return value
 
 
 def not_negative(text: str) -> float:
     """A finite number, at least 0."""
+    value = _finite(text)
+    if not value >= 0.0:
+        raise argparse.ArgumentTypeError(f"expected a number, at least 0, got {text!r}")
+    return value
+
+
+def _finite(text: str) -> float:
+    """NaN where the text is no finite number."""
     try:
         value = float(text)
     except ValueError:
-        value = math.nan
-    if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"expected a number, at least 0, got {text!r}")
-    return value
+        return math.nan
+    return value if math.isfinite(value) else math.nan
 
 
 def size(text: str) -> int:

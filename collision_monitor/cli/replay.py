@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.engines import add_engine, engine_of
+from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.progress import progress_bar
 from collision_monitor.cli.quantities import not_negative, positive
 from collision_monitor.errors import InputError
@@ -26,8 +27,6 @@ exit codes: 0 the answers are identical, 1 the session cannot be read, 3 they di
 4 they cannot be compared: they differ and were recorded by another version or machine, or messages are missing;
 of several sessions: the first of 1, 3, 4 that one of them came to
 """
-
-EXIT_ERROR = 1
 
 
 def add_parser(subparsers: Any) -> None:
@@ -118,7 +117,7 @@ def _replay_many(paths: list[Path], args: argparse.Namespace) -> int:
             for path, each in zip(paths, found, strict=True)
         ]
         print(json.dumps({"sessions": sessions}, indent=2))
-    codes = {EXIT_ERROR if each.report is None else int(each.report.verdict) for each in found}
+    codes = {ExitCode.ERROR if each.report is None else int(each.report.verdict) for each in found}
     return next((code for code in sorted(codes) if code), 0)
 
 

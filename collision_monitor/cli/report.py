@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.progress import session_bar
 from collision_monitor.errors import SessionError
 
@@ -43,4 +44,4 @@ def report_command(args: argparse.Namespace) -> int:
         history = read_history(session, args.replay, show)
     for file in write_report(history, output, pictures=args.png, overwrite=args.force):
         print(file)
-    return 0
+    return ExitCode.DONE

@@ -43,10 +43,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--after", type=positive, metavar="S", help="--on-event: so long after it begins (default: 5)")
     parser.add_argument("--profile", metavar="NAME", help="where the settings start from: fast, balanced or exact")
     parser.add_argument("--ros-args", nargs=argparse.REMAINDER, default=[], metavar="…", help="passed on to ROS")
-    parser.set_defaults(command=run)
+    parser.set_defaults(command=run_command)
 
 
-def run(args: argparse.Namespace) -> int:
+def run_command(args: argparse.Namespace) -> int:
     """Run the node until SIGINT or SIGTERM. Raises InputError, SessionError for a recording that is there already."""
     if args.record is not None and args.record.exists():
         raise SessionError(f"--record: expected the name of a new file, {args.record} is there already")

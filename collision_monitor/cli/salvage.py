@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-EXIT_LOSSY = 3
+from collision_monitor.cli.exit_codes import ExitCode
 
 EPILOG = """\
 A chunk of messages counts where its checksum is right. What is complete in a chunk whose checksum is wrong is left out,
@@ -51,4 +51,4 @@ def salvage_command(args: argparse.Namespace) -> int:
             print(f"lost       {loss}")
         trusted = f", {result.unverified} of them unverified" if result.unverified else ""
         print(f"written    {result.messages} messages{trusted} to {args.output}")
-    return EXIT_LOSSY if result.losses else 0
+    return ExitCode.NOT_AS_EXPECTED if result.losses else ExitCode.DONE

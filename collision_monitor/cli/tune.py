@@ -8,15 +8,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.output_file import writing
 from collision_monitor.cli.progress import progress_bar
 from collision_monitor.cli.quantities import positive
-from collision_monitor.cli.tradeoff import draw
 from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
     from collision_monitor.accuracy.tune import Trial
-
-EXIT_NONE = 3
 
 EPILOG = """\
 Each profile is run over the recording and every answer compared with exact ones that are computed anew at every step.
@@ -48,7 +47,7 @@ def add_parser(subparsers: Any) -> None:
 
 def tune_command(args: argparse.Namespace) -> int:
     """Return the exit code. Raises InputError, SessionError."""
-    from collision_monitor.accuracy.tradeoff import recorded
+    from collision_monitor.accuracy.inputs import recorded
     from collision_monitor.accuracy.tune import Demands, candidates, parameter_file, tune
     from collision_monitor.session import Session
 
@@ -57,7 +56,7 @@ def tune_command(args: argparse.Namespace) -> int:
         raise InputError(f"{output}: expected a new file, got one that exists; choose another name or --force")
     demands = Demands(args.max_distance_error, args.max_ttc_error, args.budget_ms)
     profile = Session(args.session).profile
-    name, descriptions, steps = recorded(args.session)
+    name, descriptions, steps, _ = recorded(args.session)
     total = 2 * len(steps) * len(candidates(profile.horizon, profile.contact_margin))
     with progress_bar("tune", total) as done:
         chosen, trials = tune(
@@ -65,26 +64,24 @@ def tune_command(args: argparse.Namespace) -> int:
             horizon=profile.horizon, contact_margin=profile.contact_margin, progress=done,
         )  # fmt: skip
     if args.json:
-        rows = [each.row.to_dict() | {"failures": each.failures} for each in trials]
+        rows = [each.measurement.to_dict() | {"failures": each.failures} for each in trials]
         print(json.dumps({"chosen": chosen and chosen.name, "demands": asdict(demands), "rows": rows}))
     else:
         print("\n".join(_as_text(trials, chosen.name if chosen else None)))
     if args.png:
-        try:
-            draw([each.row for each in trials], args.png)
-        except OSError as error:
-            raise InputError(f"{args.png}: expected a file that can be written, got: {error.strerror}") from None
+        from collision_monitor.accuracy.pictures import draw_tradeoff
+
+        with writing(args.png):
+            draw_tradeoff([each.measurement for each in trials], args.png)
     if chosen is None:
-        return EXIT_NONE
+        return ExitCode.NOT_AS_EXPECTED
     asked = ", ".join(f"{key} {value:g}" for key, value in asdict(demands).items() if value is not None)
     notes = [f"Found by `collision-monitor tune` on {args.session.name}: {chosen.name}", f"asked: {asked or 'nothing'}"]
-    try:
+    with writing(output):
         output.write_text(parameter_file(chosen, notes), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{output}: expected a file that can be written, got: {error.strerror}") from None
     if not args.json:
         print(f"written {output}; start the node with: collision-monitor run --params {output}")
-    return 0
+    return ExitCode.DONE
 
 
 def _as_text(trials: list[Trial], chosen: str | None) -> list[str]:
@@ -92,7 +89,7 @@ def _as_text(trials: list[Trial], chosen: str | None) -> list[str]:
     widths = (8, 8, 9, 11, 10, 9)
     lines = [f"  {'profile':<16} " + " ".join(f"{head:>{width}}" for head, width in zip(heads, widths, strict=True))]
     for each in trials:
-        row = each.row
+        row = each.measurement
         mark = "→ " if each.profile.name == chosen else "  "
         numbers = (
             row.step_ms,

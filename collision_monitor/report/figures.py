@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from collision_monitor.report.facts import Facts
 from collision_monitor.report.from_above import from_above
-from collision_monitor.report.picture import CONTACT, INK, PALETTE, POSSIBLE, STYLE, WARNING, Size, shortened
+from collision_monitor.report.rendering import CONTACT, INK, PALETTE, POSSIBLE, STYLE, WARNING, Size, shortened
 from collision_monitor.session.history.alerts import stated_error
 from collision_monitor.session.history.history import CollisionEvent, Floats, History, Pair
 

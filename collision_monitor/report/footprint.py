@@ -13,15 +13,15 @@ from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, 
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session.history.history import Floats
 
-DIRECTIONS: Final = 64
+VIEWING_DIRECTIONS: Final = 64
 """From which round shapes are looked at."""
 
 FAR: Final = 1e4
 """m: how much is drawn of a half-space, more than any picture shows."""
 
 _CORNERS: Final = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-_ANGLE: Final = np.linspace(0.0, 2.0 * np.pi, DIRECTIONS, endpoint=False)
-_NORMAL: Final = np.stack([np.cos(_ANGLE), np.sin(_ANGLE), np.zeros(DIRECTIONS)], axis=1)
+_ANGLE: Final = np.linspace(0.0, 2.0 * np.pi, VIEWING_DIRECTIONS, endpoint=False)
+_NORMAL: Final = np.stack([np.cos(_ANGLE), np.sin(_ANGLE), np.zeros(VIEWING_DIRECTIONS)], axis=1)
 
 
 def footprint(described: ObjectDescription, position: Floats, quaternion: Floats) -> list[Floats]:

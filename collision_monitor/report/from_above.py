@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from collision_monitor.report.facts import Facts
 from collision_monitor.report.footprint import footprint
-from collision_monitor.report.picture import INK, PALETTE, Size, shortened
+from collision_monitor.report.rendering import INK, PALETTE, Size, shortened
 from collision_monitor.report.tracks import Track
 from collision_monitor.session.history.history import CollisionEvent, Floats, History
 

@@ -10,11 +10,11 @@ from typing import Any, Final
 
 from collision_monitor._version import VERSION
 from collision_monitor.errors import SessionError
+from collision_monitor.report.assessment import assess, counted
+from collision_monitor.report.captions import captions
 from collision_monitor.report.facts import Facts, gather
-from collision_monitor.report.figures import CURVES, PAIRS, drawn_collisions, figures, largest_error
-from collision_monitor.report.from_above import AROUND, EVENTS
-from collision_monitor.report.picture import BROAD, NARROW, as_png, as_svg
-from collision_monitor.report.verdict import verdict
+from collision_monitor.report.figures import figures
+from collision_monitor.report.rendering import BROAD, NARROW, as_png, as_svg
 from collision_monitor.session.history.history import CollisionEvent, History
 
 ROWS: Final = 200
@@ -23,10 +23,19 @@ ROWS: Final = 200
 SWITCHES: Final = 10
 """Changes of settings that are told."""
 
+PICTURES: Final = {
+    "timeline": "Timeline",
+    "predicted": "Predicted against actual",
+    "distances": "The riskiest pairs",
+    "events": "From above",
+    "steps": "Step times",
+}
+"""Titles of the pictures, by the names that `figures` and `captions` give, in their order on the page."""
+
 NOTHING_ELSE: Final = "default-src 'none'; style-src 'unsafe-inline'"
 """Content security policy: whatever a name may hold, the page runs no script and asks for nothing."""
 
-STYLE: Final = """\
+STYLESHEET: Final = """\
 :root { color-scheme: light dark; --ink: #1b1f24; --paper: #fff; --soft: #f3f4f6; --line: #d5d9de;
   --bad: #c0392b; --good: #2a8c4a; --unknown: #b07800; }
 @media screen and (prefers-color-scheme: dark) { :root { --ink: #e4e7eb; --paper: #14171a; --soft: #1f2429;
@@ -105,21 +114,15 @@ def check_outputs(files: list[Path], overwrite: bool) -> None:
 
 def page(history: History, facts: Facts, pictures: dict[str, str]) -> str:
     """The whole page; pictures: HTML by the names that `figures` gives."""
-    sections = [_verdict(history, facts), _section("Timeline", _timeline_caption(facts), pictures.get("timeline"))]
-    sections.append(_collisions(history, facts))
-    for name, title, caption in (
-        ("predicted", "Predicted against actual", _predicted_caption),
-        ("distances", "The riskiest pairs", _distances_caption),
-        ("events", "From above", _events_caption),
-    ):
-        sections.append(_section(title, caption(facts), pictures.get(name)))
-    sections.append(_section("Step times", _steps_caption(history), pictures.get("steps")))
-    sections.append(_provenance(history))
+    said = captions(history, facts)
+    drawn = [_section(title, said[name], pictures.get(name)) for name, title in PICTURES.items()]
+    sections = [_verdict(history, facts), drawn[0], _collisions(history, facts), *drawn[1:], _provenance(history)]
     title = escape(history.name)
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{title}</title>\n'
         f'<meta http-equiv="Content-Security-Policy" content="{NOTHING_ELSE}">\n'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<style>\n{STYLE}</style>\n</head>\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<style>\n{STYLESHEET}</style>\n</head>\n"
         f"<body>\n<h1>{title}</h1>\n" + "\n".join(filter(None, sections)) + "\n</body>\n</html>\n"
     )
 
@@ -130,11 +133,11 @@ def _section(title: str, caption: str, picture: str | None) -> str:
 
 def _verdict(history: History, facts: Facts) -> str:
     """First what a reader has to know, and whether it can be relied on."""
-    found = verdict(history, facts)
+    found = assess(history, facts)
     moving = sum(not each.static for each in history.objects.values())
     source = "today's answers to the recorded inputs" if history.replayed else "as recorded"
     extent = (
-        f"in {history.duration:.1f} s, {_plural(len(history.times), 'step')}, {_plural(moving, 'moving object')}, "
+        f"in {history.duration:.1f} s, {counted(len(history.times), 'step')}, {counted(moving, 'moving object')}, "
         f"profile {escape(history.profile.name)}{_switched(history)}, {source}"
     )
     doubts = ""
@@ -157,53 +160,6 @@ def _switched(history: History) -> str:
 def _list(sentences: list[str], name: str) -> str:
     items = "".join(f"<li>{escape(each)}</li>" for each in sentences)
     return f'<ul class="{name}">{items}</ul>' if items else ""
-
-
-def _plural(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"
-
-
-# -- what the pictures show, and what they leave out
-
-
-def _timeline_caption(facts: Facts) -> str:
-    left = len(facts.risky) - PAIRS
-    out = f" The {PAIRS} riskiest pairs; {_plural(left, 'more pair')} left out." if left > 0 else ""
-    return f"When pairs touched, and when they were predicted to.{out}"
-
-
-def _predicted_caption(facts: Facts) -> str:
-    left = len(facts.answered) - len(drawn_collisions(facts))
-    worst = largest_error(facts)
-    held = f"at worst the interval was off by {worst:.2g} s" if worst > 0.0005 else "here every interval was right"
-    return (
-        "For each collision that was predicted: how far off the stated time was, from the first prediction to the "
-        "contact. The band is the stated interval; below the grey it was too early, above too late. "
-        f"A prediction says what happens if both go on as they move: {held}."
-        + (f" The {CURVES} that were furthest off; {left} more left out." if left else "")
-    )
-
-
-def _distances_caption(facts: Facts) -> str:
-    return (
-        "Distance of the shapes, computed from the recorded states, and the time to collision that was predicted. "
-        "Gaps: no state was known, or the object was moved."
-    )
-
-
-def _events_caption(facts: Facts) -> str:
-    left = len(facts.collisions) - EVENTS
-    out = f" Unpredicted and deepest first; {left} more left out." if left > 0 else ""
-    return (
-        f"Tracks from {AROUND:g} s before to {AROUND:g} s after the contact began, in m from the point of contact. "
-        f"Filled: then; dotted: {AROUND / 2:g} s before.{out}"
-    )
-
-
-def _steps_caption(history: History) -> str:
-    if history.replayed:
-        return f"How long the steps of this replay took ({len(history.durations)} steps)."
-    return f"How long the monitor took, as its status said ({_plural(len(history.durations), 'status message')})."
 
 
 # -- tables

@@ -15,10 +15,10 @@ from collision_monitor.objects.models import Modelled, containing_model
 from collision_monitor.records import StateFlag
 from collision_monitor.session.history.history import Floats, History, Pair
 
-PIECES: Final = 64
+MOST_PIECE_PAIRS: Final = 64
 """Most pairs of convex pieces that a distance is taken of; beyond, the objects' convex hulls stand for them."""
 
-SAMPLES: Final = 800
+MOST_TIMES: Final = 800
 """Times at which the distance of a pair is drawn, at most."""
 
 
@@ -88,10 +88,10 @@ class Tracks:
         history, (a, b) = self._history, (self[object_id] for object_id in pair)
         if a is None or b is None or any(i not in history.objects for i in pair) or not len(history.times):
             return None
-        times = history.times[:: -(-len(history.times) // SAMPLES)]
+        times = history.times[:: -(-len(history.times) // MOST_TIMES)]
         at_a, at_b = a.at(times), b.at(times)
         models = [containing_model(history.objects[i].shapes, "exact") for i in pair]
-        if len(models[0].pieces) * len(models[1].pieces) > PIECES:
+        if len(models[0].pieces) * len(models[1].pieces) > MOST_PIECE_PAIRS:
             models = [containing_model(history.objects[i].shapes, "convex_hull") for i in pair]
         distance = _distances(models[0], models[1], at_a[:2], at_b[:2])
         distance -= sum(history.objects[i].padding for i in pair)

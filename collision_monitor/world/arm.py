@@ -15,13 +15,13 @@ from collision_monitor.geometry.shapes import Mesh
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.world.scene import Array, Scene, States, positive_rate, state_array
 
-SEGMENTS: Final = 32
+CIRCLE_SEGMENTS: Final = 32
 """Of each circle: 700 triangles for a link."""
 
 LENGTHS: Final = (0.35, 0.55, 0.5, 0.25)
 """m, of the links from the base to the hand."""
 
-AXES: Final = np.array([[0, 0, 1], [0, 1, 0], [0, 1, 0], [0, 1, 0]], float)
+JOINT_AXES: Final = np.array([[0, 0, 1], [0, 1, 0], [0, 1, 0], [0, 1, 0]], float)
 """About which each link turns, in the frame of the one before."""
 
 MIDDLE: Final = np.array([0.0, 0.85, 1.35, 0.6])
@@ -34,7 +34,7 @@ ROUND_THE_BASE: Final = 0.85
 """m from the base, where the bottles stand."""
 
 
-def lathe(profile: list[tuple[float, float]], segments: int = SEGMENTS) -> Mesh:
+def lathe(profile: list[tuple[float, float]], segments: int = CIRCLE_SEGMENTS) -> Mesh:
     """The closed surface that a line of (radius, z) from axis to axis makes when it turns about z."""
     angle = 2 * np.pi * np.arange(segments) / segments
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(segments)], axis=1)
@@ -107,8 +107,8 @@ class Arm(Scene):
         q: Array = np.array([0.0, 0.0, 0.0, 1.0])
         joint, velocity, omega = np.zeros(3), np.zeros(3), np.zeros(3)
         for k, length in enumerate(LENGTHS):
-            omega = omega + rotation_matrix(q) @ AXES[k] * rates[k]
-            q = multiply(q, from_rotation_vector(AXES[k] * angles[k]))
+            omega = omega + rotation_matrix(q) @ JOINT_AXES[k] * rates[k]
+            q = multiply(q, from_rotation_vector(JOINT_AXES[k] * angles[k]))
             along = rotation_matrix(q)[:, 2] * length
             states["position"][k], states["quaternion"][k] = joint + along / 2, q / np.linalg.norm(q)
             states["linear"][k], states["angular"][k] = velocity + np.cross(omega, along / 2), omega

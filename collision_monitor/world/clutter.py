@@ -10,11 +10,11 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.world.collision_response import bounce_between_walls
 from collision_monitor.world.scene import Array, Scene, States, object_count, positive_rate, state_array
 
-SPACING = 1.0
+CUBE_PER_OBJECT = 1.0
 """m: one object for each cube of this side, at any number of objects."""
-SIZES = (0.1, 0.5)
+EXTENTS = (0.1, 0.5)
 """m, extents and lengths; radii are half of that."""
-SPEED, TURN_RATE = 1.0, 1.0
+MAX_SPEED, MAX_TURN_RATE = 1.0, 1.0
 """m/s and rad/s, the greatest along each axis."""
 
 
@@ -28,15 +28,15 @@ class Clutter(Scene):
         random = np.random.default_rng(seed)
 
         self._ids = np.arange(1, count + 1, dtype=np.uint32)
-        self.size = SPACING * count ** (1.0 / 3.0)
+        self.size = CUBE_PER_OBJECT * count ** (1.0 / 3.0)
         self.position: Array = random.uniform(0.0, self.size, (count, 3))
-        self.velocity: Array = random.uniform(-SPEED, SPEED, (count, 3))
-        self.angular: Array = random.uniform(-TURN_RATE, TURN_RATE, (count, 3))
+        self.velocity: Array = random.uniform(-MAX_SPEED, MAX_SPEED, (count, 3))
+        self.angular: Array = random.uniform(-MAX_TURN_RATE, MAX_TURN_RATE, (count, 3))
         start = random.normal(size=(count, 4))
         self._start_quaternion = start / np.linalg.norm(start, axis=1, keepdims=True)
         self._turned_for = 0.0
 
-        sizes = random.uniform(*SIZES, (count, 3))
+        sizes = random.uniform(*EXTENTS, (count, 3))
         self.descriptions = [_describe(int(i), size) for i, size in zip(self._ids, sizes, strict=True)]
 
     def _advance(self, dt: float) -> None:

@@ -20,14 +20,14 @@ from collision_monitor.world.scene import Scene, States, positive_rate, state_ar
 
 PERIOD = 8.0
 """s"""
-LANE = 4.0
+LANE_SPACING = 4.0
 """m along y from one encounter to the next: further than any two of different lanes could meet."""
 
 Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Encounter:
+class ExpectedContact:
     """What happens between two objects in each period; times in s from the period's start, None: they never touch."""
 
     id_a: int
@@ -38,7 +38,7 @@ class Encounter:
 
 
 @dataclass(frozen=True)
-class _Body:
+class _LaneObject:
     """One of the two in a lane: where it starts and how it moves, relative to the lane."""
 
     name: str
@@ -72,63 +72,63 @@ def _rod_and_ball(reach: float, ball: float, angle: float, turn_rate: float) -> 
     return (angle - touching) / turn_rate, (angle + touching) / turn_rate
 
 
-def _lanes() -> list[tuple[_Body, _Body, tuple[float | None, float | None], str]]:
+def _lanes() -> list[tuple[_LaneObject, _LaneObject, tuple[float | None, float | None], str]]:
     rod, thick = 2.0, 0.05
     ball_angle, ball_distance, ball_radius = 1.5, 0.8, 0.15
     ball_at = (ball_distance * cos(ball_angle), ball_distance * sin(ball_angle), 0.0)
     far_ball = hypot(rod / 2, thick / 2) + ball_radius + 0.01  # 1 cm beyond the reach of the rod's corners
     return [
         (
-            _Body("head_on_left", Sphere(0.3), (-3.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-            _Body("head_on_right", Sphere(0.2), (2.0, 0.0, 0.0), (-0.5, 0.0, 0.0)),
+            _LaneObject("head_on_left", Sphere(0.3), (-3.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+            _LaneObject("head_on_right", Sphere(0.2), (2.0, 0.0, 0.0), (-0.5, 0.0, 0.0)),
             _gap_over_speed(5.0, 0.5, 1.5),
             "centres 5 m apart close at 1.5 m/s and touch at 0.3 + 0.2 m",
         ),
         (
-            _Body("oblique_slow", Sphere(0.25), (-2.0, -0.3, 0.5), (0.5, 0.1, 0.0)),
-            _Body("oblique_fast", Sphere(0.35), (2.0, 0.6, 0.0), (-0.8, -0.1, 0.1)),
+            _LaneObject("oblique_slow", Sphere(0.25), (-2.0, -0.3, 0.5), (0.5, 0.1, 0.0)),
+            _LaneObject("oblique_fast", Sphere(0.35), (2.0, 0.6, 0.0), (-0.8, -0.1, 0.1)),
             _spheres((4.0, 0.9, -0.5), (-1.3, -0.2, 0.1), 0.6),
             "roots of |p + v t| = 0.25 + 0.35",
         ),
         (
-            _Body("box_left", Box((1.0, 0.8, 0.6)), (-2.5, 0.0, 0.0), (0.75, 0.0, 0.0)),
-            _Body("box_right", Box((0.6, 1.0, 0.8)), (2.5, 0.2, 0.1), (-0.25, 0.0, 0.0)),
+            _LaneObject("box_left", Box((1.0, 0.8, 0.6)), (-2.5, 0.0, 0.0), (0.75, 0.0, 0.0)),
+            _LaneObject("box_right", Box((0.6, 1.0, 0.8)), (2.5, 0.2, 0.1), (-0.25, 0.0, 0.0)),
             _gap_over_speed(5.0, 0.8, 1.0),
             "faces: 5 m less half extents 0.5 + 0.3, at 1 m/s",
         ),
         (
-            _Body("box_corner", Box((0.6, 0.6, 0.6)), (-3.0, 0.0, 0.0), (1.0, 0.0, 0.0), yaw=pi / 4),
-            _Body("box_face", Box((1.0, 2.0, 1.0)), (1.0, 0.0, 0.0)),
+            _LaneObject("box_corner", Box((0.6, 0.6, 0.6)), (-3.0, 0.0, 0.0), (1.0, 0.0, 0.0), yaw=pi / 4),
+            _LaneObject("box_face", Box((1.0, 2.0, 1.0)), (1.0, 0.0, 0.0)),
             _gap_over_speed(4.0, 0.3 * sqrt(2.0) + 0.5, 1.0),
             "a vertical edge ahead: 4 m less half a diagonal 0.3 sqrt(2) and half an extent 0.5, at 1 m/s",
         ),
         (
-            _Body("spinning_rod", Box((rod, thick, thick)), (0.0, 0.0, 0.0), yaw_rate=0.5),
-            _Body("ball", Sphere(ball_radius), ball_at),
+            _LaneObject("spinning_rod", Box((rod, thick, thick)), (0.0, 0.0, 0.0), yaw_rate=0.5),
+            _LaneObject("ball", Sphere(ball_radius), ball_at),
             _rod_and_ball(thick / 2 + ball_radius, ball_distance, ball_angle, 0.5),
             "the rod's side sweeps into the ball: 0.8 sin(1.5 - 0.5 t) = 0.025 + 0.15",
         ),
         (
-            _Body("ball_at_wall", Sphere(0.25), (-2.0, 0.0, 0.0), (0.8, 0.1, 0.0)),
-            _Body("wall", Box((0.2, 3.0, 2.0)), (1.0, 0.0, 0.0), static=True),
+            _LaneObject("ball_at_wall", Sphere(0.25), (-2.0, 0.0, 0.0), (0.8, 0.1, 0.0)),
+            _LaneObject("wall", Box((0.2, 3.0, 2.0)), (1.0, 0.0, 0.0), static=True),
             _gap_over_speed(3.0, 0.35, 0.8),
             "3 m less radius 0.25 and half the thickness 0.1, at 0.8 m/s normal to the wall",
         ),
         (
-            _Body("capsule_above", Capsule(0.15, 1.0), (0.0, 0.0, 3.0), (0.0, 0.0, -0.7)),
-            _Body("crossbeam", Box((1.5, 0.3, 0.3)), (0.1, 0.1, 0.0)),
+            _LaneObject("capsule_above", Capsule(0.15, 1.0), (0.0, 0.0, 3.0), (0.0, 0.0, -0.7)),
+            _LaneObject("crossbeam", Box((1.5, 0.3, 0.3)), (0.1, 0.1, 0.0)),
             _gap_over_speed(3.0, 0.5 + 0.15 + 0.15, 0.7),
             "upright capsule onto a beam: 3 m less half its length 0.5 + 0.15 and half the beam 0.15, at 0.7 m/s",
         ),
         (
-            _Body("near_miss_low", Sphere(0.3), (-2.5, 0.0, 0.0), (1.0, 0.0, 0.0)),
-            _Body("near_miss_high", Sphere(0.3), (2.5, 0.0, 0.61), (-1.0, 0.0, 0.0)),
+            _LaneObject("near_miss_low", Sphere(0.3), (-2.5, 0.0, 0.0), (1.0, 0.0, 0.0)),
+            _LaneObject("near_miss_high", Sphere(0.3), (2.5, 0.0, 0.61), (-1.0, 0.0, 0.0)),
             _spheres((5.0, 0.0, 0.61), (-2.0, 0.0, 0.0), 0.6),
             "passes 1 cm clear: the lines are 0.61 m apart, the radii add up to 0.6 m",
         ),
         (
-            _Body("short_rod", Box((rod, thick, thick)), (0.0, 0.0, 0.0), yaw_rate=0.8),
-            _Body("ball_out_of_reach", Sphere(ball_radius), (0.0, far_ball, 0.0)),
+            _LaneObject("short_rod", Box((rod, thick, thick)), (0.0, 0.0, 0.0), yaw_rate=0.8),
+            _LaneObject("ball_out_of_reach", Sphere(ball_radius), (0.0, far_ball, 0.0)),
             (None, None),
             "the rod's corners pass 1 cm short of the ball",
         ),
@@ -144,13 +144,13 @@ class Crossing(Scene):
         self.name = "crossing"
         self.rate = positive_rate(rate, 50.0)
         self.period = PERIOD
-        self.expected: list[Encounter] = []
+        self.expected: list[ExpectedContact] = []
         self.descriptions = []
         self._motions: dict[int, Motion] = {}
         self._restarted = False
         for lane, (body_a, body_b, (begin, end), derivation) in enumerate(_lanes()):
             ids = [self._add(body, lane) for body in (body_a, body_b)]
-            self.expected.append(Encounter(ids[0], ids[1], begin, end, derivation))
+            self.expected.append(ExpectedContact(ids[0], ids[1], begin, end, derivation))
         self._ids = np.array(list(self._motions), dtype=np.uint32)
         moving = self._motions.values()
         self._position = np.array([m.pose.position for m in moving])
@@ -158,10 +158,10 @@ class Crossing(Scene):
         self._linear = np.array([m.linear for m in moving])
         self._angular = np.array([m.angular for m in moving])
 
-    def _add(self, body: _Body, lane: int) -> int:
+    def _add(self, body: _LaneObject, lane: int) -> int:
         object_id = len(self.descriptions) + 1
         x, y, z = body.start
-        pose = Pose((x, y + lane * LANE, z), from_rotation_vector((0.0, 0.0, body.yaw)))
+        pose = Pose((x, y + lane * LANE_SPACING, z), from_rotation_vector((0.0, 0.0, body.yaw)))
         where = pose if body.static else None
         self.descriptions.append(ObjectDescription(object_id, body.shape, body.name, static=body.static, pose=where))
         if not body.static:

@@ -24,7 +24,7 @@ PITCH = np.array([10.0, 6.0])
 """m between crossings along x and along y."""
 AISLE = 3.0
 """m, width of an aisle: two lanes."""
-LANE = AISLE / 4
+LANE_OFFSET = AISLE / 4
 """m, a lane's offset from the middle of the aisle."""
 CORNER = AISLE / 2
 """m: arcs are centred on a rack's corner, this far from both middles."""
@@ -33,7 +33,7 @@ OPEN_BLOCKS = 0.15
 """Part of the blocks that has pillars at its corners instead of a rack."""
 WALL_THICKNESS, WALL_HEIGHT, RACK_HEIGHT, PILLAR = 0.2, 4.0, 2.4, 0.4
 
-DIRECTIONS = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
+HEADINGS = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
 """Headings 0..3 as steps on the grid, counter-clockwise."""
 STRAIGHT, LEFT, RIGHT = 0, 1, -1
 
@@ -75,7 +75,7 @@ class Fleet(Scene):
         """Each robot on a lane of its own, before the crossing of its tile."""
         node = np.stack(np.meshgrid(*map(np.arange, self._grid), indexing="ij"), axis=-1).reshape(-1, 2)
         node, heading = np.repeat(node, 4, axis=0), np.tile(np.arange(4), len(node))
-        lanes = np.flatnonzero(self._inside(node - DIRECTIONS[heading]))
+        lanes = np.flatnonzero(self._inside(node - HEADINGS[heading]))
         chosen = self._random.permutation(lanes)[:count]
         self._node, self._heading = node[chosen], heading[chosen]
         self._speed = self._random.choice([0.9, 1.2, 1.5], count)
@@ -90,7 +90,7 @@ class Fleet(Scene):
     def _choose_turn(self, node: Integers, heading: Integers) -> Integers:
         """One of the turns that stay in the hall; there always is one, for the grid has two rows and two columns."""
         turns = np.array([STRAIGHT, STRAIGHT, LEFT, RIGHT])  # straight on is twice as likely
-        open_ = self._inside(node[:, None] + DIRECTIONS[(heading[:, None] + turns) % 4])
+        open_ = self._inside(node[:, None] + HEADINGS[(heading[:, None] + turns) % 4])
         score = np.where(open_, self._random.random(open_.shape), -1.0)
         chosen: Integers = turns[score.argmax(axis=1)]
         return chosen
@@ -100,7 +100,7 @@ class Fleet(Scene):
         heading, turn = self._heading[which], self._turn[which]
         lead_in = PITCH[heading % 2] / 2 - CORNER
         lead_out = PITCH[(heading + turn) % 2] / 2 - CORNER
-        through = np.where(turn == STRAIGHT, 2 * CORNER, (CORNER + turn * LANE) * np.pi / 2)
+        through = np.where(turn == STRAIGHT, 2 * CORNER, (CORNER + turn * LANE_OFFSET) * np.pi / 2)
         return lead_in, through, lead_out
 
     def _advance_robots(self, dt: float) -> None:
@@ -114,13 +114,13 @@ class Fleet(Scene):
             left, length = left[done], length[done]
             self._travelled[left] -= length
             self._heading[left] = (self._heading[left] + self._turn[left]) % 4
-            self._node[left] += DIRECTIONS[self._heading[left]]
+            self._node[left] += HEADINGS[self._heading[left]]
             self._turn[left] = self._choose_turn(self._node[left], self._heading[left])
 
     def _write_robots(self, states: States) -> None:
         """Poses and twists: worked out along (u) and to the left (v) of the heading, then turned to the hall's axes."""
         lead_in, through, _ = self._tile_path(slice(None))
-        radius = CORNER + self._turn * LANE
+        radius = CORNER + self._turn * LANE_OFFSET
         before = np.minimum(self._travelled - lead_in, 0.0)
         inside = np.clip(self._travelled - lead_in, 0.0, through)
         after = np.maximum(self._travelled - lead_in - through, 0.0)
@@ -128,7 +128,7 @@ class Fleet(Scene):
         turning = self._turn != STRAIGHT
         angle = np.where(turning, self._turn * inside / radius, 0.0)
         u = before - CORNER + np.where(turning, radius * np.sin(np.abs(angle)), inside) + after * np.cos(angle)
-        v = -LANE + self._turn * radius * (1.0 - np.cos(angle)) + after * np.sin(angle)
+        v = -LANE_OFFSET + self._turn * radius * (1.0 - np.cos(angle)) + after * np.sin(angle)
 
         yaw = self._heading * (np.pi / 2)
         along = np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
@@ -160,7 +160,7 @@ class Fleet(Scene):
 
     def _walk_on(self, who: NDArray[np.intp]) -> None:
         """Give these people, who stand at their goal, a new one in a neighbouring crossing."""
-        next_node = self._goal_node[who][:, None] + DIRECTIONS
+        next_node = self._goal_node[who][:, None] + HEADINGS
         score = np.where(self._inside(next_node), self._random.random(next_node.shape[:2]), -1.0)
         self._goal_node[who] = next_node[np.arange(len(who)), score.argmax(axis=1)]
         self._from[who] = self._to[who]

@@ -23,17 +23,17 @@ from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Cylinder
 
 Array = NDArray[np.float64]
 
-SCENES: Final = ("boxes", "spheres", "mixed", "hulls")
+BENCHMARK_SCENES: Final = ("boxes", "spheres", "mixed", "hulls")
 """Their order is part of the seed."""
 
 FRAMES: Final = 12
 TIME_STEP: Final = 0.05
 """s, between frames."""
-SIZES: Final = (0.2, 0.6)
+HALF_EXTENTS: Final = (0.2, 0.6)
 """m, least and greatest half extent, radius and half length."""
-SPEED: Final = 1.0
+MAX_RATE: Final = 1.0
 """m/s and rad/s, greatest of each component."""
-NEIGHBOURS: Final = 0.5
+MEAN_OVERLAPS: Final = 0.5
 """Bodies that one overlaps on average."""
 HULLS: Final = 64
 HULL_POINTS: Final = 32
@@ -74,7 +74,7 @@ def _hull_measures(points: Array) -> tuple[float, float, float]:
 
 
 def _density(kind: NDArray[np.uint8], size: Array, hull_id: NDArray[np.int32], hulls: Array) -> float:
-    """Bodies per m^3 at which one overlaps NEIGHBOURS others.
+    """Bodies per m^3 at which one overlaps MEAN_OVERLAPS others.
 
     The mean excluded volume of two convex bodies in random directions, from their volumes, surfaces and integrals of
     mean curvature: V1 + V2 + (S1 M2 + S2 M1) / 4 pi. (Isihara, 1950)
@@ -92,36 +92,36 @@ def _density(kind: NDArray[np.uint8], size: Array, hull_id: NDArray[np.int32], h
     if len(hulls):
         volume, surface, curvature = np.array([_hull_measures(points) for points in hulls])[hull_id].T
     excluded = 2 * volume.mean() + 2 * surface.mean() * curvature.mean() / (4 * pi)
-    return NEIGHBOURS / float(excluded)
+    return MEAN_OVERLAPS / float(excluded)
 
 
-def make_bodies(name: str, n: int, seed: int = 1, frames: int = FRAMES) -> MovingBodies:
-    """The scene `name` of SCENES with n bodies. Raises InputError."""
-    if name not in SCENES:
-        raise InputError(f"scene: expected one of {', '.join(SCENES)}, got {name!r}")
+def make_moving_bodies(name: str, n: int, seed: int = 1, frames: int = FRAMES) -> MovingBodies:
+    """The scene `name` of BENCHMARK_SCENES with n bodies. Raises InputError."""
+    if name not in BENCHMARK_SCENES:
+        raise InputError(f"scene: expected one of {', '.join(BENCHMARK_SCENES)}, got {name!r}")
     for what, value, least in (("n", n, 1), ("seed", seed, 0), ("frames", frames, 1)):
         if value < least:
             raise InputError(f"{what}: expected a whole number from {least}, got {value}")
-    rng = np.random.default_rng([seed, SCENES.index(name), n])
+    rng = np.random.default_rng([seed, BENCHMARK_SCENES.index(name), n])
     kinds = {"boxes": [_BOX], "spheres": [_SPHERE], "mixed": [_BOX, _SPHERE, _CAPSULE, _CYLINDER], "hulls": [_HULL]}
     kind = np.resize(np.array(kinds[name], np.uint8), n)
     rng.shuffle(kind)
-    size = rng.uniform(*SIZES, (n, 3))
+    size = rng.uniform(*HALF_EXTENTS, (n, 3))
     size[kind == _SPHERE, 1:] = 0.0
     size[(kind == _CAPSULE) | (kind == _CYLINDER), 2] = 0.0
     hull_id, hulls = np.full(n, -1, np.int32), np.zeros((0, HULL_POINTS, 3))
     if name == "hulls":
         directions = rng.normal(size=(HULLS, HULL_POINTS, 3))
         directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
-        hulls = (directions * rng.uniform(*SIZES, (HULLS, 1, 3))).astype(np.float32).astype(np.float64)
+        hulls = (directions * rng.uniform(*HALF_EXTENTS, (HULLS, 1, 3))).astype(np.float32).astype(np.float64)
         hull_id = rng.integers(0, HULLS, n).astype(np.int32)
         size[:] = np.abs(hulls).max(axis=1)[hull_id]
     density = _density(kind, size, hull_id, hulls)
     position = rng.uniform(0.0, (n / density) ** (1 / 3), (n, 3))
     quaternion = rng.normal(size=(n, 4))
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
-    linear = rng.uniform(-SPEED, SPEED, (n, 3))
-    angular = rng.uniform(-SPEED, SPEED, (n, 3))
+    linear = rng.uniform(-MAX_RATE, MAX_RATE, (n, 3))
+    angular = rng.uniform(-MAX_RATE, MAX_RATE, (n, 3))
     time = (np.arange(frames) * TIME_STEP)[:, None, None]
     turned = multiply(from_rotation_vector(angular * time), np.roll(quaternion, -1, axis=1))
     return _from_arrays(
@@ -131,7 +131,7 @@ def make_bodies(name: str, n: int, seed: int = 1, frames: int = FRAMES) -> Movin
     )  # fmt: skip
 
 
-def load_bodies(path: Path) -> MovingBodies:
+def load_moving_bodies(path: Path) -> MovingBodies:
     """A scene that was saved. Raises InputError where the file is none."""
     try:
         with np.load(path) as file:

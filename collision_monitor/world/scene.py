@@ -18,7 +18,7 @@ States = NDArray[np.void]
 
 MAX_STEP = 60.0
 """s: a longer step is a mistake of the caller's clock, and would take scenes with bounces and turns very long."""
-ROUND_OFF = 1e-6
+TIME_ROUND_OFF = 1e-6
 """s: more than the sum of millions of steps loses; less than any step."""
 
 
@@ -54,7 +54,7 @@ class Scene(ABC):
     @property
     def finished(self) -> bool:
         """Whether `time` is past `duration`."""
-        return self.duration is not None and self.time > self.duration + ROUND_OFF
+        return self.duration is not None and self.time > self.duration + TIME_ROUND_OFF
 
 
 def state_array(ids: NDArray[np.uint32]) -> States:

@@ -10,11 +10,11 @@ from collision_monitor.geometry.shapes import Cylinder
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.world.scene import Array, Scene, States, object_count, positive_rate, state_array
 
-SPACING: Final = 3.0
+CUBE_PER_DRONE: Final = 3.0
 """m: one drone for each cube of this side, at any number of drones."""
-LOOP: Final = (1.0, 4.0)
+LOOP_RADII: Final = (1.0, 4.0)
 """m, radii of the loops, least and greatest."""
-SPEED: Final = (1.0, 4.0)
+LOOP_SPEEDS: Final = (1.0, 4.0)
 """m/s along them."""
 RADIUS, HEIGHT = 0.3, 0.15
 """m, of a drone with its rotors."""
@@ -29,9 +29,9 @@ class Swarm(Scene):
         count = object_count(objects, 150, 1, 100_000, self.name)
         random = np.random.default_rng(seed)
         self._ids = np.arange(1, count + 1, dtype=np.uint32)
-        self._centre: Array = random.uniform(0.0, SPACING * count ** (1.0 / 3.0), (count, 3))
-        self._radius = random.uniform(*LOOP, count)
-        self._rate = random.uniform(*SPEED, count) / self._radius * random.choice((-1.0, 1.0), count)  # rad/s
+        self._centre: Array = random.uniform(0.0, CUBE_PER_DRONE * count ** (1.0 / 3.0), (count, 3))
+        self._radius = random.uniform(*LOOP_RADII, count)
+        self._rate = random.uniform(*LOOP_SPEEDS, count) / self._radius * random.choice((-1.0, 1.0), count)  # rad/s
         self._phase = random.uniform(0.0, 2.0 * np.pi, count)
         self._tilt = random.uniform(-0.5, 0.5, count)  # of the height against the way along x
         self.descriptions = [ObjectDescription(int(i), Cylinder(RADIUS, HEIGHT), f"drone_{i}") for i in self._ids]

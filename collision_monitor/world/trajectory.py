@@ -19,8 +19,8 @@ from collision_monitor.geometry.pose import from_rotation_vector, multiply
 from collision_monitor.geometry.shapes import Box, Cylinder, Shape
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
-from collision_monitor.world.scene import ROUND_OFF, Scene, States, positive_rate, state_array
-from collision_monitor.world.tracks import Tracks, read_tracks
+from collision_monitor.world.scene import TIME_ROUND_OFF, Scene, States, positive_rate, state_array
+from collision_monitor.world.track_file import TrackFile, read_track_file
 
 FRAME_RATE = 29.97
 """Hz, of the recordings."""
@@ -51,7 +51,7 @@ class Trajectory(Scene):
         first_frame, rows, frames = 0, [], []
         for clip in clips:
             prefix = f"{_prefix(clip[0]).name}/" if len(clips) > 1 else ""
-            tracks = [read_tracks(file, _PEOPLE_COLUMNS if _is_people(file) else _CART_COLUMNS) for file in clip]
+            tracks = [read_track_file(file, _PEOPLE_COLUMNS if _is_people(file) else _CART_COLUMNS) for file in clip]
             start = min(int(t.frame.min()) for t in tracks)
             for track in tracks:
                 rows.append(self._add(track, prefix))
@@ -62,7 +62,7 @@ class Trajectory(Scene):
         self._frame, self._row = frame[order], row[order]
         self.duration = float(self._frame[-1]) / FRAME_RATE
 
-    def _add(self, tracks: Tracks, prefix: str) -> States:
+    def _add(self, tracks: TrackFile, prefix: str) -> States:
         """Describe the objects of one file and return their states, one for each of its rows."""
         offset = max((d.object_id for d in self.descriptions), default=0)
         people = _is_people(tracks.path)
@@ -89,11 +89,11 @@ class Trajectory(Scene):
     def states(self) -> States:
         """The states of the last frame, moved on at their twist by the part of a frame that has passed since."""
         now = self.time * FRAME_RATE
-        frame = int(now + ROUND_OFF * FRAME_RATE)
+        frame = int(now + TIME_ROUND_OFF * FRAME_RATE)
         first, last = np.searchsorted(self._frame, [frame, frame + 1])
         states = self._row[first:last].copy()
         since = max(now - frame, 0.0) / FRAME_RATE
-        if since > ROUND_OFF:
+        if since > TIME_ROUND_OFF:
             states["position"] += states["linear"] * since
             turned = from_rotation_vector(states["angular"] * since)
             states["quaternion"] = multiply(turned, states["quaternion"])
@@ -111,7 +111,7 @@ def _prefix(file: Path) -> Path:
     return file.with_name(file.name.removesuffix(_PEOPLE).removesuffix(_CARTS))
 
 
-def _write_carts(states: States, tracks: Tracks) -> None:
+def _write_carts(states: States, tracks: TrackFile) -> None:
     """Heading from psi, velocity along it; the yaw rate is not recorded: central differences of psi over the frames."""
     psi, speed = tracks.values[:, 2], tracks.values[:, 3]
     states["position"][:, 2] = CART_HEIGHT / 2

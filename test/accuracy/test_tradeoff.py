@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from collision_monitor.accuracy.plain import PlainMonitor
-from collision_monitor.accuracy.tradeoff import Step, tradeoff
+from collision_monitor.accuracy.playback import Step
+from collision_monitor.accuracy.profile_tradeoff import profile_tradeoff
+from collision_monitor.accuracy.reference_monitor import ReferenceMonitor
 from collision_monitor.cli.main import main
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.shapes import Sphere
@@ -37,14 +38,14 @@ def passing(beside: float, steps: int = 20) -> list[Step]:
 
 
 def test_a_near_miss_is_a_false_alarm_of_the_coarse_profile_only() -> None:
-    fast, exact = tradeoff("pass", TWO, passing(1.005), ["fast", "exact"])
+    fast, exact = profile_tradeoff("pass", TWO, passing(1.005), ["fast", "exact"])
     assert exact.alarms == exact.false_alarms == exact.misses == 0
     assert fast.false_alarms == fast.alarms == 20
     assert fast.misses == 0
 
 
 def test_a_hit_is_seen_by_all_and_its_time_is_known_to_the_tolerance() -> None:
-    fast, exact = tradeoff("hit", TWO, passing(0.0), ["fast", "exact"])
+    fast, exact = profile_tradeoff("hit", TWO, passing(0.0), ["fast", "exact"])
     for row in (fast, exact):
         assert (row.alarms, row.false_alarms, row.misses, row.outside_bound) == (20, 0, 0, 0)
     assert exact.ttc_error_s.worst < 1e-5
@@ -63,15 +64,15 @@ def test_what_may_happen_by_what_is_uncertain_is_no_alarm() -> None:
         monitor.describe(description)
     told = [prediction["status"] for stamp, states in steps for prediction in monitor.step(stamp, states).predictions]
     assert told and set(told) == {PredictionStatus.POSSIBLE}
-    (row,) = tradeoff("pass", TWO, steps, ["exact"])
+    (row,) = profile_tradeoff("pass", TWO, steps, ["exact"])
     assert (row.alarms, row.misses, row.compared) == (0, 0, 0) and np.isnan(row.within_bound)
 
 
 def test_an_interval_beside_the_truth_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     """The truth of another course of the same objects: every interval is beside it."""
-    right = PlainMonitor.step
-    monkeypatch.setattr(PlainMonitor, "step", lambda self, stamp, states: right(self, stamp, _slower(states)))
-    (row,) = tradeoff("hit", TWO, passing(0.0, 5), ["exact"])
+    right = ReferenceMonitor.step
+    monkeypatch.setattr(ReferenceMonitor, "step", lambda self, stamp, states: right(self, stamp, _slower(states)))
+    (row,) = profile_tradeoff("hit", TWO, passing(0.0, 5), ["exact"])
     assert (row.compared, row.outside_bound, row.within_bound) == (5, 5, 0.0)
 
 
@@ -102,10 +103,10 @@ def test_each_clip_of_recorded_tracks_is_a_scene(capsys: pytest.CaptureFixture[s
 
 def test_progress_adds_up_and_empty_scenes_are_refused() -> None:
     done: list[int] = []
-    tradeoff("hit", TWO, passing(0.0), ["fast", "balanced", "exact"], done.append)
+    profile_tradeoff("hit", TWO, passing(0.0), ["fast", "balanced", "exact"], done.append)
     assert sum(done) == 2 * 3 * 20
     with pytest.raises(InputError, match="at least one step"):
-        tradeoff("none", TWO, [], ["fast"])
+        profile_tradeoff("none", TWO, [], ["fast"])
 
 
 def test_the_command_writes_what_it_prints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from collision_monitor.accuracy.tradeoff import Errors, recorded
+from collision_monitor.accuracy.inputs import recorded
+from collision_monitor.accuracy.measurement import Errors
 from collision_monitor.accuracy.tune import FACTORS, Demands, candidates, parameter_file, tune
 from collision_monitor.cli.main import main
 from collision_monitor.cli.parameter_file import check_parameter_file
@@ -24,7 +25,7 @@ PROGRAM = Path(sys.executable).with_name("collision-monitor")
 
 @pytest.fixture(scope="module")
 def trials():
-    name, descriptions, steps = recorded(GOLDEN)
+    name, descriptions, steps, _ = recorded(GOLDEN)
     told = []
     chosen, trials = tune(name, descriptions, steps[:80], Demands(ttc_error=0.01), progress=told.append)
     assert sum(told) == 2 * 80 * len(trials)
@@ -34,17 +35,17 @@ def trials():
 def test_tighter_profiles_err_less_and_the_chosen_one_little_enough(trials) -> None:
     chosen, found = trials
     assert [each.profile.name for each in found] == ["fast", *(f"balanced × {factor:g}" for factor in FACTORS), "exact"]
-    errors = [each.row.ttc_error_s.p99 for each in found]
+    errors = [each.measurement.ttc_error_s.p99 for each in found]
     assert errors[0] > 0.01 > errors[-1]
-    assert all(bool(each.failures) == (each.row.ttc_error_s.p99 > 0.01) for each in found)
+    assert all(bool(each.failures) == (each.measurement.ttc_error_s.p99 > 0.01) for each in found)
     taken = next(each for each in found if each.profile is chosen)
     assert not taken.failures
-    assert taken.row.step_ms <= 1.05 * min(each.row.step_ms for each in found if not each.failures)
+    assert taken.measurement.step_ms <= 1.05 * min(each.measurement.step_ms for each in found if not each.failures)
 
 
 def test_each_demand_fails_with_its_measure(trials) -> None:
     row = replace(
-        trials[1][0].row,
+        trials[1][0].measurement,
         misses=0,
         outside_bound=0,
         distance_error_m=0.5,

@@ -11,12 +11,12 @@ import pytest
 from collision_monitor._version import VERSION
 from collision_monitor.cli.main import main
 from collision_monitor.errors import InputError
-from collision_monitor.world.moving_bodies import SCENES, load_bodies, make_bodies
+from collision_monitor.world.moving_bodies import BENCHMARK_SCENES, load_moving_bodies, make_moving_bodies
 
 KEYS = {"scene", "n", "seed", "threads", "frames", "median_ms", "p99_ms", "min_ms", "pairs", "version"}
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", BENCHMARK_SCENES)
 def test_json_is_one_line_with_everything(scene: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", "--scene", scene, "--n", "200", "--seed", "3", "--threads", "1", "--json"]) == 0
     out = capsys.readouterr().out
@@ -36,12 +36,12 @@ def test_a_line_for_people(capsys: pytest.CaptureFixture[str]) -> None:
     assert "over 3 frames" in out and "colliding pairs" in out
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", BENCHMARK_SCENES)
 def test_a_saved_scene_gives_the_same_pairs(scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "scene.npz"
-    made = make_bodies(scene, 150, seed=2)
+    made = make_moving_bodies(scene, 150, seed=2)
     made.save(file)
-    loaded = load_bodies(file)
+    loaded = load_moving_bodies(file)
     assert np.array_equal(loaded.positions, made.positions) and np.array_equal(loaded.quaternions, made.quaternions)
     assert [repr(shape) for shape in loaded.shapes] == [repr(shape) for shape in made.shapes]
     main(["bench", "--scene-file", str(file), "--threads", "1", "--json"])
@@ -51,8 +51,8 @@ def test_a_saved_scene_gives_the_same_pairs(scene: str, tmp_path: Path, capsys: 
 
 
 def test_the_density_does_not_depend_on_the_number() -> None:
-    for scene in SCENES:
-        few, many = (make_bodies(scene, n).arrays["rho"] for n in (500, 4000))
+    for scene in BENCHMARK_SCENES:
+        few, many = (make_moving_bodies(scene, n).arrays["rho"] for n in (500, 4000))
         assert few == pytest.approx(many, rel=0.15)
 
 
@@ -78,4 +78,4 @@ def test_bad_arguments_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 def test_scenes_are_refused_by_name() -> None:
     with pytest.raises(InputError, match="expected one of boxes"):
-        make_bodies("box", 10)
+        make_moving_bodies("box", 10)

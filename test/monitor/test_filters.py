@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from collision_monitor import records
-from collision_monitor.accuracy.plain import PlainMonitor, disagreements
+from collision_monitor.accuracy.reference_monitor import ReferenceMonitor, disagreements
 from collision_monitor.errors import ProfileError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, HalfSpace, Sphere
@@ -43,7 +43,7 @@ def relative(states: Rows, rows: Rows) -> tuple[Rows, Rows]:
     return states["position"][b] - states["position"][a], states["linear"][b] - states["linear"][a]
 
 
-@pytest.mark.parametrize("make", [Monitor, PlainMonitor])
+@pytest.mark.parametrize("make", [Monitor, ReferenceMonitor])
 def test_minimum_closing_speed(make: Callable[[Profile], Monitor]) -> None:
     left_out = 0
     for (full, _), (mine, _) in zip(play(make, Profile()), play(make, Profile(min_closing_speed=0.8)), strict=True):
@@ -55,7 +55,7 @@ def test_minimum_closing_speed(make: Callable[[Profile], Monitor]) -> None:
     assert left_out > 50
 
 
-@pytest.mark.parametrize("make", [Monitor, PlainMonitor])
+@pytest.mark.parametrize("make", [Monitor, ReferenceMonitor])
 def test_pairs_that_move_apart(make: Callable[[Profile], Monitor]) -> None:
     left_out = 0
     loose = Profile(position_tolerance=0.05)  # so that some are predicted that pass
@@ -67,7 +67,7 @@ def test_pairs_that_move_apart(make: Callable[[Profile], Monitor]) -> None:
         assert np.array_equal(mine.predictions.view(np.uint8), expected.view(np.uint8))
         assert np.array_equal(mine.contacts.view(np.uint8), full.contacts.view(np.uint8))
         left_out += len(full.predictions) - len(expected)
-    assert left_out > 10 or make is PlainMonitor, "which knows no tolerance that predicts pairs that pass"
+    assert left_out > 10 or make is ReferenceMonitor, "which knows no tolerance that predicts pairs that pass"
 
 
 def inside(states: Rows, radius: Rows) -> set[int]:
@@ -87,7 +87,7 @@ def test_region_of_interest() -> None:
         table.describe(description)
     radius = table._roster.bodies.motion["radius"][:60]
     region = Profile(region_min=LOW, region_max=HIGH)
-    answers = zip(play(PlainMonitor, Profile()), play(PlainMonitor, region), play(Monitor, region), strict=True)
+    answers = zip(play(ReferenceMonitor, Profile()), play(ReferenceMonitor, region), play(Monitor, region), strict=True)
     before: set[tuple[int, int]] = set()
     left_out = told = 0
     for (full, states), (plain, _), (mine, _) in answers:

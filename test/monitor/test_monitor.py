@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from collision_monitor import records
-from collision_monitor.accuracy.plain import PlainMonitor, disagreements
+from collision_monitor.accuracy.reference_monitor import ReferenceMonitor, disagreements
 from collision_monitor.errors import InputError, PoseError, Refusal, ShapeError, UnsupportedError
 from collision_monitor.geometry.pose import Pose, from_rotation_vector, multiply, rotation_matrix
 from collision_monitor.geometry.shapes import Box, Capsule, Circle, HalfSpace, Shape, Sphere
@@ -96,7 +96,7 @@ class Swarm:
 def test_the_event_list_equals_plain_recomputation(noise: float, turn: float, keep: float) -> None:
     swarm = Swarm(60, seed=3)
     profile = Profile.named("balanced").replace(stale_acceleration=0.0)
-    mine, plain = Monitor(profile), PlainMonitor(profile)
+    mine, plain = Monitor(profile), ReferenceMonitor(profile)
     for monitor in (mine, plain):
         swarm.describe(monitor)
     moved = seen = 0

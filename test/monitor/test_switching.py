@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from collision_monitor import records
-from collision_monitor.accuracy.plain import PlainMonitor, disagreements
+from collision_monitor.accuracy.reference_monitor import ReferenceMonitor, disagreements
 from collision_monitor.errors import ProfileError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, Sphere
@@ -77,7 +77,7 @@ def test_contacts_persist_and_keep_their_age(profile: str | Profile) -> None:
 def test_every_setting_can_change_and_holds_from_then_on(setting: Any) -> None:
     """Against plain recomputation with the new profile, at every step after the change."""
     scene = make_scene("crossing")
-    monitor, plain = Monitor("balanced"), PlainMonitor("balanced")
+    monitor, plain = Monitor("balanced"), ReferenceMonitor("balanced")
     for description in scene.descriptions:
         monitor.describe(description)
         plain.describe(description)

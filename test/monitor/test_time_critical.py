@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from collision_monitor import records
-from collision_monitor.accuracy.plain import PlainMonitor, disagreements
+from collision_monitor.accuracy.reference_monitor import ReferenceMonitor, disagreements
 from collision_monitor.codec import encode_descriptions, encode_states
 from collision_monitor.errors import ProfileError
 from collision_monitor.geometry.pose import Pose
@@ -44,7 +44,7 @@ def rods(scene: Scene) -> list[ObjectDescription]:
 def play(profile: Profile, mode: str, steps: int = 25, *, long: bool = False) -> list[tuple[StepResult, StepResult]]:
     """Answers with a budget, and those of plain recomputation of the same states."""
     scene = make_scene("clutter", objects=150 if long else 300)
-    limited, plain = Monitor(profile), PlainMonitor(profile.replace(pairs_per_step=1_000_000_000))
+    limited, plain = Monitor(profile), ReferenceMonitor(profile.replace(pairs_per_step=1_000_000_000))
     for description in rods(scene) if long else scene.descriptions:
         limited.describe(description)
         plain.describe(description)
@@ -121,7 +121,7 @@ def test_a_budget_that_is_enough_changes_no_answer(mode: str) -> None:
 
 def test_what_was_left_is_caught_up_with_when_there_is_time() -> None:
     scene = make_scene("clutter", objects=120)
-    monitor, plain = Monitor(Profile(pairs_per_step=20)), PlainMonitor()
+    monitor, plain = Monitor(Profile(pairs_per_step=20)), ReferenceMonitor()
     for description in scene.descriptions:
         monitor.describe(description)
         plain.describe(description)

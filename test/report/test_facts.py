@@ -11,9 +11,9 @@ from played_session import drive_states, record_drive, record_scene, record_stat
 from collision_monitor import Pose, Sphere, contact
 from collision_monitor.geometry.shapes import Box, HalfSpace, Polygon
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.report.assessment import assess
 from collision_monitor.report.facts import gather
 from collision_monitor.report.footprint import footprint
-from collision_monitor.report.verdict import verdict
 from collision_monitor.session import Session
 from collision_monitor.session.history.alerts import AlertOutcome, stated_error
 from collision_monitor.session.history.read_history import read_history
@@ -34,7 +34,7 @@ def test_a_drive_and_a_warning_that_came_to_nothing(drive: Path) -> None:
     assert facts.nothing[0].time[-1] == pytest.approx(0.5, abs=1.5 * STEP)
     assert facts.risky == [(1, 2), (1, 3)]
     assert np.all(stated_error(facts.answered[collision], collision, facts.period) == 0.0)
-    found = verdict(history, facts)
+    found = assess(history, facts)
     assert (found.kind, found.answer, found.doubts) == ("collisions", "1 collision", [])
     assert any("1 warning of 1 pair came to nothing" in line for line in found.findings)
 
@@ -44,7 +44,7 @@ def test_an_alert_at_the_end_is_open(tmp_path: Path) -> None:
     facts = gather(history)
     assert not facts.collisions and not facts.nothing
     assert {alert.outcome for each in facts.alerts.values() for alert in each} == {AlertOutcome.OPEN}
-    found = verdict(history, facts)
+    found = assess(history, facts)
     assert (found.kind, found.answer) == ("clear", "No collisions")
     assert any("still predicted" in line for line in found.findings)
 
@@ -107,7 +107,7 @@ def test_times_go_on_where_the_clock_is_set_back(tmp_path: Path) -> None:
     assert (first, second - first) == pytest.approx((1.5, 2.0), abs=2 * STEP)
     times, distance = facts.tracks.distance((1, 2))
     assert np.interp([1.0, 3.0], times, distance) == pytest.approx([0.5, 0.5], abs=3 * STEP)
-    assert any("the clock was set back (1 time)" in doubt for doubt in verdict(history, facts).doubts)
+    assert any("the clock was set back (1 time)" in doubt for doubt in assess(history, facts).doubts)
 
 
 def test_nothing_is_concluded_across_a_gap(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from rosgraph_msgs.msg import Clock
 from visualization_msgs.msg import Marker, MarkerArray
 
 from collision_monitor import codec, records
-from collision_monitor.accuracy.plain import PlainMonitor
+from collision_monitor.accuracy.reference_monitor import ReferenceMonitor
 from collision_monitor.codec import Removal
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Sphere
@@ -329,7 +329,7 @@ def test_a_signal_ends_it_while_the_kernels_compile(start, monkeypatch, tmp_path
 def test_a_budget_that_is_too_small_leaves_pairs_unresolved_and_none_clear(start, team, tmp_path):
     """Every body takes another course in each message: a step takes milliseconds, and has 50 microseconds."""
     monitor = start("run", "--record", "run.mcap", "--ros-args", "-p", "budget_ms:=0.05")
-    scene, truth, random = make_scene("clutter", objects=300), PlainMonitor(), np.random.default_rng(6)
+    scene, truth, random = make_scene("clutter", objects=300), ReferenceMonitor(), np.random.default_rng(6)
     for description in scene.descriptions:
         truth.describe(description)
     team.meet()

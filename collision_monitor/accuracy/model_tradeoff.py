@@ -10,12 +10,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.accuracy.tradeoff import Errors, Played, Row, Step, deepest, play
+from collision_monitor.accuracy.measurement import Errors, Measurement
+from collision_monitor.accuracy.playback import Played, Step, contacts_by_pair, play
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.monitor.result import StepResult
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import containing_model, parse_model
 from collision_monitor.query.contact import contact
@@ -25,7 +25,7 @@ from collision_monitor.settings.profile import Profile
 NEAR: Final = 0.3
 """m: pairs up to this far apart are compared."""
 
-SAMPLES: Final = 12
+COMPARED_STEPS: Final = 12
 """Steps, evenly spread, at which they are: triangles against triangles take most of a second for a pair."""
 
 MODELS: Final = (Model.SPHERE, Model.OBB, Model.KDOP26, Model.CONVEX_HULL)
@@ -39,22 +39,22 @@ def model_tradeoff(
     steps: Sequence[Step],
     models: Sequence[Model | str] = MODELS,
     progress: Callable[[int], None] = lambda done: None,
-) -> list[Row]:
+) -> list[Measurement]:
     """A row for `exact`, by `contact` of the shapes as they are, then one for each model. Raises InputError.
 
     Told are the pairs up to NEAR apart. An alarm is a pair that is said to touch; a miss, one that touches and is not.
-    progress is told how many steps were just done, of len(steps) * len(models) + min(SAMPLES, len(steps)) in all.
+    progress is told how many steps were just done, of len(steps) * len(models) + min(COMPARED_STEPS, len(steps)).
     """
     if not steps:
         raise InputError(f"scene {scene}: expected at least one step, there is none")
     described = list(descriptions)
-    sampled = np.unique(np.linspace(0, len(steps) - 1, SAMPLES).astype(int)).tolist()
+    sampled = np.unique(np.linspace(0, len(steps) - 1, COMPARED_STEPS).astype(int)).tolist()
     profile = Profile(contact_margin=NEAR)
     played = {
         model: play(Monitor(profile), [replace(each, model=model) for each in described], steps, progress)
         for model in map(parse_model, models)
     }
-    pairs = [set[Pair]().union(*(_told(each.answers[k]) for each in played.values())) for k in sampled]
+    pairs = [set[Pair]().union(*(contacts_by_pair(each.answers[k]) for each in played.values())) for k in sampled]
     truths, seconds = [], []
     for k, wanted in zip(sampled, pairs, strict=True):
         began = time.perf_counter()
@@ -63,18 +63,14 @@ def model_tradeoff(
         progress(1)
     base: dict[str, Any] = {"scene": scene, "profile": profile.name, "objects": len(described)}
     base["ttc_error_s"] = Errors.of([])
-    exact = Row(
+    exact = Measurement(
         **base, model="exact", steps=len(sampled), step_ms=float(np.median(seconds)) * 1e3,
         step_ms_p99=float(np.percentile(seconds, 99)) * 1e3, pair_us=1e6 * sum(seconds) / max(sum(map(len, pairs)), 1),
         alarms=sum(int(d <= 0.0) for truth in truths for d in truth.values()), false_alarms=0, misses=0,
         distance_error_m=0.0, compared=sum(map(len, pairs)), outside_bound=0, distance_error_part=0.0,
     )  # fmt: skip
     sizes = {each.object_id: _size(each) for each in described}
-    return [exact, *(_row(base, model, found, sampled, truths, sizes) for model, found in played.items())]
-
-
-def _told(answer: StepResult) -> dict[Pair, Any]:
-    return {(int(row["id_a"]), int(row["id_b"])): row for row in deepest(answer)}
+    return [exact, *(_measurement(base, model, found, sampled, truths, sizes) for model, found in played.items())]
 
 
 def _exact(described: list[ObjectDescription], states: NDArray[np.void], pairs: set[Pair]) -> dict[Pair, float]:
@@ -92,18 +88,18 @@ def _size(description: ObjectDescription) -> float:
     return float(np.linalg.norm(piece.size))
 
 
-def _row(
+def _measurement(
     base: dict[str, Any],
     model: Model,
     played: Played,
     sampled: list[int],
     truths: list[dict[Pair, float]],
     sizes: dict[int, float],
-) -> Row:
+) -> Measurement:
     alarms = false_alarms = misses = compared = outside = 0
     errors, parts = [0.0], [0.0]
     for k, truth in zip(sampled, truths, strict=True):
-        told = _told(played.answers[k])
+        told = contacts_by_pair(played.answers[k])
         touching = {pair for pair, row in told.items() if row["signed_distance"] <= 0.0}
         really = {pair for pair, distance in truth.items() if distance <= 0.0}
         alarms, false_alarms = alarms + len(touching), false_alarms + len(touching - really)
@@ -114,7 +110,7 @@ def _row(
             outside += bool(off > told[pair]["error_bound"] + 1e-9)
             errors.append(off)
             parts.append(off / min(sizes[each] for each in pair))
-    return Row(
+    return Measurement(
         **base, model=model.name.lower(), steps=len(played.answers), **played.cost(), alarms=alarms,
         false_alarms=false_alarms, misses=misses, distance_error_m=max(errors), compared=compared,
         outside_bound=outside, distance_error_part=max(parts),

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from collision_monitor.accuracy.playback import by_pair
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.step_context import StepContext
@@ -16,13 +14,13 @@ from collision_monitor.records import Phase, PredictionStatus
 from collision_monitor.settings.profile import Profile
 
 
-class PlainMonitor(Monitor):
+class ReferenceMonitor(Monitor):
     """A Monitor that trusts no earlier prediction and allows no body to be off its stated motion."""
 
     def __init__(self, profile: str | Profile = "balanced") -> None:
         super().__init__(profile)
         self.profile = self.profile.replace(
-            name="plain",
+            name="reference",
             position_tolerance=0.0,
             orientation_tolerance=0.0,
             velocity_tolerance=0.0,
@@ -41,20 +39,16 @@ class _RestartAll(Tracking):
         return moved, np.zeros(0, np.int32)
 
 
-def _by_pair(answers: NDArray[np.void]) -> dict[tuple[int, int], Any]:
-    return {(int(answer["id_a"]), int(answer["id_b"])): answer for answer in answers}
-
-
-def disagreements(mine: StepResult, plain: StepResult, horizon: float) -> list[str]:
-    """What `mine` says beyond its own bounds against plain recomputation from the same states, as sentences.
+def disagreements(mine: StepResult, reference: StepResult, horizon: float) -> list[str]:
+    """What `mine` says beyond its own bounds against recomputation from the same states, as sentences.
 
     Both must tell the same contacts. A collision that is certain in one must be stated in the other, and the two
     intervals of its time must meet; near the horizon (s) one may not see it yet.
     """
     found = []
-    touching = [_by_pair(result.contacts[result.contacts["phase"] != Phase.END]).keys() for result in (mine, plain)]
+    touching = [by_pair(result.contacts[result.contacts["phase"] != Phase.END]).keys() for result in (mine, reference)]
     found += [f"{pair} touches in one answer only" for pair in sorted(touching[0] ^ touching[1])]
-    stated, true = _by_pair(mine.predictions), _by_pair(plain.predictions)
+    stated, true = by_pair(mine.predictions), by_pair(reference.predictions)
     found += [f"{pair} touches and is predicted" for pair in sorted(stated.keys() & touching[0])]
     for pair, truth in true.items():
         if truth["status"] != PredictionStatus.HIT or truth["upper"] >= horizon:

@@ -1,4 +1,4 @@
-"""The verdict in words: what happened, and why it may not be all. Nothing is called clear that was not seen."""
+"""A session in words: what happened, and why that may not be all. Nothing is called clear that was not seen."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NAMED: Final = 3
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Assessment:
     """answer: the first words. findings: sentences about what happened. doubts: why there may be more.
 
     kind: `collisions`, `clear` or, where nothing is known of and not all is known, `unknown`.
@@ -29,20 +29,21 @@ class Verdict:
     doubts: list[str]
 
 
-def verdict(history: History, facts: Facts) -> Verdict:
-    """The verdict on a session."""
+def assess(history: History, facts: Facts) -> Assessment:
+    """The assessment of a session."""
     doubts = _doubts(history, facts)
     count = len(facts.collisions)
     if count:
-        kind, answer = "collisions", ("At least " if doubts else "") + _count(count, "collision")
+        kind, answer = "collisions", ("At least " if doubts else "") + counted(count, "collision")
     elif doubts:
         kind, answer = "unknown", "No collision is known of, but not all is known"
     else:
         kind, answer = "clear", "No collisions"
-    return Verdict(kind, answer, _findings(facts), doubts)
+    return Assessment(kind, answer, _findings(facts), doubts)
 
 
-def _count(count: int, what: str) -> str:
+def counted(count: int, what: str) -> str:
+    """A number and its noun."""
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
@@ -66,12 +67,12 @@ def _findings(facts: Facts) -> list[str]:
     if facts.nothing:
         pairs = len({alert.pair for alert in facts.nothing})
         lines.append(
-            f"{_count(len(facts.nothing), 'warning')} of {_count(pairs, 'pair')} came to nothing: the objects moved "
+            f"{counted(len(facts.nothing), 'warning')} of {counted(pairs, 'pair')} came to nothing: the objects moved "
             "otherwise, or passed within the tolerance"
         )
     due = sum(each[-1].certain and each[-1].outcome is AlertOutcome.OPEN for each in facts.alerts.values())
     if due:
-        lines.append(f"{_count(due, 'pair')} still predicted to touch when the session ended")
+        lines.append(f"{counted(due, 'pair')} still predicted to touch when the session ended")
     if not facts.collisions and not facts.alerts:
         lines.append("none was predicted either")
     return lines
@@ -88,14 +89,14 @@ def _doubts(history: History, facts: Facts) -> list[str]:
     if unseen:
         lines.append(f"no state of {_names(unseen)} was ever received")
     if history.restarts:
-        often = _count(history.restarts, "time")
+        often = counted(history.restarts, "time")
         lines.append(f"the clock was set back ({often}): times go on as if it had stood still")
     lines += _some([f"no step from {a:.2f} s to {b:.2f} s" for a, b in facts.gaps], "gaps between the steps")
     if facts.possible:
-        lines.append(f"{_count(len(facts.possible), 'further contact')} could not be excluded (UNRESOLVED)")
+        lines.append(f"{counted(len(facts.possible), 'further contact')} could not be excluded (UNRESOLVED)")
     stale = len(np.unique(history.prediction_step[history.predictions["stale"] != 0]))
     if stale:
-        lines.append(f"in {_count(stale, 'step')} predictions rested on states that were too old")
+        lines.append(f"in {counted(stale, 'step')} predictions rested on states that were too old")
     return lines + _counted(history)
 
 
@@ -108,12 +109,12 @@ def _counted(history: History) -> list[str]:
     refused = {reason.value: int(getattr(status, f"refused_{reason.value}")) for reason in Refusal}
     if any(refused.values()):
         reasons = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in refused.items() if count)
-        count = _count(sum(refused.values()), "refusal")
+        count = counted(sum(refused.values()), "refusal")
         lines.append(f"{count} of messages, states or shapes ({reasons}); the last: {status.last_refusal}")
     if status.messages_lost:
-        lines.append(f"{_count(status.messages_lost, 'message')} of states were lost on the way to the monitor")
+        lines.append(f"{counted(status.messages_lost, 'message')} of states were lost on the way to the monitor")
     if status.recording_dropped:
-        lines.append(f"{_count(status.recording_dropped, 'message')} could not be recorded")
+        lines.append(f"{counted(status.recording_dropped, 'message')} could not be recorded")
     if status.recording_error:
         lines.append(f"the recorder failed: {status.recording_error}")
     return lines

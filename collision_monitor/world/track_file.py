@@ -17,7 +17,7 @@ _LARGEST = 2**31 - 1
 
 
 @dataclass(frozen=True, eq=False)
-class Tracks:
+class TrackFile:
     """The rows of one file in its order: ids and frames (n,), and the columns asked for (n, k).
 
     Frames rise within each id.
@@ -29,7 +29,7 @@ class Tracks:
     values: NDArray[np.float64]
 
 
-def read_tracks(path: Path, columns: tuple[str, ...]) -> Tracks:
+def read_track_file(path: Path, columns: tuple[str, ...]) -> TrackFile:
     """The columns `id`, `frame` and these of a CSV file. Raises InputError for anything that is not such a file."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
@@ -42,7 +42,7 @@ def read_tracks(path: Path, columns: tuple[str, ...]) -> Tracks:
         raise InputError(f"{path}: expected a CSV text file, got something else: {error}") from None
 
 
-def _parse(path: Path, lines: Iterator[list[str]], columns: tuple[str, ...]) -> Tracks:
+def _parse(path: Path, lines: Iterator[list[str]], columns: tuple[str, ...]) -> TrackFile:
     header = [cell.strip() for cell in next(lines, [])]
     wanted = ("id", "frame", *columns)
     if not header:
@@ -70,7 +70,7 @@ def _parse(path: Path, lines: Iterator[list[str]], columns: tuple[str, ...]) -> 
         values.append([_number(cells[p], f"{where}, column {header[p]}") for p in places[2:]])
     if not ids:
         raise InputError(f"{path}: expected rows below the header, got none")
-    return Tracks(path, np.array(ids), np.array(frames), np.array(values))
+    return TrackFile(path, np.array(ids), np.array(frames), np.array(values))
 
 
 def _number(cell: str, where: str) -> float:

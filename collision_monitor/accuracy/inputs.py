@@ -1,0 +1,80 @@
+"""What monitors are measured on: simulated scenes, recorded tracks and recorded sessions, as steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+from collision_monitor.accuracy.default_scenes import DEFAULT_DURATION, DEFAULT_SCENES, STATE_NOISE, TRACK_SCENE
+from collision_monitor.accuracy.playback import Step
+from collision_monitor.codec import decode_descriptions, decode_states
+from collision_monitor.errors import InputError, MessageError
+from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.session import Session
+from collision_monitor.world import make_scene
+from collision_monitor.world.trajectory import clip_paths
+
+
+class Workload(NamedTuple):
+    """A scene or a session: name, objects, steps, and the noise of the states (see `world.measured`)."""
+
+    name: str
+    descriptions: list[ObjectDescription]
+    steps: list[Step]
+    noise: float = 0.0
+
+
+def recorded(path: Path) -> Workload:
+    """A session, all its objects known from the first step on, as they were described last.
+
+    What is malformed is left out. Raises InputError where there is nothing, SessionError.
+    """
+    described: dict[int, ObjectDescription] = {}
+    steps = []
+    for message in Session(path).messages():
+        with suppress(MessageError):
+            if message.type == "ObjectDescriptionArray":
+                changes = decode_descriptions(message.data).objects
+                described.update({it.object_id: it for it in changes if isinstance(it, ObjectDescription)})
+            elif message.type == "ObjectStateArray":
+                states = decode_states(message.data)
+                steps.append((states.stamp_ns, states.states.copy()))
+    if not described or not steps:
+        raise InputError(f"{path}: expected object shapes and states, found {len(described)} and {len(steps)} of them")
+    return Workload(path.stem, list(described.values()), steps)
+
+
+def simulated(
+    scenes: Sequence[str] | None = None,
+    *,
+    objects: int | None = None,
+    seed: int = 1,
+    path: Path | None = None,
+    noise: float | None = None,
+    duration: float | None = None,
+) -> Iterator[Workload]:
+    """Each scene played from its start; of recorded tracks, each clip is one. None: as in `default_scenes`.
+
+    duration: s, of each scene (None: DEFAULT_DURATION, or all of recorded tracks). Raises InputError, see `make_scene`.
+    """
+    for name, scene_noise in _scenes(scenes, path, noise):
+        for clip in clip_paths(path) if name == TRACK_SCENE and path else [path]:
+            scene = make_scene(name, objects=objects, seed=seed, path=clip, noise=scene_noise)
+            seconds = DEFAULT_DURATION if scene.duration is None else scene.duration + 1.0 / scene.rate
+            count = max(round((duration or seconds) * scene.rate), 1)
+            steps = [(0, scene.states())]
+            while len(steps) < count and not scene.finished:
+                states = scene.step()
+                steps.append((round(scene.time * 1e9), states))
+            yield Workload(clip.stem if clip and name == TRACK_SCENE else name, scene.descriptions, steps, scene_noise)
+
+
+def _scenes(names: Sequence[str] | None, path: Path | None, noise: float | None) -> list[tuple[str, float]]:
+    """Names of scenes, and the noise of their states."""
+    chosen = names or [*DEFAULT_SCENES, *([TRACK_SCENE] if path else [])]
+    if noise is not None:
+        return [(name, noise) for name in chosen]
+    usual = [(name, STATE_NOISE.get(name, 0.0)) for name in chosen]
+    return usual if names else [*((name, 0.0) for name in STATE_NOISE), *usual]

@@ -1,0 +1,63 @@
+"""A monitor's answers to a sequence of steps, and how long they took."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.monitor.result import StepResult
+from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.records import Phase
+
+Step = tuple[int, NDArray[np.void]]
+"""A stamp (ns) and records.STATE."""
+
+
+@dataclass(frozen=True)
+class Played:
+    """What a monitor answered at each step, and how long that took (s)."""
+
+    answers: list[StepResult]
+    seconds: NDArray[np.float64]
+
+    def cost(self) -> dict[str, Any]:
+        """Of a row; without the first step, which takes everything in."""
+        warm = self.seconds[1:] if len(self.seconds) > 1 else self.seconds
+        pairs = sum(a.status.narrow_phase_tests + a.status.impact_queries for a in self.answers[1:] or self.answers)
+        return {
+            "step_ms": 1e3 * float(np.median(warm)),
+            "step_ms_p99": 1e3 * float(np.percentile(warm, 99)),
+            "pair_us": 1e6 * float(warm.sum()) / pairs if pairs else np.nan,
+        }
+
+
+def play(
+    monitor: Monitor, described: Iterable[ObjectDescription], steps: Sequence[Step], progress: Callable[[int], None]
+) -> Played:
+    """Describe everything, then take all steps. progress: told of each."""
+    for description in described:
+        monitor.describe(description)
+    answers, seconds = [], np.empty(len(steps))
+    for k, (stamp, states) in enumerate(steps):
+        begin = time.perf_counter()
+        answers.append(monitor.step(stamp, states))
+        seconds[k] = time.perf_counter() - begin
+        progress(1)
+    return Played(answers, seconds)
+
+
+def by_pair(answers: NDArray[np.void]) -> dict[tuple[int, int], Any]:
+    """Rows of contacts or predictions by the ids of their pair."""
+    return {(int(answer["id_a"]), int(answer["id_b"])): answer for answer in answers}
+
+
+def contacts_by_pair(answer: StepResult) -> dict[tuple[int, int], Any]:
+    """Of each pair in contact, or within the contact margin, the row that states its distance."""
+    rows = answer.contacts
+    return by_pair(rows.compress((rows["phase"] != Phase.END) & (rows["point_index"] == 0)))

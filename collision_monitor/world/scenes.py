@@ -1,0 +1,99 @@
+"""The table of the scenes: each is made by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from collision_monitor.errors import InputError
+from collision_monitor.world.arm import Arm
+from collision_monitor.world.clutter import Clutter
+from collision_monitor.world.crossing import Crossing
+from collision_monitor.world.fleet import Fleet
+from collision_monitor.world.measured import Measured
+from collision_monitor.world.scene import Scene
+from collision_monitor.world.swarm import Swarm
+from collision_monitor.world.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class _RegisteredScene:
+    make: Callable[[int | None, int, float | None, Path | None], Scene]
+    description: str
+
+
+def _particles(objects: int | None, seed: int, rate: float | None, _path: Path | None) -> Scene:
+    from collision_monitor.world.particles import Particles  # here, for it compiles: names and help need not wait
+
+    return Particles(objects, seed, rate)
+
+
+_SCENES = {
+    "fleet": _RegisteredScene(
+        lambda objects, seed, rate, path: Fleet(objects, seed, rate),
+        "robots and people in a hall with racks, pillars and walls; they do run into each other",
+    ),
+    "particles": _RegisteredScene(
+        _particles,
+        "spheres in a closed box that bounce off the walls and off each other",
+    ),
+    "clutter": _RegisteredScene(
+        lambda objects, seed, rate, path: Clutter(objects, seed, rate),
+        "boxes, spheres, capsules and cylinders that drift and turn through each other",
+    ),
+    "crossing": _RegisteredScene(
+        lambda objects, seed, rate, path: Crossing(objects, rate),
+        "nine pairs whose times of contact are known beforehand, every 8 s anew",
+    ),
+    "swarm": _RegisteredScene(
+        lambda objects, seed, rate, path: Swarm(objects, seed, rate),
+        "drones that circle through each other's space, nobody straight ahead",
+    ),
+    "arm": _RegisteredScene(
+        lambda objects, seed, rate, path: Arm(objects, rate),
+        "a robot arm over a table with bottles, all of concave meshes",
+    ),
+    "trajectory": _RegisteredScene(
+        lambda objects, seed, rate, path: Trajectory(objects, rate, path),
+        "plays recorded tracks of people and carts from CSV files (needs a path)",
+    ),
+}
+
+
+def scene_names() -> list[str]:
+    """The names that `make_scene` takes."""
+    return list(_SCENES)
+
+
+def _registered(name: str) -> _RegisteredScene:
+    if name not in _SCENES:
+        raise InputError(f"scene: expected one of {', '.join(_SCENES)}, got {name!r}")
+    return _SCENES[name]
+
+
+def describe(name: str) -> str:
+    """One line for people about a scene. Raises InputError with the list of names."""
+    return _registered(name).description
+
+
+def make_scene(
+    name: str,
+    *,
+    objects: int | None = None,
+    seed: int = 1,
+    rate: float | None = None,
+    path: str | Path | None = None,
+    noise: float = 0.0,
+) -> Scene:
+    """The scene of this name, at time 0.
+
+    objects: how many move (None: the scene's own number); rate: Hz (None: the scene's own); path: recorded tracks,
+    for the scene that plays them; noise: of the states, as a localiser reports them (`Measured`).
+    Raises InputError for an unknown name (it lists them) and for what a scene cannot be.
+    """
+    registered = _registered(name)
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise InputError(f"seed: expected a whole number from 0, got {seed!r}")
+    scene = registered.make(objects, seed, rate, None if path is None else Path(path))
+    return scene if noise == 0.0 else Measured(scene, noise, seed)
