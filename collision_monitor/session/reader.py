@@ -17,7 +17,7 @@ import yaml
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
-from collision_monitor.codec import Descriptions, States, decode_descriptions, decode_states
+from collision_monitor.codec import ObjectDescriptionArray, ObjectStateArray, decode_descriptions, decode_states
 from collision_monitor.errors import MessageError, ProfileError, SessionError
 from collision_monitor.session.mcap.records import McapRecords, Message
 from collision_monitor.session.mcap.rosbag2 import TYPES, full_name
@@ -29,7 +29,7 @@ SALVAGE: Final = "collision_monitor_salvage"
 """Name of the metadata record that says what is missing in a file that was salvaged."""
 
 _NAMES: Final = {full_name(name): name for name in TYPES}
-_INPUTS: Final[dict[str, Callable[[bytes], States | Descriptions]]] = {
+_INPUTS: Final[dict[str, Callable[[bytes], ObjectStateArray | ObjectDescriptionArray]]] = {
     "ObjectStateArray": decode_states,
     "ObjectDescriptionArray": decode_descriptions,
 }

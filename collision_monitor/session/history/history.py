@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from collision_monitor import records
 from collision_monitor.codec import (
+    MonitorStatus,
     Removal,
-    Status,
     decode_contacts,
     decode_descriptions,
     decode_parameter_event,
@@ -27,7 +27,8 @@ from collision_monitor.codec import (
 )
 from collision_monitor.errors import InputError, MessageError, SessionError
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.pipeline.pipeline import LIMIT, Outputs, Pipeline
+from collision_monitor.pipeline.pipeline import Outputs, Pipeline
+from collision_monitor.pipeline.settings_event import LIMIT
 from collision_monitor.records import ContactStatus, Phase
 from collision_monitor.session.reader import Recorded, Session
 from collision_monitor.settings.profile import Profile
@@ -101,7 +102,7 @@ class History:
     objects: dict[int, ObjectDescription] = field(default_factory=dict)
     names: dict[str, set[int]] = field(default_factory=dict)
     settings: list[tuple[float, dict[str, Any]]] = field(default_factory=list)
-    status: Status | None = None
+    status: MonitorStatus | None = None
     problems: list[str] = field(default_factory=list)
     collisions: list[Collision] = field(default_factory=list)
 
@@ -278,7 +279,7 @@ class _Gathered:
         h.collisions = _collisions(h)
         return h
 
-    def _status_of_replay(self, pipeline: Pipeline) -> Status:
+    def _status_of_replay(self, pipeline: Pipeline) -> MonitorStatus:
         """What was refused and lost, by the replay; what the recorder dropped is missing here too."""
         status, recorded = decode_status(pipeline.status()), self._history.status
         if recorded is None:
