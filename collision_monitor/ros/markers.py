@@ -15,7 +15,7 @@ from collision_monitor.monitor.monitor import StepResult
 from collision_monitor.pipeline.catalogue import Catalogue
 from collision_monitor.records import Phase
 from collision_monitor.ros.marker_bytes import Color, Kind, Marker, encode
-from collision_monitor.ros.surfaces import triangles
+from collision_monitor.ros.surfaces import surface_triangles
 
 _STATIC: Final[Color] = (0.55, 0.57, 0.60, 0.35)
 _CALM: Final[Color] = (0.35, 0.55, 0.85, 0.9)
@@ -66,7 +66,7 @@ class MarkerView:
             it = self._catalogue.descriptions[object_id]
             self._surfaces.pop(object_id, None)
             self._static.pop(object_id, None)
-            vertices = np.concatenate([_placed(triangles(shape).reshape(-1, 3), pose) for shape, pose in it.shapes])
+            vertices = np.concatenate([_placed(surface_triangles(shape).reshape(-1, 3), pose) for shape, pose in it.shapes])
             if it.static and it.pose is not None:
                 self._static[object_id] = _placed(vertices, it.pose)
             else:
