@@ -66,7 +66,8 @@ class MarkerView:
             it = self._catalogue.descriptions[object_id]
             self._surfaces.pop(object_id, None)
             self._static.pop(object_id, None)
-            vertices = np.concatenate([_placed(surface_triangles(shape).reshape(-1, 3), pose) for shape, pose in it.shapes])
+            corners = [_placed(surface_triangles(shape).reshape(-1, 3), pose) for shape, pose in it.shapes]
+            vertices = np.concatenate(corners)
             if it.static and it.pose is not None:
                 self._static[object_id] = _placed(vertices, it.pose)
             else:

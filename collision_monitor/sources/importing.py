@@ -85,37 +85,14 @@ def _write(
     overwrite: bool,
     progress: Callable[[Imported], None] | None,
 ) -> None:
-    """Feed the inputs and record them with the answers."""
-    names: dict[Topic, str] = {topic: topic.of() for topic in RECORDED if topic is not Topic.SETTINGS}
+    """Feed the inputs and record them with the answers; where that fails, there is no target."""
     first = next(inputs, None)  # what is wrong with the bag shows before there is a file
     if first is None:
         raise SessionError("expected messages of the mapped topics in the bag, got none")
-    types = {name: topic.message for topic, name in names.items()}
+    types = {topic.of(): topic.message for topic in RECORDED if topic is not Topic.SETTINGS}
     recorder = Recorder(target, types, pipeline.metadata(node=f"/{NODE}"), overwrite=overwrite, patient=True)
-    last_status = now = first.log_time
     try:
-        recorder.write(names[Topic.STATUS], pipeline.status(), now, now)
-        for each in chain([first], inputs):
-            now = each.log_time
-            outputs = None
-            if each.topic is Topic.STATES:
-                outputs = pipeline.on_states(each.data)
-            else:
-                pipeline.on_shapes(each.data)
-                if each is first and pipeline.monitor.refused[Refusal.SHAPE]:
-                    raise InputError(pipeline.monitor.last_refusal)
-            recorder.write(names[each.topic], each.data, now, each.publish_time)
-            result.messages += 1
-            if outputs is not None:
-                result.steps = outputs.result.step
-                recorder.write(names[Topic.CONTACTS], outputs.contacts, now, outputs.result.stamp_ns)
-                recorder.write(names[Topic.PREDICTIONS], outputs.predictions, now, outputs.result.stamp_ns)
-                if now - last_status >= STATUS_PERIOD:
-                    last_status = now
-                    recorder.write(names[Topic.STATUS], pipeline.status(), now, now)
-            if progress is not None:
-                progress(result)
-        recorder.write(names[Topic.STATUS], pipeline.status(), now, now)
+        _feed(first, inputs, pipeline, recorder, result, progress)
     except BaseException:
         recorder.close()
         _remove(target)
@@ -127,6 +104,44 @@ def _write(
         raise SessionError(str(told["recording_error"]))
     result.refused = {reason.value: count for reason, count in pipeline.monitor.refused.items() if count}
     result.last_refusal = pipeline.monitor.last_refusal
+
+
+def _feed(
+    first: Input,
+    others: Iterator[Input],
+    pipeline: Pipeline,
+    recorder: Recorder,
+    result: Imported,
+    progress: Callable[[Imported], None] | None,
+) -> None:
+    """Raises InputError where the first description is refused."""
+
+    def record(topic: Topic, data: bytes, publish_time: int) -> None:
+        recorder.write(topic.of(), data, now, publish_time)
+
+    last_status = now = first.log_time
+    record(Topic.STATUS, pipeline.status(), now)
+    for each in chain([first], others):
+        now = each.log_time
+        outputs = None
+        if each.topic is Topic.STATES:
+            outputs = pipeline.on_states(each.data)
+        else:
+            pipeline.on_shapes(each.data)
+            if each is first and pipeline.monitor.refused[Refusal.SHAPE]:
+                raise InputError(pipeline.monitor.last_refusal)
+        record(each.topic, each.data, each.publish_time)
+        result.messages += 1
+        if outputs is not None:
+            result.steps = outputs.result.step
+            record(Topic.CONTACTS, outputs.contacts, outputs.result.stamp_ns)
+            record(Topic.PREDICTIONS, outputs.predictions, outputs.result.stamp_ns)
+            if now - last_status >= STATUS_PERIOD:
+                last_status = now
+                record(Topic.STATUS, pipeline.status(), now)
+        if progress is not None:
+            progress(result)
+    record(Topic.STATUS, pipeline.status(), now)
 
 
 def _remove(target: Path) -> None:
