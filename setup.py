@@ -22,8 +22,8 @@ setup(
     entry_points={
         "console_scripts": [
             "collision-monitor = collision_monitor.cli.main:main",
-            "monitor = collision_monitor.ros.main:monitor",
-            "world = collision_monitor.ros.main:world",
+            "monitor = collision_monitor.ros.executables:monitor",
+            "world = collision_monitor.ros.executables:world",
             "replay = collision_monitor.cli.main:replay_main",
         ],
         "pytest11": ["collision_monitor = collision_monitor.session.pytest_plugin"],

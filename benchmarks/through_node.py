@@ -84,15 +84,14 @@ class Listener:
         from rclpy import create_node
         from rclpy.executors import SingleThreadedExecutor
 
-        from collision_monitor.ros import qos
-        from collision_monitor_msgs.msg import MonitorStatus, PredictedCollisionArray
+        from collision_monitor.pipeline.topics import Topic
+        from collision_monitor.ros.endpoints import subscription
 
         self.arrivals: list[tuple[int, int, int]] = []  # step, stamp and arrival in ns of the system's clock
         self._status: bytes | None = None
         self._node = create_node("through_node")
-        topic = "/object_monitor/predictions"
-        self._node.create_subscription(PredictedCollisionArray, topic, self._on_predictions, qos.ANSWERS, raw=True)
-        self._node.create_subscription(MonitorStatus, "/object_monitor/status", self._on_status, qos.STATUS, raw=True)
+        subscription(self._node, Topic.PREDICTIONS, self._on_predictions, Topic.PREDICTIONS.of())
+        subscription(self._node, Topic.STATUS, self._on_status, Topic.STATUS.of())
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
 
@@ -107,7 +106,7 @@ class Listener:
         self._status = data
 
     @property
-    def status(self) -> codec.Status | None:
+    def status(self) -> codec.MonitorStatus | None:
         """The newest."""
         return None if self._status is None else codec.decode_status(self._status)
 

@@ -6,28 +6,35 @@ import ast
 import subprocess
 import sys
 from pathlib import Path
+from typing import Final
 
 import pytest
 
-PACKAGE = Path(__file__).parents[1] / "collision_monitor"
-MODULES = sorted(
-    ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
-    for path in PACKAGE.rglob("*.py")
-    if path.name != "__main__.py"
-)
-WITH_ROS = ("ros", "cli")
+from collision_monitor._jit.imports import direct_imports
 
-LAYERS = (
-    {"geometry"},
-    {"broad_phase", "narrow_phase"},
-    {"prediction"},
-    {"monitor"},
-    {"pipeline"},
-    {"session"},
-    {"report"},
-    {"ros", "cli"},
+NAME: Final = "collision_monitor"
+PACKAGE = Path(__file__).parents[1] / NAME
+
+FLOORS: Final = (
+    {"_jit", "errors", "tolerances", "records", "_version"},
+    {"settings", "geometry"},
+    {"broad_phase", "narrow_phase", "meshes"},
+    {"objects", "prediction"},
+    {"query", "detection", "monitor", "codec", "world"},
+    {"pipeline", "warm_up"},
+    {"sources", "session"},
+    {"accuracy", "report", "view", "ros"},
+    {"cli"},
+    {"__init__", "__main__"},
 )
-"""From the bottom up. A module imports its own layer and those below; the rest is free (errors, records …)."""
+"""The folders and files of the package, from the ground up: each imports itself and what is on the floors below it."""
+
+SIDEWAYS: Final = {
+    ("sources.importing", "session"): "what a bag is imported into is a session",
+}
+"""Imports of a module from another folder of its own floor, and why."""
+
+WITH_ROS = ("ros", "cli", "__main__")
 
 WITHOUT_ROS = """
 import importlib, importlib.abc, sys
@@ -43,37 +50,63 @@ for name in sys.argv[1:]:
 """
 
 
-def layer(name: str) -> int | None:
-    """The layer that a name below `collision_monitor.` belongs to, None for those that are free."""
-    return next((height for height, names in enumerate(LAYERS) if name in names), None)
+def _dotted(path: Path) -> str:
+    """`collision_monitor.geometry.pose`; a folder is named as it is imported, by its own name."""
+    return ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
+
+
+FILES: Final = {_dotted(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+def top(module: str) -> str:
+    """The folder or file right below the package that a module belongs to."""
+    return module.split(".")[1] if module != NAME else "__init__"
+
+
+def floor(name: str) -> int | None:
+    """The floor of a folder or file right below the package; None: it is on none."""
+    return next((height for height, names in enumerate(FLOORS) if name in names), None)
 
 
 def imported(path: Path) -> set[str]:
-    """What a source file imports from this package: `geometry` for `collision_monitor.geometry.pose`."""
-    names = set()
+    """The modules of this package that a source file imports, also in functions and for type checkers only."""
+    found = set()
     for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            if node.module == "collision_monitor":
-                names |= {f"collision_monitor.{alias.name}" for alias in node.names}
-            names.add(node.module)
-        elif isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-    return {name.split(".")[1] for name in names if name.startswith("collision_monitor.")}
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert not node.level, f"{path}, line {node.lineno}: expected an import by its full name"
+            members = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {member if member in FILES else str(node.module) for member in members}
+    return {name for name in found if name.split(".")[0] == NAME}
 
 
-@pytest.mark.parametrize("module", [module for module in MODULES if module.count(".")])
+@pytest.mark.parametrize("module", FILES)
 def test_imports_point_down(module: str) -> None:
-    own = layer(module.split(".")[1])
-    if own is None:
-        return
-    path = PACKAGE.parent / Path(*module.split("."))
-    source = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-    upward = {name for name in imported(source) if (layer(name) or 0) > own}
-    assert not upward, f"{module} imports {sorted(upward)}, which lies above it"
+    own = top(module)
+    height = floor(own)
+    assert height is not None, f"{module} is on no floor: add {own} to FLOORS"
+    for other in sorted(imported(FILES[module])):
+        below = floor(top(other))
+        assert below is not None, f"{module} imports {other}, which is on no floor"
+        is_inside = top(other) == own or (module.removeprefix(f"{NAME}."), top(other)) in SIDEWAYS
+        assert below < height or is_inside, f"{module} imports {other}, which is not below it"
+
+
+@pytest.mark.parametrize(("module", "other"), SIDEWAYS)
+def test_the_exceptions_are_needed(module: str, other: str) -> None:
+    path = FILES[f"{NAME}.{module}"]
+    assert floor(top(f"{NAME}.{module}")) == floor(other)
+    assert other in map(top, imported(path)), f"{module} does not import {other} any more: take it out of SIDEWAYS"
+
+
+@pytest.mark.parametrize("module", FILES)
+def test_the_import_graph_that_names_kernels_and_recordings_is_that_of_python(module: str) -> None:
+    assert direct_imports(module) == imported(FILES[module])
 
 
 def test_all_but_the_node_and_the_command_line_imports_without_ros() -> None:
-    modules = [module for module in MODULES if module.split(".")[1:2] not in [[name] for name in WITH_ROS]]
+    modules = [module for module in FILES if top(module) not in WITH_ROS]
     assert len(modules) > 20
     command = [sys.executable, "-c", WITHOUT_ROS, *modules]
     answer = subprocess.run(command, cwd=PACKAGE.parent, capture_output=True, text=True)

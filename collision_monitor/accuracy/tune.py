@@ -17,6 +17,7 @@ from collision_monitor.accuracy.playback import Step
 from collision_monitor.accuracy.profile_tradeoff import profile_tradeoff
 from collision_monitor.errors import InputError
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.pipeline.topics import PARAMETER_SECTION
 from collision_monitor.settings.profile import Profile
 
 FACTORS: Final = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.01)
@@ -126,7 +127,7 @@ def parameter_file(profile: Profile, notes: list[str]) -> str:
         for each in Profile.fields()
         if getattr(profile, each.name) != getattr(base, each.name)
     }
-    text = yaml.safe_dump({"/**/object_monitor": {"ros__parameters": settings}}, sort_keys=False)
+    text = yaml.safe_dump({PARAMETER_SECTION: {"ros__parameters": settings}}, sort_keys=False)
     return "".join(f"# {note}\n" for note in _lines(notes)) + text
 
 

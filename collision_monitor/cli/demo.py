@@ -137,7 +137,7 @@ def _picture(viewer: Viewer, scene: str, elapsed: float) -> Picture:
         elapsed=elapsed,
         contacts=None if viewer.contacts is None else codec.decode_contacts(viewer.contacts),
         predictions=None if viewer.predictions is None else codec.decode_predictions(viewer.predictions),
-        status=codec.Status() if viewer.status is None else codec.decode_status(viewer.status),
+        status=codec.MonitorStatus() if viewer.status is None else codec.decode_status(viewer.status),
     )
 
 

@@ -26,9 +26,9 @@ class Picture:
 
     title: str
     elapsed: float
-    contacts: codec.Contacts | None
-    predictions: codec.Predictions | None
-    status: codec.Status
+    contacts: codec.ContactArray | None
+    predictions: codec.PredictedCollisionArray | None
+    status: codec.MonitorStatus
 
     def table(self) -> RenderableType:
         """For a terminal."""
@@ -110,7 +110,7 @@ def _padded(table: Table, rows: int) -> Table:
     return table
 
 
-def _names(message: codec.Contacts | codec.Predictions) -> dict[int, str]:
+def _names(message: codec.ContactArray | codec.PredictedCollisionArray) -> dict[int, str]:
     return dict(zip(message.ids.tolist(), message.names, strict=True))
 
 

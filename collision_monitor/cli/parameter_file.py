@@ -7,8 +7,7 @@ from pathlib import Path
 import yaml
 
 from collision_monitor.errors import InputError
-
-NODE = "object_monitor"
+from collision_monitor.pipeline.topics import NODE, PARAMETER_SECTION
 
 
 def check_parameter_file(path: Path) -> None:
@@ -25,7 +24,7 @@ def check_parameter_file(path: Path) -> None:
     if not any(str(name).rstrip("*").rstrip("/") == "" or str(name).rsplit("/", 1)[-1] == NODE for name in nodes):
         found = f"there are settings for {', '.join(map(str, nodes))}" if nodes else "there are none"
         raise InputError(
-            f"--params: expected settings under `/**/{NODE}: ros__parameters:` in {path}, {found}; "
+            f"--params: expected settings under `{PARAMETER_SECTION}: ros__parameters:` in {path}, {found}; "
             "config/monitor.yaml is an example"
         )
 

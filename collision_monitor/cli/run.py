@@ -9,7 +9,7 @@ from collision_monitor.cli.parameter_file import check_parameter_file
 from collision_monitor.cli.quantities import positive, size
 from collision_monitor.cli.ros_arguments import parameters
 from collision_monitor.errors import InputError, SessionError
-from collision_monitor.ros.main import monitor
+from collision_monitor.ros.executables import monitor
 
 DESCRIPTION = """\
 Monitor objects: subscribes to ~/objects/shapes and ~/objects/states, publishes ~/contacts, ~/predictions, ~/status

@@ -8,7 +8,8 @@ from pathlib import Path
 from collision_monitor.cli.quantities import positive, whole
 from collision_monitor.cli.ros_arguments import parameters
 from collision_monitor.errors import InputError
-from collision_monitor.ros.main import world
+from collision_monitor.pipeline.topics import NODE
+from collision_monitor.ros.executables import world
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -26,7 +27,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="of the random numbers (default: 1)")
     parser.add_argument("--path", type=Path, metavar="FILE", help="recorded tracks, for the scene that plays them")
     parser.add_argument("--noise", type=positive, metavar="S", help="of the states, in m, rad, m/s and rad/s; declared")
-    parser.add_argument("--monitor", default="object_monitor", metavar="NAME", help="the monitor node's name")
+    parser.add_argument("--monitor", default=NODE, metavar="NAME", help="the monitor node's name")
     parser.add_argument("--ros-args", nargs=argparse.REMAINDER, default=[], metavar="…", help="passed on to ROS")
     parser.set_defaults(command=play)
 

@@ -3,34 +3,28 @@
 The elements of the hot messages lie in the bytes exactly as `records` describes them, so they are seen, not converted.
 """
 
-from collision_monitor.codec.answers import (
-    Contacts,
-    Predictions,
-    decode_contacts,
-    decode_predictions,
-    encode_contacts,
-    encode_predictions,
-)
+from collision_monitor.codec.contacts import ContactArray, decode_contacts, encode_contacts
 from collision_monitor.codec.descriptions import (
     Change,
-    Descriptions,
+    ObjectDescriptionArray,
     Removal,
     decode_descriptions,
     encode_descriptions,
 )
-from collision_monitor.codec.parameters import ParameterEvent, decode_parameter_event, encode_parameter_event
-from collision_monitor.codec.states import States, decode_states, encode_states
-from collision_monitor.codec.status import Status, decode_status, encode_status
+from collision_monitor.codec.parameter_event import ParameterEvent, decode_parameter_event, encode_parameter_event
+from collision_monitor.codec.predictions import PredictedCollisionArray, decode_predictions, encode_predictions
+from collision_monitor.codec.states import ObjectStateArray, decode_states, encode_states
+from collision_monitor.codec.status import MonitorStatus, decode_status, encode_status
 
 __all__ = [
     "Change",
-    "Contacts",
-    "Descriptions",
+    "ContactArray",
+    "MonitorStatus",
+    "ObjectDescriptionArray",
+    "ObjectStateArray",
     "ParameterEvent",
-    "Predictions",
+    "PredictedCollisionArray",
     "Removal",
-    "States",
-    "Status",
     "decode_contacts",
     "decode_descriptions",
     "decode_parameter_event",

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from collision_monitor.codec.cdr import Buffer, Floats, Ids, Reader, Writer, write_header
-from collision_monitor.codec.shapes import LEAST_SHAPE, make_shape, read_shape, write_shape
+from collision_monitor.codec.shape_fields import LEAST_SHAPE, make_shape, read_shape, write_shape
 from collision_monitor.errors import CollisionMonitorError, InputError, ShapeError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Sphere
@@ -30,8 +30,8 @@ Change = ObjectDescription | Removal
 
 
 @dataclass(frozen=True, eq=False)
-class Descriptions:
-    """ObjectDescriptionArray: the changes that can be made, in order, and for each of the others its id and why not."""
+class ObjectDescriptionArray:
+    """The changes that can be made, in order, and for each of the others its id and why not."""
 
     stamp_ns: int
     frame_id: str
@@ -41,7 +41,7 @@ class Descriptions:
 
 
 @dataclass(frozen=True, eq=False)
-class _Raw:
+class _Fields:
     """An ObjectDescription as it stands in the message, before anything is made of it."""
 
     object_id: int
@@ -65,7 +65,7 @@ _LEAST_DESCRIPTION = 111
 """Bytes of the smallest ObjectDescription that can be written."""
 
 
-def decode_descriptions(data: Buffer) -> Descriptions:
+def decode_descriptions(data: Buffer) -> ObjectDescriptionArray:
     """Raises MessageError for bytes that are no such message; an impossible object is only listed as refused."""
     reader = Reader(data, "ObjectDescriptionArray")
     stamp_ns, frame_id = reader.stamp_ns(), reader.string("header.frame_id")
@@ -82,11 +82,11 @@ def decode_descriptions(data: Buffer) -> Descriptions:
             what = f"object {each.object_id}"
             text = str(error)
             refused.append((each.object_id, text if text.startswith(what) else f"{what}: {text}"))
-    return Descriptions(stamp_ns, frame_id, snapshot, tuple(objects), tuple(refused))
+    return ObjectDescriptionArray(stamp_ns, frame_id, snapshot, tuple(objects), tuple(refused))
 
 
-def _read_description(reader: Reader) -> _Raw:
-    return _Raw(
+def _read_description(reader: Reader) -> _Fields:
+    return _Fields(
         object_id=reader.scalar("u4", "id"),
         operation=reader.scalar("u1", "operation"),
         name=reader.string("name"),
@@ -104,28 +104,28 @@ def _read_description(reader: Reader) -> _Raw:
     )
 
 
-def _change(raw: _Raw) -> Change:
+def _change(it: _Fields) -> Change:
     """Raises ShapeError, PoseError or InputError."""
-    if raw.operation == _REMOVE:
-        return Removal(raw.object_id)
-    if raw.operation != _ADD:
-        raise InputError(f"operation: expected 0 (ADD) or 1 (REMOVE), got {raw.operation}")
-    if len(raw.shape_poses) not in (0, len(raw.shapes)):
-        raise ShapeError(f"shape_poses: expected none or {len(raw.shapes)}, as shapes, got {len(raw.shape_poses)}")
-    poses = [_pose(row) for row in raw.shape_poses] or [_IDENTITY] * len(raw.shapes)
+    if it.operation == _REMOVE:
+        return Removal(it.object_id)
+    if it.operation != _ADD:
+        raise InputError(f"operation: expected 0 (ADD) or 1 (REMOVE), got {it.operation}")
+    if len(it.shape_poses) not in (0, len(it.shapes)):
+        raise ShapeError(f"shape_poses: expected none or {len(it.shapes)}, as shapes, got {len(it.shape_poses)}")
+    poses = [_pose(row) for row in it.shape_poses] or [_IDENTITY] * len(it.shapes)
     return ObjectDescription(
-        object_id=raw.object_id,
-        shapes=[(make_shape(*shape), pose) for shape, pose in zip(raw.shapes, poses, strict=True)],
-        name=raw.name,
-        static=raw.static,
-        pose=_pose(raw.pose) if raw.static else None,
-        group=raw.group,
-        mask=raw.mask,
-        allowed=tuple(raw.allowed.tolist()),
-        padding=raw.padding,
-        model=raw.model,  # type: ignore[arg-type]  # checked there
-        max_linear_acceleration=raw.max_linear_acceleration,
-        max_angular_acceleration=raw.max_angular_acceleration,
+        object_id=it.object_id,
+        shapes=[(make_shape(*shape), pose) for shape, pose in zip(it.shapes, poses, strict=True)],
+        name=it.name,
+        static=it.static,
+        pose=_pose(it.pose) if it.static else None,
+        group=it.group,
+        mask=it.mask,
+        allowed=tuple(it.allowed.tolist()),
+        padding=it.padding,
+        model=it.model,  # type: ignore[arg-type]  # checked there
+        max_linear_acceleration=it.max_linear_acceleration,
+        max_angular_acceleration=it.max_angular_acceleration,
     )
 
 

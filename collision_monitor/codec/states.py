@@ -9,13 +9,13 @@ import numpy as np
 from collision_monitor import records
 from collision_monitor.codec.cdr import Buffer, Floats, Reader, Records, Writer, write_header
 
-COVARIANCE = 12
+COVARIANCE_SIZE = 12
 """Numbers of `ObjectStateArray.covariance` for each state."""
 
 
 @dataclass(frozen=True, eq=False)
-class States:
-    """ObjectStateArray: states (n,) of records.STATE and covariance (0,) or (12 n,), both read-only views."""
+class ObjectStateArray:
+    """states (n,) of records.STATE and covariance (0,) or (12 n,), both read-only views."""
 
     stamp_ns: int
     frame_id: str
@@ -24,10 +24,10 @@ class States:
     covariance: Floats
 
 
-def decode_states(data: Buffer) -> States:
+def decode_states(data: Buffer) -> ObjectStateArray:
     """Raises MessageError. The length of `covariance` is not compared with that of `states`."""
     reader = Reader(data, "ObjectStateArray")
-    result = States(
+    result = ObjectStateArray(
         stamp_ns=reader.stamp_ns(),
         frame_id=reader.string("header.frame_id"),
         sequence=reader.scalar("u4", "sequence"),

@@ -16,8 +16,8 @@ Text = Annotated[str, "string"]
 
 
 @dataclass(frozen=True)
-class Status:
-    """MonitorStatus, field by field in its order; the annotations are the wire types."""
+class MonitorStatus:
+    """The message, field by field in its order; the annotations are the wire types."""
 
     stamp_ns: int = 0
     frame_id: str = ""
@@ -61,27 +61,27 @@ class Status:
     recording_error: Text = ""
 
 
-LIVE_FIELDS = tuple(f.name for f in dataclasses.fields(Status))[-10:]
-"""The fields of `Status` that depend on the clock and the disk; the others are a function of the inputs."""
+LIVE_FIELDS = tuple(f.name for f in dataclasses.fields(MonitorStatus))[-10:]
+"""The fields of `MonitorStatus` that depend on the clock and the disk; the others are a function of the inputs."""
 
 _WIRE = {
     name: get_args(hint)[1]
-    for name, hint in get_type_hints(Status, include_extras=True).items()
+    for name, hint in get_type_hints(MonitorStatus, include_extras=True).items()
     if len(get_args(hint)) == 2
 }
 
 
-def decode_status(data: Buffer) -> Status:
+def decode_status(data: Buffer) -> MonitorStatus:
     """Raises MessageError."""
     reader = Reader(data, "MonitorStatus")
     values: dict[str, Any] = {"stamp_ns": reader.stamp_ns(), "frame_id": reader.string("header.frame_id")}
     for name, kind in _WIRE.items():
         values[name] = reader.string(name) if kind == "string" else reader.scalar(kind, name)
     reader.finish()
-    return Status(**values)
+    return MonitorStatus(**values)
 
 
-def encode_status(status: Status) -> bytes:
+def encode_status(status: MonitorStatus) -> bytes:
     """Raises MessageError."""
     writer = Writer("MonitorStatus")
     write_header(writer, status.stamp_ns, status.frame_id)

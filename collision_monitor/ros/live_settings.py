@@ -13,7 +13,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from collision_monitor.errors import ProfileError
-from collision_monitor.ros.parameters import PROFILE, plain
+from collision_monitor.pipeline.settings_event import PROFILE
+from collision_monitor.ros.parameters import plain
 from collision_monitor.settings.profile import Profile
 
 

@@ -2,40 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.codec import Descriptions, Removal
+from collision_monitor.codec import Change, Removal
 from collision_monitor.geometry.pose import Pose, rotation_matrix
 from collision_monitor.monitor.result import StepResult
-from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.pipeline.catalogue import Catalogue
 from collision_monitor.records import Phase
 from collision_monitor.ros.marker_bytes import Color, Kind, Marker, encode
-from collision_monitor.ros.surfaces import triangles
+from collision_monitor.ros.surfaces import surface_triangles
 
-STATIC: Final[Color] = (0.55, 0.57, 0.60, 0.35)
-CALM: Final[Color] = (0.35, 0.55, 0.85, 0.9)
-PREDICTED: Final[Color] = (0.95, 0.70, 0.15, 1.0)
-TOUCHING: Final[Color] = (0.85, 0.15, 0.15, 1.0)
-CONTACT: Final[Color] = (1.0, 1.0, 1.0, 1.0)
+_STATIC: Final[Color] = (0.55, 0.57, 0.60, 0.35)
+_CALM: Final[Color] = (0.35, 0.55, 0.85, 0.9)
+_PREDICTED: Final[Color] = (0.95, 0.70, 0.15, 1.0)
+_TOUCHING: Final[Color] = (0.85, 0.15, 0.15, 1.0)
+_CONTACT: Final[Color] = (1.0, 1.0, 1.0, 1.0)
 
-NORMAL_LENGTH = 0.5
+_NORMAL_LENGTH = 0.5
 """m, of the line that shows a contact's normal."""
-LABELS = 10
+_LABELS = 10
 """The soonest impacts are labelled with the time that is left."""
 
 Vertices = NDArray[np.float64]
 
 
 class MarkerView:
-    """Remembers shapes and last poses; builds surfaces only when asked to draw."""
+    """Draws the objects of a catalogue where they were last; builds their surfaces only when asked to draw."""
 
-    def __init__(self, frame_id: str) -> None:
+    def __init__(self, catalogue: Catalogue, frame_id: str) -> None:
+        self._catalogue = catalogue
         self._frame_id = frame_id
-        self._described: dict[int, ObjectDescription] = {}
         self._unbuilt: set[int] = set()
         self._changed = False
         self._surfaces: dict[int, Vertices] = {}
@@ -45,32 +46,28 @@ class MarkerView:
         self._owner = np.empty(0, np.intp)
         self._poses: dict[int, NDArray[np.float64]] = {}
 
-    def describe(self, message: Descriptions) -> None:
-        """Take in new and changed objects, forget removed ones."""
+    def update(self, changes: Iterable[Change]) -> None:
+        """Take in which objects of the catalogue are new, changed or removed."""
         self._changed = True
-        if message.snapshot:
-            keep = {each.object_id for each in message.objects} | {object_id for object_id, _ in message.refused}
-            for object_id in self._described.keys() - keep:
-                self._forget(object_id)
-        for each in message.objects:
+        for each in changes:
             if isinstance(each, Removal):
                 self._forget(each.object_id)
             else:
-                self._described[each.object_id] = each
                 self._unbuilt.add(each.object_id)
 
     def _forget(self, object_id: int) -> None:
-        for known in (self._described, self._surfaces, self._static, self._poses):
+        for known in (self._surfaces, self._static, self._poses):
             known.pop(object_id, None)
         self._unbuilt.discard(object_id)
 
     def _build(self) -> None:
         """Surfaces of what changed since the last picture."""
         for object_id in self._unbuilt:
-            it = self._described[object_id]
+            it = self._catalogue.descriptions[object_id]
             self._surfaces.pop(object_id, None)
             self._static.pop(object_id, None)
-            vertices = np.concatenate([_placed(triangles(shape).reshape(-1, 3), pose) for shape, pose in it.shapes])
+            corners = [_placed(surface_triangles(shape).reshape(-1, 3), pose) for shape, pose in it.shapes]
+            vertices = np.concatenate(corners)
             if it.static and it.pose is not None:
                 self._static[object_id] = _placed(vertices, it.pose)
             else:
@@ -99,10 +96,10 @@ class MarkerView:
 
         static = np.concatenate(list(self._static.values())) if self._static else np.empty((0, 3))
         markers = [
-            Marker("static", Kind.TRIANGLE_LIST, STATIC, static),
-            surface("clear", CALM, ~touching & ~predicted),
-            surface("predicted", PREDICTED, predicted),
-            surface("touching", TOUCHING, touching),
+            Marker("static", Kind.TRIANGLE_LIST, _STATIC, static),
+            surface("clear", _CALM, ~touching & ~predicted),
+            surface("predicted", _PREDICTED, predicted),
+            surface("touching", _TOUCHING, touching),
             *_contact_markers(contacts),
             *_prediction_markers(result.predictions),
         ]
@@ -125,18 +122,18 @@ def _placed(vertices: Vertices, pose: Pose) -> Vertices:
 def _contact_markers(contacts: NDArray[np.void]) -> list[Marker]:
     known = contacts[np.isfinite(contacts["point_a"]).all(axis=1)]
     start = known["point_a"]
-    lines = np.stack([start, start + NORMAL_LENGTH * known["normal"]], axis=1).reshape(-1, 3)
+    lines = np.stack([start, start + _NORMAL_LENGTH * known["normal"]], axis=1).reshape(-1, 3)
     return [
-        Marker("contact points", Kind.SPHERE_LIST, CONTACT, start, (0.1, 0.1, 0.1)),
-        Marker("contact normals", Kind.LINE_LIST, CONTACT, lines, (0.03, 0.0, 0.0)),
+        Marker("contact points", Kind.SPHERE_LIST, _CONTACT, start, (0.1, 0.1, 0.1)),
+        Marker("contact normals", Kind.LINE_LIST, _CONTACT, lines, (0.03, 0.0, 0.0)),
     ]
 
 
 def _prediction_markers(predictions: NDArray[np.void]) -> list[Marker]:
     known = predictions[np.isfinite(predictions["point"]).all(axis=1)]
-    markers = [Marker("predicted impacts", Kind.SPHERE_LIST, PREDICTED, known["point"], (0.15, 0.15, 0.15))]
-    for i in range(LABELS):
-        label = Marker("time left", Kind.TEXT, PREDICTED, scale=(0.0, 0.0, 0.4), number=i)
+    markers = [Marker("predicted impacts", Kind.SPHERE_LIST, _PREDICTED, known["point"], (0.15, 0.15, 0.15))]
+    for i in range(_LABELS):
+        label = Marker("time left", Kind.TEXT, _PREDICTED, scale=(0.0, 0.0, 0.4), number=i)
         if i < len(known):
             x, y, z = (float(c) for c in known["point"][i])
             label = replace(label, position=(x, y, z + 0.5), text=f"{known['lower'][i]:.2f} s")

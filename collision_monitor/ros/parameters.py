@@ -15,6 +15,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 
 from collision_monitor.errors import InputError, ProfileError, SessionError
+from collision_monitor.pipeline.settings_event import PROFILE
 from collision_monitor.session import ONE_FILE, Splitting
 from collision_monitor.settings.profile import Profile
 from collision_monitor.settings.setting import Setting
@@ -69,7 +70,6 @@ class ParameterReader:
         return self._given.get(name)
 
 
-PROFILE = "profile"
 EXECUTORS = ("single", "events")
 RECORD_MODES = ("always", "on_event")
 _RECORD = ("record", "record_mode", "record_before", "record_after", "record_split_size", "record_split_duration")

@@ -28,7 +28,7 @@ HALF_SPACE_EXTENT = 20.0
 """m, the side of the square that stands for an endless plane."""
 
 
-def triangles(shape: Shape) -> Triangles:
+def surface_triangles(shape: Shape) -> Triangles:
     """The surface of a shape in its own frame."""
     match shape:
         case Box():

@@ -8,29 +8,25 @@ from collections.abc import Callable
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
-from collision_monitor.ros import qos
-from collision_monitor_msgs.msg import ContactArray, MonitorStatus, PredictedCollisionArray
+from collision_monitor.pipeline.topics import NODE, Topic
+from collision_monitor.ros.endpoints import subscription
 
 
 class Viewer:
     """Raw subscriptions: nothing is decoded before it is drawn. None: nothing heard yet."""
 
-    def __init__(self, monitor: str = "object_monitor") -> None:
+    def __init__(self, monitor: str = NODE) -> None:
         self.contacts: bytes | None = None
         self.predictions: bytes | None = None
         self.status: bytes | None = None
         self._node = rclpy.create_node("viewer")
-        for message, topic, quality in (
-            (ContactArray, "contacts", qos.ANSWERS),
-            (PredictedCollisionArray, "predictions", qos.ANSWERS),
-            (MonitorStatus, "status", qos.STATUS),
-        ):
-            self._node.create_subscription(message, f"/{monitor}/{topic}", self._keep(topic), quality, raw=True)
+        for topic in (Topic.CONTACTS, Topic.PREDICTIONS, Topic.STATUS):
+            subscription(self._node, topic, self._keep(topic.path), topic.of(monitor))
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
 
-    def _keep(self, topic: str) -> Callable[[bytes], None]:
-        return lambda data: setattr(self, topic, data)
+    def _keep(self, name: str) -> Callable[[bytes], None]:
+        return lambda data: setattr(self, name, data)
 
     def listen(self, until: float) -> None:
         """Take what arrives until this time of the monotonic clock."""

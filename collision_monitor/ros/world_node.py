@@ -15,11 +15,11 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from collision_monitor import codec
 from collision_monitor.errors import CollisionMonitorError, InputError
-from collision_monitor.ros import qos
+from collision_monitor.pipeline.topics import NODE, Topic
+from collision_monitor.ros.endpoints import publisher, subscription
 from collision_monitor.ros.parameters import ParameterReader
 from collision_monitor.ros.process import WAKE_UP, StopRequest
 from collision_monitor.world import make_scene, scene_names
-from collision_monitor_msgs.msg import MonitorStatus, ObjectDescriptionArray, ObjectStateArray
 
 PARAMETERS = ("scene", "objects", "rate", "duration", "seed", "path", "noise", "monitor", "frame_id")
 
@@ -40,15 +40,15 @@ class WorldNode(Node):
         except CollisionMonitorError:
             self.destroy_node()
             raise
-        topics = f"/{self._monitor}/objects"
+        shapes, states = Topic.SHAPES.of(self._monitor), Topic.STATES.of(self._monitor)
         try:
-            validate_full_topic_name(topics)
+            validate_full_topic_name(shapes)
         except InvalidTopicNameException:
             raise InputError(
                 f"monitor: expected a node's name of letters, digits and underscores, got {self._monitor!r}"
             ) from None
-        self._shapes_out = self.create_publisher(ObjectDescriptionArray, f"{topics}/shapes", qos.SHAPES)
-        self._states_out = self.create_publisher(ObjectStateArray, f"{topics}/states", qos.STATES)
+        self._shapes_out = publisher(self, Topic.SHAPES, shapes)
+        self._states_out = publisher(self, Topic.STATES, states)
 
     def _read_parameters(self) -> None:
         reader = ParameterReader(self, PARAMETERS)
@@ -64,7 +64,7 @@ class WorldNode(Node):
         self._duration = reader.read("duration", 0.0, "After which it stops [s]; 0: the scene's own end, or endless.")
         if not (self._duration >= 0.0 and math.isfinite(self._duration)):
             raise InputError(f"duration: expected a finite number of seconds, at least 0, got {self._duration}")
-        self._monitor = reader.read("monitor", "object_monitor", "Name of the monitor to publish to.").strip("/")
+        self._monitor = reader.read("monitor", NODE, "Name of the monitor to publish to.").strip("/")
         self._frame_id = reader.read("frame_id", "world", "The frame of all poses.")
 
     def play(self, stop: StopRequest) -> None:
@@ -112,11 +112,9 @@ class WorldNode(Node):
 
         Without a monitor, or with one that refuses some of the objects, play all the same.
         """
-        topic = f"/{self._monitor}/status"
+        topic = Topic.STATUS.of(self._monitor)
         known: list[int] = []
-        subscription = self.create_subscription(
-            MonitorStatus, topic, lambda data: known.append(codec.decode_status(data).objects), qos.STATUS, raw=True
-        )
+        statuses = subscription(self, Topic.STATUS, lambda data: known.append(codec.decode_status(data).objects), topic)
         executor = SingleThreadedExecutor()
         executor.add_node(self)
         patience = time.monotonic() + SHAPES_PATIENCE
@@ -126,7 +124,7 @@ class WorldNode(Node):
             executor.spin_once(timeout_sec=WAKE_UP)
         executor.remove_node(self)
         executor.shutdown()
-        self.destroy_subscription(subscription)
+        self.destroy_subscription(statuses)
 
 
 def _sleep_until(deadline: float, stop: StopRequest) -> bool:

@@ -16,7 +16,7 @@ import yaml
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
-from collision_monitor.codec import Descriptions, States, decode_descriptions, decode_states
+from collision_monitor.codec import ObjectDescriptionArray, ObjectStateArray, decode_descriptions, decode_states
 from collision_monitor.errors import MessageError, ProfileError, SessionError
 from collision_monitor.session.mcap.layout import (
     LIBRARY,
@@ -34,7 +34,7 @@ from collision_monitor.session.mcap.rosbag2 import INPUT_TYPES, RECORDED_TYPES, 
 from collision_monitor.settings.profile import Profile
 
 _SHORT_NAMES: Final = {full_name(name): name for name in RECORDED_TYPES}
-_INPUT_DECODERS: Final[dict[str, Callable[[bytes], States | Descriptions]]] = dict(
+_INPUT_DECODERS: Final[dict[str, Callable[[bytes], ObjectStateArray | ObjectDescriptionArray]]] = dict(
     zip(INPUT_TYPES, (decode_states, decode_descriptions), strict=True)
 )
 _SNAPSHOT: Final = re.compile(re.escape(SNAPSHOT) + r"(\d{1,10})\.npz")

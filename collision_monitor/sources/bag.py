@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from collision_monitor.errors import MessageError, SessionError
 
 
-class Raw(NamedTuple):
+class BagMessage(NamedTuple):
     """A message as it lies in the bag; time in ns."""
 
     topic: str
@@ -52,7 +52,7 @@ class Bag:
                 raise SessionError(f"{path}: topic {connection.topic} has messages of {other} and {connection.msgtype}")
         self._types: Any = None
 
-    def messages(self, topics: Iterable[str]) -> Iterator[Raw]:
+    def messages(self, topics: Iterable[str]) -> Iterator[BagMessage]:
         """The messages of these topics by the time of their receipt. Raises SessionError where the bag is damaged."""
         wanted = set(topics)
         connections = [c for c in self._reader.connections if c.topic in wanted]
@@ -60,7 +60,7 @@ class Bag:
             return
         try:
             for connection, log_time, data in self._reader.messages(connections):
-                yield Raw(connection.topic, connection.msgtype, log_time, data)
+                yield BagMessage(connection.topic, connection.msgtype, log_time, data)
         except GeneratorExit:
             raise
         except SessionError:
@@ -68,7 +68,7 @@ class Bag:
         except Exception as error:
             raise self._broken(error) from None
 
-    def decode(self, message: Raw) -> Any:
+    def decode(self, message: BagMessage) -> Any:
         """The message with its fields as attributes. Raises MessageError."""
         if self._types is None:
             self._types = self._typestore()

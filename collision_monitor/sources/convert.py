@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from typing import Any, Final, NamedTuple
+from enum import StrEnum
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,25 +21,28 @@ from collision_monitor.errors import CollisionMonitorError, InputError, SessionE
 from collision_monitor.geometry.pose import Pose, rotation_matrix
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.pipeline.topics import Topic
 from collision_monitor.records import StateFlag
 from collision_monitor.sources.mapping import HEADER, Mapping, Source
-from collision_monitor.sources.markers import DELETE, DELETE_ALL, MarkerTable, marker_shape, source_of
+from collision_monitor.sources.marker_objects import DELETE, DELETE_ALL, MarkerTable, marker_shape, source_of
 from collision_monitor.sources.transforms import IDENTITY, Placement, TransformTree, frame_name, placement
 
-ODOMETRY: Final = "nav_msgs/msg/Odometry"
-POSE: Final = "geometry_msgs/msg/PoseStamped"
-POSE_WITH_COVARIANCE: Final = "geometry_msgs/msg/PoseWithCovarianceStamped"
-TRANSFORMS: Final = "tf2_msgs/msg/TFMessage"
-MARKER: Final = "visualization_msgs/msg/Marker"
-MARKERS: Final = "visualization_msgs/msg/MarkerArray"
-TYPES: Final = (ODOMETRY, POSE, POSE_WITH_COVARIANCE, TRANSFORMS, MARKER, MARKERS)
-"""What can be mapped."""
+
+class SourceType(StrEnum):
+    """The messages that can be mapped."""
+
+    ODOMETRY = "nav_msgs/msg/Odometry"
+    POSE = "geometry_msgs/msg/PoseStamped"
+    POSE_WITH_COVARIANCE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+    TRANSFORMS = "tf2_msgs/msg/TFMessage"
+    MARKER = "visualization_msgs/msg/Marker"
+    MARKERS = "visualization_msgs/msg/MarkerArray"
 
 
 class Input(NamedTuple):
-    """A message for the monitor; kind: `ObjectStateArray` or `ObjectDescriptionArray`. Times in ns."""
+    """A message for the monitor; topic: STATES or SHAPES. Times in ns."""
 
-    kind: str
+    topic: Topic
     data: bytes
     log_time: int
     publish_time: int
@@ -79,14 +83,14 @@ class Converter:
 
     def take(self, topic: str, kind: str, message: Any, log_time: int) -> Iterator[Input]:
         """What a message of the bag says."""
-        if kind == TRANSFORMS:
+        if kind == SourceType.TRANSFORMS:
             yield from self._take_transforms(topic, message, log_time)
             return
-        if kind in (MARKER, MARKERS):
-            yield from self._take_markers(topic, message.markers if kind == MARKERS else [message], log_time)
+        if kind in (SourceType.MARKER, SourceType.MARKERS):
+            yield from self._take_markers(topic, message.markers if kind == SourceType.MARKERS else [message], log_time)
             return
-        pose = message.pose if kind == POSE else message.pose.pose
-        twist = message.twist.twist if kind == ODOMETRY else None
+        pose = message.pose if kind == SourceType.POSE else message.pose.pose
+        twist = message.twist.twist if kind == SourceType.ODOMETRY else None
         rows = []
         for source in self._sources[topic]:
             frame = frame_name(message.header.frame_id)
@@ -206,11 +210,11 @@ class Converter:
         """One message for each stamp, the older ones first."""
         for stamp in sorted({stamp for stamp, _ in rows}):
             states = np.array([row for other, row in rows if other == stamp], records.STATE)
-            yield Input("ObjectStateArray", encode_states(stamp, self._mapping.frame, 0, states), log_time, stamp)
+            yield Input(Topic.STATES, encode_states(stamp, self._mapping.frame, 0, states), log_time, stamp)
 
     def _descriptions(self, log_time: int, objects: list[Change], *, snapshot: bool = False) -> Input:
         data = encode_descriptions(log_time, self._mapping.frame, objects, snapshot=snapshot)
-        return Input("ObjectDescriptionArray", data, log_time, log_time)
+        return Input(Topic.SHAPES, data, log_time, log_time)
 
     def _description(
         self, source: Source, object_id: int, name: str, shapes: tuple[tuple[Shape, Pose], ...], pose: Pose | None
@@ -254,18 +258,20 @@ def _pose(where: Placement, name: str) -> Pose:
 
 def _check_source(source: Source, kind: str | None, topics: dict[str, str]) -> None:
     if kind is None:
-        usable = [f"{topic} ({each})" for topic, each in sorted(topics.items()) if each in TYPES]
+        usable = [f"{topic} ({each})" for topic, each in sorted(topics.items()) if each in list(SourceType)]
         raise SessionError(
             f"{source.name}: expected topic {source.topic} in the bag, got none; "
             f"what can be mapped there is {', '.join(usable) or 'nothing'}"
         )
-    if kind not in TYPES:
-        raise SessionError(f"{source.name}: expected {source.topic} to be one of {', '.join(TYPES)}, got {kind}")
-    markers = kind in (MARKER, MARKERS)
+    if kind not in list(SourceType):
+        raise SessionError(f"{source.name}: expected {source.topic} to be one of {', '.join(SourceType)}, got {kind}")
+    markers = kind in (SourceType.MARKER, SourceType.MARKERS)
     if markers != (source.marker is not None):
         wanted = "`marker: {ns: …, id: …}`" if markers else "no `marker`"
         raise SessionError(f"{source.name}: {source.topic} is a {kind}; expected {wanted} in the mapping")
-    if kind == TRANSFORMS and not source.frame:
+    if kind == SourceType.TRANSFORMS and not source.frame:
         raise SessionError(f"{source.name}: {source.topic} is a {kind}; expected `frame: …` in the mapping, got none")
-    if kind != TRANSFORMS and source.frame:
-        raise SessionError(f"{source.name}: `frame` is for {TRANSFORMS} and static objects; {source.topic} is a {kind}")
+    if kind != SourceType.TRANSFORMS and source.frame:
+        raise SessionError(
+            f"{source.name}: `frame` is for {SourceType.TRANSFORMS} and static objects; {source.topic} is a {kind}"
+        )

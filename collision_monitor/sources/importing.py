@@ -5,26 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Final
 
 from collision_monitor.codec import decode_states
 from collision_monitor.errors import CollisionMonitorError, InputError, MessageError, Refusal, SessionError
 from collision_monitor.pipeline.pipeline import Pipeline
-from collision_monitor.session.mcap.rosbag2 import full_name
+from collision_monitor.pipeline.topics import NODE, RECORDED, STATUS_PERIOD, Topic
 from collision_monitor.session.recording.recorder import Recorder, Recording
 from collision_monitor.settings.profile import Profile
 from collision_monitor.sources.bag import Bag
-from collision_monitor.sources.convert import TRANSFORMS, Converter, Input, put_transform
+from collision_monitor.sources.convert import Converter, Input, SourceType, put_transform
 from collision_monitor.sources.mapping import Mapping
 from collision_monitor.sources.transforms import TransformTree
 
-NODE: Final = "/object_monitor"
-STATUS_PERIOD: Final = 50_000_000
-"""ns between two statuses, as the node has them."""
-
 _STATIC: Final = "tf_static"
-_INPUTS: Final = ("ObjectStateArray", "ObjectDescriptionArray")
+_INPUTS: Final = (Topic.STATES, Topic.SHAPES)
 
 
 @dataclass
@@ -88,46 +85,14 @@ def _write(
     overwrite: bool,
     progress: Callable[[Imported], None] | None,
 ) -> None:
-    """Feed the inputs and record them with the answers."""
-    names = ("objects/shapes", "objects/states", "contacts", "predictions", "status")
-    shapes, states, contacts, predictions, status = (f"{NODE}/{name}" for name in names)
-    topics = dict(zip(("ObjectDescriptionArray", "ObjectStateArray"), (shapes, states), strict=True))
-    types = {
-        **{topic: kind for kind, topic in topics.items()},
-        contacts: "ContactArray",
-        predictions: "PredictedCollisionArray",
-        status: "MonitorStatus",
-    }
+    """Feed the inputs and record them with the answers; where that fails, there is no target."""
     first = next(inputs, None)  # what is wrong with the bag shows before there is a file
     if first is None:
         raise SessionError("expected messages of the mapped topics in the bag, got none")
-    recorder = Recorder(target, types, pipeline.metadata(node=NODE), overwrite=overwrite, patient=True)
-    last_status = now = first.log_time
+    types = {topic.of(): topic.message for topic in RECORDED if topic is not Topic.SETTINGS}
+    recorder = Recorder(target, types, pipeline.metadata(node=f"/{NODE}"), overwrite=overwrite, patient=True)
     try:
-        recorder.write(status, pipeline.status(), now, now)
-        each: Input | None = first
-        while each is not None:
-            now = each.log_time
-            outputs = None
-            if each.kind == "ObjectDescriptionArray":
-                pipeline.on_shapes(each.data)
-                if each is first and pipeline.monitor.refused[Refusal.SHAPE]:
-                    raise InputError(pipeline.monitor.last_refusal)
-            else:
-                outputs = pipeline.on_states(each.data)
-            recorder.write(topics[each.kind], each.data, now, each.publish_time)
-            result.messages += 1
-            if outputs is not None:
-                result.steps = outputs.result.step
-                recorder.write(contacts, outputs.contacts, now, outputs.result.stamp_ns)
-                recorder.write(predictions, outputs.predictions, now, outputs.result.stamp_ns)
-                if now - last_status >= STATUS_PERIOD:
-                    last_status = now
-                    recorder.write(status, pipeline.status(), now, now)
-            if progress is not None:
-                progress(result)
-            each = next(inputs, None)
-        recorder.write(status, pipeline.status(), now, now)
+        _feed(first, inputs, pipeline, recorder, result, progress)
     except BaseException:
         recorder.close()
         _remove(target)
@@ -139,6 +104,44 @@ def _write(
         raise SessionError(str(told["recording_error"]))
     result.refused = {reason.value: count for reason, count in pipeline.monitor.refused.items() if count}
     result.last_refusal = pipeline.monitor.last_refusal
+
+
+def _feed(
+    first: Input,
+    others: Iterator[Input],
+    pipeline: Pipeline,
+    recorder: Recorder,
+    result: Imported,
+    progress: Callable[[Imported], None] | None,
+) -> None:
+    """Raises InputError where the first description is refused."""
+
+    def record(topic: Topic, data: bytes, publish_time: int) -> None:
+        recorder.write(topic.of(), data, now, publish_time)
+
+    last_status = now = first.log_time
+    record(Topic.STATUS, pipeline.status(), now)
+    for each in chain([first], others):
+        now = each.log_time
+        outputs = None
+        if each.topic is Topic.STATES:
+            outputs = pipeline.on_states(each.data)
+        else:
+            pipeline.on_shapes(each.data)
+            if each is first and pipeline.monitor.refused[Refusal.SHAPE]:
+                raise InputError(pipeline.monitor.last_refusal)
+        record(each.topic, each.data, each.publish_time)
+        result.messages += 1
+        if outputs is not None:
+            result.steps = outputs.result.step
+            record(Topic.CONTACTS, outputs.contacts, outputs.result.stamp_ns)
+            record(Topic.PREDICTIONS, outputs.predictions, outputs.result.stamp_ns)
+            if now - last_status >= STATUS_PERIOD:
+                last_status = now
+                record(Topic.STATUS, pipeline.status(), now)
+        if progress is not None:
+            progress(result)
+    record(Topic.STATUS, pipeline.status(), now)
 
 
 def _remove(target: Path) -> None:
@@ -167,7 +170,7 @@ def _converter(bag: Bag, mapping: Mapping) -> Converter:
 def _mapped_inputs(bag: Bag, mapping: Mapping, converter: Converter, result: Imported) -> Iterator[Input]:
     begun = False
     for raw in bag.messages({*mapping.topics, *_transform_topics(bag)}):
-        if raw.topic.endswith(_STATIC) and raw.type == TRANSFORMS and raw.topic not in mapping.topics:
+        if raw.topic.endswith(_STATIC) and raw.type == SourceType.TRANSFORMS and raw.topic not in mapping.topics:
             continue
         if not begun:
             begun = True
@@ -181,7 +184,7 @@ def _mapped_inputs(bag: Bag, mapping: Mapping, converter: Converter, result: Imp
 
 
 def _transform_topics(bag: Bag) -> list[str]:
-    return [topic for topic, kind in bag.topics.items() if kind == TRANSFORMS]
+    return [topic for topic, kind in bag.topics.items() if kind == SourceType.TRANSFORMS]
 
 
 # -- bags with a monitor's topics
@@ -189,36 +192,36 @@ def _transform_topics(bag: Bag) -> list[str]:
 
 def _recorded_inputs(bag: Bag, node: str | None) -> tuple[str, Iterator[Input]]:
     """The frame of the states and the inputs, as they were recorded."""
-    chosen: dict[str, str] = {}
-    for name in _INPUTS:
-        found = [topic for topic, kind in bag.topics.items() if kind == full_name(name)]
+    chosen: dict[str, Topic] = {}
+    for topic in _INPUTS:
+        found = [name for name, kind in bag.topics.items() if kind == topic.type_name]
         if node is not None:
-            found = [topic for topic in found if topic.startswith(f"{node.rstrip('/')}/")]
+            found = [name for name in found if name.startswith(f"{node.rstrip('/')}/")]
         if len(found) > 1:
             raise SessionError(
                 f"{bag.path}: expected the inputs of one monitor, got {', '.join(sorted(found))}; "
-                "choose with --node, such as --node " + found[0].removesuffix("/objects/states")
+                f"choose with --node, such as --node {found[0].removesuffix(f'/{Topic.STATES.path}')}"
             )
         if found:
-            chosen[found[0]] = name
-    if "ObjectStateArray" not in chosen.values():
+            chosen[found[0]] = topic
+    if Topic.STATES not in chosen.values():
         there = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(bag.topics.items())) or "no topics"
         raise SessionError(
-            f"{bag.path}: expected {full_name('ObjectStateArray')}{f' of {node}' if node else ''}, got {there}; "
+            f"{bag.path}: expected {Topic.STATES.type_name}{f' of {node}' if node else ''}, got {there}; "
             "for other topics give a mapping file (--map)"
         )
     frame_id = ""
-    for raw in bag.messages([topic for topic, name in chosen.items() if name == "ObjectStateArray"]):
+    for raw in bag.messages([name for name, topic in chosen.items() if topic is Topic.STATES]):
         with suppress(CollisionMonitorError):
             frame_id = decode_states(raw.data).frame_id
             break
     return frame_id or "world", _inputs(bag, chosen)
 
 
-def _inputs(bag: Bag, chosen: dict[str, str]) -> Iterator[Input]:
+def _inputs(bag: Bag, chosen: dict[str, Topic]) -> Iterator[Input]:
     for raw in bag.messages(chosen):
         stamp = raw.log_time
-        if chosen[raw.topic] == "ObjectStateArray":
+        if chosen[raw.topic] is Topic.STATES:
             with suppress(MessageError):
                 stamp = decode_states(raw.data).stamp_ns
         yield Input(chosen[raw.topic], bytes(raw.data), raw.log_time, stamp)

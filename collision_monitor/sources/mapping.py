@@ -21,7 +21,7 @@ from typing import Any, Final
 import numpy as np
 import yaml
 
-from collision_monitor.codec.shapes import make_shape
+from collision_monitor.codec.shape_fields import make_shape
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Shape

@@ -24,9 +24,9 @@ def picture(**status):
     return Picture(
         title="test",
         elapsed=3.0,
-        contacts=codec.Contacts(0, "world", 1, contacts, ids, NAMES),
-        predictions=codec.Predictions(0, "world", 1, 2.0, impacts, ids, NAMES),
-        status=codec.Status(objects=3, contacts=1, predictions=2, latency=0.0042, rate=50.0, **status),
+        contacts=codec.ContactArray(0, "world", 1, contacts, ids, NAMES),
+        predictions=codec.PredictedCollisionArray(0, "world", 1, 2.0, impacts, ids, NAMES),
+        status=codec.MonitorStatus(objects=3, contacts=1, predictions=2, latency=0.0042, rate=50.0, **status),
     )
 
 
@@ -66,6 +66,6 @@ def test_the_line_names_the_soonest_pair():
 
 
 def test_nothing_heard_yet():
-    empty = Picture("test", 0.0, None, None, codec.Status())
+    empty = Picture("test", 0.0, None, None, codec.MonitorStatus())
     assert "0 touching, 0 predicted" in empty.line()
     assert "not recording" in drawn(empty)

@@ -81,10 +81,10 @@ def record(
             change = pipeline.change_settings(switches[k], now, NODE)
             recorder.write(SETTINGS, change.settings, now, now, settings=pipeline.settings())
             if change.shapes is not None:
-                recorder.write(SHAPES, change.shapes, now, now, objects=tuple(pipeline.objects.values()))
+                recorder.write(SHAPES, change.shapes, now, now, objects=tuple(pipeline.catalogue.descriptions.values()))
         if topic == SHAPES:
             pipeline.on_shapes(data)
-            recorder.write(topic, data, now, now, objects=tuple(pipeline.objects.values()))
+            recorder.write(topic, data, now, now, objects=tuple(pipeline.catalogue.descriptions.values()))
             continue
         outputs = pipeline.on_states(data)
         recorder.write(topic, data, now, now)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from collision_monitor._jit import cache
+from collision_monitor._jit import cache, imports
 
 TOP = "from collision_monitor.middle import (\n    sum_of,\n)\n"
 MIDDLE = "from collision_monitor import bottom\n"
@@ -21,14 +21,14 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     folder.mkdir()
     for name, text in (("top", TOP), ("middle", MIDDLE), ("bottom", "ONE = 1\n"), ("beside", "TWO = 2\n")):
         (folder / f"{name}.py").write_text(text)
-    monkeypatch.setattr(cache, "_PACKAGE", folder)
+    monkeypatch.setattr(imports, "_PACKAGE", folder)
     _forget()
     yield folder
     _forget()
 
 
 def _forget() -> None:
-    for cached in (cache.folder, cache._imports, cache._file_digest):
+    for cached in (cache.folder, cache._file_digest, imports.direct_imports):
         cached.cache_clear()
 
 

@@ -67,7 +67,7 @@ class Run:
         return self.pipeline.on_states(encode_states(self.stamp, frame, number, states, covariance))
 
     @property
-    def status(self) -> codec.Status:
+    def status(self) -> codec.MonitorStatus:
         return decode_status(self.pipeline.status())
 
     def refused(self, reason: Refusal) -> int:

@@ -18,7 +18,8 @@ from rclpy.qos import QoSProfile
 
 from collision_monitor import codec, records
 from collision_monitor.codec import Change
-from collision_monitor.ros import qos
+from collision_monitor.pipeline.topics import Topic
+from collision_monitor.ros.endpoints import quality_of
 from collision_monitor_msgs.msg import (
     ContactArray,
     MonitorStatus,
@@ -88,11 +89,11 @@ class Team:
         self.contacts: list[Any] = []
         self.predictions: list[Any] = []
         self.statuses: list[Any] = []
-        self._shapes_out = self.publisher(ObjectDescriptionArray, "objects/shapes", qos.SHAPES)
-        self._states_out = self.publisher(ObjectStateArray, "objects/states", qos.STATES)
-        self._subscribe(ContactArray, "contacts", qos.ANSWERS, self.contacts)
-        self._subscribe(PredictedCollisionArray, "predictions", qos.ANSWERS, self.predictions)
-        self._subscribe(MonitorStatus, "status", qos.STATUS, self.statuses)
+        self._shapes_out = self.publisher(ObjectDescriptionArray, "objects/shapes", quality_of(Topic.SHAPES))
+        self._states_out = self.publisher(ObjectStateArray, "objects/states", quality_of(Topic.STATES))
+        self._subscribe(ContactArray, "contacts", quality_of(Topic.CONTACTS), self.contacts)
+        self._subscribe(PredictedCollisionArray, "predictions", quality_of(Topic.PREDICTIONS), self.predictions)
+        self._subscribe(MonitorStatus, "status", quality_of(Topic.STATUS), self.statuses)
 
     def publisher(self, message: Any, topic: str, quality: QoSProfile) -> Any:
         return self.node.create_publisher(message, f"/object_monitor/{topic}", quality)

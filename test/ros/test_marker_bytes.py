@@ -19,7 +19,7 @@ from collision_monitor.geometry.shapes import (
     Sphere,
 )
 from collision_monitor.ros.marker_bytes import Kind, Marker, encode
-from collision_monitor.ros.surfaces import triangles
+from collision_monitor.ros.surfaces import surface_triangles
 
 
 def test_rclpy_reads_what_was_written():
@@ -61,13 +61,13 @@ TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
     ids=lambda value: type(value).__name__,
 )
 def test_a_surface_fills_the_extent_of_its_shape(shape, low, high):
-    corners = triangles(shape).reshape(-1, 3)
+    corners = surface_triangles(shape).reshape(-1, 3)
     assert corners.min(axis=0) == pytest.approx(low, abs=1e-12)
     assert corners.max(axis=0) == pytest.approx(high, abs=1e-12)
 
 
 @pytest.mark.parametrize(("shape", "volume"), [(Box((1, 2, 3)), 6.0), (Cylinder(1, 2), 2 * np.pi), (Sphere(1), 4.19)])
 def test_the_faces_of_a_solid_look_outwards(shape, volume):
-    a, b, c = np.moveaxis(triangles(shape), 1, 0)
+    a, b, c = np.moveaxis(surface_triangles(shape), 1, 0)
     enclosed = np.einsum("ni,ni->", a, np.cross(b, c)) / 6
     assert enclosed == pytest.approx(volume, rel=0.1)

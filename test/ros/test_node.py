@@ -17,7 +17,9 @@ from collision_monitor.codec import Removal
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.ros import main, qos
+from collision_monitor.pipeline.topics import Topic
+from collision_monitor.ros import executables
+from collision_monitor.ros.endpoints import quality_of
 from collision_monitor.session import Session
 from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict
@@ -212,7 +214,7 @@ def signals():
     ],
 )
 def test_impossible_parameters_are_refused_in_one_line(ros_domain_id, signals, capfd, arguments, words):
-    assert main.monitor(["monitor", "--ros-args", *arguments]) == 2
+    assert executables.monitor(["monitor", "--ros-args", *arguments]) == 2
     (line,) = capfd.readouterr().err.splitlines()
     assert words in line
 
@@ -299,7 +301,7 @@ def test_markers_are_drawn_for_whoever_looks(start, team):
     start("run")
     team.meet()
     pictures = []
-    team.node.create_subscription(MarkerArray, "/object_monitor/markers", pictures.append, qos.MARKERS)
+    team.node.create_subscription(MarkerArray, "/object_monitor/markers", pictures.append, quality_of(Topic.MARKERS))
     team.describe(*map(ball, (1, 2, 3, 4)), ball(5), ObjectDescription(6, BALL, static=True, pose=Pose((0, -9, 0))))
     team.status(lambda s: s.objects == 6)
     timer = team.node.create_timer(0.05, lambda: team.say(*APPROACHING, *OVERLAPPING, state(5, (50, 0, 0))))

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import pytest
 
-qos = pytest.importorskip("collision_monitor.ros.qos")
+endpoints = pytest.importorskip("collision_monitor.ros.endpoints")
 
 from rclpy.qos import qos_profile_parameter_events  # noqa: E402
 
+from collision_monitor.pipeline.topics import Topic  # noqa: E402
 from collision_monitor.session.mcap.rosbag2 import RECORDED_TYPES, qos_profiles  # noqa: E402
 
 NODE = {
-    "ObjectStateArray": qos.STATES,
-    "ObjectDescriptionArray": qos.SHAPES,
-    "ContactArray": qos.ANSWERS,
-    "PredictedCollisionArray": qos.ANSWERS,
-    "MonitorStatus": qos.STATUS,
+    "ObjectStateArray": endpoints.quality_of(Topic.STATES),
+    "ObjectDescriptionArray": endpoints.quality_of(Topic.SHAPES),
+    "ContactArray": endpoints.quality_of(Topic.CONTACTS),
+    "PredictedCollisionArray": endpoints.quality_of(Topic.PREDICTIONS),
+    "MonitorStatus": endpoints.quality_of(Topic.STATUS),
     "ParameterEvent": qos_profile_parameter_events,
 }
 

@@ -7,20 +7,17 @@ import numpy as np
 import pytest
 
 from collision_monitor import codec
-from collision_monitor.ros import qos
+from collision_monitor.pipeline.topics import Topic
+from collision_monitor.ros.endpoints import quality_of, subscription
 from collision_monitor.session import Session
-from collision_monitor_msgs.msg import ObjectDescriptionArray, ObjectStateArray
+from collision_monitor_msgs.msg import ObjectDescriptionArray
 
 
 def test_a_scene_is_published_at_a_steady_rate(start, team):
     heard = []
     described = []
-    team.node.create_subscription(
-        ObjectStateArray, "/object_monitor/objects/states", lambda m: heard.append((team.now, m)), qos.STATES, raw=True
-    )
-    team.node.create_subscription(
-        ObjectDescriptionArray, "/object_monitor/objects/shapes", described.append, qos.SHAPES
-    )
+    subscription(team.node, Topic.STATES, lambda m: heard.append((team.now, m)), Topic.STATES.of())
+    team.node.create_subscription(ObjectDescriptionArray, Topic.SHAPES.of(), described.append, quality_of(Topic.SHAPES))
     world = start("world", "fleet", "--objects", "20", "--rate", "50", "--duration", "2", "--seed", "7")
     team.until(lambda: not world.running, 30.0)
     assert heard, world.words
@@ -49,9 +46,7 @@ def test_a_scene_is_published_at_a_steady_rate(start, team):
 
 def test_messages_larger_than_the_default_shared_memory_of_fast_dds_arrive(start, team):
     heard = []
-    team.node.create_subscription(
-        ObjectStateArray, "/object_monitor/objects/states", lambda m: heard.append(len(m)), qos.STATES, raw=True
-    )
+    subscription(team.node, Topic.STATES, lambda m: heard.append(len(m)), Topic.STATES.of())
     world = start("world", "clutter", "--objects", "10000", "--rate", "10", "--duration", "2")
     team.until(lambda: not world.running, 60.0)
     assert world.wait() == 0

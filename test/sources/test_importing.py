@@ -24,7 +24,7 @@ from foreign_bag import (
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import StoragePlugin
 from scipy.spatial.transform import Rotation
-from session_scene import NODE, SHAPES, STATES, inputs
+from session_scene import NODE, SHAPES, STATES, inputs, record
 
 from collision_monitor import Box, Capsule, HalfSpace, Monitor, Pose, Sphere, records
 from collision_monitor.cli.main import main
@@ -401,8 +401,10 @@ def test_recorded_inputs_of_a_monitor_replay_as_they_are(tmp_path: Path, capsys:
         list(Session(monitor_bag(tmp_path / "two.mcap", "/a", "/b")).messages())
 
 
-def test_answers_that_another_recorder_took_are_compared(recorded: Path, tmp_path: Path) -> None:
+def test_answers_that_another_recorder_took_are_compared(tmp_path: Path) -> None:
     """As `ros2 bag record -a` beside a monitor with the same settings: equal bytes are equal."""
+    recorded = tmp_path / "run.mcap"
+    record(recorded)
     with (tmp_path / "bag.mcap").open("wb") as file:
         writer = McapWriter(file)
         writer.start("ros2", "another recorder")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor import records
-from collision_monitor.codec import Status
+from collision_monitor.codec import MonitorStatus
 from collision_monitor.errors import InputError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.settings.profile import Profile
@@ -82,7 +82,7 @@ class History:
     objects: dict[int, ObjectDescription] = field(default_factory=dict)
     names: dict[str, set[int]] = field(default_factory=dict)
     settings: list[tuple[float, dict[str, Any]]] = field(default_factory=list)
-    status: Status | None = None
+    status: MonitorStatus | None = None
     problems: list[str] = field(default_factory=list)
     collisions: list[CollisionEvent] = field(default_factory=list)
 

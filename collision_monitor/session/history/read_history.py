@@ -11,8 +11,8 @@ import numpy as np
 
 from collision_monitor import records
 from collision_monitor.codec import (
+    MonitorStatus,
     Removal,
-    Status,
     decode_contacts,
     decode_descriptions,
     decode_parameter_event,
@@ -21,7 +21,8 @@ from collision_monitor.codec import (
     decode_status,
 )
 from collision_monitor.errors import MessageError, SessionError
-from collision_monitor.pipeline.pipeline import LIMIT, Outputs, Pipeline
+from collision_monitor.pipeline.pipeline import Outputs, Pipeline
+from collision_monitor.pipeline.settings_event import LIMIT
 from collision_monitor.session.history.collisions import find_collisions
 from collision_monitor.session.history.growing_rows import GrowingRows
 from collision_monitor.session.history.history import NANOSECOND, History, Records
@@ -163,7 +164,7 @@ class _Gathered:
         h.collisions = find_collisions(h)
         return h
 
-    def _status_of_replay(self, pipeline: Pipeline) -> Status:
+    def _status_of_replay(self, pipeline: Pipeline) -> MonitorStatus:
         """What was refused and lost, by the replay; what the recorder dropped is missing here too."""
         status, recorded = decode_status(pipeline.status()), self._history.status
         if recorded is None:

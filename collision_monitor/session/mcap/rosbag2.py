@@ -8,24 +8,19 @@ from typing import Any, Final
 
 import yaml
 
+from collision_monitor.pipeline.topics import Topic
 from collision_monitor.session.mcap.definitions import type_hash
 
 _METADATA_VERSION: Final = 9
 """Of rosbag2's metadata, as Jazzy writes it."""
 
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
-_QOS: Final = {  # type: depth, reliability, durability; as the node offers and requests them (ros/qos.py)
-    "ObjectStateArray": (10, "best_effort", "volatile"),
-    "ObjectDescriptionArray": (100, "reliable", "transient_local"),
-    "ContactArray": (10, "reliable", "volatile"),
-    "PredictedCollisionArray": (10, "reliable", "volatile"),
-    "MonitorStatus": (1, "reliable", "transient_local"),
-    "ParameterEvent": (1000, "reliable", "volatile"),
-}
+_TOPICS: Final = (Topic.STATES, Topic.SHAPES, Topic.CONTACTS, Topic.PREDICTIONS, Topic.STATUS, Topic.SETTINGS)
+_QOS: Final = {topic.message: topic.quality for topic in _TOPICS}
 RECORDED_TYPES: Final = tuple(_QOS)
 """The message types that a session holds."""
 
-INPUT_TYPES: Final = ("ObjectStateArray", "ObjectDescriptionArray")
+INPUT_TYPES: Final = (Topic.STATES.message, Topic.SHAPES.message)
 """Those that the monitor subscribes to; all others are its answers and settings."""
 
 

@@ -84,5 +84,6 @@ def _objects(session: Session, before: Sequence[Recorded | RecordedSnapshot], ty
             pipeline.on_shapes(each.data)
     last = messages[-1]
     topic = next(topic for topic, name in types.items() if name == "ObjectDescriptionArray")
-    data = encode_descriptions(last.log_time, session.frame_id, list(pipeline.objects.values()), snapshot=True)
+    objects = list(pipeline.catalogue.descriptions.values())
+    data = encode_descriptions(last.log_time, session.frame_id, objects, snapshot=True)
     return QueueEntry(topic, data, last.log_time, last.log_time, last.sequence)

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.codec import Status, decode_contacts, decode_predictions, decode_status
+from collision_monitor.codec import MonitorStatus, decode_contacts, decode_predictions, decode_status
 from collision_monitor.codec.status import LIVE_FIELDS
 from collision_monitor.errors import MessageError
 
@@ -106,7 +106,7 @@ def compare_status(topic: str, step: int, recorded: bytes, replayed: bytes) -> D
         theirs = decode_status(recorded)
     except MessageError as error:
         return Difference(step, topic, "the message", "bytes", str(error), "a status")
-    for field in dataclasses.fields(Status):
+    for field in dataclasses.fields(MonitorStatus):
         a, b = getattr(theirs, field.name), getattr(ours, field.name)
         if field.name not in _NOT_COMPARED and a != b:
             return Difference(step, topic, "the status", field.name, repr(a), repr(b))

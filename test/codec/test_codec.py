@@ -81,7 +81,7 @@ def examples() -> dict[str, bytes]:
             STAMP, "map", 5, 2.5, random_records(records.PREDICTION, 2), np.array([1, 2], np.uint32), ["a", "bcd"]
         ),
         "status": codec.encode_status(
-            codec.Status(STAMP, "map", 5, 2**64 - 1, "1.0", "fast", last_refusal="why", rate=1.5)
+            codec.MonitorStatus(STAMP, "map", 5, 2**64 - 1, "1.0", "fast", last_refusal="why", rate=1.5)
         ),
     }
 
@@ -149,7 +149,8 @@ def test_descriptions_come_back() -> None:
 
 
 def test_status_comes_back() -> None:
-    status = codec.Status(STAMP, "map", *range(1, 3), "1.2.3", "balanced", *range(3, 25), "refused", *range(25, 27))
+    fields = (*range(1, 3), "1.2.3", "balanced", *range(3, 25), "refused", *range(25, 27))
+    status = codec.MonitorStatus(STAMP, "map", *fields)
     back = codec.decode_status(codec.encode_status(status))
     assert {k: v for k, v in vars(back).items() if v == v} == {k: v for k, v in vars(status).items() if v == v}
     assert LIVE_FIELDS[0] == "step_duration"
@@ -227,7 +228,7 @@ def test_only_the_impossible_object_is_refused() -> None:
     good = ObjectDescription(1, ((Sphere(1.0), Pose()),))
     radius = 0.7071067811865476
 
-    def with_bytes(old: bytes, new: bytes, **fields: object) -> codec.Descriptions:
+    def with_bytes(old: bytes, new: bytes, **fields: object) -> codec.ObjectDescriptionArray:
         marked = ObjectDescription(2, ((Sphere(radius), Pose()),), **fields)  # type: ignore[arg-type]
         data = codec.encode_descriptions(0, "w", [marked, good])
         at = data.rindex(old, 0, data.index(mark) + len(mark))

@@ -1,0 +1,43 @@
+"""Which modules of this package a module depends on, read from the source files without importing any."""
+
+from __future__ import annotations
+
+import functools
+import re
+import sys
+from pathlib import Path
+
+_PACKAGE = Path(__file__).parents[1]
+_IMPORT = re.compile(
+    rb"^\s*(?:from (collision_monitor[\w.]*) import (\([^)]*\)|[^\n]*)|import (collision_monitor[\w.]*))", re.MULTILINE
+)
+
+
+def source_file(module: str) -> Path | None:
+    """The module's file: one of this package, or one that was started or imported, such as a benchmark."""
+    base = _PACKAGE.parent.joinpath(*module.split("."))
+    loaded = getattr(sys.modules.get(module), "__file__", None)
+    candidates = [base.with_suffix(".py"), base / "__init__.py", *([Path(loaded)] if loaded else [])]
+    return next((path for path in candidates if path.is_file()), None)
+
+
+@functools.cache
+def direct_imports(module: str) -> frozenset[str]:
+    """The modules of this package that `module` imports by name, anywhere in its file."""
+    path = source_file(module)
+    found: set[str] = set()
+    for origin, names, plain in _IMPORT.findall(path.read_bytes()) if path else ():
+        base = (origin or plain).decode()
+        members = {f"{base}.{name}" for name in re.findall(r"\w+", names.decode())}
+        found.update({member for member in members if source_file(member)} or {base})
+    return frozenset(found)
+
+
+def with_dependencies(module: str) -> list[str]:
+    """The module and all modules of this package that it imports, also through others, by name."""
+    found, queue = {module}, [module]
+    while queue:
+        new = direct_imports(queue.pop()) - found
+        found |= new
+        queue.extend(new)
+    return sorted(found)

@@ -1,0 +1,72 @@
+"""The recording of a node: its topics, and what people learn about it. The monitoring goes on where it fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.node import Node
+
+from collision_monitor.errors import SessionError
+from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.pipeline.topics import RECORDED, Topic
+from collision_monitor.session import Recorder, Recording, Splitting
+
+
+class NodeRecording:
+    """Records a node's messages under the topics' full names.
+
+    path: empty: nothing is recorded. A recording that cannot start is logged, and `status` tells of it.
+    """
+
+    def __init__(self, node: Node, path: str, metadata: Callable[[], dict[str, str]], splitting: Splitting) -> None:
+        self._logger = node.get_logger()
+        self._names = {topic: node.resolve_topic_name(topic.private) for topic in RECORDED}
+        self._recorder: Recorder | None = None
+        self._last: dict[str, Any] = {}  # as `status` had it when it was logged last
+        if path:
+            self._start(path, metadata(), splitting)
+
+    def _start(self, path: str, metadata: dict[str, str], splitting: Splitting) -> None:
+        types = {name: topic.message for topic, name in self._names.items()}
+        try:
+            self._recorder = Recorder(path, types, metadata, splitting=splitting, snapshots=True)
+        except SessionError as error:
+            self._logger.error(f"not recording: {error}")
+            self._last = {"recording": Recording.FAILED, "recording_path": path, "recording_error": str(error)}
+
+    def __str__(self) -> str:
+        return f"recording to {self._recorder.path}" if self._recorder else "not recording"
+
+    def write(self, topic: Topic, data: bytes, log_time: int, publish_time: int, **what: Any) -> None:
+        """As `Recorder.write`."""
+        if self._recorder is not None:
+            self._recorder.write(self._names[topic], data, log_time, publish_time, **what)
+
+    def write_snapshot_if_due(self, snapshot: Callable[[], Snapshot]) -> None:
+        """As `Recorder.write_snapshot`, where it is time for one."""
+        if self._recorder is not None and self._recorder.snapshot_due:
+            self._recorder.write_snapshot(snapshot())
+
+    def status(self) -> dict[str, Any]:
+        """The recording fields of MonitorStatus."""
+        return self._last if self._recorder is None else self._recorder.status()
+
+    def log_problems(self) -> None:
+        """Log that the recording failed or dropped messages since the last call, for those who read no status."""
+        if self._recorder is None:
+            return
+        last, now = self._last, self._recorder.status()
+        self._last = now
+        if now["recording"] == Recording.FAILED != last.get("recording"):
+            self._logger.error(f"the recording failed, the monitoring goes on: {now['recording_error']}")
+        elif now["recording_dropped"] != last.get("recording_dropped", 0):
+            self._logger.warning(
+                f"the disk is too slow for the recording: {now['recording_dropped']} messages dropped so far"
+            )
+
+    def close(self) -> None:
+        """Finish the session."""
+        if self._recorder is not None:
+            self._recorder.close()
+            self.log_problems()

@@ -1,0 +1,85 @@
+"""The determinism key names what answers depend on, and nothing else."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from collision_monitor._jit import imports
+from collision_monitor.pipeline import provenance
+
+PACKAGE = Path(provenance.__file__).parents[1]
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A copy of the package whose source files the key is made of."""
+    folder = tmp_path / "collision_monitor"
+    shutil.copytree(PACKAGE, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(imports, "_PACKAGE", folder)
+    _forget()
+    yield folder
+    _forget()
+
+
+def _forget() -> None:
+    imports.direct_imports.cache_clear()
+    provenance.provenance.cache_clear()
+
+
+def _key() -> str:
+    _forget()
+    return provenance.provenance()["determinism_key"]
+
+
+def _edit(path: Path, change: Callable[[str], str]) -> None:
+    before = path.read_text()
+    after = change(before)
+    assert after != before
+    path.write_text(after)
+
+
+def test_the_key_is_that_of_the_source_files(package: Path) -> None:
+    assert _key() == _key()
+
+
+@pytest.mark.parametrize("module", ["prediction/motion.py", "monitor/monitor.py", "codec/cdr.py", "report/page.py"])
+def test_a_changed_docstring_or_comment_changes_nothing(package: Path, module: str) -> None:
+    before = _key()
+    path = package / module
+    _edit(path, lambda text: re.sub(r'^"""', '"""Another first line.\n\n', text, count=1))
+    _edit(path, lambda text: re.sub(r'(\n +""")(\w)', r"\1Other words.\n\n    \2", text))
+    _edit(path, lambda text: text + "\n\n# a last word\n")
+    assert _key() == before
+
+
+@pytest.mark.parametrize(
+    ("module", "old", "new"),
+    [
+        ("prediction/motion.py", "0.5", "0.25"),
+        ("tolerances.py", "1e-", "2e-"),
+        ("monitor/monitor.py", " + ", " - "),
+        ("codec/cdr.py", '"<I"', '">I"'),
+    ],
+)
+def test_a_changed_number_or_operation_changes_the_key(package: Path, module: str, old: str, new: str) -> None:
+    before = _key()
+    _edit(package / module, lambda text: text.replace(old, new))
+    assert _key() != before
+
+
+@pytest.mark.parametrize("folder", ["report", "ros", "cli", "session", "sources", "world", "accuracy"])
+def test_what_gives_no_answers_has_no_part_in_it(package: Path, folder: str) -> None:
+    before = _key()
+    for path in (package / folder).rglob("*.py"):
+        _edit(path, lambda text: text + "\nANOTHER = 1\n")
+    assert _key() == before
+
+
+def test_the_order_of_a_set_in_the_code_has_no_part_in_it() -> None:
+    code = provenance._constant
+    assert code(frozenset("ab")) == code(frozenset("ba")) != code(frozenset("ac"))

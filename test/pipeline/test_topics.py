@@ -1,0 +1,36 @@
+"""Every topic's names, and that nobody else writes them down."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from collision_monitor.pipeline import topics
+from collision_monitor.pipeline.topics import NODE, RECORDED, Topic
+
+PACKAGE = Path(topics.__file__).parents[1]
+
+
+def test_a_topic_has_the_names_that_its_users_need() -> None:
+    topic = Topic.SHAPES
+    assert (topic.private, topic.of(), topic.of("cell/monitor")) == (
+        "~/objects/shapes",
+        "/object_monitor/objects/shapes",
+        "/cell/monitor/objects/shapes",
+    )
+    assert (topic.type_name, topic.message) == (
+        "collision_monitor_msgs/msg/ObjectDescriptionArray",
+        "ObjectDescriptionArray",
+    )
+
+
+def test_a_picture_is_all_that_is_not_recorded() -> None:
+    assert set(Topic) - set(RECORDED) == {Topic.MARKERS}
+
+
+@pytest.mark.parametrize("name", [f'"{NODE}"', f'"/{NODE}', "~/objects", '"objects/s', '"~/'])
+def test_names_stand_in_one_place(name: str) -> None:
+    """Help texts may say them in words."""
+    users = [path.relative_to(PACKAGE).as_posix() for path in PACKAGE.rglob("*.py") if name in path.read_text()]
+    assert [user for user in users if user not in ("pipeline/topics.py", "cli/run.py")] == []
