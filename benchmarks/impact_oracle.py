@@ -72,7 +72,7 @@ def overlaps_before(
     multibody: Any, pairs: Any, step: float, until: Any, deep: float, scratch: Any, found: Any
 ) -> None:
     """The first sample (N,) before `until` (N,) at which the pairs are deeper than `deep` (m); infinite: none is."""
-    bodies = multibody.bodies
+    table, parts, bodies = multibody
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
         A, B = bodies.motion[i], bodies.motion[j]
@@ -89,7 +89,7 @@ def overlaps_before(
             px, py, pz = relative_position(A, B, t)
             gap = math.sqrt(px * px + py * py + pz * pz) - A.radius - B.radius
             if not gap > 0.0:
-                gap = contact_at(multibody, pair, t, scratch)
+                gap = contact_at(table, parts, pair, t, scratch)
                 if gap < -deep:
                     found[k] = t
                     break
@@ -100,11 +100,11 @@ def overlaps_before(
 @kernel
 def distances(multibody: Any, pairs: Any, times: Any, scratch: Any, found: Any) -> None:
     """Signed distances (N,) of the pairs at a time (N,) of its own for each."""
-    bodies = multibody.bodies
+    table, parts, bodies = multibody
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
         pair = ShapePair(bodies.motion[i], bodies.motion[j], bodies.first_shape[i], bodies.first_shape[j])
-        found[k] = contact_at(multibody, pair, times[k], scratch)
+        found[k] = contact_at(table, parts, pair, times[k], scratch)
 
 
 def check(rng: np.random.Generator, kind_a: str, kind_b: str) -> NDArray[np.int_]:

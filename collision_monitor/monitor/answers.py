@@ -19,10 +19,10 @@ from collision_monitor.monitor.result import StepResult, StepStatus
 from collision_monitor.monitor.roster import count_bodies
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
-from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS
+from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, UNSETTLED
 from collision_monitor.prediction.body_impact import CLOSING
 from collision_monitor.prediction.impact_record import BOUND_ONLY, TREE_BOUND, UNRESOLVED, ids_of
-from collision_monitor.records import ContactStatus, Phase, PredictionStatus, joined
+from collision_monitor.records import Phase, joined
 
 PERSIST: Final = int(Phase.PERSIST)
 BEGIN: Final = int(Phase.BEGIN)
@@ -115,8 +115,8 @@ def step_status(
 ) -> StepStatus:
     """What the step did."""
     roster = step.roster
-    unresolved = np.count_nonzero(contacts["status"] == ContactStatus.UNRESOLVED)
-    unresolved += np.count_nonzero(predictions["status"] == PredictionStatus.UNRESOLVED)
+    unresolved = np.count_nonzero(contacts["status"] == UNSETTLED)
+    unresolved += np.count_nonzero(predictions["status"] == UNRESOLVED)
     static, unseen, stale = count_bodies(roster.bodies, roster.top, step.now, step.profile.stale_after)
     return StepStatus(
         objects=len(roster),

@@ -103,7 +103,7 @@ class Intake(Stage):
         """The states themselves where they lie as the kernels read them and stay as they are, else a copy."""
         if given.ndim != 1:
             raise InputError(f"states: expected one dimension, got shape {given.shape}")
-        unknown = given["flags"] & StateFlag.TWIST_UNKNOWN  # the kernel writes their standard deviations
+        unknown = given["flags"] & _TWIST_UNKNOWN  # the kernel writes their standard deviations
         if given.flags.carray and not is_written and not unknown.any():
             return given
         if len(given) > len(self._buffer):

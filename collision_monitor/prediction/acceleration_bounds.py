@@ -36,7 +36,7 @@ class Intervals(NamedTuple):
 @device
 def _first_possible(multibody, i, j, until, off, query, room):
     """A time in [0, until] before which the bodies cannot touch; off: coefficients of their deviation in t (m)."""
-    parts, bodies = multibody.parts, multibody.bodies
+    table, parts, bodies = multibody
     A, B = room.motion[0], room.motion[1]
     first = until
     for segment in range(SEGMENTS):
@@ -46,7 +46,7 @@ def _first_possible(multibody, i, j, until, off, query, room):
         b = first_b
         while a >= 0:
             window = Window(begin, min(end, first))
-            status, t, _, _ = shape_impact(multibody, ShapePair(A, B, a, b), window, tube, query, room.scratch)
+            status, t, _, _ = shape_impact(table, parts, ShapePair(A, B, a, b), window, tube, query, room.scratch)
             if status != CLEAR:
                 first = min(first, t)
             a, b = next_pair(parts, first_b, a, b)
@@ -58,7 +58,7 @@ def _first_possible(multibody, i, j, until, off, query, room):
 @device
 def _first_certain(multibody, i, j, window, off, margin, room):
     """A time in the window at which the bodies touch whatever they do; infinite: none is known."""
-    parts, bodies = multibody.parts, multibody.bodies
+    table, parts, bodies = multibody
     A, B = room.motion[0], room.motion[1]
     begin, end = window
     for node in range(NODES + 1):
@@ -67,7 +67,7 @@ def _first_certain(multibody, i, j, window, off, margin, room):
         a, first_b = bodies.first_shape[i], bodies.first_shape[j]
         b = first_b
         while a >= 0:
-            distance = contact_at(multibody, ShapePair(A, B, a, b), t, room.scratch)
+            distance = contact_at(table, parts, ShapePair(A, B, a, b), t, room.scratch)
             if distance + room.scratch.out[10] - margin + wide <= 0.0:
                 return t
             a, b = next_pair(parts, first_b, a, b)

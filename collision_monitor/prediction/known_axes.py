@@ -18,12 +18,11 @@ AXES: Final = 8
 
 
 @device
-def remember(multibody, pair, passed, n, scratch, axes):
+def remember(table, parts, pair, passed, n, scratch, axes):
     """Keep the direction in scratch.out as one of the axes (AXES, 4) of a pair of shapes (ShapePair).
 
     n: how many were before; passed: whether the sample passed.
     """
-    table, parts = multibody.table, multibody.parts
     A, B, a, b = pair
     R_a, R_b, out = scratch.rotation[2], scratch.rotation[3], scratch.out
     oa = place_shape(table, parts, a, A.rotation, R_a)

@@ -109,7 +109,7 @@ def _first_contact(multibody, i, j, window, tube, query, room):
 
     They move as in room.motion, whose time 0 is now; so is the tube's.
     """
-    parts, bodies = multibody.parts, multibody.bodies
+    table, parts, bodies = multibody
     A, B = room.motion[0], room.motion[1]
     begin, end = window
     first, last = begin, end
@@ -129,7 +129,7 @@ def _first_contact(multibody, i, j, window, tube, query, room):
     b = first_b
     while a >= 0:
         pair = ShapePair(A, B, a, b)
-        status, t, _, _ = shape_impact(multibody, pair, Window(first, last), there, query, room.scratch)
+        status, t, _, _ = shape_impact(table, parts, pair, Window(first, last), there, query, room.scratch)
         if status != CLEAR:
             best = last = t
         a, b = next_pair(parts, first_b, a, b)
@@ -139,13 +139,13 @@ def _first_contact(multibody, i, j, window, tube, query, room):
 @device
 def _gap_at(multibody, i, j, t, room):
     """Signed distance (m) of the shapes of bodies i and j at t; its direction into room.block[0]."""
-    parts, bodies = multibody.parts, multibody.bodies
+    table, parts, bodies = multibody
     A, B, out, normal = room.motion[0], room.motion[1], room.scratch.out, room.block[0]
     best = inf
     a, first_b = bodies.first_shape[i], bodies.first_shape[j]
     b = first_b
     while a >= 0:
-        gap = contact_at(multibody, ShapePair(A, B, a, b), t, room.scratch)
+        gap = contact_at(table, parts, ShapePair(A, B, a, b), t, room.scratch)
         if gap < best:
             best = gap
             normal[0], normal[1], normal[2] = out[1], out[2], out[3]
@@ -411,7 +411,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, room, answers)
     Left out are pairs that are not stated to meet and do not within `sigmas` standard deviations, or with much less
     than the least probability. NaN: left out, or neither body has declared any uncertainty.
     """
-    bodies = multibody.bodies
+    table, parts, bodies = multibody
     query, horizon, stated = sampling.query, sampling.horizon, sampling.stated
     points, weights, stale_acceleration = sampling.points, sampling.weights, sampling.stale_acceleration
     times = np.empty(weights.size)
@@ -455,7 +455,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, room, answers)
         p, v = (B.x, B.y, B.z), (B.vx, B.vy, B.vz)
         w_i, w_j = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
         straight = (
-            _is_straight(multibody.parts, bodies, i, j, A, B)
+            _is_straight(parts, bodies, i, j, A, B)
             and turn_i[0] + turn_i[1] + turn_j[0] + turn_j[1] == 0.0
         )
         room.axes[:, 3] = inf  # none is known
@@ -483,7 +483,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, room, answers)
                 times[n] = _first_contact(multibody, i, j, window, Tube(bias, 0.0), roughly, room)
                 if straight:
                     pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
-                    remember(multibody, pair, times[n] == inf, n, room.scratch, room.axes)
+                    remember(table, parts, pair, times[n] == inf, n, room.scratch, room.axes)
                 seen += weights[n] if times[n] < inf else 0.0
         if likely:
             _summarise(times, weights, np.argsort(times), sampling.confidence, safe, answers[k])

@@ -143,7 +143,7 @@ def _swept_bounds(motion: Any, pairs: Any, horizon: float, times: Any) -> None:
 
 @kernel
 def _bisect(multibody: Any, pairs: Any, horizon: float, step: float, halvings: int, times: Any, scratch: Any) -> None:
-    bodies = multibody.bodies
+    table, parts, bodies = multibody
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
         pair = ShapePair(bodies.motion[i], bodies.motion[j], bodies.first_shape[i], bodies.first_shape[j])
@@ -151,11 +151,11 @@ def _bisect(multibody: Any, pairs: Any, horizon: float, step: float, halvings: i
         count = math.ceil(horizon / step)
         for n in range(count + 1):
             late = min(n * step, horizon)
-            if contact_at(multibody, pair, late, scratch) <= 0.0:
+            if contact_at(table, parts, pair, late, scratch) <= 0.0:
                 early = max((n - 1) * step, 0.0)
                 for _ in range(halvings if n > 0 else 0):
                     middle = 0.5 * (early + late)
-                    if contact_at(multibody, pair, middle, scratch) <= 0.0:
+                    if contact_at(table, parts, pair, middle, scratch) <= 0.0:
                         late = middle
                     else:
                         early = middle
