@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.broad_phase.hashed_grid import Region, overlap, query_box
+from collision_monitor.broad_phase.hashed_grid import query_box
+from collision_monitor.broad_phase.region import regions_overlap
 from collision_monitor.prediction.motion import swept_box
 
 
@@ -46,8 +47,8 @@ def find_partners(bodies, grid, which, is_new, now, margin, found, pairs):
     n = 0
     for k in range(which.size):
         i = which[k]
-        x, y, z, hx, hy, hz = swept_box(bodies, i, max(now, bodies.motion[i].covered), margin)
-        for m in range(query_box(grid, Region(x, y, z, hx, hy, hz), i, found)):
+        swept = swept_box(bodies, i, max(now, bodies.motion[i].covered), margin)
+        for m in range(query_box(grid, swept, i, found)):
             j = found[m]
             if not _finds(bodies, is_new, i, j):
                 continue
@@ -73,8 +74,8 @@ def keep_new(bodies, grid, pairs, is_new, now, margin):
                 continue
         covered = bodies.motion[i].covered
         if covered > now:  # else what is new of it is its whole box
-            x, y, z, hx, hy, hz = swept_box(bodies, i, covered, margin)
-            if not overlap(Region(x, y, z, hx, hy, hz), grid.box[j]):
+            swept = swept_box(bodies, i, covered, margin)
+            if not regions_overlap(swept, grid.box[j]):
                 continue
         pairs[n, 0], pairs[n, 1] = i, j
         n += 1

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor import records
+from collision_monitor._jit.vectors import LANES
 from collision_monitor.broad_phase.hashed_grid import regridded
 from collision_monitor.errors import InputError, Refusal
-from collision_monitor.geometry.shape_table import LANES, POLYGON, ShapeTable, ShapeTableBuilder
+from collision_monitor.geometry.shape_table import POLYGON, ShapeTable, ShapeTableBuilder
 from collision_monitor.monitor import active_pairs
 from collision_monitor.monitor.monitor import Monitor, StepResult, StepStatus
 from collision_monitor.monitor.snapshot import Snapshot, check_range

@@ -184,7 +184,7 @@ def restart_motion(
                 m.tube_0 += 2.0 * stale_acceleration * age * age
                 m.tube_1 += 2.0 * stale_acceleration * age
         _cover_spread(bodies, spread, sigmas, i, now, np.inf, np.inf, stale_acceleration)
-        put_box(grid, i, *swept_box(bodies, i, now, margin))
+        put_box(grid, i, swept_box(bodies, i, now, margin))
 
 
 @kernel
@@ -202,4 +202,4 @@ def continue_motion(bodies, spread, sigmas, grid, which, now, horizon, margin, s
         _cover(bodies, i, now, horizon)
         # no more than it did: what it could meet until `covered` is known already
         _cover_spread(bodies, spread, sigmas, i, now, allowed_0, allowed_1, stale_acceleration)
-        put_box(grid, i, *swept_box(bodies, i, now, margin))
+        put_box(grid, i, swept_box(bodies, i, now, margin))
