@@ -18,8 +18,7 @@ from collision_monitor import records
 from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.broad_phase.hashed_grid import make_hashed_grid, read_boxes, regridded, remove_boxes
 from collision_monitor.errors import CollisionMonitorError, InputError, Refusal, UnsupportedError
-from collision_monitor.geometry.pieces import is_planar
-from collision_monitor.geometry.plane import flat_pose, flat_states
+from collision_monitor.geometry.planar import flat_pose, flat_states, is_planar
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shape_table import CIRCLE, SPHERE, ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Shape

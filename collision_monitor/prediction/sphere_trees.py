@@ -19,6 +19,7 @@ from collision_monitor.geometry.shape_table import BOX, CONVEX_HULL
 from collision_monitor.prediction.impact_record import CLEAR, TREE_BOUND
 from collision_monitor.prediction.motion import half_acceleration, relative_position, relative_velocity, rotation_at
 from collision_monitor.prediction.sphere_interval import meeting_of_spheres, sphere_interval
+from collision_monitor.tolerances import ROUNDED_UP
 
 Array = NDArray[np.float64]
 
@@ -30,9 +31,6 @@ WORTH: Final = 0.4
 
 MOST_CORNERS: Final = 2000
 """Beyond it a tree takes a second to make."""
-
-ROUNDED_UP: Final = 1e-12
-"""Spheres are larger by this part, so that they contain their piece whatever was rounded."""
 
 
 class Trees(NamedTuple):
