@@ -50,23 +50,6 @@ MOST_QUERIES = 0.01
 FEWEST_PAIRS_FOR_THREADS = 500
 """Handing work to a thread costs as much as predicting some 100 pairs."""
 
-PREDICTED_BY = frozenset(
-    {
-        "horizon",
-        "contact_margin",
-        "impact_tolerance",
-        "impact_iterations",
-        "position_tolerance",
-        "orientation_tolerance",
-        "velocity_tolerance",
-        "angular_velocity_tolerance",
-        "uncertainty",
-        "confidence",
-        "min_probability",
-    }
-)
-"""The settings that predictions rest on: where one changes, all are made anew."""
-
 _VERDICTS = {
     intake.UNKNOWN_ID: (Refusal.UNKNOWN_ID, "expected the id of an object that was described, got {id}"),
     intake.NON_FINITE: (
@@ -204,7 +187,7 @@ class Monitor:
         new = self._profile.switched(profile) if isinstance(profile, str) else profile
         changed = self._profile.differences(new).keys()
         self._profile = new
-        if changed & PREDICTED_BY:
+        if Profile.changes_predictions(changed):
             self._renewed.update(np.flatnonzero(self._bodies.used[: self._top]).tolist())
         if "horizon" in changed:
             self._bodies.slack[:] = 0.0  # it is counted in horizons
