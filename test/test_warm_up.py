@@ -105,10 +105,11 @@ def test_no_step_with_a_budget_is_the_first_to_load_a_kernel(when: str) -> None:
     """28 ms in a step of 1.6: what the first ones had no time for was loaded by the first that had."""
     program = (
         "from collision_monitor.monitor.monitor import Monitor, Profile\n"
-        "from collision_monitor.prediction import coarse\n"
+        "from collision_monitor.prediction.pairs import refine\n"
+        "from collision_monitor.prediction.sphere_trees import tighten\n"
         "limited = Profile(budget_ms=1.0)\n"
         f"monitor = {when}\n"
-        "print(len(coarse.refine.signatures), len(coarse.tighten.signatures))\n"
+        "print(len(refine.signatures), len(tighten.signatures))\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300)
     assert done.stdout.split() == ["1", "1"], done.stderr
