@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from collision_monitor._jit import kernel
-from collision_monitor.broad_phase.dense_grid import CLASSES, STARTING, partners, places, searches, sort_by_cell
+from collision_monitor.broad_phase.dense_grid import CLASSES, STARTING, Bounds, partners, places, searches, sort_by_cell
 from collision_monitor.detection.detector import Detector, kernels
 from collision_monitor.world.moving_bodies import make_moving_bodies
 
@@ -49,7 +49,7 @@ def candidates(grid, frame):
         for b in range(CLASSES):
             if searches(grid, a, b):
                 for p in range(first, behind):
-                    total += partners(grid, frame.extent, True, a, b, p, frame.found[0], 0)
+                    total += partners(grid, Bounds(frame.extent, True), a, b, p, frame.found[0], 0)
     return total
 
 

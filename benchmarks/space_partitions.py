@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.broad_phase.bsp_tree import bsp_tree, locate
+from collision_monitor.broad_phase.bsp_tree import bsp_tree, locate_in_bsp_tree
 from collision_monitor.broad_phase.partitions import PARTITIONS
 from collision_monitor.cli.progress import progress_bar
 from collision_monitor.geometry.polyhedra import locate_in_polyhedron
@@ -107,9 +107,9 @@ def bsp_table() -> None:
         tree = bsp_tree(vertices, faces)
         build = 1e3 * (time.process_time() - begin)
         points = rng.uniform(-1.5, 1.5, (20_000, 3))
-        if (locate(points, tree) != locate_in_polyhedron(points, vertices, faces)).any():
+        if (locate_in_bsp_tree(points, tree) != locate_in_polyhedron(points, vertices, faces)).any():
             raise SystemExit("the BSP tree and the ray parity differ")
-        by_tree = milliseconds(partial(locate, points, tree)) / 20
+        by_tree = milliseconds(partial(locate_in_bsp_tree, points, tree)) / 20
         by_parity = milliseconds(partial(locate_in_polyhedron, points, vertices, faces)) / 20
         print(f"| {len(faces):,} | {len(tree.front):,} | {build:.0f} | {by_tree:.2f} | {by_parity:.2f} |", flush=True)
 

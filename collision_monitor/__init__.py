@@ -1,17 +1,20 @@
 """What touches now, what will touch next, when, how sure that is and what it costs to know.
 
-    monitor         Monitor, StepResult, StepStatus        the core: states in, contacts and predictions out
-    profiles        Profile                                the settings that trade speed for accuracy
-    shapes, poses   Sphere, Box, …, Pose, Motion           what objects are made of and where they are
-    description     ObjectDescription                      an object with its shapes, group and bounds
-    contact         contact, Contact                       two shapes at two poses: distance, normal, points, bound
-    features        contact_features                       what touches what: "vertex 3 of A on face 7 of B"
-    overlap         overlap                                yes or no, by the test that one chooses
-    decomposition   convex_decomposition                   a concave mesh as convex parts, with their error
-    impact          time_of_impact, Impact                 two shapes in motion: when they meet, as an interval
-    impact_batch    time_of_impact_batch, Impacts          the same for many motions of two shapes
-    feature_impact  vertex_face_impact, edge_edge_impact   the same for vertices, faces and edges in linear motion
-    errors          CollisionMonitorError and its kinds    what can be wrong with an input
+    monitor.monitor                Monitor, StepResult, StepStatus        states in, contacts and predictions out
+    settings.profile               Profile                                the settings that trade speed for accuracy
+    geometry.shapes, .pose         Sphere, Box, …, Pose, Motion           what objects are made of and where they are
+    objects.description            ObjectDescription                      an object with its shapes, group and bounds
+    objects.convex_decomposition   convex_decomposition, Decomposition    a concave mesh as convex parts, with an error
+    query.contact                  contact, Contact                       two shapes: distance, normal, points, bound
+    query.features                 contact_features                       what touches: "vertex 3 of A on face 7 of B"
+    query.overlap                  overlap                                yes or no, by the test that one chooses
+    query.time_of_impact           time_of_impact, Impact                 when two shapes meet, as an interval
+    query.time_of_impact_batch     time_of_impact_batch, Impacts          the same for many motions of two shapes
+    query.feature_impact           vertex_face_impact, edge_edge_impact   the same for features in linear motion
+    records                        Model                                  what can stand for an object
+    errors                         CollisionMonitorError and its kinds    what can be wrong with an input
+
+The names on the right are those of this module: `collision_monitor.contact`. Each is imported at its first use.
 """
 
 from __future__ import annotations
@@ -115,3 +118,8 @@ def __getattr__(name: str) -> Any:
     value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
     globals()[name] = value
     return value
+
+
+def __dir__() -> list[str]:
+    """The names of the API too, which are not there before their first use: for tab completion."""
+    return sorted({*globals(), *__all__})

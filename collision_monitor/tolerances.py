@@ -1,4 +1,7 @@
-"""Every numerical constant of the package: its unit, why it has this value, and what breaks if it changes.
+"""Tolerances of the geometry and of the narrow phase: the unit of each, the reason for its value, the cost of another.
+
+The tolerances that several modules share stand here, and all those of SAT, GJK and EPA, which depend on each other.
+A constant of one algorithm (a size, a number of tries, a threshold of its own) stands beside its use.
 
 All tolerances are relative (to the sizes or the speeds involved) unless the name ends in a unit.
 """
@@ -34,6 +37,10 @@ SAT_ROUND_OFF: Final = 64 * EPSILON
 HULL_DROP: Final = 1e-14
 """A point that stands out of its hull by less than this part of the hull's size is dropped with the interior ones.
 Larger: visible corners vanish. Smaller: round-off keeps points that lie in a face, and each costs time."""
+
+ROUNDED_UP: Final = 1e-12
+"""Bounding spheres and models are larger by this part of their size, so that they hold their content whatever was
+rounded."""
 
 OPPOSED: Final = 8 * EPSILON
 """Two half-spaces face each other where their normals add up to at most this: what turning both by one pose leaves.

@@ -27,7 +27,7 @@ from collision_monitor.geometry.bounding_spheres import (
 )
 from collision_monitor.geometry.bounding_volumes import aabb, convex_hull, kdop
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume, obb_pca
-from collision_monitor.geometry.polygon_polygon import project, sat_2d
+from collision_monitor.geometry.polygon_overlap import project, sat_2d
 from collision_monitor.geometry.sphere_tree import distance_intervals, sphere_tree
 from collision_monitor.geometry.triangulation import triangulate
 

@@ -1,7 +1,7 @@
 """The one place that decides how kernels are compiled.
 
 `fastmath` is off everywhere: results must be the same bits with one thread and with two, live and in replay.
-Compiled kernels are cached (`_cache.py`), so that a second start compiles nothing.
+Compiled kernels are cached (`cache.py`), so that a second start compiles nothing.
 """
 
 from __future__ import annotations

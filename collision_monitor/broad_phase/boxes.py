@@ -12,7 +12,7 @@ from collision_monitor.errors import InputError
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-AT_ONCE: Final = 1 << 20
+CANDIDATES_AT_ONCE: Final = 1 << 20
 """Candidates that are compared at a time: their table stays in 100 MB."""
 
 
@@ -38,7 +38,8 @@ def overlaps_in_ranges(low: Array, high: Array, box: Indices, first: Indices, co
     done = np.cumsum(count)
     begin = 0
     while begin < len(box):
-        end = max(int(np.searchsorted(done, (done[begin - 1] if begin else 0) + AT_ONCE, side="right")), begin + 1)
+        most = (done[begin - 1] if begin else 0) + CANDIDATES_AT_ONCE
+        end = max(int(np.searchsorted(done, most, side="right")), begin + 1)
         j, owner = ranges(first[begin:end], count[begin:end])
         found.append(overlaps(low, high, box[begin:end][owner], j))
         begin = end

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from collision_monitor.errors import InputError, ShapeError
-from collision_monitor.geometry.coordinates import Array, Booleans, Indices, Signs, coordinates, triangles
+from collision_monitor.geometry.coordinates import Array, Booleans, Indices, Signs, coordinates
 from collision_monitor.geometry.point_in_polygon import Location
-from collision_monitor.geometry.polyhedra import is_closed
+from collision_monitor.geometry.polyhedra import closed_mesh
 
 THICKNESS: Final = 1e-9
 """Of a plane, as part of the solid's size: what is nearer counts as on it. Smaller: cut corners, which are rounded,
@@ -46,9 +46,7 @@ def bsp_tree(vertices: ArrayLike, faces: ArrayLike) -> BspTree:
 
     A scene of solids that do not meet is one such mesh. Raises ShapeError.
     """
-    vertices, faces = triangles(vertices, faces)
-    if not is_closed(faces):
-        raise ShapeError("mesh: expected a closed surface, got edges that belong to an odd number of faces")
+    vertices, faces = closed_mesh(vertices, faces)
     thickness = THICKNESS * float(np.ptp(vertices[np.unique(faces)], axis=0).max())
     polygons = [corners for corners in vertices[faces] if _plane(corners, thickness) is not None]
     if not polygons:
@@ -126,7 +124,7 @@ def _cut(corners: Array, height: Array, here: Booleans, there: Booleans) -> Arra
     return np.array(kept)
 
 
-def locate(points: ArrayLike, tree: BspTree) -> Signs:
+def locate_in_bsp_tree(points: ArrayLike, tree: BspTree) -> Signs:
     """Location (...) of points (..., 3); within the planes' thickness of the surface: BOUNDARY, or one of its sides."""
     points = coordinates(points, "points", 3)
     p = points.reshape(-1, 3)

@@ -18,7 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor._jit import allocating_kernel, device, inlined
 from collision_monitor._jit.prefetch import prefetch
-from collision_monitor.broad_phase.lanes import LANES, boxes_overlap, lowest_bit, spheres_overlap
+from collision_monitor._jit.vectors import LANES
+from collision_monitor.broad_phase.lanes import boxes_overlap, lowest_bit, spheres_overlap
+from collision_monitor.broad_phase.region import Region
 from collision_monitor.errors import InputError
 from collision_monitor.tolerances import EPSILON
 
@@ -41,7 +43,7 @@ STRIP: Final = 2
 FARTHEST_CELL: Final = 2.0**52
 """Hashed cell coordinates end here, where float64 still counts them one by one; beyond, bodies share cells."""
 
-LARGEST: Final = 2.0**200
+LARGEST_BODY: Final = 2.0**200
 """Half extents and positions (m) beyond this are compared with everything: the products of cells stay finite."""
 
 AHEAD: Final = 8
@@ -76,6 +78,13 @@ class Grid(NamedTuple):
     centre: Any  # (3, N + PAD) float64, sorted by cell
 
 
+class Bounds(NamedTuple):
+    """Bounds of the bodies, in the order of the grid's places: boxes, or spheres with their radii in row 0."""
+
+    extent: Any  # (3, N + PAD) float64: half extents or radii (m)
+    balls: bool
+
+
 def make_grid(capacity: int) -> Grid:
     """Scratch memory for up to `capacity` bodies."""
     cells = DENSE * capacity + (_ABSENT + 1) * FEWEST_CELLS
@@ -93,7 +102,7 @@ def make_grid(capacity: int) -> Grid:
 
 @device
 def classify(size: Any, starts: Any, octave: Any, cubes: Any, grid: Any) -> None:
-    """Put bodies with half extent `size` (N,) m into classes; NaN: absent, beyond LARGEST: unbounded.
+    """Put bodies with half extent `size` (N,) m into classes; NaN: absent, beyond LARGEST_BODY: unbounded.
 
     octave (_OCTAVES, 2): scratch for counts and classes; cubes (_OCTAVES, 2): of sums and of the greatest of the cubes
     of the sizes, relative to the octave's.
@@ -101,7 +110,7 @@ def classify(size: Any, starts: Any, octave: Any, cubes: Any, grid: Any) -> None
     octave[:] = 0
     cubes[:] = 0.0
     for i in range(size.size):
-        if size[i] <= LARGEST:
+        if size[i] <= LARGEST_BODY:
             mantissa, exponent = frexp(size[i])
             k = min(max(exponent + _OCTAVES // 2, 0), _OCTAVES - 1)
             octave[k, 0] += 1
@@ -124,10 +133,10 @@ def classify(size: Any, starts: Any, octave: Any, cubes: Any, grid: Any) -> None
         octave[k, 1] = number
     for i in range(size.size):
         rest = 0 if starts[i] else STARTING
-        if size[i] <= LARGEST:
+        if size[i] <= LARGEST_BODY:
             k = min(max(frexp(size[i])[1] + _OCTAVES // 2, 0), _OCTAVES - 1)
             grid.klass[i] = rest + octave[k, 1]
-        elif size[i] > LARGEST:
+        elif size[i] > LARGEST_BODY:
             grid.klass[i] = rest
         else:
             grid.klass[i] = _ABSENT
@@ -279,18 +288,15 @@ def places(grid: Any, a: int) -> Any:
 
 
 @inlined
-def keep_overlapping(grid: Any, extent: Any, balls: bool, p: int, low: int, high: int, found: Any, n: int) -> int:
-    """Append the places low ... high - 1 whose bounds overlap those of place p to found[n:]; returns the new n.
-
-    extent (3, N + PAD): half extents of boxes, or with `balls` radii of spheres in row 0.
-    """
-    cx, cy, cz = grid.centre[0, p], grid.centre[1, p], grid.centre[2, p]
-    hx, hy, hz = extent[0, p], extent[1, p], extent[2, p]
+def keep_overlapping(grid: Any, bounds: Any, p: int, low: int, high: int, found: Any, n: int) -> int:
+    """Append the places low ... high - 1 whose bounds overlap those of place p to found[n:]; returns the new n."""
+    x, y, z = grid.centre[0, p], grid.centre[1, p], grid.centre[2, p]
+    own = Region(x, y, z, bounds.extent[0, p], bounds.extent[1, p], bounds.extent[2, p])
     for q in range(low, max(high, low + 1), LANES):  # an empty range too is looked at: cheaper than to ask
-        if balls:
-            bits = spheres_overlap(grid.centre, extent, q, cx, cy, cz, hx)
+        if bounds.balls:
+            bits = spheres_overlap(grid.centre, bounds.extent, q, own)
         else:
-            bits = boxes_overlap(grid.centre, extent, q, cx, cy, cz, hx, hy, hz)
+            bits = boxes_overlap(grid.centre, bounds.extent, q, own)
         bits &= (1 << max(min(high - q, LANES), 0)) - 1
         while bits != 0:
             found[n] = q + lowest_bit(bits)
@@ -317,10 +323,10 @@ def _clamped(x: float, origin: float, inverse: float, last: int) -> Any:
 
 
 @inlined
-def partners(grid: Any, extent: Any, balls: bool, a: int, b: int, p: int, found: Any, n: int) -> int:
+def partners(grid: Any, bounds: Any, a: int, b: int, p: int, found: Any, n: int) -> int:
     """Append to found[n:] the places of class b that overlap place p of class a, each pair of one class once.
 
-    extent, balls: as in `keep_overlapping`. `found` must have room for one more than all bodies of the class.
+    `found` must have room for one more than all bodies of the class.
     """
     first, count = grid.layout[b, _FIRST], grid.layout[b, _COUNT]
     mode = grid.layout[b, _MODE]
@@ -328,9 +334,9 @@ def partners(grid: Any, extent: Any, balls: bool, a: int, b: int, p: int, found:
     nx, ny, nz, strip = grid.layout[b, _NX], grid.layout[b, _NY], grid.layout[b, _NZ], grid.layout[b, _STRIP]
     inverse, reach = grid.scale[b, _INVERSE], grid.scale[b, _REACH]
     cx, cy, cz = grid.centre[0, p], grid.centre[1, p], grid.centre[2, p]
-    rx = extent[0, p] * (1.0 + 16.0 * EPSILON) + reach
-    ry = rx if balls else extent[1, p] * (1.0 + 16.0 * EPSILON) + reach
-    rz = rx if balls else extent[2, p] * (1.0 + 16.0 * EPSILON) + reach
+    rx = bounds.extent[0, p] * (1.0 + 16.0 * EPSILON) + reach
+    ry = rx if bounds.balls else bounds.extent[1, p] * (1.0 + 16.0 * EPSILON) + reach
+    rz = rx if bounds.balls else bounds.extent[2, p] * (1.0 + 16.0 * EPSILON) + reach
     if mode == _DENSE:
         ox, oy, oz = grid.origin[0], grid.origin[1], grid.origin[2]
         x0 = _clamped(cx - rx, ox, inverse, nx - 1)
@@ -345,20 +351,20 @@ def partners(grid: Any, extent: Any, balls: bool, a: int, b: int, p: int, found:
             own = _dense(cy, oy, inverse)
             y0, y1, z1 = max(own - 1, 0), min(own + 1, ny - 1), min(z0 + 1, nz - 1)
             row = base + _row(own, z0, nz, strip) * nx
-            n = keep_overlapping(grid, extent, balls, p, p + 1, grid.start[row + x1 + 1], found, n)
+            n = keep_overlapping(grid, bounds, p, p + 1, grid.start[row + x1 + 1], found, n)
             if own < y1:
                 row = base + _row(y1, z0, nz, strip) * nx
-                n = keep_overlapping(grid, extent, balls, p, grid.start[row + x0], grid.start[row + x1 + 1], found, n)
+                n = keep_overlapping(grid, bounds, p, grid.start[row + x0], grid.start[row + x1 + 1], found, n)
             z0 += 1
         for z in range(z0, z1 + 1):
             for y in range(y0, y1 + 1):
                 row = base + _row(y, z, nz, strip) * nx
-                n = keep_overlapping(grid, extent, balls, p, grid.start[row + x0], grid.start[row + x1 + 1], found, n)
+                n = keep_overlapping(grid, bounds, p, grid.start[row + x0], grid.start[row + x1 + 1], found, n)
         return n
     rows = (2.0 * ry * inverse + 2.0) * (2.0 * rz * inverse + 2.0)
     if mode == _WHOLE or (a != b and not rows * (2.0 * rx * inverse + 2.0) < count):
         low = p + 1 if a == b else first
-        return keep_overlapping(grid, extent, balls, p, low, first + count, found, n)
+        return keep_overlapping(grid, bounds, p, low, first + count, found, n)
     x0, x1 = _hashed(cx - rx, inverse), _hashed(cx + rx, inverse)
     y0, y1 = _hashed(cy - ry, inverse), _hashed(cy + ry, inverse)
     z0, z1 = _hashed(cz - rz, inverse), _hashed(cz + rz, inverse)
@@ -377,7 +383,7 @@ def partners(grid: Any, extent: Any, balls: bool, a: int, b: int, p: int, found:
                 low = grid.start[base + cell]
                 if a == b and z == own_z and y == own_y:
                     low = max(low, p + 1)
-                n = keep_overlapping(grid, extent, balls, p, low, grid.start[base + cell + run], found, n)
+                n = keep_overlapping(grid, bounds, p, low, grid.start[base + cell + run], found, n)
                 x += run
             n = _of_row(grid, inverse, y, z, found, begin, n)
     return n
@@ -417,12 +423,12 @@ def _box_pairs(centre: Any, half: Any, starts: Any, grid: Any, pairs: Any) -> in
     for i in range(n):
         x, y, z = centre[i, 0], centre[i, 1], centre[i, 2]
         size[i] = max(half[i, 0], half[i, 1], half[i, 2])
-        if not max(abs(x), abs(y), abs(z)) <= LARGEST:
+        if not max(abs(x), abs(y), abs(z)) <= LARGEST_BODY:
             size[i] = np.inf
         total = half[i, 0] + half[i, 1] + half[i, 2] + x + y + z
         if total != total or not min(half[i, 0], half[i, 1], half[i, 2]) >= 0.0:
             size[i] = np.nan
-        if size[i] <= LARGEST:
+        if size[i] <= LARGEST_BODY:
             lx, ly, lz = min(lx, x), min(ly, y), min(lz, z)
             hx, hy, hz = max(hx, x), max(hy, y), max(hz, z)
     classify(size, starts, np.empty((_OCTAVES, 2), np.int64), np.empty((_OCTAVES, 2)), grid)
@@ -443,7 +449,7 @@ def _box_pairs(centre: Any, half: Any, starts: Any, grid: Any, pairs: Any) -> in
             if not searches(grid, a, b):
                 continue
             for p in range(first, end):
-                count = partners(grid, extent, False, a, b, p, found, 0)
+                count = partners(grid, Bounds(extent, False), a, b, p, found, 0)
                 i = grid.order[p]
                 for m in range(count):
                     if total < pairs.shape[0]:

@@ -15,16 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel, device, inlined, kernel
+from collision_monitor.broad_phase.region import Region, regions_overlap
 
-LEVELS: Final = 128
+GRID_LEVELS: Final = 128
+"""Sizes of cells."""
+
 LEVEL_OFFSET: Final = 64
 """Level of cells 1 m wide; levels run from 2^-64 m to 2^63 m, sizes beyond are put in the outermost."""
 
-FARTHEST_CELL: Final = 2.0**62
+CELL_LIMIT: Final = 2.0**62
 """Cell coordinates are clipped here, so that no position overflows an int64; clipped boxes share cells."""
 
-
-BOX = np.dtype(
+GRID_BOX = np.dtype(
     [
         ("x", np.float64),  # centre (m)
         ("y", np.float64),
@@ -46,41 +48,30 @@ BOX = np.dtype(
 """One box, all that a look at it reads side by side."""
 
 
-class Region(NamedTuple):
-    """A box to ask for, which need not be in the grid (m)."""
-
-    x: float
-    y: float
-    z: float
-    hx: float
-    hy: float
-    hz: float
-
-
 class HashedGrid(NamedTuple):
     """Capacity N boxes, B buckets (a power of two)."""
 
-    box: Any  # (N,) BOX
+    box: Any  # (N,) GRID_BOX
     head: Any  # (B,) int32: first box of the bucket, -1: none
-    level_head: Any  # (LEVELS,) int32
-    level_count: Any  # (LEVELS,) int32
+    level_head: Any  # (GRID_LEVELS,) int32
+    level_count: Any  # (GRID_LEVELS,) int32
 
 
 def make_hashed_grid(capacity: int) -> HashedGrid:
     """An empty grid for box numbers 0 … capacity - 1."""
     buckets = 1 << max(4, (2 * capacity - 1).bit_length())
-    box = np.zeros(capacity, BOX)
+    box = np.zeros(capacity, GRID_BOX)
     box["level"] = -1
     return HashedGrid(
         box=box,
         head=np.full(buckets, -1, np.int32),
-        level_head=np.full(LEVELS, -1, np.int32),
-        level_count=np.zeros(LEVELS, np.int32),
+        level_head=np.full(GRID_LEVELS, -1, np.int32),
+        level_count=np.zeros(GRID_LEVELS, np.int32),
     )
 
 
 def regridded(box: NDArray[np.void], capacity: int) -> HashedGrid:
-    """A grid of this capacity that holds those of the boxes (N,) BOX that were in a grid."""
+    """A grid of this capacity that holds those of the boxes (N,) GRID_BOX that were in a grid."""
     grid = make_hashed_grid(capacity)
     centre, half = np.empty((2, len(box), 3))
     read_boxes(box, centre, half)
@@ -92,14 +83,14 @@ def regridded(box: NDArray[np.void], capacity: int) -> HashedGrid:
 def _level_of(width):
     """The finest level whose cells are at least `width` wide."""
     if not width < 2.0**62:
-        return LEVELS - 1
+        return GRID_LEVELS - 1
     exponent = frexp(width)[1] if width > 0.0 else -LEVEL_OFFSET
     return max(exponent + LEVEL_OFFSET, 0)
 
 
 @device
 def _coordinate(x, cell):
-    return np.int64(min(max(np.floor(x / cell), -FARTHEST_CELL), FARTHEST_CELL))
+    return np.int64(min(max(np.floor(x / cell), -CELL_LIMIT), CELL_LIMIT))
 
 
 @inlined
@@ -133,18 +124,18 @@ def remove_box(grid, i):
 
 
 @device
-def put_box(grid, i, cx, cy, cz, hx, hy, hz):
-    """Put box i (centre, half extents; m) in, or move it there."""
+def put_box(grid, i, region):
+    """Put box i with the bounds `region` in, or move it there."""
     remove_box(grid, i)
     box = grid.box[i]
-    level = _level_of(max(hx, hy, hz))
+    level = _level_of(max(region.hx, region.hy, region.hz))
     size = 2.0 ** (level - LEVEL_OFFSET)
-    x, y, z = _coordinate(cx, size), _coordinate(cy, size), _coordinate(cz, size)
+    x, y, z = _coordinate(region.x, size), _coordinate(region.y, size), _coordinate(region.z, size)
     bucket = _bucket(level, x, y, z, grid.head.size - 1)
     box.level = level
     box.cell_x, box.cell_y, box.cell_z = x, y, z
-    box.x, box.y, box.z = cx, cy, cz
-    box.hx, box.hy, box.hz = hx, hy, hz
+    box.x, box.y, box.z = region.x, region.y, region.z
+    box.hx, box.hy, box.hz = region.hx, region.hy, region.hz
     box.next = grid.head[bucket]
     box.previous = -2 - bucket
     if box.next >= 0:
@@ -158,35 +149,29 @@ def put_box(grid, i, cx, cy, cz, hx, hy, hz):
     grid.level_count[level] += 1
 
 
-@inlined
-def overlap(a, b):
-    """Do two boxes (BOX or Region) overlap or touch?"""
-    return abs(a.x - b.x) <= a.hx + b.hx and abs(a.y - b.y) <= a.hy + b.hy and abs(a.z - b.z) <= a.hz + b.hz
-
-
 @device
 def query_box(grid, box, i, found):
-    """The boxes but number i that overlap `box` (BOX or Region), into found[0:n], in no particular order.
+    """The boxes but number i that overlap `box` (a Region or a GRID_BOX), into found[0:n], in no particular order.
 
     Returns n. n can be larger than found.size: then the rest was counted but not written.
     """
     n = 0
-    for level in range(LEVELS):
+    for level in range(GRID_LEVELS):
         count = grid.level_count[level]
         if count == 0:
             continue
         size = 2.0 ** (level - LEVEL_OFFSET)
         # a box of this level reaches at most a cell from its centre; the outermost level holds any size
-        reach = size if level < LEVELS - 1 else np.inf
+        reach = size if level < GRID_LEVELS - 1 else np.inf
         x0, x1 = np.floor((box.x - box.hx - reach) / size), np.floor((box.x + box.hx + reach) / size)
         y0, y1 = np.floor((box.y - box.hy - reach) / size), np.floor((box.y + box.hy + reach) / size)
         z0, z1 = np.floor((box.z - box.hz - reach) / size), np.floor((box.z + box.hz + reach) / size)
         cells = (x1 - x0 + 1.0) * (y1 - y0 + 1.0) * (z1 - z0 + 1.0)
         outermost = max(abs(x0), abs(x1), abs(y0), abs(y1), abs(z0), abs(z1))
-        if not (cells <= 2.0 * count and outermost < FARTHEST_CELL):
+        if not (cells <= 2.0 * count and outermost < CELL_LIMIT):
             j = grid.level_head[level]
             while j >= 0:
-                if j != i and overlap(box, grid.box[j]):
+                if j != i and regions_overlap(box, grid.box[j]):
                     if n < found.size:
                         found[n] = j
                     n += 1
@@ -199,7 +184,7 @@ def query_box(grid, box, i, found):
                     while j >= 0:
                         other = grid.box[j]
                         if (
-                            overlap(box, other)
+                            regions_overlap(box, other)
                             and other.cell_x == x
                             and other.cell_y == y
                             and other.cell_z == z
@@ -218,13 +203,15 @@ def put_boxes(grid, which, centre, half):
     """Put boxes `which` (M,) at centre, half (N, 3), indexed by box number."""
     for k in range(which.size):
         i = which[k]
-        put_box(grid, i, centre[i, 0], centre[i, 1], centre[i, 2], half[i, 0], half[i, 1], half[i, 2])
+        x, y, z = centre[i, 0], centre[i, 1], centre[i, 2]
+        put_box(grid, i, Region(x, y, z, half[i, 0], half[i, 1], half[i, 2]))
 
 
 @kernel
 def read_boxes(box, centre, half):
-    """The first N of the boxes (BOX) into centre, half (N, 3); those that are not in the grid with a NaN half extent,
-    which meets nothing.
+    """The first N of the boxes (GRID_BOX) into centre, half (N, 3).
+
+    A box that is not in the grid gets a NaN half extent, which meets nothing.
     """
     for i in range(centre.shape[0]):
         centre[i, 0], centre[i, 1], centre[i, 2] = box[i].x, box[i].y, box[i].z

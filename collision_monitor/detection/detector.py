@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from collision_monitor.broad_phase.dense_grid import classify_bodies, make_grid
 from collision_monitor.detection import kernels
 from collision_monitor.errors import InputError, PoseError, UnsupportedError
-from collision_monitor.geometry.pieces import is_planar
+from collision_monitor.geometry.planar import is_planar
 from collision_monitor.geometry.shape_table import BOX, SPHERE, ShapeTableBuilder
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION

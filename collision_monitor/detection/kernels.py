@@ -20,6 +20,7 @@ from collision_monitor.broad_phase.dense_grid import (
     CLASSES,
     PAD,
     STARTING,
+    Bounds,
     Grid,
     find_buckets,
     gather_centres,
@@ -244,7 +245,7 @@ def _search(table: Any, path: int, limit: float, grid: Any, frame: Any, hits: An
             if not searches(grid, a, c):
                 continue
             for p in range(first, behind):
-                m = partners(grid, frame.extent, True, a, c, p, found, n)
+                m = partners(grid, Bounds(frame.extent, True), a, c, p, found, n)
                 for k in range(n, m):
                     owner[k] = p
                 n = m

@@ -17,7 +17,7 @@ from collision_monitor.geometry.coordinates import Array, point_set
 from collision_monitor.geometry.qhull import qhull
 from collision_monitor.tolerances import EPSILON
 
-OUTSIDE: Final = 1e-12
+GROWTH_THRESHOLD: Final = 1e-12
 """A point farther out than this part of the radius makes the minimal sphere grow.
 Smaller: where five or more points are on the sphere, round-off takes them in turns. Larger: the sphere is larger than
 the smallest by as much."""
@@ -90,7 +90,7 @@ def _smallest(points: Array, touching: Array) -> tuple[Array, float]:
     k = 0
     while k < len(points):
         distance = np.linalg.norm(points[k:] - center, axis=1)
-        outside = np.flatnonzero(distance > radius * (1 + OUTSIDE))
+        outside = np.flatnonzero(distance > radius * (1 + GROWTH_THRESHOLD))
         if not len(outside):
             break
         k += int(outside[0])

@@ -11,12 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.bounding_tests import aabb_aabb
 from collision_monitor.geometry.bounding_volumes import aabb
-from collision_monitor.geometry.coordinates import Array, Indices, triangles
+from collision_monitor.geometry.coordinates import Array, Indices
 from collision_monitor.geometry.point_in_polygon import Location
-from collision_monitor.geometry.polyhedra import edge_face, is_closed, locate_in_polyhedron, mesh_edges
+from collision_monitor.geometry.polyhedra import closed_mesh, edge_face, locate_in_polyhedron, mesh_edges
 
 
 class Stage(Enum):
@@ -27,7 +26,7 @@ class Stage(Enum):
     EDGES_AND_FACES = "edges against faces"
 
 
-class Collision(NamedTuple):
+class CascadeResult(NamedTuple):
     """collides: touching counts. stage: where it was settled.
 
     vertices_a, vertices_b (k,): those of A in B and of B in A. edges_a, edges_b (k, 3): of each crossing the edge's two
@@ -42,29 +41,28 @@ class Collision(NamedTuple):
     edges_b: Indices
 
 
-def collide(vertices_a: ArrayLike, faces_a: ArrayLike, vertices_b: ArrayLike, faces_b: ArrayLike) -> Collision:
+def polyhedra_intersect(
+    vertices_a: ArrayLike, faces_a: ArrayLike, vertices_b: ArrayLike, faces_b: ArrayLike
+) -> CascadeResult:
     """Whether two closed meshes, convex or not, in one frame (vertices (n, 3), faces (m, 3)), have a point in common.
 
     Each stage ends the test if it settles it: boxes apart, a vertex of one inside the other, an edge through a face.
     The last one also finds crossed bars, which have no vertex in each other. Exact. Raises ShapeError.
     """
-    points_a, corners_a = triangles(vertices_a, faces_a, "mesh A")
-    points_b, corners_b = triangles(vertices_b, faces_b, "mesh B")
-    for faces, name in ((corners_a, "A"), (corners_b, "B")):
-        if not is_closed(faces):
-            raise ShapeError(f"mesh {name}: expected a closed surface, got edges that belong to an odd number of faces")
+    points_a, corners_a = closed_mesh(vertices_a, faces_a, "mesh A")
+    points_b, corners_b = closed_mesh(vertices_b, faces_b, "mesh B")
     none, no_edges = np.zeros(0, np.int64), np.zeros((0, 3), np.int64)
     used_a, used_b = np.unique(corners_a), np.unique(corners_b)
     box_a, box_b = aabb(points_a[used_a]), aabb(points_b[used_b])
     if not aabb_aabb(box_a, box_b):
-        return Collision(False, Stage.BOUNDING_VOLUMES, none, none, no_edges, no_edges)
+        return CascadeResult(False, Stage.BOUNDING_VOLUMES, none, none, no_edges, no_edges)
     inside_b = _inside(points_a, used_a, points_b, corners_b)
     inside_a = _inside(points_b, used_b, points_a, corners_a)
     if len(inside_a) or len(inside_b):
-        return Collision(True, Stage.VERTICES, inside_b, inside_a, no_edges, no_edges)
+        return CascadeResult(True, Stage.VERTICES, inside_b, inside_a, no_edges, no_edges)
     edges_a = _crossings(points_a, mesh_edges(corners_a), points_b, corners_b)
     edges_b = _crossings(points_b, mesh_edges(corners_b), points_a, corners_a)
-    return Collision(bool(len(edges_a) or len(edges_b)), Stage.EDGES_AND_FACES, none, none, edges_a, edges_b)
+    return CascadeResult(bool(len(edges_a) or len(edges_b)), Stage.EDGES_AND_FACES, none, none, edges_a, edges_b)
 
 
 def _inside(points: Array, used: Indices, vertices: Array, faces: Indices) -> Indices:

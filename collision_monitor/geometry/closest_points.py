@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.coordinates import Array, coordinates
-from collision_monitor.geometry.lines import Extent
+from collision_monitor.geometry.lines import LineKind
 from collision_monitor.tolerances import SEGMENT_PARALLEL_SIN2
 
 
@@ -35,8 +35,8 @@ def closest_points(
     u: ArrayLike,
     q: ArrayLike,
     v: ArrayLike,
-    first: Extent = Extent.SEGMENT,
-    second: Extent = Extent.SEGMENT,
+    first: LineKind = LineKind.SEGMENT,
+    second: LineKind = LineKind.SEGMENT,
 ) -> ClosestPoints:
     """Minimise |p + alpha u - (q + beta v)| over the extents (line: all, ray: >= 0, segment: 0 … 1); all (..., 3).
 
@@ -88,7 +88,7 @@ def _on_lines(u: Array, v: Array, w: Array) -> Array:
     return _ratio(_dot(np.cross(w, v), n), _dot(n, n))
 
 
-def _beside(u: Array, v: Array, w: Array, first: Extent, second: Extent) -> Array:
+def _beside(u: Array, v: Array, w: Array, first: LineKind, second: LineKind) -> Array:
     """alpha in the middle of where A runs beside B, both parallel; out of A's extent where they do not."""
     start, per_beta = _ratio(_dot(u, w), _dot(u, u)), _ratio(_dot(u, v), _dot(u, u))
     with np.errstate(invalid="ignore"):

@@ -18,7 +18,7 @@ from collision_monitor.geometry.coordinates import Array, Booleans, Signs, coord
 from collision_monitor.geometry.orientation import cross, orient2d
 
 
-class Extent(Enum):
+class LineKind(Enum):
     """How far a + t (b - a) reaches: the least and the greatest t."""
 
     LINE = (-inf, inf)
@@ -76,16 +76,16 @@ def intersect(
     b: ArrayLike,
     c: ArrayLike,
     d: ArrayLike,
-    first: Extent = Extent.SEGMENT,
-    second: Extent = Extent.SEGMENT,
+    first: LineKind = LineKind.SEGMENT,
+    second: LineKind = LineKind.SEGMENT,
 ) -> Intersection:
     """Where a, b and c, d (..., 2) meet, each as a line, a ray from its first point or a segment; ends included.
 
     The relation is exact. A segment may have no length; a line or ray must have a direction. Raises InputError.
     (Slide "Line intersection – two equations": the vector equation's t_a and t_b, here by Cramer's rule)
     """
-    a, b = (coordinates(a, "a", 2), coordinates(b, "b", 2)) if first is Extent.SEGMENT else _distinct(a, b, "a, b")
-    c, d = (coordinates(c, "c", 2), coordinates(d, "d", 2)) if second is Extent.SEGMENT else _distinct(c, d, "c, d")
+    a, b = (coordinates(a, "a", 2), coordinates(b, "b", 2)) if first is LineKind.SEGMENT else _distinct(a, b, "a, b")
+    c, d = (coordinates(c, "c", 2), coordinates(d, "d", 2)) if second is LineKind.SEGMENT else _distinct(c, d, "c, d")
     try:
         a, b, c, d = np.broadcast_arrays(a, b, c, d)
     except ValueError:
@@ -96,13 +96,13 @@ def intersect(
     parallel = turn == 0.0
     way = np.sign(turn)
     meets = ~parallel
-    if first is not Extent.LINE:
+    if first is not LineKind.LINE:
         meets &= at_a * way >= 0.0  # t_a >= 0
-    if first is Extent.SEGMENT:
+    if first is LineKind.SEGMENT:
         meets &= at_b * way <= 0.0  # t_a <= 1
-    if second is not Extent.LINE:
+    if second is not LineKind.LINE:
         meets &= at_c * way <= 0.0  # t_b >= 0
-    if second is Extent.SEGMENT:
+    if second is LineKind.SEGMENT:
         meets &= at_d * way >= 0.0  # t_b <= 1
 
     divisor = np.where(meets, turn, 1.0)
@@ -141,7 +141,7 @@ def _distinct(a: ArrayLike, b: ArrayLike, what: str) -> tuple[Array, Array]:
     return a, b
 
 
-def _parameter(t: Array, at_start: Array, at_end: Array, extent: Extent) -> Array:
+def _parameter(t: Array, at_start: Array, at_end: Array, extent: LineKind) -> Array:
     t = np.where(at_start == 0.0, 0.0, np.where(at_end == 0.0, 1.0, t))
     return np.clip(t, *extent.value)
 
@@ -160,12 +160,12 @@ def _position(p: Array, a: Array, b: Array) -> Array:
     return np.asarray(np.where(u == 0.0, 0.0, w / np.where(u == 0.0, 1.0, u)))
 
 
-def _ends(a: Array, b: Array, extent: Extent) -> tuple[Array, Array]:
+def _ends(a: Array, b: Array, extent: LineKind) -> tuple[Array, Array]:
     """Least and greatest coordinates (..., 2) that it reaches."""
     low, high = np.minimum(a, b), np.maximum(a, b)
-    if extent is not Extent.SEGMENT:
+    if extent is not LineKind.SEGMENT:
         high = np.where(b > a, inf, high)
         low = np.where(b < a, -inf, low)
-    if extent is Extent.LINE:
+    if extent is LineKind.LINE:
         low, high = np.where(a == b, a, -inf), np.where(a == b, a, inf)
     return low, high

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 
 from collision_monitor.geometry.closest_points import closest_points
 from collision_monitor.geometry.coordinates import Array, Booleans, coordinates, numbers
-from collision_monitor.geometry.lines import Extent
+from collision_monitor.geometry.lines import LineKind
 
 
-class Encounter(NamedTuple):
+class ParticleEncounter(NamedTuple):
     """collides (...); distance (m) of the paths; times alpha, beta (s) when A and B pass their closest points."""
 
     collides: Booleans
@@ -32,7 +32,7 @@ def particle_particle(
     v_b: ArrayLike,
     distance_threshold: float,
     time_threshold: float,
-) -> Encounter:
+) -> ParticleEncounter:
     """Whether particles at p (m), velocities v (m/s), all (..., 2 or 3), are at one time where their paths are near.
 
     min over alpha, beta >= 0 of |p_A + alpha v_A - (p_B + beta v_B)| <= distance_threshold and
@@ -41,14 +41,14 @@ def particle_particle(
     """
     position_a, velocity_a = _in_space(p_a, "p_a"), _in_space(v_a, "v_a")
     position_b, velocity_b = _in_space(p_b, "p_b"), _in_space(v_b, "v_b")
-    nearest = closest_points(position_a, velocity_a, position_b, velocity_b, Extent.RAY, Extent.RAY)
+    nearest = closest_points(position_a, velocity_a, position_b, velocity_b, LineKind.RAY, LineKind.RAY)
     time, distance = closest_approach(p_a, v_a, p_b, v_b)
     size = np.abs(position_a).max() + np.abs(position_b).max()
     at_once = distance <= nearest.distance + 1e-15 * size
     alpha, beta = np.where(at_once, time, nearest.alpha), np.where(at_once, time, nearest.beta)
     near = nearest.distance <= numbers(distance_threshold, "distance_threshold", 0.0)
     together = np.abs(alpha - beta) <= numbers(time_threshold, "time_threshold", 0.0)
-    return Encounter(np.asarray(near & together), nearest.distance, alpha, beta)
+    return ParticleEncounter(np.asarray(near & together), nearest.distance, alpha, beta)
 
 
 def closest_approach(p_a: ArrayLike, v_a: ArrayLike, p_b: ArrayLike, v_b: ArrayLike) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ from collision_monitor.geometry.lines import segments_intersect
 from collision_monitor.geometry.orientation import orient2d, orient3d
 from collision_monitor.geometry.point_in_polygon import Location
 
-AT_ONCE: Final = 256
+POINTS_AT_ONCE: Final = 256
 """Points that are located together in a mesh. Larger: more faces are near some of them. Smaller: more turns."""
 
 
@@ -32,6 +32,14 @@ def is_closed(faces: ArrayLike) -> bool:
     faces = np.asarray(faces, dtype=np.int64)
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     return bool((np.unique(edges, axis=0, return_counts=True)[1] % 2 == 0).all())
+
+
+def closed_mesh(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> tuple[Array, Indices]:
+    """A closed triangle mesh: vertices (n, 3), faces (m, 3) of vertex indices, m >= 1. Raises ShapeError."""
+    vertices, faces = triangles(vertices, faces, what)
+    if not is_closed(faces):
+        raise ShapeError(f"{what}: expected a closed surface, got edges that belong to an odd number of faces")
+    return vertices, faces
 
 
 def locate_in_convex_polyhedron(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> Signs:
@@ -54,16 +62,14 @@ def locate_in_polyhedron(points: ArrayLike, vertices: ArrayLike, faces: ArrayLik
     Raises ShapeError for a mesh that is not closed.
     """
     points = coordinates(points, "points", 3)
-    vertices, faces = triangles(vertices, faces)
-    if not is_closed(faces):
-        raise ShapeError("mesh: expected a closed surface, got edges that belong to an odd number of faces")
+    vertices, faces = closed_mesh(vertices, faces)
     a, b, c = (vertices[corner] for corner in faces.T)
     low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     p = points.reshape(-1, 3)
     on_face, odd = np.zeros(len(p), bool), np.zeros(len(p), bool)
     order = np.argsort(p[:, 0])
-    for first in range(0, len(p), AT_ONCE):  # few points side by side, so that few faces are in question for each
-        some = order[first : first + AT_ONCE]
+    for first in range(0, len(p), POINTS_AT_ONCE):  # few points side by side: few faces are in question for each
+        some = order[first : first + POINTS_AT_ONCE]
         near = np.flatnonzero((low[:, 0] <= p[some[-1], 0]) & (p[some[0], 0] <= high[:, 0]))
         beside = (low[near, :2] <= p[some, None, :2]) & (p[some, None, :2] <= high[near, :2])
         below = p[some, None, 2] <= high[near, 2]

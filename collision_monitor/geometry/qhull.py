@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+from math import inf
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.tolerances import HULL_DROP
 
-def qhull(points: NDArray[np.float64]) -> Any | None:
+Array = NDArray[np.float64]
+
+HEIGHTS_AT_ONCE: Final = 1 << 20
+"""Heights of points over planes that are computed together: 8 MB."""
+
+
+def qhull(points: Array) -> Any | None:
     """The hull of points (n, d) as scipy.spatial.ConvexHull, or None where they are flat: Qhull gives up on those."""
     from scipy.spatial import ConvexHull, QhullError
 
@@ -16,3 +24,23 @@ def qhull(points: NDArray[np.float64]) -> Any | None:
         return ConvexHull(points)
     except QhullError:
         return None
+
+
+def hull_vertices(points: Array) -> NDArray[np.int32]:
+    """Indices of the points (n, 3) that span their convex hull, ascending; all distinct points where qhull gives up."""
+    _, first = np.unique(points, axis=0, return_index=True)
+    first = np.sort(first)
+    centred = points[first] - points[first].mean(axis=0)
+    scale = float(np.abs(centred).max())
+    hull = qhull(centred / scale)
+    if hull is None:
+        return first.astype(np.int32)
+    # qhull merges what is nearly coplanar; a vertex that it dropped although it sticks out stays in
+    keep = np.zeros(len(first), bool)
+    keep[hull.vertices] = True
+    normal, offset = hull.equations[:, :3], hull.equations[:, 3]
+    rest = np.flatnonzero(~keep)
+    for some in np.array_split(rest, len(rest) * len(normal) // HEIGHTS_AT_ONCE + 1):
+        outside = (centred[some] / scale) @ normal.T + offset
+        keep[some] = outside.max(axis=1, initial=-inf) > HULL_DROP
+    return first[keep].astype(np.int32)

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device
+from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.geometry import shapes
 from collision_monitor.geometry.polygons import corners, is_convex, is_counter_clockwise
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.qhull import qhull
+from collision_monitor.geometry.qhull import hull_vertices
 from collision_monitor.records import ShapeType
-from collision_monitor.tolerances import HULL_DROP
 
 Array = NDArray[np.float64]
 
@@ -33,17 +33,12 @@ HALF_SPACE: Final = int(ShapeType.HALF_SPACE)
 CIRCLE: Final = int(ShapeType.CIRCLE)
 POLYGON: Final = int(ShapeType.POLYGON)
 
-SUPPORTED: Final = "Sphere, Box, Capsule, Cylinder, Cone, ConvexHull, HalfSpace; Circle, Polygon (convex) in the plane"
+SUPPORTED_SHAPES: Final = (
+    "Sphere, Box, Capsule, Cylinder, Cone, ConvexHull, HalfSpace; Circle, Polygon (convex) in the plane"
+)
 
-LANES: Final = 8
-"""Hull vertices come in blocks of this many, the last one repeated, so that the support scan has no tail."""
-
-
-AT_ONCE: Final = 1 << 20
-"""Heights of points over planes that are computed together: 8 MB."""
-
-_CORNERS: Final = np.arange(3, dtype=np.int32)
-"""Of a triangle."""
+_TRIANGLE: Final = np.arange(3, dtype=np.int32)
+"""Its corners, as `hull_vertices` of a hull."""
 
 
 class ShapeTable(NamedTuple):
@@ -51,6 +46,7 @@ class ShapeTable(NamedTuple):
 
     size holds, by kind: sphere r | box half extents x, y, z | capsule r, half core length | cylinder r, half height |
     cone r, half height | half-space normal x, y, z, offset | hull nothing | circle r | polygon number of corners.
+    Hull vertices come in blocks of LANES, the last one repeated, so that the support scan has no tail.
     """
 
     kind: Any  # (K,) uint8, records.ShapeType
@@ -106,7 +102,7 @@ def triangle_table(corners: Array) -> ShapeTable:
     n = len(corners)
     table = _empty(n, LANES * n)
     radius = np.linalg.norm(corners, axis=2).max(axis=1)
-    lanes = np.minimum(np.arange(LANES, dtype=np.int32), _CORNERS[-1])
+    lanes = np.minimum(np.arange(LANES, dtype=np.int32), _TRIANGLE[-1])
     return table._replace(
         kind=np.full(n, CONVEX_HULL, np.uint8),
         radius=np.nextafter(radius * (1 + 1e-15), inf),
@@ -116,26 +112,6 @@ def triangle_table(corners: Array) -> ShapeTable:
         vertex_index=np.tile(lanes, n),
         local_rotation=np.tile(np.eye(3), (n, 1, 1)),
     )
-
-
-def hull_vertices(points: Array) -> NDArray[np.int32]:
-    """Indices of the points (n, 3) that span their convex hull, ascending; all distinct points where qhull gives up."""
-    _, first = np.unique(points, axis=0, return_index=True)
-    first = np.sort(first)
-    centred = points[first] - points[first].mean(axis=0)
-    scale = float(np.abs(centred).max())
-    hull = qhull(centred / scale)
-    if hull is None:
-        return first.astype(np.int32)
-    # qhull merges what is nearly coplanar; a vertex that it dropped although it sticks out stays in
-    keep = np.zeros(len(first), bool)
-    keep[hull.vertices] = True
-    normal, offset = hull.equations[:, :3], hull.equations[:, 3]
-    rest = np.flatnonzero(~keep)
-    for some in np.array_split(rest, len(rest) * len(normal) // AT_ONCE + 1):
-        outside = (centred[some] / scale) @ normal.T + offset
-        keep[some] = outside.max(axis=1, initial=-inf) > HULL_DROP
-    return first[keep].astype(np.int32)
 
 
 def convex_ring(points: Array) -> NDArray[np.int32]:
@@ -222,7 +198,7 @@ class ShapeTableBuilder:
             case shapes.ConvexHull() | shapes.Triangle():
                 kind, size, radius = CONVEX_HULL, (), float(np.linalg.norm(shape.points, axis=1).max())
                 flat = isinstance(shape, shapes.Triangle)
-                start, count = self._share(shape.points, _CORNERS if flat else hull_vertices(shape.points))
+                start, count = self._share(shape.points, _TRIANGLE if flat else hull_vertices(shape.points))
             case shapes.Circle():
                 kind, size, radius = CIRCLE, (shape.radius,), shape.radius
             case shapes.Polygon():
@@ -230,7 +206,7 @@ class ShapeTableBuilder:
                 kind, size, radius = POLYGON, (len(ring),), float(np.linalg.norm(shape.points, axis=1).max())
                 start, count = self._share(np.pad(shape.points, ((0, 0), (0, 1))), ring)
             case _:
-                raise UnsupportedError(f"{type(shape).__name__} has no narrow phase; supported are {SUPPORTED}")
+                raise UnsupportedError(f"{type(shape).__name__} has no narrow phase; supported are {SUPPORTED_SHAPES}")
         slot = self._new_slot()
         table = self.table
         table.size[slot] = 0.0

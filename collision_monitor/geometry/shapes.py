@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -66,6 +67,11 @@ class Box(Shape):
         if len(size) != 3 or not all(0.0 <= s <= LARGEST_INPUT for s in size) or max(size) == 0.0:
             raise ShapeError(f"Box size: expected 3 extents from 0 to {LARGEST_INPUT:g}, not all zero, got {size}")
         object.__setattr__(self, "size", size)
+
+    @property
+    def corners(self) -> Array:
+        """The eight corners (8, 3) in m."""
+        return np.array(list(product((-0.5, 0.5), repeat=3))) * np.array(self.size)
 
 
 @dataclass(frozen=True)

@@ -22,18 +22,15 @@ from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.point_triangle import closest_point_on_triangle
 from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.tolerances import EPSILON
+from collision_monitor.tolerances import EPSILON, ROUNDED_UP
 
 DEEPEST: Final = 8
 """Levels beyond the first that a tree may have: a surface then meets some 400,000 cells."""
 
-ROUND_OFF: Final = 1e-12
-"""Spheres are larger, and balls inside smaller, by this part of the size."""
-
 MOST_PAIRS: Final = 1_000_000
 """Pairs of spheres at which a query ends for want of memory; the interval that it has is true as any."""
 
-AT_ONCE: Final = 1 << 16
+FACES_AT_ONCE: Final = 1 << 16
 """Pairs of a cell and a face that are looked at together, so that their table stays small."""
 
 _AXES: Final = np.array([sign * np.array(d) / np.linalg.norm(d) for d in KDOP_DIRECTIONS[26] for sign in (1.0, -1.0)])
@@ -86,12 +83,12 @@ def sphere_tree(vertices: ArrayLike, faces: ArrayLike, depth: int = 5) -> Sphere
         inside = np.zeros(len(center), bool)
         if closed:
             inside = locate_in_polyhedron(center, vertices, faces) >= Location.BOUNDARY
-        reach = np.sqrt(0.75) * width * (1.0 + ROUND_OFF)
+        reach = np.sqrt(0.75) * width * (1.0 + ROUNDED_UP)
         level = Level(
             center=center,
             radius=np.full(len(center), reach),
             inner_center=np.where(inside[:, None], center, nearest),
-            inner_radius=np.where(inside, np.maximum(distance - ROUND_OFF * size, 0.0), 0.0),
+            inner_radius=np.where(inside, np.maximum(distance - ROUNDED_UP * size, 0.0), 0.0),
             parent=parent,
         )
         kept = inside | (distance <= reach)
@@ -112,7 +109,7 @@ def sphere_tree(vertices: ArrayLike, faces: ArrayLike, depth: int = 5) -> Sphere
         center, parent = (center[split, None] + width * _OCTANTS).reshape(-1, 3), np.repeat(np.flatnonzero(~whole), 8)
         width /= 2.0
     ball = minimal_sphere(vertices[np.unique(faces)])
-    levels[0] = levels[0]._replace(center=ball.center[None], radius=ball.radius[None] * (1.0 + ROUND_OFF))
+    levels[0] = levels[0]._replace(center=ball.center[None], radius=ball.radius[None] * (1.0 + ROUNDED_UP))
     return _with_best_balls(_sorted(levels))
 
 
@@ -131,7 +128,7 @@ def _nearest(points: Array, corners: Array, owner: Indices, face: Indices) -> tu
     """
     parts = [
         closest_point_on_triangle(points[owner[some]], *np.moveaxis(corners[face[some]], 1, 0))
-        for some in (slice(k, k + AT_ONCE) for k in range(0, len(owner), AT_ONCE))
+        for some in (slice(k, k + FACES_AT_ONCE) for k in range(0, len(owner), FACES_AT_ONCE))
     ]
     closest, apart = (np.concatenate(part) for part in zip(*parts, strict=True))
     every = np.arange(len(points))

@@ -11,14 +11,13 @@ from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.broad_phase.hashed_grid import (
     HashedGrid,
-    Region,
     make_hashed_grid,
-    overlap,
     query_box,
     read_boxes,
     regridded,
     remove_boxes,
 )
+from collision_monitor.broad_phase.region import regions_overlap
 from collision_monitor.monitor.roster import FIRST_CAPACITY, Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
@@ -136,8 +135,8 @@ def find_partners(bodies, grid, search, now, margin, pairs):
     n = 0
     for k in range(which.size):
         i = which[k]
-        x, y, z, hx, hy, hz = swept_box(bodies, i, max(now, bodies.motion[i].covered), margin)
-        for m in range(query_box(grid, Region(x, y, z, hx, hy, hz), i, found)):
+        swept = swept_box(bodies, i, max(now, bodies.motion[i].covered), margin)
+        for m in range(query_box(grid, swept, i, found)):
             j = found[m]
             if not _finds(bodies, is_new, i, j):
                 continue
@@ -163,8 +162,8 @@ def keep_new(bodies, grid, pairs, is_new, now, margin):
                 continue
         covered = bodies.motion[i].covered
         if covered > now:  # else what is new of it is its whole box
-            x, y, z, hx, hy, hz = swept_box(bodies, i, covered, margin)
-            if not overlap(Region(x, y, z, hx, hy, hz), grid.box[j]):
+            swept = swept_box(bodies, i, covered, margin)
+            if not regions_overlap(swept, grid.box[j]):
                 continue
         pairs[n, 0], pairs[n, 1] = i, j
         n += 1

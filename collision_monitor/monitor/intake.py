@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from collision_monitor import records
 from collision_monitor._jit import device, kernel
 from collision_monitor.errors import InputError, Refusal
-from collision_monitor.geometry.plane import flat_states
+from collision_monitor.geometry.planar import flat_states
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions

@@ -36,23 +36,6 @@ from collision_monitor.settings.profile import Profile
 FACTS = "monitor"
 """Key of the monitor's entry in Snapshot.facts."""
 
-PREDICTED_BY = frozenset(
-    {
-        "horizon",
-        "contact_margin",
-        "impact_tolerance",
-        "impact_iterations",
-        "position_tolerance",
-        "orientation_tolerance",
-        "velocity_tolerance",
-        "angular_velocity_tolerance",
-        "uncertainty",
-        "confidence",
-        "min_probability",
-    }
-)
-"""The settings that predictions rest on: where one changes, all are made anew."""
-
 Events = NDArray[np.void]
 
 
@@ -103,7 +86,7 @@ class Monitor:
         new = self._profile.switched(profile) if isinstance(profile, str) else profile
         changed = self._profile.differences(new).keys()
         self._profile = new
-        if changed & PREDICTED_BY:
+        if Profile.changes_predictions(changed):
             self._roster.renew_all()
         if "horizon" in changed:
             self._roster.bodies.slack[:] = 0.0  # it is counted in horizons

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
+from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import CollisionMonitorError, InputError, UnsupportedError
-from collision_monitor.geometry.pieces import is_planar
-from collision_monitor.geometry.plane import flat_pose
-from collision_monitor.geometry.shape_table import LANES, POLYGON, ShapeTable, ShapeTableBuilder
+from collision_monitor.geometry.planar import flat_pose, is_planar
+from collision_monitor.geometry.shape_table import POLYGON, ShapeTable, ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.objects.description import ObjectDescription

@@ -11,7 +11,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.broad_phase.hashed_grid import LEVEL_OFFSET, LEVELS, HashedGrid
+from collision_monitor.broad_phase.hashed_grid import GRID_LEVELS, LEVEL_OFFSET, HashedGrid
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.narrow_phase.dispatch import _METHODS, KIND_NAMES, pair_test
 
@@ -102,7 +102,7 @@ def scene_plan(roster: Roster, grid: HashedGrid, *, uncertain: bool, outside: in
         static=int(np.count_nonzero(static)),
         turning=int(np.count_nonzero(bodies.spin_radius[moving_bodies] > 0.0)),
         tests={(KIND_NAMES[a], KIND_NAMES[b]): pair_test(a, b) for a, b in sorted(set(pairs))},
-        cells={2.0 ** (k - LEVEL_OFFSET): int(grid.level_count[k]) for k in range(LEVELS) if grid.level_count[k]},
+        cells={2.0 ** (k - LEVEL_OFFSET): int(grid.level_count[k]) for k in range(GRID_LEVELS) if grid.level_count[k]},
         groups=len(filters),
         never_meet=_ignoring(*of_groups[0]) - _ignoring(*of_groups[1]),
         planar=roster.planar,

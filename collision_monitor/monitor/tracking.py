@@ -282,7 +282,7 @@ def restart_motion(bodies, uncertainty, grid, which, now, settings):
                 m.tube_0 += 2.0 * stale_acceleration * age * age
                 m.tube_1 += 2.0 * stale_acceleration * age
         _cover_spread(bodies, uncertainty, i, now, (np.inf, np.inf), stale_acceleration)
-        put_box(grid, i, *swept_box(bodies, i, now, settings.margin))
+        put_box(grid, i, swept_box(bodies, i, now, settings.margin))
 
 
 @kernel
@@ -300,4 +300,4 @@ def continue_motion(bodies, uncertainty, grid, which, now, settings):
         _cover(bodies, i, now, settings.horizon)
         # no more than it did: what it could meet until `covered` is known already
         _cover_spread(bodies, uncertainty, i, now, allowed, settings.stale_acceleration)
-        put_box(grid, i, *swept_box(bodies, i, now, settings.margin))
+        put_box(grid, i, swept_box(bodies, i, now, settings.margin))

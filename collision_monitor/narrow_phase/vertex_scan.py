@@ -13,21 +13,14 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from collision_monitor.geometry.shape_table import LANES
+from collision_monitor._jit.vectors import DOUBLES, LANES, spread
 
 _LANE = ir.IntType(32)
-_DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
 _INDICES = ir.VectorType(ir.IntType(64), LANES)
 
 
 def _vector(constants: list[int]) -> Any:
     return ir.Constant(_INDICES, constants)
-
-
-def _spread(builder: Any, value: Any, vector: Any) -> Any:
-    """`value` in every lane."""
-    one = builder.insert_element(ir.Constant(vector, ir.Undefined), value, _LANE(0))
-    return builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(_LANE, LANES), [0] * LANES))
 
 
 def _better(builder: Any, value: Any, index: Any, other_value: Any, other_index: Any) -> Any:
@@ -51,7 +44,7 @@ def farthest_vertex(
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array = context.make_array(signature.args[0])(context, builder, arguments[0])
         start, count = arguments[1], arguments[2]
-        direction = [_spread(builder, d, _DOUBLES) for d in arguments[3:]]
+        direction = [spread(builder, d) for d in arguments[3:]]
         index_type = ir.IntType(64)
         row_length = cgutils.unpack_tuple(builder, array.shape)[1]
         rows = [
@@ -61,7 +54,7 @@ def farthest_vertex(
         def dots(offset: Any) -> Any:
             total = None
             for row, d in zip(rows, direction, strict=True):
-                place = builder.bitcast(builder.gep(row, [offset]), _DOUBLES.as_pointer())
+                place = builder.bitcast(builder.gep(row, [offset]), DOUBLES.as_pointer())
                 product = builder.fmul(builder.load(place, align=8), d)
                 total = product if total is None else builder.fadd(total, product)
             return total
@@ -70,7 +63,7 @@ def farthest_vertex(
         where = cgutils.alloca_once_value(builder, _vector(list(range(LANES))))
         with cgutils.for_range_slice(builder, index_type(LANES), count, index_type(LANES)) as (offset, _):
             here = dots(offset)
-            indices = builder.add(_spread(builder, offset, _INDICES), _vector(list(range(LANES))))
+            indices = builder.add(spread(builder, offset, _INDICES), _vector(list(range(LANES))))
             farther = builder.fcmp_ordered(">", here, builder.load(most))
             builder.store(builder.select(farther, here, builder.load(most)), most)
             builder.store(builder.select(farther, indices, builder.load(where)), where)

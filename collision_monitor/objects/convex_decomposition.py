@@ -37,7 +37,7 @@ SETTLED: Final = 0.02
 COARSE: Final = 1e-3
 """Or, where it is small, to this part of the size."""
 
-NEIGHBOURS: Final = 16
+NEAREST_CENTRES: Final = 16
 """Faces, by their centres, that are asked for the nearest one. Fewer: the stated error is larger than it has to be."""
 
 INSTALL: Final = 'pip install "collision_monitor[decomposition]"'
@@ -167,7 +167,7 @@ def _to_surface(points: Array, corners: Array) -> tuple[Array, Indices]:
     """Distances (n,) of points from the nearest of some triangles (m, 3, 3), or a little more, and which it is."""
     from scipy.spatial import cKDTree
 
-    _, near = cKDTree(corners.mean(axis=1)).query(points, min(NEIGHBOURS, len(corners)))
+    _, near = cKDTree(corners.mean(axis=1)).query(points, min(NEAREST_CENTRES, len(corners)))
     near = near.reshape(len(points), -1)
     apart = closest_point_on_triangle(points[:, None], *np.moveaxis(corners[near], 2, 0))[1]
     best = apart.argmin(axis=1)[:, None]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.pieces import shape_pairs
+from collision_monitor.geometry.compound import shape_pairs
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.records import Model
 

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.bounding_spheres import minimal_sphere
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
+from collision_monitor.geometry.convex_pieces import convex_pieces
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
-from collision_monitor.geometry.pieces import convex_pieces, is_planar
+from collision_monitor.geometry.planar import is_planar
 from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
@@ -36,20 +37,18 @@ from collision_monitor.geometry.shapes import (
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.objects.convex_decomposition import convex_decomposition
 from collision_monitor.records import Model
+from collision_monitor.tolerances import ROUNDED_UP
 
 Array = NDArray[np.float64]
-Pieces = list[tuple[Shape, Pose]]
+PosedShapes = list[tuple[Shape, Pose]]
 
-ROUNDED_UP: Final = 1e-12
-"""Models are larger by this part of their size, so that they contain the object whatever was rounded."""
-
-SAMPLES: Final = 24
+EXCESS_CELLS: Final = 24
 """Cells along each axis in which the excess around a concave object is sought: it is known to their half diagonal.
-Larger: as the cube slower. Smaller: the stated excess is up to 2/SAMPLES of the size too large."""
+Larger: as the cube slower. Smaller: the stated excess is up to 2/EXCESS_CELLS of the size too large."""
 
 KDOPS: Final = {Model.KDOP6: 6, Model.KDOP14: 14, Model.KDOP18: 18, Model.KDOP26: 26}
 
-SUPPORTED: Final = tuple(m.name.lower() for m in Model)
+MODEL_NAMES: Final = tuple(m.name.lower() for m in Model)
 """The models that there are, by name."""
 
 
@@ -59,7 +58,7 @@ class Modelled(NamedTuple):
     No point of the model is farther than the excess from the object, and no point of the object is outside the model.
     """
 
-    pieces: Pieces
+    pieces: PosedShapes
     shapes: list[int]  # for each piece: index of the shape that it is part of
     model: Model
     excess: float
@@ -73,7 +72,7 @@ def parse_model(model: Model | str | int) -> Model:
     else:
         chosen = Model(model) if model in list(Model) else None
     if chosen is None:
-        raise InputError(f"model: expected one of {', '.join(SUPPORTED)}, got {model!r}")
+        raise InputError(f"model: expected one of {', '.join(MODEL_NAMES)}, got {model!r}")
     return chosen
 
 
@@ -155,7 +154,7 @@ def _decomposed(shapes: Sequence[tuple[Shape, Pose]], convex: bool) -> Modelled:
     return Modelled(pieces, index, Model.CONVEX_DECOMPOSITION, excess, convex)
 
 
-def _enclose(pieces: Pieces, model: Model) -> tuple[Shape, Pose]:
+def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
     """The model around the pieces, with its pose in the object's frame."""
     shape, pose = pieces[0]
     single = len(pieces) == 1
@@ -205,7 +204,7 @@ def _box(size: Array) -> Box:
     return Box(size + ROUNDED_UP * float(size.max()))
 
 
-def _corners(pieces: Pieces) -> Array:
+def _corners(pieces: PosedShapes) -> Array:
     """Points whose hull contains the pieces: the vertices of polytopes, the corners of boxes about round ones."""
     corners = []
     for shape, pose in pieces:
@@ -218,7 +217,7 @@ def _corners(pieces: Pieces) -> Array:
     return np.concatenate(corners)
 
 
-def _kdop(pieces: Pieces, k: int) -> tuple[Shape, Pose]:
+def _kdop(pieces: PosedShapes, k: int) -> tuple[Shape, Pose]:
     """The slabs around the pieces as the polytope that they cut out."""
     from scipy.spatial import HalfspaceIntersection
 
@@ -235,7 +234,7 @@ def _kdop(pieces: Pieces, k: int) -> tuple[Shape, Pose]:
     return ConvexHull(points), Pose(centre)
 
 
-def _excess(shapes: Sequence[tuple[Shape, Pose]], pieces: Pieces, model: Shape, pose: Pose) -> float:
+def _excess(shapes: Sequence[tuple[Shape, Pose]], pieces: PosedShapes, model: Shape, pose: Pose) -> float:
     """Largest distance (m) of a point of the model from the object, rounded up."""
     if len(pieces) == 1 and model is pieces[0][0]:
         return 0.0
@@ -247,12 +246,14 @@ def _excess(shapes: Sequence[tuple[Shape, Pose]], pieces: Pieces, model: Shape, 
     return max(float(_distances(_corners([(model, pose)]), pieces).max()), 0.0)
 
 
-def _excess_around_concave(shapes: Sequence[tuple[Shape, Pose]], pieces: Pieces, model: Shape, pose: Pose) -> float:
+def _excess_around_concave(
+    shapes: Sequence[tuple[Shape, Pose]], pieces: PosedShapes, model: Shape, pose: Pose
+) -> float:
     """Sampled in cells: a distance changes by no more than one moves, half a cell's diagonal at most."""
     low, high = -reach([(model, pose)], -np.eye(3)), reach([(model, pose)], np.eye(3))
-    cell = (high - low) / SAMPLES
+    cell = (high - low) / EXCESS_CELLS
     slack = float(np.linalg.norm(cell)) / 2
-    centres = np.stack(np.meshgrid(*[np.arange(SAMPLES) + 0.5] * 3, indexing="ij"), -1).reshape(-1, 3) * cell + low
+    centres = np.stack(np.meshgrid(*[np.arange(EXCESS_CELLS) + 0.5] * 3, indexing="ij"), -1).reshape(-1, 3) * cell + low
     if not isinstance(model, Box):
         centres = centres[_distances(centres, [(model, pose)]) <= slack]
     inside = np.zeros(len(centres), bool)
@@ -271,7 +272,7 @@ def _excess_around_concave(shapes: Sequence[tuple[Shape, Pose]], pieces: Pieces,
     return float(_distances(centres, pieces).max()) + slack
 
 
-def _distances(points: Array, pieces: Pieces) -> Array:
+def _distances(points: Array, pieces: PosedShapes) -> Array:
     """Signed distances (n,) (m) of points (n, 3) from the nearest piece, rounded up."""
     builder = ShapeTableBuilder(slots=1 + len(pieces))
     size = float(max(np.abs(reach(pieces, np.concatenate([np.eye(3), -np.eye(3)])))))

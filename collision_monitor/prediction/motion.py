@@ -11,6 +11,7 @@ from math import sqrt
 import numpy as np
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.broad_phase.region import Region
 from collision_monitor.prediction.trigonometry import sin_cos
 
 MOTION = np.dtype(
@@ -177,7 +178,7 @@ def rotation_now(bodies, i, now, q, R):
 
 @device
 def swept_box(bodies, i, begin, margin):
-    """Centre and half extents (m) of a box that holds body i, and `margin` more, from `begin` until its cover time."""
+    """A box that holds body i, and `margin` more, from `begin` until its cover time."""
     m = bodies.motion[i]
     sweep = 0.0 if bodies.static[i] else m.cover - begin
     half = m.radius + margin + m.tube_0 + m.spread_0 + (m.tube_1 + m.spread_1) * (begin - m.tube_time + sweep)
@@ -186,7 +187,7 @@ def swept_box(bodies, i, begin, margin):
     # of a t^2 / 2 the middle of both ends, and half of what is between
     first, last = 0.25 * (middle - ahead) ** 2, 0.25 * (middle + ahead) ** 2
     between, bent = first + last, last - first
-    return (
+    return Region(
         m.x + middle * m.vx + between * m.ax,
         m.y + middle * m.vy + between * m.ay,
         m.z + middle * m.vz + between * m.az,

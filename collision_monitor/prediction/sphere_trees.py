@@ -20,6 +20,7 @@ from collision_monitor.prediction.body_impact import Window, tube_of
 from collision_monitor.prediction.impact_record import CLEAR, TREE_BOUND
 from collision_monitor.prediction.motion import half_acceleration, rotation_at
 from collision_monitor.prediction.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
+from collision_monitor.tolerances import ROUNDED_UP
 
 Array = NDArray[np.float64]
 
@@ -31,9 +32,6 @@ WORTH: Final = 0.4
 
 MOST_CORNERS: Final = 2000
 """Beyond it a tree takes a second to make."""
-
-ROUNDED_UP: Final = 1e-12
-"""Spheres are larger by this part, so that they contain their piece whatever was rounded."""
 
 
 class Trees(NamedTuple):

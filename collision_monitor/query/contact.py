@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import PoseError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
-from collision_monitor.geometry.pieces import is_planar, shape_pairs
+from collision_monitor.geometry.compound import shape_pairs
+from collision_monitor.geometry.planar import is_planar
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
 from collision_monitor.geometry.pose import Pose

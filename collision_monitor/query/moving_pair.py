@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import PoseError, UnsupportedError
-from collision_monitor.geometry.pieces import is_planar, shape_pairs
-from collision_monitor.geometry.plane import flat_pose
+from collision_monitor.geometry.compound import shape_pairs
+from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shape_table import CIRCLE, SPHERE, ShapeTable, ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Shape
-from collision_monitor.objects.models import Pieces, containing_model
+from collision_monitor.objects.models import PosedShapes, containing_model
 from collision_monitor.prediction.bodies import Bodies, Multibody, Parts, make_bodies, make_parts
 from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.impact_record import IMPACT
@@ -35,7 +35,7 @@ class Body(NamedTuple):
     """One of the two: its shapes, and the convex pieces that they are tested as, with poses in its frame."""
 
     shapes: Sequence[tuple[Shape, Pose]]
-    pieces: Pieces
+    pieces: PosedShapes
     shape_of: list[int]
     motion: Motion
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Final
 
-import numpy as np
-
 from collision_monitor.errors import InputError, PoseError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import Hull, convex_hull
-from collision_monitor.geometry.cascade import collide
+from collision_monitor.geometry.cascade import polyhedra_intersect
+from collision_monitor.geometry.compound import shape_pairs
 from collision_monitor.geometry.coordinates import Array
-from collision_monitor.geometry.pieces import shape_pairs
 from collision_monitor.geometry.polyhedra import is_closed
 from collision_monitor.geometry.polyhedron_sat import sat_3d
 from collision_monitor.geometry.pose import Pose
@@ -18,8 +16,6 @@ from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape
 from collision_monitor.query.contact import Compound, contact
 
 TESTS: Final = ("contact", "cascade", "sat")
-
-_CORNERS: Final = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 
 
 def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, test: str = "contact") -> bool:
@@ -38,7 +34,7 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
     ]
     if test == "sat":
         return any(sat_3d(a, b).overlaps for a in solids[0] for b in solids[1])
-    return any(collide(*a, *b).collides for a in solids[0] for b in solids[1])
+    return any(polyhedra_intersect(*a, *b).collides for a in solids[0] for b in solids[1])
 
 
 def _solids(shape: Compound, pose: Pose, test: str, name: str) -> list[Hull]:
@@ -56,7 +52,7 @@ def _solids(shape: Compound, pose: Pose, test: str, name: str) -> list[Hull]:
 def _polyhedron(shape: Shape, test: str) -> Hull:
     match shape:
         case Box():
-            return convex_hull(_CORNERS * np.array(shape.size))
+            return convex_hull(shape.corners)
         case ConvexHull():
             return convex_hull(shape.points)
         case Mesh() if test == "cascade" and is_closed(shape.faces):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.aabb_tree import aabb_tree
-from collision_monitor.geometry.pieces import convex_pieces, is_convex_mesh
+from collision_monitor.geometry.convex_pieces import convex_pieces, is_convex_mesh
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shape_table import ShapeTable, ShapeTableBuilder, join, triangle_table
 from collision_monitor.geometry.shapes import ConvexHull, HalfSpace, Mesh, Polygon, Shape

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import InputError, PoseError
-from collision_monitor.geometry.pieces import is_planar
+from collision_monitor.geometry.planar import is_planar
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import HalfSpace, Mesh
 from collision_monitor.prediction.bodies import Multibody

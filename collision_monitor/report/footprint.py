@@ -19,7 +19,6 @@ VIEWING_DIRECTIONS: Final = 64
 FAR: Final = 1e4
 """m: how much is drawn of a half-space, more than any picture shows."""
 
-_CORNERS: Final = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 _ANGLE: Final = np.linspace(0.0, 2.0 * np.pi, VIEWING_DIRECTIONS, endpoint=False)
 _NORMAL: Final = np.stack([np.cos(_ANGLE), np.sin(_ANGLE), np.zeros(VIEWING_DIRECTIONS)], axis=1)
 
@@ -38,7 +37,7 @@ def _outline(shape: Shape, pose: Pose) -> Floats | None:
         case Polygon():
             return _from_above(np.pad(shape.points, ((0, 0), (0, 1))), pose)
         case Box():
-            return _hull(_CORNERS * np.asarray(shape.size), pose)
+            return _hull(shape.corners, pose)
         case ConvexHull() | Triangle():
             return _hull(shape.points, pose)
         case Mesh():

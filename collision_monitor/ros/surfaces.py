@@ -32,7 +32,7 @@ def surface_triangles(shape: Shape) -> Triangles:
     """The surface of a shape in its own frame."""
     match shape:
         case Box():
-            return _box(np.asarray(shape.size))
+            return _box(shape.corners)
         case Sphere():
             angles = np.linspace(-np.pi / 2, np.pi / 2, SIDES // 2 + 1)
             return _revolve(shape.radius * np.cos(angles), shape.radius * np.sin(angles))
@@ -72,8 +72,7 @@ def _revolve(radii: NDArray[np.float64], heights: NDArray[np.float64]) -> Triang
     return np.concatenate([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)]).reshape(-1, 3, 3)
 
 
-def _box(size: NDArray[np.float64]) -> Triangles:
-    corner = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * size
+def _box(corner: NDArray[np.float64]) -> Triangles:
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     return np.array([corner[[q[0], q[i], q[i + 1]]] for q in quads for i in (1, 2)])
 

@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-import yaml
-
 from collision_monitor.errors import ProfileError
 from collision_monitor.records import MOST_POINTS, Model
+from collision_monitor.settings.named_profiles import NAMED_PROFILES, profile_changes
 from collision_monitor.settings.setting import EVERYWHERE, Setting, choice, number, settings_of, switch, vector
 
 NO_BUDGET: Final = 1e6
@@ -27,41 +26,67 @@ NO_LIMIT: Final = 1_000_000_000
 
 _MODELS: Final = [model.name.lower() for model in Model if model is not Model.EXACT]
 
-BASED_ON: Final = "based_on"
-"""In the file of a custom profile: the profile that it starts from."""
-
 
 @dataclass(frozen=True)
 class Profile:
     """How far the monitor looks and how exact it is. Raises ProfileError for values that are, or go together, wrong."""
 
     name: str = "balanced"
-    horizon: float = number(2.0, 0.0, 1e6, "s", "How far ahead collisions are predicted; 0: contacts only.")
-    contact_margin: float = number(0.0, 0.0, 1e6, "m", "Pairs up to this far apart count as touching.")
+    horizon: float = number(
+        2.0, 0.0, 1e6, "s", "How far ahead collisions are predicted; 0: contacts only.", predictions=True
+    )
+    contact_margin: float = number(
+        0.0, 0.0, 1e6, "m", "Pairs up to this far apart count as touching.", predictions=True
+    )
     contact_points: int = number(
         1, 1, MOST_POINTS, "1", "Most points of a contact; past 1, a row for each corner of faces that touch."
     )
-    impact_tolerance: float = number(1e-4, 1e-12, 1.0, "m", "Gap at which a predicted impact is settled.")
+    impact_tolerance: float = number(
+        1e-4, 1e-12, 1.0, "m", "Gap at which a predicted impact is settled.", predictions=True
+    )
     impact_iterations: int = number(
-        64, 1, 100000, "1", "Most distance computations for one predicted impact; past it the pair is UNRESOLVED."
+        64,
+        1,
+        100000,
+        "1",
+        "Most distance computations for one predicted impact; past it the pair is UNRESOLVED.",
+        predictions=True,
     )
     position_tolerance: float = number(
-        1e-3, 0.0, 1e3, "m", "An object this close to its predicted position needs no new prediction."
+        1e-3,
+        0.0,
+        1e3,
+        "m",
+        "An object this close to its predicted position needs no new prediction.",
+        predictions=True,
     )
-    orientation_tolerance: float = number(1e-3, 0.0, math.pi, "rad", "The same for its predicted orientation.")
-    velocity_tolerance: float = number(1e-3, 0.0, 1e3, "m/s", "The same for its linear velocity.")
-    angular_velocity_tolerance: float = number(1e-3, 0.0, 1e3, "rad/s", "The same for its angular velocity.")
+    orientation_tolerance: float = number(
+        1e-3, 0.0, math.pi, "rad", "The same for its predicted orientation.", predictions=True
+    )
+    velocity_tolerance: float = number(1e-3, 0.0, 1e3, "m/s", "The same for its linear velocity.", predictions=True)
+    angular_velocity_tolerance: float = number(
+        1e-3, 0.0, 1e3, "rad/s", "The same for its angular velocity.", predictions=True
+    )
     stale_after: float = number(0.5, 0.0, 1e6, "s", "Age of an object's last state from which answers are flagged.")
     stale_acceleration: float = number(
         1.0, 0.0, 1e4, "m/s^2", "How hard an object may accelerate while it is not heard of: widens its bounds."
     )
-    uncertainty: bool = switch(True, "Whether it is told when and how likely pairs meet, where states declare it.")
+    uncertainty: bool = switch(
+        True, "Whether it is told when and how likely pairs meet, where states declare it.", predictions=True
+    )
     uncertainty_samples: int = number(
         1024, 16, 4096, "1", "Samples of what is uncertain, for each pair that may meet, where states declare it."
     )
-    confidence: float = number(0.95, 0.5, 0.9999, "1", "At which the earliest and latest times are stated.")
+    confidence: float = number(
+        0.95, 0.5, 0.9999, "1", "At which the earliest and latest times are stated.", predictions=True
+    )
     min_probability: float = number(
-        0.01, 1e-6, 1.0, "1", "From which on pairs are told that would meet only because of what is uncertain."
+        0.01,
+        1e-6,
+        1.0,
+        "1",
+        "From which on pairs are told that would meet only because of what is uncertain.",
+        predictions=True,
     )
     max_time_step: float = number(10.0, 1e-3, 1e9, "s", "A stamp that jumps by more is refused unless the next agrees.")
     threads: int = number(1, 1, 64, "1", "Threads of the kernels; the answers are the same bytes for any number.")
@@ -101,10 +126,15 @@ class Profile:
         """The settings in order, without the profile's name."""
         return tuple(settings_of(cls))
 
+    @classmethod
+    def changes_predictions(cls, changed: Collection[str]) -> bool:
+        """Whether predictions rest on one of the `changed` settings: then all predictions are made anew."""
+        return any(setting.predictions for setting in cls.fields() if setting.name in changed)
+
     @staticmethod
     def names() -> list[str]:
         """The profiles that come with the package."""
-        return sorted(_NAMED)
+        return sorted(NAMED_PROFILES)
 
     @classmethod
     def named(cls, name: str) -> Profile:
@@ -116,28 +146,11 @@ class Profile:
 
         Settings that it does not name stay as they are. Raises ProfileError.
         """
-        if name in _NAMED:
-            return self.replace(name=name, **_NAMED[name])
-        if Path(name).suffix in (".yaml", ".yml"):
-            return self._from_file(Path(name))
-        raise ProfileError(f"profile: expected one of {', '.join(self.names())}, or a .yaml file, got {name!r}")
-
-    def _from_file(self, path: Path) -> Profile:
+        changes = profile_changes(name)
         try:
-            content = yaml.safe_load(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise ProfileError(f"profile: expected a file that can be read, got {path}: {error.strerror}") from None
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            raise ProfileError(f"profile {path}: expected YAML, got: {' '.join(str(error).split())}") from None
-        if not isinstance(content, dict) or not content:
-            raise ProfileError(f"profile {path}: expected settings, as `horizon: 3.0`, got {content!r}")
-        base = content.pop(BASED_ON, "balanced")
-        if base not in _NAMED:
-            raise ProfileError(f"profile {path}, {BASED_ON}: expected one of {', '.join(self.names())}, got {base!r}")
-        try:
-            return self.switched(base).replace(**{"name": path.stem, **content})
+            return self.replace(**changes)
         except (ProfileError, TypeError) as error:
-            raise ProfileError(f"{path}: {error}") from None
+            raise ProfileError(f"{Path(name)}: {error}") from None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON and YAML."""
@@ -161,33 +174,3 @@ class Profile:
         """The fields in which `other` is not the same, with its values; the name is one of them."""
         mine, theirs = self.to_dict(), other.to_dict()
         return {name: value for name, value in theirs.items() if value != mine[name]}
-
-
-_TOLERANCES: Final = ("position_tolerance", "orientation_tolerance", "velocity_tolerance", "angular_velocity_tolerance")
-_NAMED: Final[dict[str, dict[str, Any]]] = {
-    "balanced": {
-        "impact_tolerance": 1e-4,
-        "impact_iterations": 64,
-        "uncertainty": True,
-        "uncertainty_samples": 1024,
-        **dict.fromkeys(_TOLERANCES, 1e-3),
-    },
-    "fast": {
-        "impact_tolerance": 1e-3,
-        "impact_iterations": 64,
-        "uncertainty": False,  # of all that a step may do, sampling takes by far the longest
-        "uncertainty_samples": 128,
-        "position_tolerance": 1e-2,
-        "orientation_tolerance": 1e-2,
-        "velocity_tolerance": 2e-2,
-        "angular_velocity_tolerance": 2e-2,
-    },
-    "exact": {
-        "impact_tolerance": 1e-6,
-        "impact_iterations": 256,
-        "uncertainty": True,
-        "uncertainty_samples": 2048,
-        **dict.fromkeys(_TOLERANCES, 1e-9),
-    },
-}
-"""Each names the same settings, so that switching from one to another leaves nothing of the first."""

@@ -22,10 +22,18 @@ EVERYWHERE: Final = LARGEST_INPUT
 _KINDS: dict[type, str] = {bool: "true or false", int: "a whole number", float: "a number", tuple: "three numbers"}
 
 
-def number(default: float | int, minimum: float | int, maximum: float | int, unit: str, description: str) -> Any:
+def number(
+    default: float | int,
+    minimum: float | int,
+    maximum: float | int,
+    unit: str,
+    description: str,
+    *,
+    predictions: bool = False,
+) -> Any:
     """A field of a profile: a number, whole where the default is."""
     metadata = {"minimum": minimum, "maximum": maximum, "unit": unit, "description": description}
-    return field(default=default, metadata=metadata)
+    return field(default=default, metadata={**metadata, "predictions": predictions})
 
 
 def vector(default: Vector, largest: float, unit: str, description: str) -> Any:
@@ -34,9 +42,9 @@ def vector(default: Vector, largest: float, unit: str, description: str) -> Any:
     return field(default=default, metadata=metadata)
 
 
-def switch(default: bool, description: str) -> Any:
+def switch(default: bool, description: str, *, predictions: bool = False) -> Any:
     """A field of a profile: on or off."""
-    return field(default=default, metadata={"description": description})
+    return field(default=default, metadata={"description": description, "predictions": predictions})
 
 
 def choice(choices: Iterable[str], description: str) -> Any:
@@ -47,7 +55,10 @@ def choice(choices: Iterable[str], description: str) -> Any:
 
 @dataclass(frozen=True)
 class Setting:
-    """One field of a profile, as parameter declarations and help texts need it; minimum and maximum: of numbers."""
+    """One field of a profile, as parameter declarations and help texts need it; minimum and maximum: of numbers.
+
+    predictions: predictions rest on it, so that a change makes all of them anew.
+    """
 
     name: str
     type: type
@@ -57,6 +68,7 @@ class Setting:
     maximum: float | int = math.inf
     unit: str = "1"
     choices: tuple[str, ...] = ()
+    predictions: bool = False
 
     def checked(self, value: Any) -> Value:
         """The value in the setting's own type. Raises ProfileError, naming setting, value and what was expected."""

@@ -20,7 +20,10 @@ ROOT = Path(__file__).resolve().parents[2]
 VENV = ROOT / ".venv"
 BUILD = ROOT / "build"
 PYTHON = VENV / "bin" / "python"
+PACKAGE = "collision_monitor"
 MESSAGES = "collision_monitor_msgs"
+
+_IMPORT = re.compile(rf"^\s*from ({PACKAGE}[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -175,15 +178,24 @@ def _install_package(ros: machine.RosInstall | None, log: IO[str]) -> None:
 
 
 def _kernel_inputs(ros: machine.RosInstall | None) -> str:
-    # the rule of collision_monitor/_jit.py, which names the folder of the compiled kernels
-    sources = sorted((ROOT / "collision_monitor").rglob("*.py"))
-    constants = ("tolerances.py", "records.py", "warm_up.py")
-    kernels = [path for path in sources if path.name in constants or _has_kernels(path.read_bytes())]
-    return _digest(files=kernels)
+    return _digest(files=compiled_sources())
 
 
-def _has_kernels(source: bytes) -> bool:
-    return b"_jit" in source or b"numba" in source
+def compiled_sources() -> list[Path]:
+    """What the warm-up imports, directly or not: where one of these changes, kernels are compiled anew.
+
+    The rule of collision_monitor/_jit/cache.py, which names the folders of the compiled kernels.
+    """
+    found, queue = set(), [ROOT / PACKAGE / "warm_up.py"]
+    while queue:
+        path = queue.pop()
+        found.add(path)
+        for module, names in _IMPORT.findall(path.read_text()):
+            base = ROOT.joinpath(*module.split("."))
+            places = [base, *(base / name for name in re.findall(r"\w+", names))]
+            files = [file for place in places for file in (place.with_suffix(".py"), place / "__init__.py")]
+            queue += [file for file in files if file.is_file() and file not in found]
+    return sorted(found)
 
 
 def _compile_monitor(ros: machine.RosInstall | None, log: IO[str]) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from solids import CONCAVE, CONVEX, SKEWS
 
-from collision_monitor.broad_phase.bsp_tree import bsp_tree, first_hit, locate
+from collision_monitor.broad_phase.bsp_tree import bsp_tree, first_hit, locate_in_bsp_tree
 from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.polyhedra import edge_face, locate_in_polyhedron
@@ -24,11 +24,11 @@ def test_points_and_segments(name, skew):
     low, high = vertices.min(axis=0) - 0.5, vertices.max(axis=0) + 0.5
     p, q = rng.uniform(low, high, (2, 300, 3))
     expected = locate_in_polyhedron(p, vertices, faces)
-    np.testing.assert_array_equal(locate(p, tree), expected)
+    np.testing.assert_array_equal(locate_in_bsp_tree(p, tree), expected)
     # on faces, edges and corners: the boundary, on either side of which the tree has a leaf
     corners = vertices[faces]
     for points in (corners.mean(axis=1), corners[:, :2].mean(axis=1), vertices[np.unique(faces)]):
-        assert (locate(points, tree) == Location.BOUNDARY).all()
+        assert (locate_in_bsp_tree(points, tree) == Location.BOUNDARY).all()
     # a segment that starts inside hits at once, another where it first crosses a face
     crossing = edge_face(p[:, None], q[:, None], *np.moveaxis(corners, 1, 0))
     first = np.where(crossing.meets, crossing.t, np.inf).min(axis=1)

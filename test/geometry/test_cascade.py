@@ -11,7 +11,7 @@ from rational import in_polyhedron, segment_meets_triangle
 from solids import SKEWS, bar, cube, hollow, ring, u_shape
 
 from collision_monitor.errors import ShapeError
-from collision_monitor.geometry.cascade import Stage, collide
+from collision_monitor.geometry.cascade import Stage, polyhedra_intersect
 from collision_monitor.geometry.polyhedra import mesh_edges
 
 
@@ -35,27 +35,27 @@ def meet(a, b):
 
 
 def test_each_stage():
-    apart = collide(*cube(), *moved(cube(), [3, 0, 0]))
+    apart = polyhedra_intersect(*cube(), *moved(cube(), [3, 0, 0]))
     assert not apart.collides and apart.stage is Stage.BOUNDING_VOLUMES
-    corner = collide(*cube(), *moved(cube(), [0.5, 0.5, 0.5]))
+    corner = polyhedra_intersect(*cube(), *moved(cube(), [0.5, 0.5, 0.5]))
     assert corner.collides and corner.stage is Stage.VERTICES
     assert cube()[0][corner.vertices_a].tolist() == [[1, 1, 1]]
     assert moved(cube(), [0.5, 0.5, 0.5])[0][corner.vertices_b].tolist() == [[0.5, 0.5, 0.5]]
-    crossed = collide(
+    crossed = polyhedra_intersect(
         *moved(cube(), [-2, 0, 0], np.diag([5, 1, 1])), *moved(cube(), [0.25, -2, 0.25], np.diag([0.5, 5, 0.5]))
     )
     assert crossed.collides and crossed.stage is Stage.EDGES_AND_FACES
     assert len(crossed.edges_a) and len(crossed.edges_b)
-    beside = collide(*u_shape(), *moved(cube(), [1.25, 0, 1.25], np.eye(3) / 2))
+    beside = polyhedra_intersect(*u_shape(), *moved(cube(), [1.25, 0, 1.25], np.eye(3) / 2))
     assert not beside.collides and beside.stage is Stage.EDGES_AND_FACES  # between the arms
 
 
 def test_one_within_the_other_and_within_its_cavity():
-    within = collide(*moved(cube(), [1, 1, 0.25], np.eye(3) / 2), *bar(3, 3, 1))
+    within = polyhedra_intersect(*moved(cube(), [1, 1, 0.25], np.eye(3) / 2), *bar(3, 3, 1))
     assert within.collides and within.stage is Stage.VERTICES and len(within.vertices_a) == 8
-    cavity = collide(*moved(cube(), [1.25, 1.25, 1.25], np.eye(3) / 2), *hollow())
+    cavity = polyhedra_intersect(*moved(cube(), [1.25, 1.25, 1.25], np.eye(3) / 2), *hollow())
     assert not cavity.collides
-    through = collide(*moved(bar(1, 1, 5), [1.25, 1.25, -2], np.diag([0.5, 0.5, 1])), *ring())
+    through = polyhedra_intersect(*moved(bar(1, 1, 5), [1.25, 1.25, -2], np.diag([0.5, 0.5, 1])), *ring())
     assert not through.collides  # through the hole
 
 
@@ -66,7 +66,7 @@ def test_touching_at_corners_edges_and_faces(shift, solid):
     expected = meet(*upright)
     for skew in SKEWS.values():
         a, b = (moved(s, 0, skew) for s in upright)
-        assert collide(*a, *b).collides == collide(*b, *a).collides == expected
+        assert polyhedra_intersect(*a, *b).collides == polyhedra_intersect(*b, *a).collides == expected
 
 
 def test_random_solids_against_fcl():
@@ -84,7 +84,7 @@ def test_random_solids_against_fcl():
             model.endModel()
             objects.append(fcl.CollisionObject(model))
         surfaces_cross = fcl.collide(*objects) > 0
-        found = collide(*a, *b)
+        found = polyhedra_intersect(*a, *b)
         if surfaces_cross:
             assert found.collides
         if not found.collides or found.stage is Stage.EDGES_AND_FACES:
@@ -96,6 +96,6 @@ def test_random_solids_against_fcl():
 def test_open_and_impossible_meshes_are_refused():
     vertices, faces = cube()
     with pytest.raises(ShapeError, match="mesh B: expected a closed surface"):
-        collide(vertices, faces, vertices, faces[1:])
+        polyhedra_intersect(vertices, faces, vertices, faces[1:])
     with pytest.raises(ShapeError, match="mesh A faces"):
-        collide(vertices, faces + 5, vertices, faces)
+        polyhedra_intersect(vertices, faces + 5, vertices, faces)

@@ -9,11 +9,11 @@ from scipy.optimize import lsq_linear
 
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.closest_points import closest_points
-from collision_monitor.geometry.lines import Extent
+from collision_monitor.geometry.lines import LineKind
 
-LINE, RAY, SEGMENT = Extent.LINE, Extent.RAY, Extent.SEGMENT
+LINE, RAY, SEGMENT = LineKind.LINE, LineKind.RAY, LineKind.SEGMENT
 FOUR = st.tuples(POINTS_3D, POINTS_3D, POINTS_3D, POINTS_3D)
-EXTENTS = st.sampled_from(list(Extent))
+EXTENTS = st.sampled_from(list(LineKind))
 
 
 def test_the_slides_normal_equations():

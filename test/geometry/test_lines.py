@@ -8,7 +8,7 @@ from rational import EXPONENTS, POINTS_2D, area2, common_points, cross2, exact, 
 
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.lines import (
-    Extent,
+    LineKind,
     Relation,
     explicit_line,
     implicit_line,
@@ -37,7 +37,7 @@ def test_lines_that_have_no_such_form_are_refused():
     with pytest.raises(InputError, match="different points"):
         implicit_line([1, 2], [1, 2])
     with pytest.raises(InputError, match="different points"):
-        intersect([1, 2], [1, 2], [0, 0], [1, 0], Extent.RAY)
+        intersect([1, 2], [1, 2], [0, 0], [1, 0], LineKind.RAY)
     with pytest.raises(InputError, match="finite"):
         intersect([1, np.nan], [1, 2], [0, 0], [1, 0])
 
@@ -68,7 +68,7 @@ def test_swapped_and_reversed_segments_meet_alike(points):
     assert relation == intersect(*turned).relation
 
 
-@given(FOUR, st.sampled_from(list(Extent)), st.sampled_from(list(Extent)))
+@given(FOUR, st.sampled_from(list(LineKind)), st.sampled_from(list(LineKind)))
 def test_every_pair_of_extents_by_solving_the_slides_equations(points, first, second):
     a, b, c, d = points
     assume(a != b and c != d)

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from numba import njit
 
+from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.geometry import shapes
 from collision_monitor.geometry.pose import Pose, rotation_matrix
-from collision_monitor.geometry.shape_table import LANES, ShapeTableBuilder, bounds, hull_vertices
+from collision_monitor.geometry.qhull import hull_vertices
+from collision_monitor.geometry.shape_table import ShapeTableBuilder, bounds
 
 
 @njit

@@ -12,8 +12,8 @@ from scipy.spatial import ConvexHull as Qhull
 
 from collision_monitor import Circle, Polygon, Pose, contact
 from collision_monitor.geometry.closest_points import closest_points
-from collision_monitor.geometry.lines import Extent
-from collision_monitor.geometry.polygon_polygon import Evidence, polygons_intersect
+from collision_monitor.geometry.lines import LineKind
+from collision_monitor.geometry.polygon_overlap import Evidence, polygons_intersect
 
 L_SHAPE = Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)])
 
@@ -37,7 +37,7 @@ def distance(p, q):
     i, j = np.indices((len(p), len(q))).reshape(2, -1)
     p3, q3 = (np.pad(x, ((0, 0), (0, 1))) for x in (p, q))
     u, v = np.roll(p3, -1, 0) - p3, np.roll(q3, -1, 0) - q3
-    return closest_points(p3[i], u[i], q3[j], v[j], Extent.SEGMENT, Extent.SEGMENT).distance.min()
+    return closest_points(p3[i], u[i], q3[j], v[j], LineKind.SEGMENT, LineKind.SEGMENT).distance.min()
 
 
 def depth(p, q):

@@ -125,6 +125,14 @@ def test_exported_variables_of_other_pythons_are_left_out(monkeypatch: pytest.Mo
     assert stages.environment_variables(install)["AMENT_PREFIX_PATH"] == f"{stages.VENV}:/opt/ros/jazzy"
 
 
+def test_kernels_are_compiled_again_when_a_module_changes_that_they_import() -> None:
+    names = {str(path.relative_to(ROOT / "collision_monitor")) for path in stages.compiled_sources()}
+    kernels = {"broad_phase/dense_grid.py", "monitor/event_list.py", "detection/kernels.py", "_jit/__init__.py"}
+    below = {"warm_up.py", "tolerances.py", "records.py", "geometry/polygons.py", "settings/setting.py"}
+    assert kernels | below <= names
+    assert not [name for name in names if name.startswith(("cli/", "ros/", "report/", "session/"))]
+
+
 def test_compiled_kernels_stay_for_a_month(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stages, "VENV", tmp_path)
     cache = tmp_path / "var" / "cache" / "collision_monitor"

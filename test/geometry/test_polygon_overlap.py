@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull
 
 from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.points import closest_point_on_segment
-from collision_monitor.geometry.polygon_polygon import (
+from collision_monitor.geometry.polygon_overlap import (
     Evidence,
     contained_vertices,
     crossing_edge_pairs,

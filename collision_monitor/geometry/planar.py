@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import PoseError
 from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Circle, Polygon, Shape
 
 PLANAR_VECTORS = {"position": slice(2, 3), "linear": slice(2, 3), "angular": slice(0, 2)}
 """Fields of records.STATE and which of their components are none of the plane's business."""
@@ -38,3 +39,8 @@ def flat_pose(pose: Pose) -> Pose:
     if not quaternion.any():
         raise PoseError(f"expected z to point up for a shape of the plane, got quaternion {pose.quaternion.tolist()}")
     return Pose((*pose.position[:2], 0.0), quaternion)
+
+
+def is_planar(shape: Shape) -> bool:
+    """Whether a shape is one of the x-y plane."""
+    return isinstance(shape, Circle | Polygon)

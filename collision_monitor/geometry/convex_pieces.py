@@ -2,46 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import lru_cache
-from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.polygons import is_convex
 from collision_monitor.geometry.polyhedra import is_closed
 from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.qhull import HEIGHTS_AT_ONCE
 from collision_monitor.geometry.shapes import ConvexHull, Mesh, Polygon, Shape, Triangle
 from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.tolerances import HULL_DROP
-
-PLANAR = ("Circle", "Polygon")
-
-AT_ONCE: Final = 1 << 20
-"""Heights of vertices over faces that are computed together: 8 MB."""
-
-
-def is_planar(shape: Shape) -> bool:
-    """Whether a shape is one of the x-y plane."""
-    return type(shape).__name__ in PLANAR
-
-
-def shape_pairs(value: Any, what: str) -> tuple[tuple[Shape, Pose], ...]:
-    """An object's shapes, given as one or as (shape, pose in the object's frame). Raises ShapeError, naming `what`."""
-    if isinstance(value, Shape):
-        return ((value, Pose()),)
-    if not isinstance(value, Iterable):
-        raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), got {value!r}")
-    pairs = tuple(tuple(item) if isinstance(item, Iterable) else item for item in value)
-    for pair in pairs:
-        is_pair = isinstance(pair, tuple) and len(pair) == 2
-        if not (is_pair and isinstance(pair[0], Shape) and isinstance(pair[1], Pose)):
-            raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), got {pair!r} in the list")
-    if not pairs:
-        raise ShapeError(f"{what}: expected at least one shape, got none")
-    return pairs
 
 
 @lru_cache(maxsize=64)
@@ -81,7 +53,7 @@ def is_convex_mesh(mesh: Mesh) -> bool:
     flat = HULL_DROP * 16 * size
     # inward or outward, but all the same way, and not a sheet that is folded onto itself
     outward = inward = True
-    for some in np.array_split(np.arange(len(normal)), len(normal) * len(used) // AT_ONCE + 1):
+    for some in np.array_split(np.arange(len(normal)), len(normal) * len(used) // HEIGHTS_AT_ONCE + 1):
         height = used @ normal[some].T - offset[some]
         low, high = height.min(axis=0), height.max(axis=0)
         outward = outward and bool((high <= flat).all() and (low < -flat).all())

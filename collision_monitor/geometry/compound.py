@@ -1,0 +1,26 @@
+"""A compound: one object of several shapes, each with its pose in the object's frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from collision_monitor.errors import ShapeError
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Shape
+
+
+def shape_pairs(value: Any, what: str) -> tuple[tuple[Shape, Pose], ...]:
+    """An object's shapes, given as one or as (shape, pose in the object's frame). Raises ShapeError, naming `what`."""
+    if isinstance(value, Shape):
+        return ((value, Pose()),)
+    if not isinstance(value, Iterable):
+        raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), got {value!r}")
+    pairs = tuple(tuple(item) if isinstance(item, Iterable) else item for item in value)
+    for pair in pairs:
+        is_pair = isinstance(pair, tuple) and len(pair) == 2
+        if not (is_pair and isinstance(pair[0], Shape) and isinstance(pair[1], Pose)):
+            raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), got {pair!r} in the list")
+    if not pairs:
+        raise ShapeError(f"{what}: expected at least one shape, got none")
+    return pairs

@@ -1,0 +1,74 @@
+"""The profiles that come with the package, and those that a user keeps in YAML files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import yaml
+
+from collision_monitor.errors import ProfileError
+
+BASED_ON: Final = "based_on"
+"""In the file of a custom profile: the profile that it starts from."""
+
+_TOLERANCES: Final = ("position_tolerance", "orientation_tolerance", "velocity_tolerance", "angular_velocity_tolerance")
+
+NAMED_PROFILES: Final[dict[str, dict[str, Any]]] = {
+    "balanced": {
+        "impact_tolerance": 1e-4,
+        "impact_iterations": 64,
+        "uncertainty": True,
+        "uncertainty_samples": 1024,
+        **dict.fromkeys(_TOLERANCES, 1e-3),
+    },
+    "fast": {
+        "impact_tolerance": 1e-3,
+        "impact_iterations": 64,
+        "uncertainty": False,  # of all that a step may do, sampling takes by far the longest
+        "uncertainty_samples": 128,
+        "position_tolerance": 1e-2,
+        "orientation_tolerance": 1e-2,
+        "velocity_tolerance": 2e-2,
+        "angular_velocity_tolerance": 2e-2,
+    },
+    "exact": {
+        "impact_tolerance": 1e-6,
+        "impact_iterations": 256,
+        "uncertainty": True,
+        "uncertainty_samples": 2048,
+        **dict.fromkeys(_TOLERANCES, 1e-9),
+    },
+}
+"""Each names the same settings, so that switching from one to another leaves nothing of the first."""
+
+
+def profile_changes(name: str) -> dict[str, Any]:
+    """The settings that a profile names, by its name or by the path of its YAML file. Raises ProfileError.
+
+    The values of a file are not checked here.
+    """
+    if name in NAMED_PROFILES:
+        return {"name": name, **NAMED_PROFILES[name]}
+    if Path(name).suffix in (".yaml", ".yml"):
+        return _read(Path(name))
+    raise ProfileError(f"profile: expected one of {_names()}, or a .yaml file, got {name!r}")
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ProfileError(f"profile: expected a file that can be read, got {path}: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ProfileError(f"profile {path}: expected YAML, got: {' '.join(str(error).split())}") from None
+    if not isinstance(content, dict) or not content:
+        raise ProfileError(f"profile {path}: expected settings, as `horizon: 3.0`, got {content!r}")
+    base = content.pop(BASED_ON, "balanced")
+    if base not in NAMED_PROFILES:
+        raise ProfileError(f"profile {path}, {BASED_ON}: expected one of {_names()}, got {base!r}")
+    return {**NAMED_PROFILES[base], "name": path.stem, **content}
+
+
+def _names() -> str:
+    return ", ".join(sorted(NAMED_PROFILES))
