@@ -122,7 +122,7 @@ class ActivePairs(Stage):
     def examine(self, step: StepContext, which: NDArray[np.intp], scratch: Scratch, later: Rows) -> int:
         """Examine the pairs `which` (M,); what is certified apart for a while goes into `later` (IMPACT): how many."""
         n, tests, queries = _examine(
-            step.roster.multibody, self.active, which, step.now, (step.impact, step.contact), scratch, later
+            step.roster.multibody, self.active, which, step.now, (step.settings.impact, step.settings.contact), scratch, later
         )
         step.work.narrow_phase_tests += tests
         step.work.impact_queries += queries

@@ -83,5 +83,5 @@ def _impacts(
 ) -> tuple[Events, int]:
     """Impacts (IMPACT) that a kernel finds for pairs, in their order, and the distance queries that it made."""
     events = np.empty(len(pairs) + 1, IMPACT)
-    n, queries = kernel(step.roster.multibody, pairs, step.now, step.impact, events, scratch)
+    n, queries = kernel(step.roster.multibody, pairs, step.now, step.settings.impact, events, scratch)
     return events[:n], queries

@@ -22,7 +22,7 @@ from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.monitor.scene_plan import ScenePlan, scene_plan
 from collision_monitor.monitor.snapshot import Snapshot, Stage
-from collision_monitor.monitor.step_context import StepContext
+from collision_monitor.monitor.step_context import KernelSettings, StepContext
 from collision_monitor.monitor.time_critical import TimeCritical
 from collision_monitor.monitor.timeline import Progress, Timeline
 from collision_monitor.monitor.tracking import Tracking
@@ -50,6 +50,7 @@ class Monitor:
 
     def __init__(self, profile: str | Profile = "balanced", *, timed: bool = True) -> None:
         self._profile = Profile.named(profile) if isinstance(profile, str) else profile
+        self._settings = KernelSettings.of(self._profile)
         self._roster = Roster()
         self._timeline = Timeline()
         self._intake = Intake()
@@ -85,7 +86,7 @@ class Monitor:
     def profile(self, profile: str | Profile) -> None:
         new = self._profile.switched(profile) if isinstance(profile, str) else profile
         changed = self._profile.differences(new).keys()
-        self._profile = new
+        self._profile, self._settings = new, KernelSettings.of(new)
         if Profile.changes_predictions(changed):
             self._roster.renew_all()
         if "horizon" in changed:
@@ -96,7 +97,7 @@ class Monitor:
 
     def _prepare_for_budget(self) -> None:
         if TimeCritical.has_budget(self._profile):
-            self._time_critical.prepare(StepContext.of(self._roster, self._profile, 0.0, 0), self._first_impacts)
+            self._time_critical.prepare(StepContext(self._roster, self._profile, self._settings, 0.0, 0), self._first_impacts)
 
     # ------------------------------------------------------------------ objects
 
@@ -224,7 +225,7 @@ class Monitor:
             return self._answers.repeated()
         roster, timeline, uncertain = self._roster, self._timeline, self._uncertain
         self._intake.take(states, covariances, timeline.seconds(stamp_ns), roster, uncertain)
-        step = StepContext.of(roster, self._profile, timeline.now, self._answers.step_count + 1)
+        step = StepContext(roster, self._profile, self._settings, timeline.now, self._answers.step_count + 1)
         budget = self._time_critical.budget(self._profile)
 
         outside = self._tracking.apply_region(step, self._candidates.grid)
@@ -245,9 +246,10 @@ class Monitor:
 
         contacts = self._answers.contacts(step, self._active_pairs)
         predictions, slots = self._answers.predictions(step, self._active_pairs, self._events)
-        with self.clock.aside():  # no budget cuts it: with its time kept free, nothing else would be done
-            touching = self._active_pairs.touching_keys
-            predictions = uncertain.complete(step, predictions, slots, touching, self._first_impacts.pool)
+        if uncertain.active:
+            with self.clock.aside():  # no budget cuts it: with its time kept free, nothing else would be done
+                touching = self._active_pairs.touching_keys
+                predictions = uncertain.complete(step, predictions, slots, touching, self._first_impacts.pool)
         predictions = self._answers.filtered(step, predictions)
         status = step_status(step, self._active_pairs, self._events, contacts, predictions)
         self._time_critical.end_step(step)

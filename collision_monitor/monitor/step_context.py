@@ -24,28 +24,17 @@ class MotionSettings(NamedTuple):
     angular_velocity_tolerance: float  # rad/s
 
 
-@dataclass(frozen=True, slots=True)
-class StepContext:
-    """One step. impact, contact, motion: the profile's settings as the kernels read them."""
+class KernelSettings(NamedTuple):
+    """A profile's settings as the kernels read them."""
 
-    roster: Roster
-    profile: Profile
-    now: float  # s after the timeline's origin
-    number: int  # of the step, from 1
     impact: ImpactQuery
     contact: ContactQuery
     motion: MotionSettings
-    work: Work = field(default_factory=Work)
 
     @classmethod
-    def of(cls, roster: Roster, profile: Profile, now: float, number: int) -> Self:
-        """The step of this number at `now` (s)."""
-        p = profile
+    def of(cls, p: Profile) -> Self:
+        """The settings of a profile."""
         return cls(
-            roster,
-            p,
-            now,
-            number,
             ImpactQuery(p.contact_margin, p.impact_tolerance, p.impact_iterations),
             ContactQuery(p.contact_margin, p.stale_acceleration),
             MotionSettings(
@@ -58,3 +47,15 @@ class StepContext:
                 p.angular_velocity_tolerance,
             ),
         )
+
+
+@dataclass(slots=True)
+class StepContext:
+    """One step: the objects, the settings, the time, and the count of what the stages do."""
+
+    roster: Roster
+    profile: Profile
+    settings: KernelSettings
+    now: float  # s after the timeline's origin
+    number: int  # of the step, from 1
+    work: Work = field(default_factory=Work)

@@ -170,7 +170,7 @@ class TimeCritical(Stage):
         done, left = order[:at], order[at:]
         active.events["lower"][done[active.pairs["touching"][done] == 1]] = step.now  # examined last at this time
         step.work.deferred += len(left)
-        n += int(leave(step.roster.bodies, active.active, left, step.now, step.contact, later[n:]))
+        n += int(leave(step.roster.bodies, active.active, left, step.now, step.settings.contact, later[n:]))
         return later[:n]
 
     def _refine(

@@ -98,7 +98,7 @@ class Tracking(Stage):
         roster = step.roster
         found = np.empty((2, roster.top), np.int32)
         uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
-        n, m = find_moved(roster.bodies, uncertainty, roster.top, step.now, step.motion, self._columns, found)
+        n, m = find_moved(roster.bodies, uncertainty, roster.top, step.now, step.settings.motion, self._columns, found)
         return found[0, :n], found[1, :m]
 
     def restart(
@@ -107,8 +107,10 @@ class Tracking(Stage):
         """Start `moved` anew from their last states, and predict `ending` further; their boxes go into the grid."""
         bodies = step.roster.bodies
         uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
-        restart_motion(bodies, uncertainty, grid, moved, step.now, step.motion)
-        continue_motion(bodies, uncertainty, grid, ending, step.now, step.motion)
+        if len(moved):
+            restart_motion(bodies, uncertainty, grid, moved, step.now, step.settings.motion)
+        if len(ending):
+            continue_motion(bodies, uncertainty, grid, ending, step.now, step.settings.motion)
 
     def remember_cover(self, step: StepContext, which: Slots) -> None:
         """The bodies `which` have been predicted until their cover times."""

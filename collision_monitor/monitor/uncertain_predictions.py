@@ -158,7 +158,7 @@ class UncertainPredictions(Stage):
         predictions (n,): of stated motions, with the body slots (n, 2); touching: keys of the pairs that touch now.
         Returns them soonest first.
         """
-        if not self.active or not step.profile.horizon > 0.0:
+        if not step.profile.horizon > 0.0:
             return predictions
         self._widen(step, predictions, slots)
         if not self.counts(step.profile):
@@ -182,7 +182,7 @@ class UncertainPredictions(Stage):
             return
         ends = [np.ascontiguousarray(predictions[name]) for name in INTERVAL]
         widen_intervals(
-            step.roster.multibody, self.spread, Intervals(slots, *ends), step.now, step.profile.horizon, step.impact,
+            step.roster.multibody, self.spread, Intervals(slots, *ends), step.now, step.profile.horizon, step.settings.impact,
             self._rooms[0],
         )  # fmt: skip
         for name, column in zip(INTERVAL, ends, strict=True):
@@ -192,7 +192,7 @@ class UncertainPredictions(Stage):
         """Answers (n, 4) for pairs of body slots (n, 2), on all threads; the same for any number of them."""
         p = step.profile
         sampling = Sampling(
-            step.impact,
+            step.settings.impact,
             p.horizon,
             p.stale_acceleration,
             stated,

@@ -55,7 +55,7 @@ def test_the_monitor_itself_keeps_its_profile_and_its_stages_alone() -> None:
     monitor = Monitor()
     stages = {id(stage) for stage in monitor.stages}
     others = {name for name, value in vars(monitor).items() if id(value) not in stages}
-    assert others == {"_profile"}  # which the restorer hands over
+    assert others == {"_profile", "_settings"}  # which the restorer hands over
 
 
 @pytest.mark.parametrize("stage", STAGES, ids=lambda kind: kind.__name__)
