@@ -121,11 +121,10 @@ class ActivePairs(Stage):
 
     def examine(self, step: StepContext, which: NDArray[np.intp], scratch: Scratch, later: Rows) -> int:
         """Examine the pairs `which` (M,); what is certified apart for a while goes into `later` (IMPACT): how many."""
-        n, tests, queries = _examine(
-            step.roster.multibody, self.active, which, step.now, (step.settings.impact, step.settings.contact), scratch, later
-        )
+        queries = step.settings.impact, step.settings.contact
+        n, tests, made = _examine(step.roster.multibody, self.active, which, step.now, queries, scratch, later)
         step.work.narrow_phase_tests += tests
-        step.work.impact_queries += queries
+        step.work.impact_queries += made
         return int(n)
 
     def take_orphans(self, now: float) -> Rows:

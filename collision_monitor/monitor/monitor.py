@@ -97,7 +97,8 @@ class Monitor:
 
     def _prepare_for_budget(self) -> None:
         if TimeCritical.has_budget(self._profile):
-            self._time_critical.prepare(StepContext(self._roster, self._profile, self._settings, 0.0, 0), self._first_impacts)
+            step = StepContext(self._roster, self._profile, self._settings, 0.0, 0)
+            self._time_critical.prepare(step, self._first_impacts)
 
     # ------------------------------------------------------------------ objects
 

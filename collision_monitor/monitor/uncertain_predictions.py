@@ -181,10 +181,8 @@ class UncertainPredictions(Stage):
         if not self.spread.acceleration.any():
             return
         ends = [np.ascontiguousarray(predictions[name]) for name in INTERVAL]
-        widen_intervals(
-            step.roster.multibody, self.spread, Intervals(slots, *ends), step.now, step.profile.horizon, step.settings.impact,
-            self._rooms[0],
-        )  # fmt: skip
+        intervals, query, horizon = Intervals(slots, *ends), step.settings.impact, step.profile.horizon
+        widen_intervals(step.roster.multibody, self.spread, intervals, step.now, horizon, query, self._rooms[0])
         for name, column in zip(INTERVAL, ends, strict=True):
             predictions[name] = column
 
