@@ -18,7 +18,7 @@ from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.polyhedra import closed_mesh, edge_face, locate_in_polyhedron, mesh_edges
 
 
-class Stage(Enum):
+class CascadeStage(Enum):
     """The stage that settled it."""
 
     BOUNDING_VOLUMES = "bounding volumes"
@@ -34,7 +34,7 @@ class CascadeResult(NamedTuple):
     """
 
     collides: bool
-    stage: Stage
+    stage: CascadeStage
     vertices_a: Indices
     vertices_b: Indices
     edges_a: Indices
@@ -55,14 +55,14 @@ def polyhedra_intersect(
     used_a, used_b = np.unique(corners_a), np.unique(corners_b)
     box_a, box_b = aabb(points_a[used_a]), aabb(points_b[used_b])
     if not aabb_aabb(box_a, box_b):
-        return CascadeResult(False, Stage.BOUNDING_VOLUMES, none, none, no_edges, no_edges)
+        return CascadeResult(False, CascadeStage.BOUNDING_VOLUMES, none, none, no_edges, no_edges)
     inside_b = _inside(points_a, used_a, points_b, corners_b)
     inside_a = _inside(points_b, used_b, points_a, corners_a)
     if len(inside_a) or len(inside_b):
-        return CascadeResult(True, Stage.VERTICES, inside_b, inside_a, no_edges, no_edges)
+        return CascadeResult(True, CascadeStage.VERTICES, inside_b, inside_a, no_edges, no_edges)
     edges_a = _crossings(points_a, mesh_edges(corners_a), points_b, corners_b)
     edges_b = _crossings(points_b, mesh_edges(corners_b), points_a, corners_a)
-    return CascadeResult(bool(len(edges_a) or len(edges_b)), Stage.EDGES_AND_FACES, none, none, edges_a, edges_b)
+    return CascadeResult(bool(len(edges_a) or len(edges_b)), CascadeStage.EDGES_AND_FACES, none, none, edges_a, edges_b)
 
 
 def _inside(points: Array, used: Indices, vertices: Array, faces: Indices) -> Indices:

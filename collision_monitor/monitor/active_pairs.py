@@ -33,7 +33,7 @@ PAIR = np.dtype(
 )
 
 
-AHEAD: Final = 2
+PREFETCH_AHEAD: Final = 2
 """Pairs whose bodies are prefetched while one is examined."""
 
 Rows = NDArray[np.void]
@@ -217,9 +217,9 @@ def _examine(multibody, active, which, now, queries, scratch, later):
     impact, contact = queries
     n_later = tests = made = 0
     for at in range(which.size):
-        if at + AHEAD < which.size:
-            _ask_for(table, bodies, pairs[which[at + AHEAD]].i)
-            _ask_for(table, bodies, pairs[which[at + AHEAD]].j)
+        if at + PREFETCH_AHEAD < which.size:
+            _ask_for(table, bodies, pairs[which[at + PREFETCH_AHEAD]].i)
+            _ask_for(table, bodies, pairs[which[at + PREFETCH_AHEAD]].j)
         k = which[at]
         pair, event = pairs[k], events[k]
         i, j = pair.i, pair.j

@@ -62,9 +62,9 @@ class Answers(Stage):
         pending = events.until(step.now + p.horizon)
         predictions = np.empty(len(pending) + len(active.pairs), records.PREDICTION)
         slots = np.empty((len(predictions), 2), np.int32)
-        source = Source(active.pairs, active.events, pending)
+        predicted = Predicted(active.pairs, active.events, pending)
         times = Times(step.now, p.horizon, p.stale_after)
-        n = write_predictions(source, roster.bodies, roster.parts.index, times, predictions, slots)
+        n = write_predictions(predicted, roster.bodies, roster.parts.index, times, predictions, slots)
         return predictions[:n], slots[:n]
 
     def filtered(self, step: StepContext, predictions: Rows) -> Rows:
@@ -171,7 +171,7 @@ def write_contacts(pairs, results, bodies, shape_index, now, contacts):
     return n
 
 
-class Source(NamedTuple):
+class Predicted(NamedTuple):
     """Where predictions come from."""
 
     pairs: Any  # (n,) PAIR: active pairs
@@ -188,12 +188,12 @@ class Times(NamedTuple):
 
 
 @kernel
-def write_predictions(source, bodies, shape_index, times, predictions, slots):
+def write_predictions(predicted, bodies, shape_index, times, predictions, slots):
     """Predictions (records.PREDICTION) of the active pairs that do not touch, then of the pending events.
 
     shape_index (S,): a shape's place in its object's description; slots (n, 2): of the bodies. Returns how many.
     """
-    pairs, active, pending = source
+    pairs, active, pending = predicted
     now, horizon, stale_after = times
     n = 0
     for k in range(pairs.size + pending.size):

@@ -27,7 +27,7 @@ LONGEST_SLACK: Final = 1.0
 """How far beyond the horizon a body is predicted, in horizons: at first, at least, and at most."""
 
 WIDER: Final = 1.1
-"""Room for standard deviations that vary a little from state to state."""
+"""Workspace for standard deviations that vary a little from state to state."""
 
 GOLDEN_RATIO: Final = 0.6180339887498949
 PLASTIC_RATIO: Final = 0.7548776662466927

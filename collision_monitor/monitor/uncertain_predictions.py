@@ -21,11 +21,13 @@ from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.prediction.acceleration_bounds import Intervals, widen_intervals
 from collision_monitor.prediction.bodies import enlarge
+from collision_monitor.prediction.error_samples import Workspace, make_workspace
+from collision_monitor.prediction.impact_distribution import PROBABILITY
 from collision_monitor.prediction.impact_record import holds, ids_of_keys, pair_keys, write_pair
 from collision_monitor.prediction.normal_samples import normal_samples
 from collision_monitor.prediction.pair_impacts import cover_of
 from collision_monitor.prediction.spread import Spread, is_uncertain, make_spread, take_spread
-from collision_monitor.prediction.uncertainty import PROBABILITY, Room, Sampling, impact_probabilities, make_room
+from collision_monitor.prediction.uncertainty import Sampling, impact_probabilities
 from collision_monitor.records import PREDICTION, Method, PredictionStatus
 from collision_monitor.settings.profile import Profile
 
@@ -33,7 +35,7 @@ Pool = ThreadPoolExecutor | None
 """Threads to share work among; None: there is one."""
 
 ANSWERS: Final = ("earliest", "most_likely", "latest", "probability")
-FEWEST_PAIRS_FOR_THREADS: Final = 8
+FEWEST_SAMPLED_PAIRS_FOR_THREADS: Final = 8
 """Handing work to a thread costs as much as some of them."""
 
 INTERVAL: Final = ("lower", "upper", "status")
@@ -93,7 +95,7 @@ class UncertainPredictions(Stage):
     """The uncertainties of all bodies, and the pairs that only they could bring together."""
 
     SAVED = ("active", "spread", "entries")
-    CACHES = ("_rooms",)
+    CACHES = ("_workspaces",)
 
     def __init__(self, capacity: int) -> None:
         self.active = False
@@ -101,12 +103,12 @@ class UncertainPredictions(Stage):
         self.spread = make_spread(capacity)
         self.entries: Records = np.empty(0, ENTRY)
         """The pairs, by key."""
-        self._rooms = [make_room()]  # one for each thread
+        self._workspaces = [make_workspace()]  # one for each thread
 
     # ------------------------------------------------------------------ the bodies
 
     def enlarge(self, capacity: int) -> None:
-        """Make room for so many bodies; the slots stay."""
+        """Make work for so many bodies; the slots stay."""
         if len(self.spread.stddev) < capacity:
             spread = make_spread(capacity)
             enlarge(self.spread, spread)
@@ -182,7 +184,7 @@ class UncertainPredictions(Stage):
             return
         ends = [np.ascontiguousarray(predictions[name]) for name in INTERVAL]
         intervals, query, horizon = Intervals(slots, *ends), step.settings.impact, step.profile.horizon
-        widen_intervals(step.roster.multibody, self.spread, intervals, step.now, horizon, query, self._rooms[0])
+        widen_intervals(step.roster.multibody, self.spread, intervals, step.now, horizon, query, self._workspaces[0])
         for name, column in zip(INTERVAL, ends, strict=True):
             predictions[name] = column
 
@@ -202,17 +204,17 @@ class UncertainPredictions(Stage):
             *normal_samples(p.uncertainty_samples),
         )
 
-        def part(slots: Pairs, room: Room) -> NDArray[np.float64]:
+        def part(slots: Pairs, work: Workspace) -> NDArray[np.float64]:
             answers = np.empty((len(slots), len(ANSWERS)))
-            impact_probabilities(step.roster.multibody, self.spread, slots, step.now, sampling, room, answers)
+            impact_probabilities(step.roster.multibody, self.spread, slots, step.now, sampling, work, answers)
             return answers
 
-        if pool is None or len(slots) < FEWEST_PAIRS_FOR_THREADS:
-            return part(slots, self._rooms[0])
-        while len(self._rooms) < p.threads:
-            self._rooms.append(make_room())
-        rooms = self._rooms[: p.threads]
-        return np.concatenate(list(pool.map(part, np.array_split(slots, len(rooms)), rooms)))
+        if pool is None or len(slots) < FEWEST_SAMPLED_PAIRS_FOR_THREADS:
+            return part(slots, self._workspaces[0])
+        while len(self._workspaces) < p.threads:
+            self._workspaces.append(make_workspace())
+        workspaces = self._workspaces[: p.threads]
+        return np.concatenate(list(pool.map(part, np.array_split(slots, len(workspaces)), workspaces)))
 
     # ------------------------------------------------------------------ snapshots
 

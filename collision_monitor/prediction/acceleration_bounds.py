@@ -15,12 +15,12 @@ from collision_monitor._jit import device, kernel
 from collision_monitor.prediction.bodies import next_pair
 from collision_monitor.prediction.body_impact import ShapePair, Tube, Window, contact_at, shape_impact
 from collision_monitor.prediction.impact_record import CLEAR, UNRESOLVED
-from collision_monitor.prediction.uncertainty import carry_on
+from collision_monitor.prediction.motion import carry_on
 
 SEGMENTS: Final = 8
 """In each of them the deviation is bounded by its chord: too wide by 1 / 256 of that at the end, at most."""
 
-NODES: Final = 16
+CONTACT_NODES: Final = 16
 """Times after the stated impact at which it is asked whether contact is certain."""
 
 
@@ -34,10 +34,10 @@ class Intervals(NamedTuple):
 
 
 @device
-def _first_possible(multibody, i, j, until, off, query, room):
+def _first_possible(multibody, i, j, until, off, query, work):
     """A time in [0, until] before which the bodies cannot touch; off: coefficients of their deviation in t (m)."""
     table, parts, bodies = multibody
-    A, B = room.motion[0], room.motion[1]
+    A, B = work.motion[0], work.motion[1]
     first = until
     for segment in range(SEGMENTS):
         begin, end = until * segment / SEGMENTS, until * (segment + 1) / SEGMENTS
@@ -46,7 +46,7 @@ def _first_possible(multibody, i, j, until, off, query, room):
         b = first_b
         while a >= 0:
             window = Window(begin, min(end, first))
-            status, t, _, _ = shape_impact(table, parts, ShapePair(A, B, a, b), window, tube, query, room.scratch)
+            status, t, _, _ = shape_impact(table, parts, ShapePair(A, B, a, b), window, tube, query, work.scratch)
             if status != CLEAR:
                 first = min(first, t)
             a, b = next_pair(parts, first_b, a, b)
@@ -56,19 +56,19 @@ def _first_possible(multibody, i, j, until, off, query, room):
 
 
 @device
-def _first_certain(multibody, i, j, window, off, margin, room):
+def _first_certain(multibody, i, j, window, off, margin, work):
     """A time in the window at which the bodies touch whatever they do; infinite: none is known."""
     table, parts, bodies = multibody
-    A, B = room.motion[0], room.motion[1]
+    A, B = work.motion[0], work.motion[1]
     begin, end = window
-    for node in range(NODES + 1):
-        t = begin + (end - begin) * node / NODES
+    for node in range(CONTACT_NODES + 1):
+        t = begin + (end - begin) * node / CONTACT_NODES
         wide = off[0] + t * (off[1] + t * off[2])
         a, first_b = bodies.first_shape[i], bodies.first_shape[j]
         b = first_b
         while a >= 0:
-            distance = contact_at(table, parts, ShapePair(A, B, a, b), t, room.scratch)
-            if distance + room.scratch.out[10] - margin + wide <= 0.0:
+            distance = contact_at(table, parts, ShapePair(A, B, a, b), t, work.scratch)
+            if distance + work.scratch.out[10] - margin + wide <= 0.0:
                 return t
             a, b = next_pair(parts, first_b, a, b)
     return inf
@@ -82,7 +82,7 @@ def _bound(bodies, spread, i):
 
 
 @kernel
-def widen_intervals(multibody, spread, intervals, now, horizon, query, room):
+def widen_intervals(multibody, spread, intervals, now, horizon, query, work):
     """Widen intervals (Intervals) by the accelerations that the bodies have declared. horizon: s after `now`.
 
     Where a body may avoid contact, the upper end becomes infinite and the status UNRESOLVED.
@@ -94,16 +94,16 @@ def widen_intervals(multibody, spread, intervals, now, horizon, query, room):
         a_i, a_j = _bound(bodies, spread, i), _bound(bodies, spread, j)
         if not a_i + a_j > 0.0:
             continue
-        age_i = carry_on(bodies, i, now, room.quaternion, room.motion[0])
-        age_j = carry_on(bodies, j, now, room.quaternion, room.motion[1])
+        age_i = carry_on(bodies, i, now, work.quaternion, work.motion[0])
+        age_j = carry_on(bodies, j, now, work.quaternion, work.motion[1])
         off = (
             0.5 * (a_i * age_i * age_i + a_j * age_j * age_j),
             a_i * age_i + a_j * age_j,
             0.5 * (a_i + a_j),
         )
-        lower[k] = _first_possible(multibody, i, j, lower[k], off, query, room)
+        lower[k] = _first_possible(multibody, i, j, lower[k], off, query, work)
         if upper[k] < inf:
             end = max(horizon, upper[k])
-            upper[k] = _first_certain(multibody, i, j, Window(upper[k], end), off, query.margin, room)
+            upper[k] = _first_certain(multibody, i, j, Window(upper[k], end), off, query.margin, work)
         if not upper[k] < inf:
             status[k] = UNRESOLVED

@@ -42,6 +42,14 @@ class Placed(NamedTuple):
     w_b: Any
 
 
+class Gap(NamedTuple):
+    """A lower bound on a gap: start + rate d - curvature d^2 after d seconds, less what the cores turn into it."""
+
+    start: Any  # m
+    rate: Any  # m/s
+    curvature: Any  # m/s^2
+
+
 class Axis(NamedTuple):
     """A direction in a shape's own axes, and by how much it turns there a second."""
 
@@ -115,8 +123,8 @@ def advance(table, at, n, m, rate, gap, until):
     curvature = max(0.5 * bend - dot(m, at.v), 0.0)
     A, B = _seen_from(at.R_a, n, k_a), _seen_from(at.R_b, n, k_b)
     if is_centred_box(table.kind[at.a]) and is_centred_box(table.kind[at.b]):
-        return _between_boxes(core_box(table, at.a), core_box(table, at.b), A, B, rate, curvature, gap, until)
-    return _between_any(table, at.a, at.b, A, B, rate, curvature, gap, until)
+        return _between_boxes(core_box(table, at.a), core_box(table, at.b), A, B, Gap(gap, rate, curvature), until)
+    return _between_any(table, (at.a, at.b), A, B, Gap(gap, rate, curvature), until)
 
 
 @inlined
@@ -127,11 +135,12 @@ def _line(size, x, dx, d):
 
 
 @inlined
-def _between_boxes(sa, sb, A, B, rate, curvature, gap, remaining):
+def _between_boxes(sa, sb, A, B, gap, remaining):
     """`advance` for cores that are boxes: the bound is the least of parabolas, one for each choice of their sides.
 
     Newton's method from outside: the roots fall until the sides at one are those that it was made of.
     """
+    curvature = gap.curvature
     d, last = 0.0, inf
     for _ in range(PIECES):
         g0, s0 = _line(sa[0], A.x, A.dx, d)
@@ -140,8 +149,8 @@ def _between_boxes(sa, sb, A, B, rate, curvature, gap, remaining):
         g3, s3 = _line(sb[0], B.x, B.dx, d)
         g4, s4 = _line(sb[1], B.y, B.dy, d)
         g5, s5 = _line(sb[2], B.z, B.dz, d)
-        start = gap + ((g0 + g1) + (g2 + g3) + (g4 + g5))
-        speed = ((s0 + s1) + (s2 + s3) + (s4 + s5)) - rate
+        start = gap.start + ((g0 + g1) + (g2 + g3) + (g4 + g5))
+        speed = ((s0 + s1) + (s2 + s3) + (s4 + s5)) - gap.rate
         root = sqrt(speed * speed + 4.0 * curvature * start)
         if speed > 0.0:
             d = 2.0 * start / (speed + root)
@@ -155,9 +164,11 @@ def _between_boxes(sa, sb, A, B, rate, curvature, gap, remaining):
 
 
 @inlined
-def _gap_after(table, a, b, A, B, h_a, h_b, rate, curvature, gap, d):
-    """Lower bound on the gap after d seconds; h_*: the support values at d = 0."""
-    value = gap + d * rate - curvature * d * d
+def _gap_after(table, shapes, A, B, h, gap, d):
+    """Lower bound on the gap after d seconds; h: the support values of both shapes at d = 0."""
+    a, b = shapes
+    h_a, h_b = h
+    value = gap.start + d * gap.rate - gap.curvature * d * d
     if A.dx != 0.0 or A.dy != 0.0 or A.dz != 0.0:
         value -= core_support(table, a, A.x + d * A.dx, A.y + d * A.dy, A.z + d * A.dz) - h_a
     if B.dx != 0.0 or B.dy != 0.0 or B.dz != 0.0:
@@ -166,18 +177,17 @@ def _gap_after(table, a, b, A, B, h_a, h_b, rate, curvature, gap, d):
 
 
 @device
-def _between_any(table, a, b, A, B, rate, curvature, gap, remaining):
+def _between_any(table, shapes, A, B, gap, remaining):
     """`advance` for all cores: the bound is looked at in turn from outside, where it is negative, and inside.
 
     Inside is where the chord has its root: below a concave function.
     """
-    h_a = core_support(table, a, A.x, A.y, A.z)
-    h_b = core_support(table, b, -B.x, -B.y, -B.z)
-    low, f_low = 0.0, gap
+    h = (core_support(table, shapes[0], A.x, A.y, A.z), core_support(table, shapes[1], -B.x, -B.y, -B.z))
+    low, f_low = 0.0, gap.start
     high, f_high = remaining, 0.0
     d, outside = remaining, True
     for _ in range(11):
-        f = _gap_after(table, a, b, A, B, h_a, h_b, rate, curvature, gap, d)
+        f = _gap_after(table, shapes, A, B, h, gap, d)
         if outside:
             if f >= 0.0:
                 return d
@@ -187,7 +197,7 @@ def _between_any(table, a, b, A, B, rate, curvature, gap, remaining):
             drop = f_low - f
             far = d + f * ((d - low) / drop) if drop > 0.0 else high
             low, f_low = d, f  # f may be a rounding below 0: half the tolerance is there for it
-            if f <= 0.05 * gap:
+            if f <= 0.05 * gap.start:
                 break
             if far < high:
                 d, outside = far, True

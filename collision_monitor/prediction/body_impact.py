@@ -71,7 +71,7 @@ class ShapePair(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Room for one thread's intermediate results, so that the kernels allocate nothing."""
+    """Workspace for one thread's intermediate results, so that the kernels allocate nothing."""
 
     rotation: Any  # (4, 3, 3)
     quaternion: Any  # (1, 4)

@@ -195,3 +195,22 @@ def swept_box(bodies, i, begin, margin):
         half + ahead * abs(m.vy) + bent * abs(m.ay),
         half + ahead * abs(m.vz) + bent * abs(m.az),
     )  # fmt: skip
+
+
+@device
+def carry_on(bodies, i, now, q, m):
+    """Body i's last state carried on to `now` as the motion m (MOTION), whose time 0 is now; returns its age (s)."""
+    age = 0.0 if bodies.static[i] else now - bodies.time[i]
+    m.ax, m.ay, m.az = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
+    m.x, m.y, m.z = (
+        position_now(bodies, i, age, 0), position_now(bodies, i, age, 1), position_now(bodies, i, age, 2)
+    )  # fmt: skip
+    m.vx = bodies.linear[i, 0] + m.ax * age
+    m.vy = bodies.linear[i, 1] + m.ay * age
+    m.vz = bodies.linear[i, 2] + m.az * age
+    m.wx, m.wy, m.wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
+    turn_quaternion(bodies.quaternion, i, m.wx, m.wy, m.wz, age, q[0])
+    quaternion_to_matrix(q, 0, m.rotation)
+    m.time = 0.0
+    m.radius = bodies.motion[i].radius
+    return age

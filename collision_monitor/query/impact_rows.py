@@ -41,7 +41,7 @@ def _set_motion(motion, state, k):
     motion.wx, motion.wy, motion.wz = state[k, 10], state[k, 11], state[k, 12]
 
 
-class FirstImpacts(NamedTuple):
+class RowImpacts(NamedTuple):
     """Where the kernel writes; `left` marks rows that touch at the start and stay open."""
 
     event: Any  # (1,) IMPACT: scratch
@@ -55,7 +55,7 @@ def impacts_of_rows(multibody, states, rows, horizon, queries, scratch, found):
     """First impacts of the two bodies moving as in `rows` of their states (2, N, 13), into found.
 
     queries: the ImpactQuery, and the one for what overlaps at the start by more than touching, which is an impact at 0.
-    found: FirstImpacts; other rows stay.
+    found: RowImpacts; other rows stay.
     """
     bodies = multibody.bodies
     state_a, state_b = states

@@ -17,7 +17,7 @@ from collision_monitor.prediction.bodies import Multibody
 from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.query.contact import Compound
-from collision_monitor.query.impact_rows import FirstImpacts, impacts_of_rows, impacts_of_spheres, normalise_states
+from collision_monitor.query.impact_rows import RowImpacts, impacts_of_rows, impacts_of_spheres, normalise_states
 from collision_monitor.query.moving_pair import Body, Query, make_body, make_scene
 from collision_monitor.query.time_of_impact import BUDGET, check_bounded, check_query, time_of_impact
 from collision_monitor.tolerances import LARGEST_INPUT, TOUCHING, UNIT_QUATERNION
@@ -134,5 +134,5 @@ def _solve(
         rows = np.flatnonzero(left)
     deep = query.separation - TOUCHING * float(radii[np.isfinite(radii)].sum())
     queries = tuple(ImpactQuery(margin, query.tolerance, query.budget) for margin in (query.separation, deep))
-    found = FirstImpacts(np.zeros(1, IMPACT), lower, upper, left)
+    found = RowImpacts(np.zeros(1, IMPACT), lower, upper, left)
     impacts_of_rows(Multibody(*scene), (state_a, state_b), rows, query.horizon, queries, make_scratch(), found)

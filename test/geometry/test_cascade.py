@@ -11,7 +11,7 @@ from rational import in_polyhedron, segment_meets_triangle
 from solids import SKEWS, bar, cube, hollow, ring, u_shape
 
 from collision_monitor.errors import ShapeError
-from collision_monitor.geometry.cascade import Stage, polyhedra_intersect
+from collision_monitor.geometry.cascade import CascadeStage, polyhedra_intersect
 from collision_monitor.geometry.polyhedra import mesh_edges
 
 
@@ -36,23 +36,23 @@ def meet(a, b):
 
 def test_each_stage():
     apart = polyhedra_intersect(*cube(), *moved(cube(), [3, 0, 0]))
-    assert not apart.collides and apart.stage is Stage.BOUNDING_VOLUMES
+    assert not apart.collides and apart.stage is CascadeStage.BOUNDING_VOLUMES
     corner = polyhedra_intersect(*cube(), *moved(cube(), [0.5, 0.5, 0.5]))
-    assert corner.collides and corner.stage is Stage.VERTICES
+    assert corner.collides and corner.stage is CascadeStage.VERTICES
     assert cube()[0][corner.vertices_a].tolist() == [[1, 1, 1]]
     assert moved(cube(), [0.5, 0.5, 0.5])[0][corner.vertices_b].tolist() == [[0.5, 0.5, 0.5]]
     crossed = polyhedra_intersect(
         *moved(cube(), [-2, 0, 0], np.diag([5, 1, 1])), *moved(cube(), [0.25, -2, 0.25], np.diag([0.5, 5, 0.5]))
     )
-    assert crossed.collides and crossed.stage is Stage.EDGES_AND_FACES
+    assert crossed.collides and crossed.stage is CascadeStage.EDGES_AND_FACES
     assert len(crossed.edges_a) and len(crossed.edges_b)
     beside = polyhedra_intersect(*u_shape(), *moved(cube(), [1.25, 0, 1.25], np.eye(3) / 2))
-    assert not beside.collides and beside.stage is Stage.EDGES_AND_FACES  # between the arms
+    assert not beside.collides and beside.stage is CascadeStage.EDGES_AND_FACES  # between the arms
 
 
 def test_one_within_the_other_and_within_its_cavity():
     within = polyhedra_intersect(*moved(cube(), [1, 1, 0.25], np.eye(3) / 2), *bar(3, 3, 1))
-    assert within.collides and within.stage is Stage.VERTICES and len(within.vertices_a) == 8
+    assert within.collides and within.stage is CascadeStage.VERTICES and len(within.vertices_a) == 8
     cavity = polyhedra_intersect(*moved(cube(), [1.25, 1.25, 1.25], np.eye(3) / 2), *hollow())
     assert not cavity.collides
     through = polyhedra_intersect(*moved(bar(1, 1, 5), [1.25, 1.25, -2], np.diag([0.5, 0.5, 1])), *ring())
@@ -87,7 +87,7 @@ def test_random_solids_against_fcl():
         found = polyhedra_intersect(*a, *b)
         if surfaces_cross:
             assert found.collides
-        if not found.collides or found.stage is Stage.EDGES_AND_FACES:
+        if not found.collides or found.stage is CascadeStage.EDGES_AND_FACES:
             assert found.collides == surfaces_cross  # FCL's meshes have no inside
         seen.add((found.collides, found.stage))
     assert len(seen) >= 3

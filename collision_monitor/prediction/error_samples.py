@@ -1,0 +1,183 @@
+"""Samples of the errors of two bodies' states: their covariance, its root, and the motions of one sample."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from collision_monitor._jit import device, inlined
+from collision_monitor.prediction.body_impact import Scratch, make_scratch
+from collision_monitor.prediction.known_axes import AXES
+from collision_monitor.prediction.motion import MOTION
+from collision_monitor.prediction.spread import FIFTH_ROOT, unknown_acceleration
+
+
+class Workspace(NamedTuple):
+    """Workspace for one thread's intermediate results."""
+
+    motion: Any  # (2,) MOTION: the two bodies, from now on
+    quaternion: Any  # (1, 4)
+    rotation: Any  # (2, 3, 3): the stated orientations now
+    frame: Any  # (3, 3): rows across the path, along it, and across both
+    joint: Any  # (6, 6): covariance of position at the time of closest approach and of velocity, then its root
+    block: Any  # (3, 3)
+    axes: Any  # (AXES, 4): directions that parted the bodies in other samples
+    scratch: Scratch
+
+
+def make_workspace() -> Workspace:
+    """Workspace for one thread."""
+    return Workspace(
+        np.zeros(2, MOTION),
+        np.zeros((1, 4)),
+        np.zeros((2, 3, 3)),
+        np.zeros((3, 3)),
+        np.zeros((6, 6)),
+        np.zeros((3, 3)),
+        np.zeros((AXES, 4)),
+        make_scratch(),
+    )
+
+
+@device
+def set_frame(frame, vx, vy, vz):
+    """Complete the frame whose first row is a direction n: the second the part of v across n, the third across both.
+
+    Where the first row is 0 it becomes some direction across v.
+    """
+    n = sqrt(frame[0, 0] ** 2 + frame[0, 1] ** 2 + frame[0, 2] ** 2)
+    v = sqrt(vx * vx + vy * vy + vz * vz)
+    if n > 0.0:
+        nx, ny, nz = frame[0, 0] / n, frame[0, 1] / n, frame[0, 2] / n
+    else:
+        nx, ny, nz = _across(vx, vy, vz)
+    along = vx * nx + vy * ny + vz * nz
+    ux, uy, uz = vx - along * nx, vy - along * ny, vz - along * nz
+    u = sqrt(ux * ux + uy * uy + uz * uz)
+    if u > 1e-6 * v:
+        ux, uy, uz = ux / u, uy / u, uz / u
+    else:
+        ux, uy, uz = _across(nx, ny, nz)
+    frame[0, 0], frame[0, 1], frame[0, 2] = nx, ny, nz
+    frame[1, 0], frame[1, 1], frame[1, 2] = ux, uy, uz
+    frame[2, 0], frame[2, 1], frame[2, 2] = ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
+
+
+@inlined
+def _across(x, y, z):
+    """A unit vector across (x, y, z); level where that is possible."""
+    level = sqrt(x * x + y * y)
+    if level > 1e-6 * abs(z):
+        return -y / level, x / level, 0.0
+    return 1.0, 0.0, 0.0
+
+
+@device
+def add_covariance(spread, i, age, t, stale_acceleration, planar, work):
+    """Add body i's part to work.joint, the covariance of (position t seconds from now, velocity) along the frame.
+
+    The acceleration nobody told acts as an error of the velocity that is right at t.
+    """
+    at = age + t
+    s = unknown_acceleration(spread, i, age > 0.0, 0, stale_acceleration)
+    ahead = 0.5 * t if unknown_acceleration(spread, i, False, 0, stale_acceleration) > 0.0 else 0.0
+    velocity = s * (age + ahead)
+    position = s * 0.5 * age * age + velocity * t
+    C, frame, joint, block = spread.covariance, work.frame, work.joint, work.block
+    for part in range(3):
+        row, column = 3 * (part == 2), 3 * (part > 0)
+        factor = at if part == 1 else at * at
+        extra = (position * position, position * velocity, velocity * velocity)[part]
+        k = 0
+        for r in range(3):
+            for c in range(r, 3):
+                value = C[i, 6 + k] if part == 2 else factor * C[i, 6 + k] + (C[i, k] if part == 0 else 0.0)
+                if r == c and not (planar and r == 2):
+                    value += extra
+                block[r, c] = block[c, r] = value
+                k += 1
+        for r in range(3):
+            x = y = z = 0.0
+            for k in range(3):
+                x += frame[r, k] * block[k, 0]
+                y += frame[r, k] * block[k, 1]
+                z += frame[r, k] * block[k, 2]
+            for c in range(3):
+                joint[row + r, column + c] += x * frame[c, 0] + y * frame[c, 1] + z * frame[c, 2]
+
+
+@device
+def take_root(joint):
+    """The lower Cholesky factor of a covariance (6, 6), of which the upper triangle is read, in its place.
+
+    A coordinate without variance of its own gets an empty column.
+    """
+    for c in range(6):
+        d = joint[c, c]
+        scale = d
+        for k in range(c):
+            d -= joint[c, k] * joint[c, k]
+        root = sqrt(d) if d > 1e-12 * scale else 0.0
+        for r in range(c + 1, 6):
+            value = joint[c, r]
+            for k in range(c):
+                value -= joint[r, k] * joint[c, k]
+            joint[r, c] = value / root if root > 0.0 else 0.0
+        joint[c, c] = root
+
+
+@inlined
+def turn(m, R, w, off, error):
+    """Let the motion m (MOTION), which is R and turns at w (3,), be off by error (3,) times `off` (rad now, rad/s)."""
+    x, y, z = error
+    m.wx, m.wy, m.wz = w[0] + off[1] * x, w[1] + off[1] * y, w[2] + off[1] * z
+    dx, dy, dz = off[0] * x, off[0] * y, off[0] * z
+    angle = sqrt(dx * dx + dy * dy + dz * dz)
+    c = 2.0 * np.sin(0.5 * angle) ** 2
+    s = np.sin(angle)
+    if angle > 0.0:
+        dx, dy, dz = dx / angle, dy / angle, dz / angle
+    for j in range(3):
+        x, y, z = R[0, j], R[1, j], R[2, j]
+        ax, ay, az = dy * z - dz * y, dz * x - dx * z, dx * y - dy * x
+        m.rotation[0, j] = x + s * ax + c * (dy * az - dz * ay)
+        m.rotation[1, j] = y + s * ay + c * (dz * ax - dx * az)
+        m.rotation[2, j] = z + s * az + c * (dx * ay - dy * ax)
+
+
+@device
+def orientation_spread(spread, i, radius, age, t):
+    """How an error of the orientation goes on that is one standard deviation t seconds from now: (rad now, rad/s).
+
+    That of a rate which is not known is on average in proportion to how much of the whole it makes; 0, 0 where turning
+    moves nothing. age: s since the last state.
+    """
+    if radius == 0.0:
+        return 0.0, 0.0
+    at = age + t
+    pose, rate = spread.stddev[i, 1] ** 2, spread.stddev[i, 3] ** 2
+    turning = (0.5 * FIFTH_ROOT * spread.acceleration[i, 1]) ** 2
+    whole = sqrt(pose + (rate + turning * at * at) * at * at)
+    if whole == 0.0:
+        return 0.0, 0.0
+    return (pose + (rate + turning * age * at) * age * at) / whole, (rate + turning * at * (at + age)) * at / whole
+
+
+@device
+def shift(work, z, t, p, v):
+    """Put body j where sample z (12,) of the errors has it: position p + what is off at t, velocity v + what is off."""
+    B, L, F, y = work.motion[1], work.joint, work.frame, work.block
+    for r in range(6):
+        value = 0.0
+        for c in range(r + 1):
+            value += L[r, c] * z[c]
+        y[r // 3, r % 3] = value
+    dx = y[1, 0] * F[0, 0] + y[1, 1] * F[1, 0] + y[1, 2] * F[2, 0]
+    dy = y[1, 0] * F[0, 1] + y[1, 1] * F[1, 1] + y[1, 2] * F[2, 1]
+    dz = y[1, 0] * F[0, 2] + y[1, 1] * F[1, 2] + y[1, 2] * F[2, 2]
+    B.vx, B.vy, B.vz = v[0] + dx, v[1] + dy, v[2] + dz
+    B.x = p[0] + y[0, 0] * F[0, 0] + y[0, 1] * F[1, 0] + y[0, 2] * F[2, 0] - t * dx
+    B.y = p[1] + y[0, 0] * F[0, 1] + y[0, 1] * F[1, 1] + y[0, 2] * F[2, 1] - t * dy
+    B.z = p[2] + y[0, 0] * F[0, 2] + y[0, 1] * F[1, 2] + y[0, 2] * F[2, 2] - t * dz

@@ -1,0 +1,75 @@
+"""From the times of impact of weighted samples to the times and the probability that are published."""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Final
+
+from collision_monitor._jit import device
+
+EARLIEST: Final = 0
+
+
+MOST_LIKELY: Final = 1
+
+
+LATEST: Final = 2
+
+
+PROBABILITY: Final = 3
+
+
+OUTWARD: Final = 2.0
+"""Standard errors of a quantile by which the earliest time is earlier and the latest later than the samples' own."""
+
+
+@device
+def summarise(times, weights, order, confidence, safe, answer):
+    """Quantiles of the samples' times of impact into answer (4,); safe: a time before which hardly any impact is.
+
+    earliest: of the impacts at most 1 - confidence are before; `safe` where there are too few samples to tell.
+    Both quantiles are moved outward by what they may be off for so few samples.
+    """
+    n = 0
+    total = squares = all_squares = 0.0
+    for k in range(order.size):
+        w = weights[order[k]]
+        all_squares += w * w
+        if times[order[k]] < inf:
+            total += w
+            squares += w * w
+            n += 1
+    answer[PROBABILITY] = min(total, 1.0)
+    answer[EARLIEST] = answer[MOST_LIKELY] = answer[LATEST] = inf
+    if n == 0:
+        return
+    doubt = 1.0 - confidence
+    variance = doubt * confidence
+    few = total * (doubt - OUTWARD * sqrt(variance * squares) / total)
+    answer[EARLIEST] = min(safe, times[order[0]])
+    below = 0.0
+    for k in range(n):
+        below += weights[order[k]]
+        if below > few:
+            break
+        answer[EARLIEST] = times[order[k]]
+    most = confidence + OUTWARD * sqrt(variance * all_squares)
+    below = 0.0
+    for k in range(n):
+        below += weights[order[k]]
+        if below >= most:
+            answer[LATEST] = times[order[k]]
+            break
+    # the shortest time in which half of the impacts are
+    low = 0
+    inside = 0.0
+    shortest = inf
+    for high in range(n):
+        inside += weights[order[high]]
+        while inside - weights[order[low]] >= 0.5 * total:
+            inside -= weights[order[low]]
+            low += 1
+        length = times[order[high]] - times[order[low]]
+        if inside >= 0.5 * total and length < shortest:
+            shortest = length
+            answer[MOST_LIKELY] = 0.5 * (times[order[high]] + times[order[low]])
