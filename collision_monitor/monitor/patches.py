@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel
 from collision_monitor.geometry.shape_table import ShapeTable, take
-from collision_monitor.narrow_phase.contact_row import work_array
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.narrow_phase.manifold import CORNERS, manifold_batch, reduce_points
+from collision_monitor.narrow_phase.work_memory import work_array
 from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUCHING
 from collision_monitor.prediction.body_impact import closing_speed
 from collision_monitor.prediction.motion import (
@@ -95,18 +95,18 @@ def _join(bodies, pairs, results, now, of, tie, patch, counts, most, count, poin
     begin = 0
     while begin < of.size:
         k = of[begin]
-        nx, ny, nz = results[k, 1], results[k, 2], results[k, 3]
+        normal = (results[k, 1], results[k, 2], results[k, 3])
         m = 0
         end = begin
         while end < of.size and of[end] == k:
             if m + MOST_POINTS > CORNERS:
-                m = reduce_points(corners, m, nx, ny, nz, tie[begin], MOST_POINTS, work)
+                m = reduce_points(corners, m, normal, tie[begin], MOST_POINTS, work)
             for c in range(counts[end]):
                 corners[m] = patch[end, c]
                 m += 1
             end += 1
         if end - begin > 1 or m > most:
-            m = reduce_points(corners, m, nx, ny, nz, tie[begin], most, work)
+            m = reduce_points(corners, m, normal, tie[begin], most, work)
         begin = end
         if m < 2:
             continue

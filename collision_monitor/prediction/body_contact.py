@@ -7,6 +7,7 @@ from typing import Final
 
 from collision_monitor._jit import device
 from collision_monitor.narrow_phase.dispatch import contact_within
+from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.body_impact import closing_speed
 from collision_monitor.prediction.motion import (
     place_shape,
@@ -18,7 +19,7 @@ from collision_monitor.prediction.motion import (
 from collision_monitor.records import ContactStatus
 
 RESULT: Final = 20
-"""Numbers for each pair: what narrow_phase.dispatch.contact gives relative to body i, then by name below."""
+"""Numbers for each pair: what narrow_phase.dispatch.pair_contact gives relative to body i, then by name below."""
 
 
 CLOSING: Final = 15
@@ -70,10 +71,10 @@ def body_contact(table, parts, bodies, i, j, now, margin, stale_acceleration, sc
         b = bodies.first_shape[j]
         while b >= 0:
             ob = place_shape(table, parts, b, R_j, R_b)
-            x, y, z = px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]
+            pose = PairPose(R_a, R_b, (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]))
             tests += 1
             limit = min(wanted, best)
-            if contact_within(table, a, b, R_a, R_b, x, y, z, limit, out, scratch.work) and out[0] < best:
+            if contact_within(table, a, b, pose, limit, out, scratch.work) and out[0] < best:
                 best = out[0]
                 for c in range(3):
                     out[4 + c] += oa[c]

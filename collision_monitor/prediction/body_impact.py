@@ -13,8 +13,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.narrow_phase.contact_row import WORK_SIZE
-from collision_monitor.narrow_phase.dispatch import contact, separation
+from collision_monitor.narrow_phase.dispatch import pair_contact, separation
+from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.narrow_phase.work_memory import WORK_SIZE
 from collision_monitor.prediction.advance import Placed, advance
 from collision_monitor.prediction.impact_record import CLEAR, CLOSED_FORM, CONSERVATIVE_ADVANCEMENT, HIT, UNRESOLVED
 from collision_monitor.prediction.motion import (
@@ -80,9 +81,8 @@ def shape_impact(table, parts, A, B, a, b, begin, end, margin, tube_0, tube_1, t
         oa = place_shape(table, parts, a, R_i, R_a)
         ob = place_shape(table, parts, b, R_j, R_b)
         px, py, pz = relative_position(A, B, t)
-        gap = separation(
-            table, a, b, R_a, R_b, px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2], out, scratch.work
-        )
+        pose = PairPose(R_a, R_b, (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]))
+        gap = separation(table, a, b, pose, out, scratch.work)
         gap -= margin + tube_0 + tube_1 * (t - begin)
         if gap <= tolerance:
             if t > t_before:
@@ -116,7 +116,7 @@ def shape_impact(table, parts, A, B, a, b, begin, end, margin, tube_0, tube_1, t
 def contact_at(table, parts, A, B, a, b, t, scratch):
     """Contact of shape a in motion A with shape b in motion B at time t, into scratch.out; returns the signed distance.
 
-    out as narrow_phase.dispatch.contact gives it, but relative to A's origin; out[15]: closing speed (m/s).
+    out as narrow_phase.dispatch.pair_contact gives it, but relative to A's origin; out[15]: closing speed (m/s).
     """
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
@@ -125,7 +125,8 @@ def contact_at(table, parts, A, B, a, b, t, scratch):
     oa = place_shape(table, parts, a, R_i, R_a)
     ob = place_shape(table, parts, b, R_j, R_b)
     px, py, pz = relative_position(A, B, t)
-    contact(table, a, b, R_a, R_b, px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2], out, scratch.work)
+    pose = PairPose(R_a, R_b, (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]))
+    pair_contact(table, a, b, pose, out, scratch.work)
     for k in range(3):
         out[4 + k] += oa[k]
         out[7 + k] += oa[k]
