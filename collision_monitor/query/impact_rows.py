@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, kernel
 from collision_monitor.prediction.body_impact import body_impact
@@ -13,6 +13,14 @@ from collision_monitor.tolerances import EPSILON, LARGEST_INPUT, UNIT_QUATERNION
 
 _SMALLEST: Final = 1e-240
 """m^4/s^2, as in time_of_impact.py: below it products of lengths and speeds lose digits."""
+
+
+class ImpactTimes(NamedTuple):
+    """Answers for N motions."""
+
+    lower: Any  # (N,) s
+    upper: Any  # (N,) s
+    left: Any  # (N,) bool: left open
 
 
 @kernel
@@ -42,15 +50,17 @@ def _set_motion(motion, state, k):
 
 
 @kernel
-def impacts_of_rows(
-    table, parts, bodies, state_a, state_b, rows, horizon, separation, deep, tolerance, budget, scratch, event,
-    lower, upper, left,
-):  # fmt: skip
-    """First impacts of the two bodies moving as in `rows` of the states (N, 13); the rest of lower, upper (N,) stays.
+def impacts_of_rows(multibody, states, rows, query, deep, memory, times):
+    """First impacts of two bodies moving as in `rows` of the states, two arrays (N, 13); the rest of `times` stays.
 
-    What overlaps by more than touching (within `deep`, m) at the start is at 0; left (N,) bool: touches there and is
-    left open.
+    query: ImpactQuery. What overlaps by more than touching (within `deep`, m) at the start is at 0; times.left: touches
+    there and is left open. memory: Scratch, and a place for an IMPACT.
     """
+    table, parts, bodies = multibody
+    state_a, state_b = states
+    horizon, tolerance, separation, iterations = query
+    scratch, event = memory
+    lower, upper, left = times
     q_a, q_b = state_a[:, 3:7], state_b[:, 3:7]
     for r in range(len(rows)):
         k = rows[r]
@@ -58,7 +68,7 @@ def impacts_of_rows(
         _set_motion(bodies.motion[1], state_b, k)
         quaternion_to_matrix(q_a, k, bodies.motion[0].rotation)
         quaternion_to_matrix(q_b, k, bodies.motion[1].rotation)
-        body_impact(table, parts, bodies, 0, 1, 0.0, horizon, separation, tolerance, budget, scratch, event[0])
+        body_impact(table, parts, bodies, 0, 1, 0.0, horizon, separation, tolerance, iterations, scratch, event[0])
         lower[k] = upper[k] = inf
         left[k] = False
         if event[0].status == CLEAR:
@@ -67,7 +77,7 @@ def impacts_of_rows(
         if event[0].status == HIT and event[0].upper <= horizon:
             upper[k] = event[0].upper
         if lower[k] <= 0.0:
-            body_impact(table, parts, bodies, 0, 1, 0.0, horizon, deep, tolerance, budget, scratch, event[0])
+            body_impact(table, parts, bodies, 0, 1, 0.0, horizon, deep, tolerance, iterations, scratch, event[0])
             if event[0].status == HIT and event[0].upper <= 0.0:
                 upper[k] = 0.0
             else:
@@ -75,13 +85,14 @@ def impacts_of_rows(
 
 
 @kernel
-def impacts_of_spheres(a, b, reach, horizon, lower, upper, left):
+def impacts_of_spheres(a, b, reach, horizon, times):
     """The same in closed form for spheres whose radii add up to `reach` (m); a, b: columns of the states, (13, N).
 
     As `sphere_interval`, but the same for all and without a branch, so that the processor does eight at once: the first
-    root c / (-b + sqrt(D)), rounded outward for the lower end and inward for the upper one. left (N,) bool: what
-    touches at the start, grazes or underflows, which this leaves open.
+    root c / (-b + sqrt(D)), rounded outward for the lower end and inward for the upper one. times.left: what touches
+    at the start, grazes or underflows, which this leaves open.
     """
+    lower, upper, left = times
     certain = reach * (1.0 - 8.0 * EPSILON)  # the radii are rounded up by nearly as much
     outer, inner = reach * reach, certain * certain
     for k in range(len(lower)):

@@ -22,16 +22,16 @@ from collision_monitor.prediction.pairs import predict_pairs
 from collision_monitor.query.contact import Compound
 
 
-class Query(NamedTuple):
+class ImpactQuery(NamedTuple):
     """What is asked for: horizon (s), tolerance (m), separation (m), most distance queries for a pair of pieces."""
 
     horizon: float
     tolerance: float
     separation: float
-    budget: int
+    iterations: int
 
 
-class Body(NamedTuple):
+class MovingShape(NamedTuple):
     """One of the two: its shapes, and the convex pieces that they are tested as, with poses in its frame."""
 
     shapes: Sequence[tuple[Shape, Pose]]
@@ -40,15 +40,15 @@ class Body(NamedTuple):
     motion: Motion
 
 
-class Scene(NamedTuple):
-    """The two as the kernels read them; the pieces of A stand first in the table, then those of B."""
+class Multibody(NamedTuple):
+    """Bodies as the kernels read them: the table of their shapes, how these make up bodies, and the bodies."""
 
     table: ShapeTable
     parts: Parts
     bodies: Bodies
 
 
-def make_body(shape: Compound, motion: Motion, name: str) -> Body:
+def make_moving_shape(shape: Compound, motion: Motion, name: str) -> MovingShape:
     """Check one of the two; in the plane, motions out of it are left out. Raises ShapeError, PoseError."""
     shapes = shape_pairs(shape, f"shape {name}")
     if not isinstance(motion, Motion):
@@ -60,48 +60,50 @@ def make_body(shape: Compound, motion: Motion, name: str) -> Body:
         level = (*motion.acceleration[:2], 0.0)
         motion = Motion(flat_pose(motion.pose), (x, y, 0.0), (0.0, 0.0, motion.angular[2]), level)
     modelled = containing_model(shapes, "exact")
-    return Body(shapes, modelled.pieces, modelled.shapes, motion)
+    return MovingShape(shapes, modelled.pieces, modelled.shapes, motion)
 
 
-def make_scene(a: Body, b: Body, horizon: float, apart: bool = False) -> Scene:
-    """The two with reference motions from 0 until the horizon; `apart`: each piece as a body of its own."""
+def lay_out_pair(a: MovingShape, b: MovingShape, horizon: float, apart: bool = False) -> Multibody:
+    """The two with reference motions from 0 until the horizon; `apart`: each piece as a body of its own.
+
+    The pieces of A stand first in the table, then those of B.
+    """
     count = len(a.pieces) + len(b.pieces)
     builder = ShapeTableBuilder(slots=count)
-    parts, bodies = make_parts(count), make_bodies(count if apart else 2)
+    slots = [[builder.append(piece, pose) for piece, pose in shape.pieces] for shape in (a, b)]
+    multibody = Multibody(builder.table, make_parts(count), make_bodies(count if apart else 2))
+    parts = multibody.parts
     k = 0
-    for body in (a, b):
-        slots = [builder.append(piece, pose) for piece, pose in body.pieces]
-        for slot, shape, (_, pose) in zip(slots, body.shape_of, body.pieces, strict=True):
+    for moving, own in zip((a, b), slots, strict=True):
+        for slot, shape, (_, pose) in zip(own, moving.shape_of, moving.pieces, strict=True):
             parts.index[slot] = shape
             parts.placed[slot] = pose.position.any() or not np.array_equal(pose.rotation, np.eye(3))
-        chains = [[slot] for slot in slots] if apart else [slots]
-        for chain in chains:
+        for chain in [[slot] for slot in own] if apart else [own]:
             parts.next[chain[:-1]] = chain[1:]
-            _set_motion(bodies, k, body, chain, builder.table, parts, horizon)
+            _lay_out_body(multibody, k, chain, moving.motion, horizon)
             k += 1
-    return Scene(builder.table, parts, bodies)
+    return multibody
 
 
-def _set_motion(
-    bodies: Bodies, k: int, body: Body, slots: list[int], table: ShapeTable, parts: Parts, horizon: float
-) -> None:
+def _lay_out_body(multibody: Multibody, k: int, slots: list[int], motion: Motion, horizon: float) -> None:
+    table, parts, bodies = multibody
     bodies.first_shape[k] = slots[0]
     radius = float((np.linalg.norm(table.local_position[slots], axis=1) + table.radius[slots]).max())
     bodies.id[k] = k
-    motion = bodies.motion[k]
-    motion["radius"], motion["cover"] = radius, horizon
-    motion["x"], motion["y"], motion["z"] = body.motion.pose.position
-    motion["vx"], motion["vy"], motion["vz"] = body.motion.linear
-    motion["ax"], motion["ay"], motion["az"] = body.motion.acceleration
-    motion["wx"], motion["wy"], motion["wz"] = body.motion.angular
-    motion["rotation"] = body.motion.pose.rotation
+    reference = bodies.motion[k]
+    reference["radius"], reference["cover"] = radius, horizon
+    reference["x"], reference["y"], reference["z"] = motion.pose.position
+    reference["vx"], reference["vy"], reference["vz"] = motion.linear
+    reference["ax"], reference["ay"], reference["az"] = motion.acceleration
+    reference["wx"], reference["wy"], reference["wz"] = motion.angular
+    reference["rotation"] = motion.pose.rotation
     # only one ball about the origin is never moved by turning
     centred = len(slots) == 1 and not parts.placed[slots[0]] and table.kind[slots[0]] in (SPHERE, CIRCLE)
     bodies.spin_radius[k] = 0.0 if centred else radius
 
 
 def first_impacts(
-    scene: Scene, pairs: NDArray[np.int32], begin: float, query: Query, separation: float | None = None
+    multibody: Multibody, pairs: NDArray[np.int32], begin: float, query: ImpactQuery, separation: float | None = None
 ) -> NDArray[np.void]:
     """First impacts (IMPACT) of the pairs (P, 2) of bodies from `begin` on; pairs without one are left out.
 
@@ -109,5 +111,6 @@ def first_impacts(
     """
     events = np.zeros(len(pairs) + 1, IMPACT)
     wanted = query.separation if separation is None else separation
-    found, _ = predict_pairs(*scene, pairs, begin, wanted, query.tolerance, query.budget, events, make_scratch())
+    tolerance, iterations = query.tolerance, query.iterations
+    found, _ = predict_pairs(*multibody, pairs, begin, wanted, tolerance, iterations, events, make_scratch())
     return events[:found]
