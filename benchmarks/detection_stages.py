@@ -87,7 +87,7 @@ def main(name: str = "boxes", n: str = "10000") -> None:
         detector._table, detector._path, detector._grid, detector._frame, detector._hits
     )  # fmt: skip
     number = cells(positions, grid, frame)
-    pairs, rows = np.empty((len(contacts), 2), np.int32), np.empty((len(contacts), kernels.COLUMNS))
+    pairs, rows = np.empty((len(contacts), 2), np.int32), np.empty((len(contacts), kernels.DETECTED_SIZE))
     found = candidates(grid, frame)
     time_candidates = best(lambda: candidates(grid, frame))
     time_search = best(lambda: search(table, path, grid, frame, hits))

@@ -27,11 +27,10 @@ from numpy.typing import NDArray
 
 import collision_monitor as cm
 from collision_monitor._jit import kernel
-from collision_monitor.prediction.bodies import Multibody
 from collision_monitor.prediction.body_impact import ShapePair, contact_at, make_scratch
 from collision_monitor.prediction.motion import relative_position
-from collision_monitor.query.impact_methods import lay_out
-from collision_monitor.query.moving_pair import make_body
+from collision_monitor.query.impact_methods import lay_out_motions
+from collision_monitor.query.moving_pair import make_moving_shape
 
 Array = NDArray[np.float64]
 Shape = cm.Sphere | cm.Box | cm.Capsule | cm.Cylinder | cm.Cone | cm.ConvexHull | cm.HalfSpace
@@ -112,10 +111,10 @@ def check(rng: np.random.Generator, kind_a: str, kind_b: str) -> NDArray[np.int_
     a_shape, b_shape = KINDS[kind_a](rng), KINDS[kind_b](rng)
     a, b = states(rng, a_shape), states(rng, b_shape)
     answers = cm.time_of_impact_batch(a_shape, a[:, :7], a[:, 7:], b_shape, b[:, :7], b[:, 7:], HORIZON)
-    bodies = make_body(a_shape, cm.Motion(cm.Pose()), "A"), make_body(b_shape, cm.Motion(cm.Pose()), "B")
-    scene, pairs = lay_out(*bodies, a, b, HORIZON)
+    still = cm.Motion(cm.Pose())
+    shapes = make_moving_shape(a_shape, still, "A"), make_moving_shape(b_shape, still, "B")
+    multibody, pairs = lay_out_motions(*shapes, a, b, HORIZON)
     first, apart, scratch = np.empty(BATCH), np.empty(BATCH), make_scratch()
-    multibody = Multibody(*scene)
     overlaps_before(multibody, pairs, STEP, np.minimum(answers.lower, HORIZON + STEP), ROUND_OFF, scratch, first)
     hit = answers.status == "hit"
     distances(multibody, pairs, np.where(hit, answers.upper, 0.0), scratch, apart)

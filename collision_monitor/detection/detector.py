@@ -1,6 +1,6 @@
 """Full detection: all poses in, all contacts out, frame by frame.
 
-    Detector(shapes).detect(positions, quaternions) -> Contacts
+    Detector(shapes).detect(positions, quaternions) -> DetectedContacts
 
 For objects whose every pose is new in each frame. Monitor is what remembers and predicts.
 """
@@ -35,46 +35,49 @@ def default_threads() -> int:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Contacts:
+class DetectedContacts:
     """M contacts, sorted by pair. `table` holds a row for each; the fields are views of it."""
 
     pairs: NDArray[np.int32]
     """(M, 2): numbers of the two shapes, the smaller first; A and B below."""
     table: Array
-    """(M, 14): signed distance, error bound, normal, point, point on A, point on B."""
+    """(M, 14): signed distance, error bound, normal, point, point on A, point on B (see kernels.DETECTED)."""
 
     def __len__(self) -> int:
         return len(self.pairs)
 
+    def _field(self, name: str) -> Array:
+        return self.table.view(kernels.DETECTED)[name][:, 0]
+
     @property
     def signed_distance(self) -> Array:
         """(M,) m: minus the depth where the shapes overlap."""
-        return self.table[:, 0]
+        return self._field("signed_distance")
 
     @property
     def error_bound(self) -> Array:
         """(M,) m: how wrong the signed distance can be."""
-        return self.table[:, 1]
+        return self._field("error_bound")
 
     @property
     def normal(self) -> Array:
         """(M, 3): unit vector from A to B; B moved along it by the depth touches A."""
-        return self.table[:, 2:5]
+        return self._field("normal")
 
     @property
     def point(self) -> Array:
         """(M, 3) m: the middle between the witness points."""
-        return self.table[:, 5:8]
+        return self._field("point")
 
     @property
     def point_a(self) -> Array:
         """(M, 3) m: the witness point on A, in the world."""
-        return self.table[:, 8:11]
+        return self._field("point_a")
 
     @property
     def point_b(self) -> Array:
         """(M, 3) m: the witness point on B, in the world."""
-        return self.table[:, 11:14]
+        return self._field("point_b")
 
 
 class Detector:
@@ -125,7 +128,7 @@ class Detector:
     def __len__(self) -> int:
         return self._n
 
-    def detect(self, positions: ArrayLike, quaternions: ArrayLike) -> Contacts:
+    def detect(self, positions: ArrayLike, quaternions: ArrayLike) -> DetectedContacts:
         """Contacts at these positions (N, 3) m and unit quaternions (N, 4) x, y, z, w.
 
         Raises InputError for arrays of another shape, PoseError for numbers that are no pose.
@@ -145,10 +148,10 @@ class Detector:
             run = kernels.detect
         while True:
             pairs = np.empty((self._room, 2), np.int32)
-            table = np.empty((self._room, kernels.COLUMNS))
+            table = np.empty((self._room, kernels.DETECTED_SIZE))
             count = run(self._path, self._margin, positions, quaternions, pairs, table, *self._memory)
             if count >= 0:
-                return Contacts(pairs[:count], table[:count])
+                return DetectedContacts(pairs[:count], table[:count])
             if count >= kernels.BAD_QUATERNION:
                 raise PoseError(_what_is_wrong(positions, quaternions))
             # more contacts than ever before: with room for them, the frame is done again

@@ -32,9 +32,19 @@ from collision_monitor.broad_phase.dense_grid import (
 )
 from collision_monitor.geometry.shape_table import ShapeTable
 from collision_monitor.narrow_phase.box_box import axis_direction, sat, touching_features
-from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, WORK_SIZE
+from collision_monitor.narrow_phase.contact_row import (
+    BOUND,
+    CONTACT_SIZE,
+    DISTANCE,
+    NORMAL,
+    POINT_A,
+    POINT_B,
+    first_column,
+)
 from collision_monitor.narrow_phase.dispatch import contact_within
+from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact
+from collision_monitor.narrow_phase.work_memory import WORK_SIZE
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 
 SPHERES, BOXES, ANY = 0, 1, 2
@@ -43,8 +53,25 @@ SPHERES, BOXES, ANY = 0, 1, 2
 CHUNK: Final = 256
 """Candidates that are collected before the narrow phase runs over them: both loops stay in the caches."""
 
-COLUMNS: Final = 14
-"""Of the output: signed distance, error bound, normal, point, point on A, point on B."""
+DETECTED: Final = np.dtype(
+    [
+        ("signed_distance", np.float64),  # m
+        ("error_bound", np.float64),  # m
+        ("normal", np.float64, 3),  # unit, from A to B
+        ("point", np.float64, 3),  # m, in the world: the middle between the witness points
+        ("point_a", np.float64, 3),
+        ("point_b", np.float64, 3),
+    ]
+)
+"""A row of the output."""
+
+_SIGNED_DISTANCE: Final = first_column(DETECTED, "signed_distance")
+_ERROR_BOUND: Final = first_column(DETECTED, "error_bound")
+_NORMAL: Final = first_column(DETECTED, "normal")
+_POINT: Final = first_column(DETECTED, "point")
+_POINT_A: Final = first_column(DETECTED, "point_a")
+_POINT_B: Final = first_column(DETECTED, "point_b")
+DETECTED_SIZE: Final = DETECTED.itemsize // 8
 
 
 class Frame(NamedTuple):
@@ -61,6 +88,14 @@ class Frame(NamedTuple):
     begins: Any  # (N + 1,) int32: scratch of the final sort
     hits: Any  # (B,) int64: contacts of each block
     good: Any  # (B,) bool: whether all the input of the block was
+
+
+class CandidateTest(NamedTuple):
+    """What every candidate is tested by."""
+
+    table: Any  # ShapeTable
+    path: Any  # SPHERES, BOXES or ANY
+    limit: Any  # m: pairs that are farther apart are no contacts
 
 
 class Hits(NamedTuple):
@@ -176,12 +211,11 @@ def _gather(path: int, positions: Any, quaternions: Any, grid: Any, frame: Any, 
 
 
 @inlined
-def _boxes(a: Any, b: Any, RA: Any, RB: Any, px: float, py: float, pz: float, out: Any, work: Any) -> bool:
-    gap, axis, sign = sat(a[0], a[1], a[2], b[0], b[1], b[2], RA, RB, px, py, pz, 0.0)
+def _boxes(a: Any, b: Any, pose: Any, out: Any, work: Any) -> bool:
+    gap, axis, sign = sat((a[0], a[1], a[2]), (b[0], b[1], b[2]), pose, 0.0)
     if gap > 0.0:
         return False
-    nx, ny, nz = axis_direction(axis, sign, RA, RB)
-    touching_features(a, b, RA, RB, px, py, pz, gap, nx, ny, nz, out, work)
+    touching_features(a, b, pose, gap, axis_direction(axis, sign, pose), out, work)
     return True
 
 
@@ -198,43 +232,43 @@ def _ask_for(table: Any, path: int, order: Any, size: Any, rotation: Any, q: Any
 
 
 @device
-def _narrow(
-    table: Any, path: int, limit: float, grid: Any, frame: Any, found: Any, owner: Any, count: int, hits: int,
-    pair: Any, contact: Any, work: Any,
-) -> int:  # fmt: skip
-    """Test candidates found[:count] of owner[:count]; append contacts from place `hits` on, return the new number."""
+def _narrow(test: Any, grid: Any, frame: Any, hits: Any, b: Any, candidates: int, count: int) -> int:
+    """CandidateTest the first `candidates` of block b; append contacts from place `count` on, return the new number."""
+    table, path, limit = test.table, test.path, test.limit
+    found, owner, work = frame.found[b], frame.owner[b], frame.work[b]
+    pair, contact = hits.pair[b], hits.contact[b]
     order, centre, size, rotation = grid.order, grid.centre, frame.size, frame.rotation
     last = pair.shape[0] - 1
-    for k in range(count):
+    for k in range(candidates):
         if path != SPHERES:
-            _ask_for(table, path, order, size, rotation, np.intp(found[min(k + AHEAD, count - 1)]))
+            _ask_for(table, path, order, size, rotation, np.intp(found[min(k + AHEAD, candidates - 1)]))
         p, q = owner[k], found[k]
         i, j = order[p], order[q]
         if i > j:
             i, j, p, q = j, i, q, p
-        px, py, pz = centre[0, q] - centre[0, p], centre[1, q] - centre[1, p], centre[2, q] - centre[2, p]
-        at = min(hits, last)
+        apart = (centre[0, q] - centre[0, p], centre[1, q] - centre[1, p], centre[2, q] - centre[2, p])
+        at = min(count, last)
         out = contact[at]
         if path == SPHERES:
-            sphere_sphere_contact(size[p, 0], size[q, 0], px, py, pz, out)
-            touching = out[0] <= limit
+            sphere_sphere_contact(size[p, 0], size[q, 0], apart, out)
+            touching = out[DISTANCE] <= limit
         elif path == BOXES:
-            touching = _boxes(size[p], size[q], rotation[p], rotation[q], px, py, pz, out, work)
+            touching = _boxes(size[p], size[q], PairPose(rotation[p], rotation[q], apart), out, work)
         else:
-            touching = contact_within(table, i, j, rotation[p], rotation[q], px, py, pz, limit, out, work)
+            touching = contact_within(table, i, j, PairPose(rotation[p], rotation[q], apart), limit, out, work)
         if touching:
             pair[at, 0] = i
             pair[at, 1] = j
-            hits += 1
-    return hits
+            count += 1
+    return count
 
 
 @device
 def _search(table: Any, path: int, limit: float, grid: Any, frame: Any, hits: Any, b: Any) -> None:
     """Contacts of a block of places with all that they look for, and how many there are."""
     begin, end = _block(b, frame, grid.order.size)
-    found, owner, work = frame.found[b], frame.owner[b], frame.work[b]
-    pair, contact = hits.pair[b], hits.contact[b]
+    found, owner = frame.found[b], frame.owner[b]
+    test = CandidateTest(table, path, limit)
     n = count = 0
     for a in range(STARTING):
         first, behind = places(grid, a)
@@ -250,9 +284,9 @@ def _search(table: Any, path: int, limit: float, grid: Any, frame: Any, hits: An
                     owner[k] = p
                 n = m
                 if n >= CHUNK:
-                    count = _narrow(table, path, limit, grid, frame, found, owner, n, count, pair, contact, work)
+                    count = _narrow(test, grid, frame, hits, b, n, count)
                     n = 0
-    frame.hits[b] = _narrow(table, path, limit, grid, frame, found, owner, n, count, pair, contact, work)
+    frame.hits[b] = _narrow(test, grid, frame, hits, b, n, count)
 
 
 @device
@@ -297,16 +331,22 @@ def _write(positions: Any, frame: Any, hits: Any, total: int, pairs: Any, contac
         i = hits.pair[b, h, 0]
         pairs[k, 0] = i
         pairs[k, 1] = hits.pair[b, h, 1]
-        contacts[k, 0] = hits.contact[b, h, 0]
-        contacts[k, 1] = hits.contact[b, h, 10]
+        contacts[k, _SIGNED_DISTANCE] = hits.contact[b, h, DISTANCE]
+        contacts[k, _ERROR_BOUND] = hits.contact[b, h, BOUND]
         for c in range(3):
-            on_a = positions[i, c] + hits.contact[b, h, 4 + c]
-            on_b = positions[i, c] + hits.contact[b, h, 7 + c]
-            contacts[k, 2 + c] = hits.contact[b, h, 1 + c]
-            contacts[k, 5 + c] = on_a + 0.5 * (on_b - on_a)
-            contacts[k, 8 + c] = on_a
-            contacts[k, 11 + c] = on_b
+            on_a = positions[i, c] + hits.contact[b, h, POINT_A + c]
+            on_b = positions[i, c] + hits.contact[b, h, POINT_B + c]
+            contacts[k, _NORMAL + c] = hits.contact[b, h, NORMAL + c]
+            contacts[k, _POINT + c] = on_a + 0.5 * (on_b - on_a)
+            contacts[k, _POINT_A + c] = on_a
+            contacts[k, _POINT_B + c] = on_b
 
+
+# Where the arrays of each begin among those that a kernel is called with.
+_GRID: Final = len(ShapeTable._fields)
+_FRAME: Final = _GRID + len(Grid._fields)
+_HITS: Final = _FRAME + len(Frame._fields)
+_END: Final = _HITS + len(Hits._fields)
 
 BAD_POSITION: Final = -1
 BAD_QUATERNION: Final = -2
@@ -331,8 +371,8 @@ def detect(path: int, limit: float, positions: Any, quaternions: Any, pairs: Any
     memory: the arrays of the shape table, the grid, the frame and the hits. Arrays that are handed over one by one
     cost 20 ns each, those in a named tuple 200 ns.
     """
-    table, grid = ShapeTable(*memory[:10]), Grid(*memory[10:18])
-    frame, hits = Frame(*memory[18:29]), Hits(*memory[29:32])
+    table, grid = ShapeTable(*memory[:_GRID]), Grid(*memory[_GRID:_FRAME])
+    frame, hits = Frame(*memory[_FRAME:_HITS]), Hits(*memory[_HITS:_END])
     blocks = frame.bounds.shape[0]
     for b in range(blocks):
         _bounds(positions, frame, b)
@@ -362,8 +402,8 @@ def detect_parallel(
 
     A parallel loop's b is cast to what it is in `detect`, so that both share their compiled stages.
     """
-    table, grid = ShapeTable(*memory[:10]), Grid(*memory[10:18])
-    frame, hits = Frame(*memory[18:29]), Hits(*memory[29:32])
+    table, grid = ShapeTable(*memory[:_GRID]), Grid(*memory[_GRID:_FRAME])
+    frame, hits = Frame(*memory[_FRAME:_HITS]), Hits(*memory[_HITS:_END])
     blocks = frame.bounds.shape[0]
     for b in range(blocks):
         _bounds(positions, frame, b)

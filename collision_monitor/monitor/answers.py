@@ -19,6 +19,17 @@ from collision_monitor.monitor.result import StepResult, StepStatus
 from collision_monitor.monitor.roster import count_bodies
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
+from collision_monitor.narrow_phase.contact_row import (
+    BOUND,
+    DISTANCE,
+    FEATURE_INDEX_A,
+    FEATURE_INDEX_B,
+    FEATURE_TYPE_A,
+    FEATURE_TYPE_B,
+    NORMAL,
+    POINT_A,
+    POINT_B,
+)
 from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, UNSETTLED
 from collision_monitor.prediction.body_impact import CLOSING
 from collision_monitor.prediction.impact_record import BOUND_ONLY, TREE_BOUND, UNRESOLVED, ids_of
@@ -148,16 +159,16 @@ def write_contacts(pairs, results, bodies, shape_index, now, contacts):
         contact.model_a, contact.model_b = bodies.model[pair.i], bodies.model[pair.j]
         contact.point_index, contact.point_count = 0, 1
         if pair.touching == 1:
-            contact.signed_distance = row[0]
-            contact.error_bound = row[10]
+            contact.signed_distance = row[DISTANCE]
+            contact.error_bound = row[BOUND]
             for c in range(3):
-                contact.point_a[c], contact.point_b[c] = row[4 + c], row[7 + c]
-                contact.normal[c] = row[1 + c]
+                contact.point_a[c], contact.point_b[c] = row[POINT_A + c], row[POINT_B + c]
+                contact.normal[c] = row[NORMAL + c]
             contact.closing_speed = row[CLOSING]
             contact.shape_a = shape_index[int(row[SHAPE_I])]
             contact.shape_b = shape_index[int(row[SHAPE_J])]
-            contact.feature_type_a, contact.feature_index_a = int(row[11]), int(row[12])
-            contact.feature_type_b, contact.feature_index_b = int(row[13]), int(row[14])
+            contact.feature_type_a, contact.feature_index_a = int(row[FEATURE_TYPE_A]), int(row[FEATURE_INDEX_A])
+            contact.feature_type_b, contact.feature_index_b = int(row[FEATURE_TYPE_B]), int(row[FEATURE_INDEX_B])
             contact.phase = PERSIST if pair.touched == 1 else BEGIN
             contact.status = int(row[STATUS])
         else:

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from collision_monitor._jit import allocating_kernel
 from collision_monitor.geometry.shape_table import take
 from collision_monitor.monitor.active_pairs import Active
-from collision_monitor.narrow_phase.contact_row import work_array
+from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.narrow_phase.manifold import CORNERS, manifold_batch, reduce_points
+from collision_monitor.narrow_phase.work_memory import work_array
 from collision_monitor.prediction.bodies import Multibody, next_pair, place_shape
 from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUCHING, closing_now, relative_now
 from collision_monitor.prediction.motion import position_now, rotation_now
@@ -57,7 +58,7 @@ def _shape_pairs(multibody, active, now, found):
         for slot in (int(results[k, SHAPE_I]), int(results[k, SHAPE_J])):
             if isfinite(table.radius[slot]):
                 size += table.radius[slot]
-        near = results[k, 0] + FEATURE_TIE * size
+        near = results[k, DISTANCE] + FEATURE_TIE * size
         a, first_b = bodies.first_shape[i], bodies.first_shape[j]
         b = first_b
         oa = (0.0, 0.0, 0.0)
@@ -105,33 +106,33 @@ def _join(bodies, active, now, patches, most, points, work):
     pairs, _, results = active
     of, tie = patches.of, patches.tie
     corners = np.empty((CORNERS, 3))
-    out = np.empty(10)
+    out = np.empty(CONTACT_SIZE)
     begin = 0
     while begin < of.size:
         k = of[begin]
-        nx, ny, nz = results[k, 1], results[k, 2], results[k, 3]
+        normal = (results[k, NORMAL], results[k, NORMAL + 1], results[k, NORMAL + 2])
         m = 0
         end = begin
         while end < of.size and of[end] == k:
             if m + MOST_POINTS > CORNERS:
-                m = reduce_points(corners, m, nx, ny, nz, tie[begin], MOST_POINTS, work)
+                m = reduce_points(corners, m, normal, tie[begin], MOST_POINTS, work)
             for c in range(patches.count[end]):
                 corners[m] = patches.corners[end, c]
                 m += 1
             end += 1
         if end - begin > 1 or m > most:
-            m = reduce_points(corners, m, nx, ny, nz, tie[begin], most, work)
+            m = reduce_points(corners, m, normal, tie[begin], most, work)
         begin = end
         if m < 2:
             continue
         points.count[k] = m
         i, j = pairs[k].i, pairs[k].j
         there = relative_now(bodies, i, j, now)
-        out[:4] = results[k, :4]
+        out[:POINT_A] = results[k, :POINT_A]
         for c in range(m):
             for d in range(3):
-                out[4 + d] = corners[c, d]
-                out[7 + d] = corners[c, d] + out[0] * out[1 + d]
+                out[POINT_A + d] = corners[c, d]
+                out[POINT_B + d] = corners[c, d] + out[DISTANCE] * out[NORMAL + d]
                 points.position[k, c, d] = corners[c, d] + position_now(bodies, i, there.age_i, d)
             points.closing[k, c] = closing_now(bodies, i, j, there, out)
 
@@ -156,8 +157,9 @@ def with_patches(
     two = np.arange(2 * n, dtype=np.int32).reshape(-1, 2)
     placed = take(multibody.table, shapes["slot"].ravel())
     rows = contact_batch(placed, position, rotation, two)
-    level = rows[:, 0] <= results[of, 0] + tie
-    level &= np.einsum("ij,ij->i", rows[:, 1:4], results[of, 1:4]) >= 1.0 - FEATURE_TIE
+    level = rows[:, DISTANCE] <= results[of, DISTANCE] + tie
+    aligned = np.einsum("ij,ij->i", rows[:, NORMAL:POINT_A], results[of, NORMAL:POINT_A])
+    level &= aligned >= 1.0 - FEATURE_TIE
     of, tie = of[level], tie[level]
     counts, patch = manifold_batch(placed, position, rotation, two[level], rows[level])
     patch += position[two[level, 0], None]

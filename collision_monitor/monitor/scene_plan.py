@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.hashed_grid import GRID_LEVELS, LEVEL_OFFSET, HashedGrid
 from collision_monitor.monitor.roster import Roster
-from collision_monitor.narrow_phase.dispatch import _METHODS, KIND_NAMES, pair_test
+from collision_monitor.narrow_phase.dispatch import KIND_NAMES, TEST_METHODS, pair_test
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class ScenePlan:
         lines = [f"objects   {self.moving} moving, {self.static} static"]
         lines.append("shapes    " + (", ".join(f"{count} {name}" for name, count in self.shapes.items()) or "none"))
         for (a, b), test in self.tests.items():
-            lines.append(f"test      {a} – {b}: {test} ({_METHODS[test]})")
+            lines.append(f"test      {a} – {b}: {test} ({TEST_METHODS[test]})")
         for width, count in self.cells.items():
             lines.append(f"grid      cells of {width:g} m: {count}")
         unneeded = self.unneeded

@@ -7,12 +7,49 @@ Axes 0-2 are A's face normals, 3-5 are B's, 6 + 3 i + j is the cross product of 
 from __future__ import annotations
 
 from math import copysign, inf, sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
-from collision_monitor._jit import device
-from collision_monitor.narrow_phase.contact_row import EDGE, FACE, VERTEX, write
+from collision_monitor._jit import device, inlined
+from collision_monitor.narrow_phase.contact_row import (
+    DISTANCE,
+    EDGE,
+    FACE,
+    FEATURE_TYPE_A,
+    FEATURE_TYPE_B,
+    NORMAL,
+    POINT_A,
+    POINT_B,
+    VERTEX,
+    write,
+)
+from collision_monitor.narrow_phase.convex_convex import convex_contact
+from collision_monitor.narrow_phase.core import half_extents
+from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.segment import segment_segment
+from collision_monitor.narrow_phase.vector import (
+    Vector,
+    along,
+    column,
+    cross,
+    dot,
+    minus,
+    opposite,
+    plus,
+    rotate_back,
+    scaled,
+)
 from collision_monitor.tolerances import FACE_PREFERENCE, FEATURE_TIE, PARALLEL_SIN2, SAT_ROUND_OFF
+
+# Sections of the scratch memory: the features, and two polygons of rows (u, v).
+_FEATURE_A, _FEATURE_B, _POLYGON, _CLIPPED = 0, 6, 16, 80
+
+
+class BoxFeature(NamedTuple):
+    """A vertex, edge or face of a box."""
+
+    half: Any  # (3,): half extents of the box
+    R: Any  # (3, 3): rotation of the box to world axes
+    row: Any  # (6,): its centre from the box's centre, world axes; for each axis its side (-1, 1), or 0 for a free axis
 
 
 @device
@@ -26,21 +63,17 @@ def _edge(best: float, axis: int, sign: float, number: int, dot: float, radius: 
 
 
 @device
-def sat(
-    a0: float, a1: float, a2: float, b0: float, b1: float, b2: float, RA: Any, RB: Any, px: float, py: float, pz: float,
-    limit: float,
-) -> Any:
-    """Largest gap of the 15 axes (m), its axis and sign; a0.. and b0.. are half extents, p = B - A in world axes.
+def sat(a: Vector, b: Vector, pose: PairPose, limit: float) -> Any:
+    """Largest gap of the 15 axes (m), its axis and sign; a and b are half extents (3,).
 
     A negative gap is minus the least translation that parts the boxes. Where a face axis has a gap over `limit` (m),
     that is the answer: most pairs that are apart need no edge axis.
     """
-    t0 = RA[0, 0] * px + RA[1, 0] * py + RA[2, 0] * pz
-    t1 = RA[0, 1] * px + RA[1, 1] * py + RA[2, 1] * pz
-    t2 = RA[0, 2] * px + RA[1, 2] * py + RA[2, 2] * pz
-    s0 = RB[0, 0] * px + RB[1, 0] * py + RB[2, 0] * pz
-    s1 = RB[0, 1] * px + RB[1, 1] * py + RB[2, 1] * pz
-    s2 = RB[0, 2] * px + RB[1, 2] * py + RB[2, 2] * pz
+    RA, RB = pose.R_A, pose.R_B
+    a0, a1, a2 = a
+    b0, b1, b2 = b
+    t0, t1, t2 = rotate_back(RA, pose.p)
+    s0, s1, s2 = rotate_back(RB, pose.p)
     c00 = RA[0, 0] * RB[0, 0] + RA[1, 0] * RB[1, 0] + RA[2, 0] * RB[2, 0]
     c01 = RA[0, 0] * RB[0, 1] + RA[1, 0] * RB[1, 1] + RA[2, 0] * RB[2, 1]
     c02 = RA[0, 0] * RB[0, 2] + RA[1, 0] * RB[1, 2] + RA[2, 0] * RB[2, 2]
@@ -126,8 +159,9 @@ def sat(
 
 
 @device
-def axis_direction(axis: int, sign: float, RA: Any, RB: Any) -> Any:
+def axis_direction(axis: int, sign: float, pose: PairPose) -> Vector:
     """Unit vector of a SAT axis in world axes, times its sign."""
+    RA, RB = pose.R_A, pose.R_B
     if axis < 3:
         return sign * RA[0, axis], sign * RA[1, axis], sign * RA[2, axis]
     if axis < 6:
@@ -142,40 +176,24 @@ def axis_direction(axis: int, sign: float, RA: Any, RB: Any) -> Any:
 
 
 @device
-def box_box_separation(
-    a0: float,
-    a1: float,
-    a2: float,
-    b0: float,
-    b1: float,
-    b2: float,
-    margin: float,
-    RA: Any,
-    RB: Any,
-    px: float,
-    py: float,
-    pz: float,
-    out: Any,
-) -> float:
+def box_box_separation(a: Vector, b: Vector, margin: float, pose: PairPose, out: Any) -> float:
     """Largest SAT gap less the margins and the round-off (m); its direction in out[0:3]."""
-    gap, axis, sign = sat(a0, a1, a2, b0, b1, b2, RA, RB, px, py, pz, inf)
-    out[0], out[1], out[2] = axis_direction(axis, sign, RA, RB)
-    return gap - margin - SAT_ROUND_OFF * (abs(gap) + a0 + a1 + a2 + b0 + b1 + b2)
+    gap, axis, sign = sat(a, b, pose, inf)
+    out[0], out[1], out[2] = axis_direction(axis, sign, pose)
+    return gap - margin - SAT_ROUND_OFF * (abs(gap) + a[0] + a[1] + a[2] + b[0] + b[1] + b[2])
 
 
 @device
-def _feature(h0: float, h1: float, h2: float, R: Any, nx: float, ny: float, nz: float, tie: float, row: Any) -> int:
-    """The vertex, edge or face of a box that is extreme along n: the number of its free axes (0, 1, 2).
-
-    row[0:3] = its centre from the box's centre, world axes; row[3:6] = 0 for a free axis, else the side (-1 or 1).
-    """
+def _find(feature: BoxFeature, n: Vector, tie: float) -> int:
+    """Fill the row of the feature that is extreme along n; the number of its free axes: 0 vertex, 1 edge, 2 face."""
+    row, R = feature.row, feature.R
     row[0] = 0.0
     row[1] = 0.0
     row[2] = 0.0
     free = 0
     for k in range(3):
-        h = h0 if k == 0 else (h1 if k == 1 else h2)
-        c = R[0, k] * nx + R[1, k] * ny + R[2, k] * nz
+        h = feature.half[k]
+        c = dot(column(R, k), n)
         if abs(c) * h <= tie and h > 0.0 and free < 2:
             row[3 + k] = 0.0
             free += 1
@@ -214,28 +232,28 @@ def _clip(work: Any, source: int, target: int, count: int, column: int, limit: f
 
 
 @device
-def _common_point(
-    face: Any, free: Any, Rf: Any, f: Any, Ro: Any, o: Any, dx: float, dy: float, dz: float, work: Any
-) -> Any:
-    """Middle of what a face (rows `face`, half extents f) and another feature (`free`) share, along the face.
+def _common_point(face: BoxFeature, other: BoxFeature, d: Vector, work: Any) -> Vector:
+    """Middle of what a face and another feature share, along the face.
 
     d = face's centre - the feature's centre. Returns the offset of the shared point from the face's centre;
     where round-off leaves nothing shared, the feature's middle pulled into the face.
     """
-    i = 0 if face[3] == 0.0 else 1
-    j = 2 if face[5] == 0.0 else 1
-    hi, hj = f[i], f[j]
+    i = 0 if face.row[3] == 0.0 else 1
+    j = 2 if face.row[5] == 0.0 else 1
+    side_i, side_j = column(face.R, i), column(face.R, j)
+    hi, hj = face.half[i], face.half[j]
     # the feature's corners in the face's two coordinates
-    ui = -(Rf[0, i] * dx + Rf[1, i] * dy + Rf[2, i] * dz)
-    uj = -(Rf[0, j] * dx + Rf[1, j] * dy + Rf[2, j] * dz)
-    start = 16
+    ui = -dot(side_i, d)
+    uj = -dot(side_j, d)
+    start = _POLYGON
     work[start] = ui
     work[start + 1] = uj
     count = 1
     for k in range(3):
-        if free[3 + k] == 0.0:
-            ei = o[k] * (Rf[0, i] * Ro[0, k] + Rf[1, i] * Ro[1, k] + Rf[2, i] * Ro[2, k])
-            ej = o[k] * (Rf[0, j] * Ro[0, k] + Rf[1, j] * Ro[1, k] + Rf[2, j] * Ro[2, k])
+        if other.row[3 + k] == 0.0:
+            edge = column(other.R, k)
+            ei = other.half[k] * dot(side_i, edge)
+            ej = other.half[k] * dot(side_j, edge)
             # a point becomes a segment, a segment a parallelogram
             for m in range(count):
                 far = start + 2 * (2 * count - 1 - m)
@@ -246,8 +264,8 @@ def _common_point(
                 work[near + 1] -= ej
             count *= 2
     line = count == 2
-    count = _clip(work, start, start + 64, count, 0, hi)
-    count = _clip(work, start, start + 64, count, 1, hj)
+    count = _clip(work, start, _CLIPPED, count, 0, hi)
+    count = _clip(work, start, _CLIPPED, count, 1, hj)
     if count == 0:
         ci = min(max(ui, -hi), hi)
         cj = min(max(uj, -hj), hj)
@@ -268,7 +286,7 @@ def _common_point(
             cj += work[start + 2 * m + 1]
         ci /= count
         cj /= count
-    return ci * Rf[0, i] + cj * Rf[0, j], ci * Rf[1, i] + cj * Rf[1, j], ci * Rf[2, i] + cj * Rf[2, j]
+    return along(scaled(side_i, ci), cj, side_j)
 
 
 @device
@@ -292,61 +310,74 @@ def _describe(row: Any, free: int, out: Any, at: int) -> None:
 
 
 @device
-def touching_features(
-    a: Any,
-    b: Any,
-    RA: Any,
-    RB: Any,
-    px: float,
-    py: float,
-    pz: float,
-    distance: float,
-    nx: float,
-    ny: float,
-    nz: float,
-    out: Any,
-    work: Any,
-) -> None:
+def touching_features(a: Any, b: Any, pose: PairPose, distance: float, n: Vector, out: Any, work: Any) -> None:
     """Witness points and features of two boxes (half extents a, b) that would touch after a move along the normal n.
 
     Writes the whole contact with the given signed distance.
     """
     tie = FEATURE_TIE * max(max(a[0], a[1], a[2]), max(b[0], b[1], b[2]))
-    fa = work[0:6]
-    fb = work[6:12]
-    na = _feature(a[0], a[1], a[2], RA, nx, ny, nz, tie, fa)
-    nb = _feature(b[0], b[1], b[2], RB, -nx, -ny, -nz, tie, fb)
+    A = BoxFeature(a, pose.R_A, work[_FEATURE_A : _FEATURE_A + 6])
+    B = BoxFeature(b, pose.R_B, work[_FEATURE_B : _FEATURE_B + 6])
+    free_a = _find(A, n, tie)
+    free_b = _find(B, opposite(n), tie)
+    center_a = (A.row[0], A.row[1], A.row[2])
     # B's feature, moved along the normal until it lies in the plane of A's
-    bx = px + fb[0] - distance * nx
-    by = py + fb[1] - distance * ny
-    bz = pz + fb[2] - distance * nz
-    if na == 0:
-        x, y, z = fa[0], fa[1], fa[2]
-    elif nb == 0:
-        x, y, z = bx, by, bz
-    elif na == 2:
-        x, y, z = _common_point(fa, fb, RA, a, RB, b, fa[0] - bx, fa[1] - by, fa[2] - bz, work)
-        x, y, z = fa[0] + x, fa[1] + y, fa[2] + z
-    elif nb == 2:
-        x, y, z = _common_point(fb, fa, RB, b, RA, a, bx - fa[0], by - fa[1], bz - fa[2], work)
-        x, y, z = bx + x, by + y, bz + z
+    px, py, pz = pose.p
+    center_b = (
+        px + B.row[0] - distance * n[0],
+        py + B.row[1] - distance * n[1],
+        pz + B.row[2] - distance * n[2],
+    )
+    if free_a == 0:
+        point = center_a
+    elif free_b == 0:
+        point = center_b
+    elif free_a == 2:
+        point = plus(center_a, _common_point(A, B, minus(center_a, center_b), work))
+    elif free_b == 2:
+        point = plus(center_b, _common_point(B, A, minus(center_b, center_a), work))
     else:
-        i = 0 if fa[3] == 0.0 else (1 if fa[4] == 0.0 else 2)
-        j = 0 if fb[3] == 0.0 else (1 if fb[4] == 0.0 else 2)
-        s, _ = segment_segment(
-            a[i] * RA[0, i],
-            a[i] * RA[1, i],
-            a[i] * RA[2, i],
-            b[j] * RB[0, j],
-            b[j] * RB[1, j],
-            b[j] * RB[2, j],
-            bx - fa[0],
-            by - fa[1],
-            bz - fa[2],
-        )
+        i = 0 if A.row[3] == 0.0 else (1 if A.row[4] == 0.0 else 2)
+        j = 0 if B.row[3] == 0.0 else (1 if B.row[4] == 0.0 else 2)
+        edge_a, edge_b = column(pose.R_A, i), column(pose.R_B, j)
+        s, _ = segment_segment(scaled(edge_a, a[i]), scaled(edge_b, b[j]), minus(center_b, center_a))
         s *= a[i]
-        x, y, z = fa[0] + s * RA[0, i], fa[1] + s * RA[1, i], fa[2] + s * RA[2, i]
+        point = along(center_a, s, edge_a)
     size = a[0] + a[1] + a[2] + b[0] + b[1] + b[2]
-    write(out, distance, nx, ny, nz, x, y, z, SAT_ROUND_OFF * (abs(distance) + size) + FACE_PREFERENCE * size)
-    _describe(fa, na, out, 11)
-    _describe(fb, nb, out, 13)
+    write(out, distance, n, point, SAT_ROUND_OFF * (abs(distance) + size) + FACE_PREFERENCE * size)
+    _describe(A.row, free_a, out, FEATURE_TYPE_A)
+    _describe(B.row, free_b, out, FEATURE_TYPE_B)
+
+
+@inlined
+def box_box_contact(table: Any, a: int, b: int, pose: PairPose, limit: float, out: Any, work: Any) -> bool:
+    """SAT, and GJK for the distance of boxes whose nearest features no SAT axis is at a right angle to.
+
+    Whole contact in out; False, and out undefined, where the distance is certified to be over `limit` (m).
+    """
+    ha, hb = table.size[a], table.size[b]
+    ma, mb = table.margin[a], table.margin[b]
+    reach = limit + ma + mb
+    gap, axis, sign = sat(half_extents(table, a), half_extents(table, b), pose, reach)
+    if gap > reach:
+        return False
+    size = max(max(ha[0], ha[1], ha[2]), max(hb[0], hb[1], hb[2]))
+    if gap > 0.0:
+        if not convex_contact(table, a, b, pose, limit, out, work):
+            return False
+        if out[DISTANCE] + ma + mb - gap > FACE_PREFERENCE * size:
+            return True
+    n = axis_direction(axis, sign, pose)
+    if gap > 0.0:
+        # where corners are nearest the gap can be as long as the distance to 1e-9, and they beside the axis by 1e-5
+        beside = cross((out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]), n)
+        if gap * sqrt(dot(beside, beside)) > FEATURE_TIE * size:
+            return True
+        # the SAT axis is the direction of the distance too, and has no noise however near the boxes are
+    touching_features(ha, hb, pose, gap, n, out, work)
+    if ma > 0.0 or mb > 0.0:
+        out[DISTANCE] -= ma + mb
+        for i in range(3):
+            out[POINT_A + i] += ma * out[NORMAL + i]
+            out[POINT_B + i] -= mb * out[NORMAL + i]
+    return True

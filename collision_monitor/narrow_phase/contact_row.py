@@ -1,10 +1,7 @@
-"""Where a pair test writes its answer, and how much scratch memory it needs.
+"""The row in which a pair test writes a contact: its columns by name, for kernels and for NumPy.
 
-Every test works relative to A's origin, in world axes, with the normal from A to B:
-separation -> out[0:3] unit direction; contact -> out[0:15]:
-
-    0 signed distance (m)   1:4 normal   4:7 witness on A   7:10 witness on B = witness on A + distance * normal
-    10 error bound (m)      11, 12 feature type and index on A   13, 14 the same on B (types of Contact.msg)
+Every test works relative to A's origin, in world axes, with the normal from A to B. CONTACT_ROW is the layout; the
+constants below are the columns at which its fields begin.
 """
 
 from __future__ import annotations
@@ -15,8 +12,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import inlined
+from collision_monitor.narrow_phase.vector import Vector
 
-CONTACT_SIZE: Final = 15
+CONTACT_ROW: Final = np.dtype(
+    [
+        ("distance", np.float64),  # signed (m)
+        ("normal", np.float64, 3),  # unit, from A to B
+        ("point_a", np.float64, 3),  # witness on A (m)
+        ("point_b", np.float64, 3),  # witness on B: the one on A + distance * normal
+        ("bound", np.float64),  # error bound of the distance (m)
+        ("feature_type_a", np.float64),  # types of Contact.msg, below
+        ("feature_index_a", np.float64),
+        ("feature_type_b", np.float64),
+        ("feature_index_b", np.float64),
+    ]
+)
+
+
+def first_column(row: np.dtype[np.void], field: str) -> int:
+    """The column at which a field of a row of float64 begins."""
+    assert row.fields is not None
+    return int(row.fields[field][1]) // 8
+
+
+DISTANCE: Final = first_column(CONTACT_ROW, "distance")
+NORMAL: Final = first_column(CONTACT_ROW, "normal")
+POINT_A: Final = first_column(CONTACT_ROW, "point_a")
+POINT_B: Final = first_column(CONTACT_ROW, "point_b")
+BOUND: Final = first_column(CONTACT_ROW, "bound")
+FEATURE_TYPE_A: Final = first_column(CONTACT_ROW, "feature_type_a")
+FEATURE_INDEX_A: Final = first_column(CONTACT_ROW, "feature_index_a")
+FEATURE_TYPE_B: Final = first_column(CONTACT_ROW, "feature_type_b")
+FEATURE_INDEX_B: Final = first_column(CONTACT_ROW, "feature_index_b")
+CONTACT_SIZE: Final = CONTACT_ROW.itemsize // 8
 
 UNKNOWN: Final = 0.0
 VERTEX: Final = 1.0
@@ -24,44 +52,27 @@ EDGE: Final = 2.0
 FACE: Final = 3.0
 SURFACE: Final = 4.0
 
-MAX_VERTICES: Final = 512
-"""Support points that EPA may take; 64 already settle a pair of 32-vertex hulls."""
 
-MAX_FACES: Final = 2 * MAX_VERTICES
-"""A closed triangle surface has fewer than twice as many faces as vertices."""
-
-SIMPLEX: Final = 24
-"""Start of the points (rows of 8: B - A, point on A, index on A, index on B); 0:12 hold the pose of B in A's frame."""
-
-FACES: Final = SIMPLEX + 8 * MAX_VERTICES
-"""Start of EPA's faces: MAX_FACES each of normal x, y, z, distance and three vertices."""
-
-EDGES: Final = FACES + 7 * MAX_FACES
-"""Start of EPA's horizon: two rows of 3 * MAX_FACES."""
-
-WORK_SIZE: Final = EDGES + 6 * MAX_FACES
-
-
-def work_array() -> NDArray[np.float64]:
-    """Scratch memory for one thread; its content never carries over from one call to the next."""
-    return np.zeros(WORK_SIZE)
+def as_contacts(rows: NDArray[np.float64]) -> NDArray[np.void]:
+    """A view of rows (..., CONTACT_SIZE) as records (...,) of CONTACT_ROW."""
+    return rows.view(CONTACT_ROW)[..., 0]
 
 
 @inlined
-def write(
-    out: Any, distance: float, nx: float, ny: float, nz: float, ax: float, ay: float, az: float, bound: float
-) -> None:
+def write(out: Any, distance: float, normal: Vector, point_a: Vector, bound: float) -> None:
     """Distance, normal, witness points and error bound; the features stay unknown."""
-    out[0] = distance
-    out[1] = nx
-    out[2] = ny
-    out[3] = nz
-    out[4] = ax
-    out[5] = ay
-    out[6] = az
-    out[7] = ax + distance * nx
-    out[8] = ay + distance * ny
-    out[9] = az + distance * nz
-    out[10] = bound
-    for i in range(11, 15):
+    nx, ny, nz = normal
+    ax, ay, az = point_a
+    out[DISTANCE] = distance
+    out[NORMAL] = nx
+    out[NORMAL + 1] = ny
+    out[NORMAL + 2] = nz
+    out[POINT_A] = ax
+    out[POINT_A + 1] = ay
+    out[POINT_A + 2] = az
+    out[POINT_B] = ax + distance * nx
+    out[POINT_B + 1] = ay + distance * ny
+    out[POINT_B + 2] = az + distance * nz
+    out[BOUND] = bound
+    for i in range(FEATURE_TYPE_A, CONTACT_SIZE):
         out[i] = UNKNOWN

@@ -11,43 +11,44 @@ from typing import Any
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.shape_table import CYLINDER, SPHERE
-from collision_monitor.narrow_phase.contact_row import SURFACE, write
-from collision_monitor.narrow_phase.segment import across
-from collision_monitor.narrow_phase.support import core_radius
+from collision_monitor.narrow_phase.contact_row import FEATURE_TYPE_A, SURFACE, write
+from collision_monitor.narrow_phase.core import rounding
+from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.narrow_phase.vector import Vector, across, along, column, cross, dot, scaled
 from collision_monitor.tolerances import SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2
 
 
 @inlined
-def is_parallel(table: Any, a: int, RA: Any, RB: Any) -> bool:
+def is_parallel(table: Any, a: int, pose: PairPose) -> bool:
     """Whether shape a, a sphere, capsule or cylinder, has the axis direction of B's frame (a sphere has any)."""
     if table.kind[a] == SPHERE:
         return True
-    x = RA[1, 2] * RB[2, 2] - RA[2, 2] * RB[1, 2]
-    y = RA[2, 2] * RB[0, 2] - RA[0, 2] * RB[2, 2]
-    z = RA[0, 2] * RB[1, 2] - RA[1, 2] * RB[0, 2]
-    return x * x + y * y + z * z <= SEGMENT_PARALLEL_SIN2
+    c = cross(column(pose.R_A, 2), column(pose.R_B, 2))
+    return dot(c, c) <= SEGMENT_PARALLEL_SIN2
 
 
 @device
-def parallel_cylinders_contact(
-    table: Any, a: int, b: int, RB: Any, px: float, py: float, pz: float, out: Any
-) -> None:
-    """Contact of a with cylinder b where `is_parallel` holds. Touching faces meet in the middle of what they share."""
+def parallel_cylinders_contact(table: Any, a: int, b: int, R: Any, p: Vector, out: Any) -> None:
+    """Contact of a with cylinder b (rotation R) where `is_parallel` holds.
+
+    Touching faces meet in the middle of what they share.
+    """
     kind = table.kind[a]
-    round_a = table.margin[a] + core_radius(kind, table.size[a, 0])
+    round_a = rounding(table, a)
     round_b = table.margin[b]
     ra = table.size[a, 0] if kind == CYLINDER else 0.0
     ha = 0.0 if kind == SPHERE else table.size[a, 1]
     rb, hb = table.size[b, 0], table.size[b, 1]
-    zx, zy, zz = RB[0, 2], RB[1, 2], RB[2, 2]
-    height = zx * px + zy * py + zz * pz
-    x, y, z = px - height * zx, py - height * zy, pz - height * zz
+    px, py, pz = p
+    axis = column(R, 2)
+    height = dot(axis, p)
+    x, y, z = px - height * axis[0], py - height * axis[1], pz - height * axis[2]
     reach = sqrt(x * x + y * y + z * z)
     size = ra + ha + rb + hb
     if reach > SAT_ROUND_OFF * (size + abs(height)):
-        x, y, z = x / reach, y / reach, z / reach
+        radial = (x / reach, y / reach, z / reach)
     else:
-        x, y, z = across(zx, zy, zz, x, y, z)
+        radial = across(axis, (x, y, z))
     up = copysign(1.0, height)
     out_of_side = reach - (ra + rb)
     out_of_cap = abs(height) - (ha + hb)
@@ -61,18 +62,9 @@ def parallel_cylinders_contact(
     else:
         distance, side, cap = out_of_cap, 0.0, up
         r, h = 0.5 * (max(-ra, reach - rb) + min(ra, reach + rb)), up * ha
-    nx, ny, nz = side * x + cap * zx, side * y + cap * zy, side * z + cap * zz
+    n = along(scaled(radial, side), cap, axis)
     bound = (SAT_ROUND_OFF + sqrt(SEGMENT_PARALLEL_SIN2)) * (size + abs(px) + abs(py) + abs(pz) + round_a + round_b)
-    write(
-        out,
-        distance - round_a - round_b,
-        nx,
-        ny,
-        nz,
-        r * x + h * zx + round_a * nx,
-        r * y + h * zy + round_a * ny,
-        r * z + h * zz + round_a * nz,
-        bound,
-    )
+    witness = along(along(scaled(radial, r), h, axis), round_a, n)
+    write(out, distance - round_a - round_b, n, witness, bound)
     if kind != CYLINDER:
-        out[11] = SURFACE
+        out[FEATURE_TYPE_A] = SURFACE

@@ -9,63 +9,63 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Any, Final
 
-from collision_monitor._jit import device
-from collision_monitor.narrow_phase.contact_row import EDGES, FACES, MAX_FACES, SIMPLEX
-from collision_monitor.narrow_phase.gjk import WEIGHTS, closest_on_triangle
-from collision_monitor.narrow_phase.segment import across
-from collision_monitor.narrow_phase.support import support_difference
+from collision_monitor._jit import device, inlined
+from collision_monitor.narrow_phase.core import Core
+from collision_monitor.narrow_phase.gjk import closest_on_triangle, point_on_a, simplex_point, weighted
+from collision_monitor.narrow_phase.support_point import support_difference
+from collision_monitor.narrow_phase.vector import Vector, across, cross, dot, minus, opposite, scaled
+from collision_monitor.narrow_phase.work_memory import (
+    EDGES,
+    FACES,
+    MAX_FACES,
+    SIMPLEX,
+    SIMPLEX_ROW,
+    SPARE,
+    WEIGHTS,
+)
 from collision_monitor.tolerances import EPSILON, FLAT, SLIVER_SIN2
 
-NX: Final = FACES
-NY: Final = FACES + MAX_FACES
-NZ: Final = FACES + 2 * MAX_FACES
-D: Final = FACES + 3 * MAX_FACES
-I: Final = FACES + 4 * MAX_FACES  # noqa: E741
-J: Final = FACES + 5 * MAX_FACES
-K: Final = FACES + 6 * MAX_FACES
-FROM: Final = EDGES
-TO: Final = EDGES + 3 * MAX_FACES
+# Columns of a face, MAX_FACES numbers each: its normal, its distance, its three vertices; and of an edge.
+_NX, _NY, _NZ, _D, _I, _J, _K = range(FACES, FACES + 7 * MAX_FACES, MAX_FACES)
+_FROM: Final = EDGES
+_TO: Final = EDGES + 3 * MAX_FACES
+
+
+@inlined
+def _from_first(work: Any, k: int) -> Vector:
+    """From the first point of the simplex to point k."""
+    return minus(simplex_point(work, k), simplex_point(work, 0))
 
 
 @device
-def _normal(work: Any, i: int, j: int, k: int) -> Any:
+def _normal(work: Any, i: int, j: int, k: int) -> tuple[Vector, float]:
     """Cross product of the edges ij and ik, and the product of their squared lengths."""
-    a, b, c = SIMPLEX + 8 * i, SIMPLEX + 8 * j, SIMPLEX + 8 * k
-    ux, uy, uz = work[b] - work[a], work[b + 1] - work[a + 1], work[b + 2] - work[a + 2]
-    vx, vy, vz = work[c] - work[a], work[c + 1] - work[a + 1], work[c + 2] - work[a + 2]
-    return (
-        uy * vz - uz * vy,
-        uz * vx - ux * vz,
-        ux * vy - uy * vx,
-        (ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz),
-    )
+    a = simplex_point(work, i)
+    u, v = minus(simplex_point(work, j), a), minus(simplex_point(work, k), a)
+    return cross(u, v), dot(u, u) * dot(v, v)
 
 
 @device
 def _set_face(work: Any, f: int, i: int, j: int, k: int) -> None:
     """Face f through the points i, j, k, counter-clockwise from outside; a sliver gets distance inf and no normal."""
-    nx, ny, nz, product = _normal(work, i, j, k)
-    n2 = nx * nx + ny * ny + nz * nz
-    work[I + f] = i
-    work[J + f] = j
-    work[K + f] = k
+    n, product = _normal(work, i, j, k)
+    n2 = dot(n, n)
+    work[_I + f] = i
+    work[_J + f] = j
+    work[_K + f] = k
     if n2 > SLIVER_SIN2 * product:
-        inverse = 1.0 / sqrt(n2)
-        nx *= inverse
-        ny *= inverse
-        nz *= inverse
-        a = SIMPLEX + 8 * i
-        work[D + f] = nx * work[a] + ny * work[a + 1] + nz * work[a + 2]
+        n = scaled(n, 1.0 / sqrt(n2))
+        work[_D + f] = dot(n, simplex_point(work, i))
     else:
-        nx = ny = nz = 0.0
-        work[D + f] = inf
-    work[NX + f] = nx
-    work[NY + f] = ny
-    work[NZ + f] = nz
+        n = (0.0, 0.0, 0.0)
+        work[_D + f] = inf
+    work[_NX + f] = n[0]
+    work[_NY + f] = n[1]
+    work[_NZ + f] = n[2]
 
 
 @device
-def _probe(work: Any, count: int, step: int) -> Any:
+def _probe(work: Any, count: int, step: int) -> Vector:
     """Unit direction to look in for a point off the first `count` simplex points: 6 steps, then 4, then 2."""
     s = 1.0 if step % 2 == 0 else -1.0
     if count == 1:
@@ -75,75 +75,51 @@ def _probe(work: Any, count: int, step: int) -> Any:
             s if step // 2 == 2 else 0.0,
         )
     if count == 2:
-        x, y, z = (
-            work[SIMPLEX + 8] - work[SIMPLEX],
-            work[SIMPLEX + 9] - work[SIMPLEX + 1],
-            work[SIMPLEX + 10] - work[SIMPLEX + 2],
-        )
-        ux, uy, uz = across(x, y, z, 0.0, 0.0, 0.0)
+        edge = _from_first(work, 1)
+        u = across(edge, (0.0, 0.0, 0.0))
         if step >= 2:
-            ux, uy, uz = y * uz - z * uy, z * ux - x * uz, x * uy - y * ux
+            u = cross(edge, u)
     else:
-        ux, uy, uz, _ = _normal(work, 0, 1, 2)
-    length = s * sqrt(ux * ux + uy * uy + uz * uz)
-    return ux / length, uy / length, uz / length
+        u, _ = _normal(work, 0, 1, 2)
+    length = s * sqrt(dot(u, u))
+    return u[0] / length, u[1] / length, u[2] / length
 
 
 @device
-def _off(work: Any, count: int, nx: float, ny: float, nz: float) -> float:
+def _off(work: Any, count: int, n: Vector) -> float:
     """How far the spare row is off the point, line or plane of the first `count` simplex points; n is the plane's."""
-    x = work[SIMPLEX + 32] - work[SIMPLEX]
-    y = work[SIMPLEX + 33] - work[SIMPLEX + 1]
-    z = work[SIMPLEX + 34] - work[SIMPLEX + 2]
+    d = _from_first(work, 4)
     if count == 3:
-        return abs(x * nx + y * ny + z * nz)
+        return abs(dot(d, n))
     if count == 2:
-        ex = work[SIMPLEX + 8] - work[SIMPLEX]
-        ey = work[SIMPLEX + 9] - work[SIMPLEX + 1]
-        ez = work[SIMPLEX + 10] - work[SIMPLEX + 2]
-        f = sqrt(ex * ex + ey * ey + ez * ez)
-        x, y, z = (ey * z - ez * y) / f, (ez * x - ex * z) / f, (ex * y - ey * x) / f
-    return sqrt(x * x + y * y + z * z)
+        edge = _from_first(work, 1)
+        length = sqrt(dot(edge, edge))
+        d = cross(edge, d)
+        d = (d[0] / length, d[1] / length, d[2] / length)
+    return sqrt(dot(d, d))
 
 
 @device
 def _push_edge(work: Any, count: int, i: float, j: float) -> int:
     """Add a directed edge to the horizon, or cancel it against its reverse: it then lies inside of the hole."""
     for e in range(count):
-        if work[FROM + e] == j and work[TO + e] == i:
-            work[FROM + e] = work[FROM + count - 1]
-            work[TO + e] = work[TO + count - 1]
+        if work[_FROM + e] == j and work[_TO + e] == i:
+            work[_FROM + e] = work[_FROM + count - 1]
+            work[_TO + e] = work[_TO + count - 1]
             return count - 1
-    work[FROM + count] = i
-    work[TO + count] = j
+    work[_FROM + count] = i
+    work[_TO + count] = j
     return count + 1
 
 
 @device
 def epa(
-    ka: int,
-    a0: float,
-    a1: float,
-    a2: float,
-    sa: int,
-    na: int,
-    kb: int,
-    b0: float,
-    b1: float,
-    b2: float,
-    sb: int,
-    nb: int,
-    vertices: Any,
-    work: Any,
-    size: float,
-    count: int,
-    tolerance: float,
-    most: int,
-) -> Any:
+    A: Core, B: Core, work: Any, size: float, count: int, tolerance: float, most: int
+) -> tuple[float, float, Vector, Vector]:
     """Depth of two cores that overlap or touch, from the `count` simplex points that GJK left, in A's frame.
 
-    Returns (upper, lower, nx, ny, nz, ax, ay, az): bounds of the depth (m), the unit direction from A to B, the
-    witness on A. Ends when upper - lower <= tolerance * size (m), or with `most` (<= MAX_VERTICES) points.
+    Returns (upper, lower, normal, point_a): bounds of the depth (m), the unit direction from A to B, the witness on A.
+    Ends when upper - lower <= tolerance * size (m), or with `most` (<= MAX_VERTICES) points.
     """
     flat = FLAT * size
     # The simplex grows to a tetrahedron by the farthest of a few support points: along the axes from a point,
@@ -151,44 +127,36 @@ def epa(
     step = 0
     farthest = 0.0
     upper = inf
-    mx = my = mz = 0.0
-    spare = SIMPLEX + 32
+    nearest = (0.0, 0.0, 0.0)  # the direction that proves `upper`
     while count < 4:
-        x, y, z = _probe(work, count, step)
-        wx, wy, wz = support_difference(
-            ka, a0, a1, a2, sa, na, kb, b0, b1, b2, sb, nb, vertices, work, x, y, z, spare
-        )
-        h = x * wx + y * wy + z * wz
+        d = _probe(work, count, step)
+        w = support_difference(A, B, work, d, SPARE)
+        h = dot(d, w)
         if h < upper:
             upper = h
-            mx, my, mz = x, y, z
-        off = _off(work, count, x, y, z)
+            nearest = d
+        off = _off(work, count, d)
         if off > farthest:
             farthest = off
-            for m in range(8):
-                work[SIMPLEX + 8 * count + m] = work[spare + m]
+            for m in range(SIMPLEX_ROW):
+                work[SIMPLEX + SIMPLEX_ROW * count + m] = work[SPARE + m]
         step += 1
         if step == 8 - 2 * count:
             if farthest <= flat:
                 ax = ay = az = 0.0
                 for k in range(count):
-                    ax += work[WEIGHTS + k] * work[SIMPLEX + 8 * k + 3]
-                    ay += work[WEIGHTS + k] * work[SIMPLEX + 8 * k + 4]
-                    az += work[WEIGHTS + k] * work[SIMPLEX + 8 * k + 5]
-                return upper, min(upper, -flat), -mx, -my, -mz, ax, ay, az
+                    x, y, z = point_on_a(work, k)
+                    ax += work[WEIGHTS + k] * x
+                    ay += work[WEIGHTS + k] * y
+                    az += work[WEIGHTS + k] * z
+                return upper, min(upper, -flat), opposite(nearest), (ax, ay, az)
             work[WEIGHTS + count] = 0.0
             count += 1
             step = 0
             farthest = 0.0
             upper = inf
-    x, y, z, _ = _normal(work, 0, 1, 2)
-    fourth = SIMPLEX + 24
-    side = (
-        x * (work[fourth] - work[SIMPLEX])
-        + y * (work[fourth + 1] - work[SIMPLEX + 1])
-        + z * (work[fourth + 2] - work[SIMPLEX + 2])
-    )
-    p, q = (1, 2) if side < 0.0 else (2, 1)
+    n, _ = _normal(work, 0, 1, 2)
+    p, q = (1, 2) if dot(n, _from_first(work, 3)) < 0.0 else (2, 1)
     _set_face(work, 0, 0, p, q)
     _set_face(work, 1, 0, q, 3)
     _set_face(work, 2, 0, 3, p)
@@ -204,42 +172,39 @@ def epa(
     while points < most:
         near = 0
         for f in range(1, faces):
-            if work[D + f] < work[D + near]:
+            if work[_D + f] < work[_D + near]:
                 near = f
-        d = work[D + near]
-        if not d < inf:
+        distance = work[_D + near]
+        if not distance < inf:
             break
-        lower = max(lower, min(d, lower_cap))
-        x, y, z = work[NX + near], work[NY + near], work[NZ + near]
-        at = SIMPLEX + 8 * points
-        wx, wy, wz = support_difference(
-            ka, a0, a1, a2, sa, na, kb, b0, b1, b2, sb, nb, vertices, work, x, y, z, at
-        )
-        h = x * wx + y * wy + z * wz
+        lower = max(lower, min(distance, lower_cap))
+        n = (work[_NX + near], work[_NY + near], work[_NZ + near])
+        w = support_difference(A, B, work, n, SIMPLEX + SIMPLEX_ROW * points)
+        h = dot(n, w)
         if h < upper:
             upper = h
-            mx, my, mz = x, y, z
-            plane = d
-        if upper - lower <= tolerance * size or upper <= d:
+            nearest = n
+            plane = distance
+        if upper - lower <= tolerance * size or upper <= distance:
             break
         known = False
         for k in range(points):
-            r = SIMPLEX + 8 * k
-            if work[r] == wx and work[r + 1] == wy and work[r + 2] == wz:
+            x, y, z = simplex_point(work, k)
+            if x == w[0] and y == w[1] and z == w[2]:
                 known = True
                 break
-        if known or h - d <= visible:
+        if known or h - distance <= visible:
             # a face that round-off tilted: it cannot be expanded, and what it promised is kept as a bound
-            lower_cap = min(lower_cap, d)
-            work[D + near] = inf
+            lower_cap = min(lower_cap, distance)
+            work[_D + near] = inf
             continue
         edges = 0
         f = 0
         while f < faces:
-            if work[NX + f] * wx + work[NY + f] * wy + work[NZ + f] * wz - work[D + f] > visible:
-                edges = _push_edge(work, edges, work[I + f], work[J + f])
-                edges = _push_edge(work, edges, work[J + f], work[K + f])
-                edges = _push_edge(work, edges, work[K + f], work[I + f])
+            if dot((work[_NX + f], work[_NY + f], work[_NZ + f]), w) - work[_D + f] > visible:
+                edges = _push_edge(work, edges, work[_I + f], work[_J + f])
+                edges = _push_edge(work, edges, work[_J + f], work[_K + f])
+                edges = _push_edge(work, edges, work[_K + f], work[_I + f])
                 faces -= 1
                 for m in range(7):
                     work[FACES + m * MAX_FACES + f] = work[FACES + m * MAX_FACES + faces]
@@ -248,30 +213,23 @@ def epa(
         if faces + edges > MAX_FACES:
             break
         for e in range(edges):
-            _set_face(work, faces, int(work[FROM + e]), int(work[TO + e]), points)
+            _set_face(work, faces, int(work[_FROM + e]), int(work[_TO + e]), points)
             faces += 1
         points += 1
 
     # the witness: where the ray along the answer's normal leaves the polytope, on whichever coplanar face that is
     best = inf
-    ax = ay = az = 0.0
+    point_a = (0.0, 0.0, 0.0)
     reach = plane + max(upper - plane, 64.0 * EPSILON * size)
+    exit_point = scaled(nearest, upper)
     for f in range(faces):
-        if work[D + f] <= reach or best == inf:
-            i, j, k = SIMPLEX + 8 * int(work[I + f]), SIMPLEX + 8 * int(work[J + f]), SIMPLEX + 8 * int(work[K + f])
-            ox, oy, oz = upper * mx, upper * my, upper * mz
-            wa, wb, wc = closest_on_triangle(
-                work[i] - ox, work[i + 1] - oy, work[i + 2] - oz,
-                work[j] - ox, work[j + 1] - oy, work[j + 2] - oz,
-                work[k] - ox, work[k + 1] - oy, work[k + 2] - oz,
-            )  # fmt: skip
-            x = wa * work[i] + wb * work[j] + wc * work[k] - ox
-            y = wa * work[i + 1] + wb * work[j + 1] + wc * work[k + 1] - oy
-            z = wa * work[i + 2] + wb * work[j + 2] + wc * work[k + 2] - oz
-            d2 = x * x + y * y + z * z
+        if work[_D + f] <= reach or best == inf:
+            i, j, k = int(work[_I + f]), int(work[_J + f]), int(work[_K + f])
+            a, b, c = simplex_point(work, i), simplex_point(work, j), simplex_point(work, k)
+            weights = closest_on_triangle(minus(a, exit_point), minus(b, exit_point), minus(c, exit_point))
+            d = minus(weighted(weights, a, b, c), exit_point)
+            d2 = dot(d, d)
             if d2 < best:
                 best = d2
-                ax = wa * work[i + 3] + wb * work[j + 3] + wc * work[k + 3]
-                ay = wa * work[i + 4] + wb * work[j + 4] + wc * work[k + 4]
-                az = wa * work[i + 5] + wb * work[j + 5] + wc * work[k + 5]
-    return upper, lower, -mx, -my, -mz, ax, ay, az
+                point_a = weighted(weights, point_on_a(work, i), point_on_a(work, j), point_on_a(work, k))
+    return upper, lower, opposite(nearest), point_a

@@ -8,14 +8,17 @@ along it they are two convex polygons, and what these share is the patch; four o
 from __future__ import annotations
 
 from math import copysign, inf, sqrt
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, kernel
 from collision_monitor.geometry.shape_table import BOX, CONVEX_HULL, HALF_SPACE, POLYGON
-from collision_monitor.narrow_phase.contact_row import work_array
+from collision_monitor.narrow_phase.contact_row import DISTANCE, NORMAL, POINT_A
+from collision_monitor.narrow_phase.pair_pose import PairPose, pair_pose
+from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus, opposite, rotate, scaled
+from collision_monitor.narrow_phase.work_memory import work_array
 from collision_monitor.records import MOST_POINTS
 from collision_monitor.tolerances import EPSILON, FEATURE_TIE, SAT_ROUND_OFF, TOUCHING
 
@@ -27,9 +30,28 @@ _ROOM: Final = 8 * CORNERS + 16
 _A, _B, _C, _D = 0, _ROOM, 2 * _ROOM, 3 * _ROOM
 
 
+class View(NamedTuple):
+    """A look along a direction: unit vectors across it and across each other, and where the origin is seen."""
+
+    along: Any
+    u: Any
+    v: Any
+    origin: Any  # (u, v)
+
+
+class Line(NamedTuple):
+    """A line in the plane through a point, along a direction of any length."""
+
+    x: Any
+    y: Any
+    ux: Any
+    uy: Any
+
+
 @device
-def _basis(nx: float, ny: float, nz: float) -> Any:
+def _basis(n: Vector) -> tuple[Vector, Vector]:
     """Two unit vectors across n and each other, the same for n and -n."""
+    nx, ny, nz = n
     if abs(nx) >= abs(ny) and abs(nx) >= abs(nz):
         sign = copysign(1.0, nx)
         ux, uy, uz = -sign * ny, sign * nx, 0.0
@@ -40,8 +62,8 @@ def _basis(nx: float, ny: float, nz: float) -> Any:
         sign = copysign(1.0, nz)
         ux, uy, uz = sign * nz, 0.0, -sign * nx
     length = sqrt(ux * ux + uy * uy + uz * uz)
-    ux, uy, uz = ux / length, uy / length, uz / length
-    return ux, uy, uz, sign * (ny * uz - nz * uy), sign * (nz * ux - nx * uz), sign * (nx * uy - ny * ux)
+    u = (ux / length, uy / length, uz / length)
+    return u, scaled(cross(n, u), sign)
 
 
 @device
@@ -94,35 +116,31 @@ def _outline(work: Any, at: int, count: int, tie: float) -> int:
 
 
 @device
-def _touching(
-    table: Any, slot: int, R: Any, nx: float, ny: float, nz: float, height_tie: float, tie: float,
-    ux: float, uy: float, uz: float, vx: float, vy: float, vz: float, x: float, y: float, work: Any, at: int,
-) -> int:  # fmt: skip
-    """The outline of the corners within `height_tie` of the farthest along n, in coordinates u, v about (x, y)."""
+def _touching(table: Any, slot: int, R: Any, view: View, tie: float, work: Any, at: int) -> int:
+    """The corners within `tie` (m) of the farthest along the view as points of it, at `at`; how many."""
     count = 8 if table.kind[slot] == BOX else int(table.vertex_count[slot])
     farthest = -inf
     kept = 0
+    x, y = view.origin
+    (ux, uy, uz), (vx, vy, vz) = view.u, view.v
     for scan in range(2):
         for k in range(count):
-            cx, cy, cz = _corner(table, slot, k)
-            wx = R[0, 0] * cx + R[0, 1] * cy + R[0, 2] * cz
-            wy = R[1, 0] * cx + R[1, 1] * cy + R[1, 2] * cz
-            wz = R[2, 0] * cx + R[2, 1] * cy + R[2, 2] * cz
-            height = nx * wx + ny * wy + nz * wz
+            corner = rotate(R, _corner(table, slot, k))
+            height = dot(view.along, corner)
             if scan == 0:
                 farthest = max(farthest, height)
-            elif height >= farthest - height_tie and kept < CORNERS:
+            elif height >= farthest - tie and kept < CORNERS:
+                wx, wy, wz = corner
                 work[at + 2 * kept] = x + ux * wx + uy * wy + uz * wz
                 work[at + 2 * kept + 1] = y + vx * wx + vy * wy + vz * wz
                 kept += 1
-    return _outline(work, at, kept, tie)
+    return kept
 
 
 @device
-def _clip_to_edge(
-    work: Any, source: int, target: int, count: int, x: float, y: float, ux: float, uy: float, round_off: float
-) -> int:
-    """Of a polygon, what is left of the line through (x, y) along (ux, uy) or on it; its corners."""
+def _clip_to_edge(work: Any, source: int, target: int, count: int, line: Line, round_off: float) -> int:
+    """Of a polygon, what is left of the line or on it; its corners."""
+    x, y, ux, uy = line
     kept = 0
     slack = round_off * sqrt(ux * ux + uy * uy)
     for k in range(count):
@@ -147,7 +165,8 @@ def _shared(work: Any, a: int, na: int, b: int, nb: int, round_off: float) -> in
     for k in range(na):
         x, y = work[a + 2 * k], work[a + 2 * k + 1]
         after = a + 2 * ((k + 1) % na)
-        nb = _clip_to_edge(work, source, target, nb, x, y, work[after] - x, work[after + 1] - y, round_off)
+        edge = Line(x, y, work[after] - x, work[after + 1] - y)
+        nb = _clip_to_edge(work, source, target, nb, edge, round_off)
         source, target = target, source
         if nb == 0:
             return 0
@@ -188,12 +207,12 @@ def _chosen(work: Any, at: int, count: int, tie: float, most: int) -> int:
     for k in range(count):
         mx += work[at + 2 * k] / count
         my += work[at + 2 * k + 1] / count
-    i = _farthest(work, at, count, mx, my, 0.0, 0.0, tie)
+    i = _farthest(work, at, count, Line(mx, my, 0.0, 0.0), tie)
     ix, iy = work[at + 2 * i], work[at + 2 * i + 1]
-    j = _farthest(work, at, count, ix, iy, 0.0, 0.0, tie)
+    j = _farthest(work, at, count, Line(ix, iy, 0.0, 0.0), tie)
     ux, uy = work[at + 2 * j] - ix, work[at + 2 * j + 1] - iy
-    left = _farthest(work, at, count, ix, iy, ux, uy, tie)
-    right = _farthest(work, at, count, ix, iy, -ux, -uy, tie)
+    left = _farthest(work, at, count, Line(ix, iy, ux, uy), tie)
+    right = _farthest(work, at, count, Line(ix, iy, -ux, -uy), tie)
     if most == 2:
         left = right = i
     elif most == 3:
@@ -212,8 +231,9 @@ def _chosen(work: Any, at: int, count: int, tie: float, most: int) -> int:
 
 
 @device
-def _farthest(work: Any, at: int, count: int, x: float, y: float, ux: float, uy: float, tie: float) -> int:
-    """The corner farthest from (x, y), or left of the line through it along u where that is not zero."""
+def _farthest(work: Any, at: int, count: int, line: Line, tie: float) -> int:
+    """The corner farthest to the left of a line, or where that has no direction, farthest from its point."""
+    x, y, ux, uy = line
     best, chosen = -inf, 0
     length = sqrt(ux * ux + uy * uy)
     for k in range(count):
@@ -225,21 +245,19 @@ def _farthest(work: Any, at: int, count: int, x: float, y: float, ux: float, uy:
 
 
 @device
-def manifold(
-    table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float, pz: float, row: Any, out: Any, work: Any
-) -> int:
-    """The points on A (4, 3) of a contact (`row`, see answer.py), about A's origin in world axes; how many there are.
+def manifold(table: Any, a: int, b: int, pose: PairPose, row: Any, out: Any, work: Any) -> int:
+    """The points on A (4, 3) of a contact (`row`, see contact_row.py), about A's origin in world axes; how many.
 
     One, the witness, where no face or edge touches as a whole or one of the two is not a polytope.
     """
     for i in range(3):
-        out[0, i] = row[4 + i]
+        out[0, i] = row[POINT_A + i]
     ka, kb = table.kind[a], table.kind[b]
     flat_a = ka == BOX or ka == CONVEX_HULL or ka == POLYGON
     flat_b = kb == BOX or kb == CONVEX_HULL or kb == POLYGON
     if not ((flat_a or ka == HALF_SPACE) and (flat_b or kb == HALF_SPACE) and (flat_a or flat_b)):
         return 1
-    nx, ny, nz = row[1], row[2], row[3]
+    n = (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2])
     size = 0.0
     if flat_a:
         size += table.radius[a]
@@ -247,17 +265,19 @@ def manifold(
         size += table.radius[b]
     tie = FEATURE_TIE * size
     height_tie = tie
-    core = row[0] + table.margin[a] + table.margin[b]
+    core = row[DISTANCE] + table.margin[a] + table.margin[b]
     if core > TOUCHING * size:
         # GJK's normal of two hulls is no better than their round-off over their distance
         height_tie += 8.0 * EPSILON * size * size / core
-    ux, uy, uz, vx, vy, vz = _basis(nx, ny, nz)
+    u, v = _basis(n)
     na = nb = 0
     if flat_a:
-        na = _touching(table, a, RA, nx, ny, nz, height_tie, tie, ux, uy, uz, vx, vy, vz, 0.0, 0.0, work, _A)
+        na = _touching(table, a, pose.R_A, View(n, u, v, (0.0, 0.0)), height_tie, work, _A)
+        na = _outline(work, _A, na, tie)
     if flat_b:
-        x, y = ux * px + uy * py + uz * pz, vx * px + vy * py + vz * pz
-        nb = _touching(table, b, RB, -nx, -ny, -nz, height_tie, tie, ux, uy, uz, vx, vy, vz, x, y, work, _B)
+        seen = View(opposite(n), u, v, (dot(u, pose.p), dot(v, pose.p)))
+        nb = _touching(table, b, pose.R_B, seen, height_tie, work, _B)
+        nb = _outline(work, _B, nb, tie)
     at = _B
     if na == 0:
         count = nb
@@ -274,12 +294,11 @@ def manifold(
     if count < 2:
         return 1
     count = _chosen(work, at, _outline(work, at, count, tie), tie, MOST_POINTS)
-    height = nx * row[4] + ny * row[5] + nz * row[6]
+    height = dot(n, (row[POINT_A], row[POINT_A + 1], row[POINT_A + 2]))
     for k in range(count):
         x, y = work[at + 2 * k], work[at + 2 * k + 1]
-        out[k, 0] = x * ux + y * vx + height * nx
-        out[k, 1] = x * uy + y * vy + height * ny
-        out[k, 2] = x * uz + y * vz + height * nz
+        for i in range(3):
+            out[k, i] = x * u[i] + y * v[i] + height * n[i]
     return count
 
 
@@ -289,36 +308,33 @@ def _manifolds(
 ) -> None:
     for k in range(len(pairs)):
         a, b = pairs[k, 0], pairs[k, 1]
-        count[k] = manifold(
-            table, a, b, rotation[a], rotation[b], position[b, 0] - position[a, 0], position[b, 1] - position[a, 1],
-            position[b, 2] - position[a, 2], contacts[k], out[k], work,
-        )  # fmt: skip
+        pose = pair_pose(position, rotation, a, b)
+        count[k] = manifold(table, a, b, pose, contacts[k], out[k], work)
 
 
 @device
-def reduce_points(points: Any, count: int, nx: float, ny: float, nz: float, tie: float, most: int, work: Any) -> int:
+def reduce_points(points: Any, count: int, n: Vector, tie: float, most: int, work: Any) -> int:
     """Of the first `count` points (m, 3), all in one plane across n, put those that stand for their outline first.
 
     At most `most` of 2 to 4; how many.
     """
-    ux, uy, uz, vx, vy, vz = _basis(nx, ny, nz)
-    base_x, base_y, base_z = points[0, 0], points[0, 1], points[0, 2]
+    u, v = _basis(n)
+    base = (points[0, 0], points[0, 1], points[0, 2])
     for k in range(count):
-        x, y, z = points[k, 0] - base_x, points[k, 1] - base_y, points[k, 2] - base_z
-        work[_A + 2 * k] = ux * x + uy * y + uz * z
-        work[_A + 2 * k + 1] = vx * x + vy * y + vz * z
+        point = minus((points[k, 0], points[k, 1], points[k, 2]), base)
+        work[_A + 2 * k] = dot(u, point)
+        work[_A + 2 * k + 1] = dot(v, point)
     count = _chosen(work, _A, _outline(work, _A, count, tie), tie, most)
     for k in range(count):
         x, y = work[_A + 2 * k], work[_A + 2 * k + 1]
-        points[k, 0] = base_x + x * ux + y * vx
-        points[k, 1] = base_y + x * uy + y * vy
-        points[k, 2] = base_z + x * uz + y * vz
+        for i in range(3):
+            points[k, i] = base[i] + x * u[i] + y * v[i]
     return count
 
 
 @kernel
 def _reduce(points: Any, normal: Any, tie: float, work: Any) -> int:
-    return reduce_points(points, len(points), normal[0], normal[1], normal[2], tie, MOST_POINTS, work)
+    return reduce_points(points, len(points), (normal[0], normal[1], normal[2]), tie, MOST_POINTS, work)
 
 
 def manifold_batch(

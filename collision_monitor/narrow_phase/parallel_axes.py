@@ -11,27 +11,34 @@ from typing import Any
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.shape_table import CAPSULE, CONE, CYLINDER, SPHERE
+from collision_monitor.narrow_phase.core import Core
+from collision_monitor.narrow_phase.vector import Vector
+from collision_monitor.narrow_phase.work_memory import P_AB, R_AB
 from collision_monitor.tolerances import FEATURE_TIE, SEGMENT_PARALLEL_SIN2
 
 
 @inlined
-def axes_are_parallel(ka: int, kb: int, work: Any) -> bool:
-    """Whether both are solids of revolution and B's axis, the last column of R_AB in work, lies along A's."""
-    if kb != CONE and kb != CYLINDER and kb != CAPSULE and kb != SPHERE:
-        return False
-    if ka != CONE and ka != CYLINDER and ka != CAPSULE and ka != SPHERE:
-        return False
-    return ka == SPHERE or kb == SPHERE or work[2] * work[2] + work[5] * work[5] <= SEGMENT_PARALLEL_SIN2
+def _is_of_revolution(core: Core) -> bool:
+    return core.kind == CONE or core.kind == CYLINDER or core.kind == CAPSULE or core.kind == SPHERE
 
 
 @inlined
-def _corners(kind: int, s0: float, s1: float) -> Any:
-    """The profile's upper and lower half width and half height (m): (top, bottom, half height)."""
-    if kind == CYLINDER:
-        return s0, s0, s1
-    if kind == CONE:
-        return 0.0, s0, s1
-    return 0.0, 0.0, s1 if kind == CAPSULE else 0.0
+def axes_are_parallel(A: Core, B: Core, work: Any) -> bool:
+    """Whether both are solids of revolution and B's axis, the last column of R_AB in work, lies along A's."""
+    if not _is_of_revolution(B) or not _is_of_revolution(A):
+        return False
+    x, y = work[R_AB + 2], work[R_AB + 5]
+    return A.kind == SPHERE or B.kind == SPHERE or x * x + y * y <= SEGMENT_PARALLEL_SIN2
+
+
+@inlined
+def _profile(core: Core) -> tuple[float, float, float]:
+    """The upper and lower half width and half height (m): (top, bottom, half height)."""
+    if core.kind == CYLINDER:
+        return core.size[0], core.size[0], core.size[1]
+    if core.kind == CONE:
+        return 0.0, core.size[0], core.size[1]
+    return 0.0, 0.0, core.size[1] if core.kind == CAPSULE else 0.0
 
 
 @device
@@ -58,21 +65,20 @@ def _touching(top: float, bottom: float, half: float, r: float, z: float, tie: f
 
 
 @device
-def parallel_axes_depth(ka: int, a0: float, a1: float, kb: int, b0: float, b1: float, work: Any, size: float) -> Any:
-    """Depth of two overlapping cores for which `axes_are_parallel`, in A's frame; work[0:12] is the pose of B in it.
+def parallel_axes_depth(A: Core, B: Core, work: Any, size: float) -> tuple[float, Vector, Vector]:
+    """Depth (m) of two overlapping cores for which `axes_are_parallel`, the unit normal, and the witness on A.
 
-    Returns (depth, nx, ny, nz, ax, ay, az): depth (m), the unit direction from A to B, the witness on A: in the middle
-    of what two faces share.
+    In A's frame, in which work holds the pose of B. The witness is in the middle of what two faces share.
     """
-    top_a, bottom_a, half_a = _corners(ka, a0, a1)
-    top_b, bottom_b, half_b = _corners(kb, b0, b1)
-    x, y, height = work[9], work[10], work[11]
+    top_a, bottom_a, half_a = _profile(A)
+    top_b, bottom_b, half_b = _profile(B)
+    x, y, height = work[P_AB], work[P_AB + 1], work[P_AB + 2]
     reach = sqrt(x * x + y * y)
     if reach > 0.0:
         x, y = x / reach, y / reach
     else:
         x, y = 1.0, 0.0
-    if work[8] < 0.0:
+    if work[R_AB + 8] < 0.0:
         top_b, bottom_b = bottom_b, top_b
     depth = inf
     r = z = 0.0
@@ -105,4 +111,4 @@ def parallel_axes_depth(ka: int, a0: float, a1: float, kb: int, b0: float, b1: f
     along = min(max(along, least_a), most_a)
     out = _reach(top_a, bottom_a, half_a, r, z)
     ar, az = out * r - along * z, out * z + along * r
-    return depth, r * x, r * y, z, ar * x, ar * y, az
+    return depth, (r * x, r * y, z), (ar * x, ar * y, az)

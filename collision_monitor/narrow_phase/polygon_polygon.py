@@ -12,6 +12,7 @@ from typing import Any
 from collision_monitor._jit import device
 from collision_monitor.geometry.shape_table import CIRCLE
 from collision_monitor.narrow_phase.contact_row import write
+from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
 from collision_monitor.tolerances import FEATURE_TIE, SAT_ROUND_OFF
 
 
@@ -31,11 +32,13 @@ def _corners(table: Any, slot: int) -> int:
 
 
 @device
-def _widest_gap(table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float, tie: float) -> Any:
+def _widest_gap(table: Any, a: int, b: int, pose: PairPose, tie: float) -> Any:
     """The edge of a along whose outward normal b is farthest off: gap, normal, and a touching point on that edge.
 
-    p = origin of b - origin of a; the point is about a's origin. The gap is -inf where a has no edge.
+    The point is about a's origin. The gap is -inf where a has no edge.
     """
+    RA, RB = pose.R_A, pose.R_B
+    px, py, _ = pose.p
     best, nx, ny, x, y = -inf, 1.0, 0.0, 0.0, 0.0
     n, m = _corners(table, a), _corners(table, b)
     if n < 2:
@@ -65,8 +68,10 @@ def _widest_gap(table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: flo
 
 
 @device
-def _nearest(table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float) -> Any:
+def _nearest(table: Any, a: int, b: int, pose: PairPose) -> Any:
     """The corner of a that is nearest to the boundary of b: squared distance, corner, and point on b, about a."""
+    RA, RB = pose.R_A, pose.R_B
+    px, py, _ = pose.p
     best, x, y, u, v = inf, 0.0, 0.0, 0.0, 0.0
     n, m = _corners(table, a), _corners(table, b)
     for k in range(n):
@@ -89,8 +94,10 @@ def _nearest(table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float)
 
 
 @device
-def planar_contact(table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: float, out: Any) -> None:
-    """Contact of two shapes of the plane in out[0:15]; only the x-y parts of the rotations and of p are looked at."""
+def planar_contact(table: Any, a: int, b: int, pose: PairPose, out: Any) -> None:
+    """Contact of two shapes of the plane; only the x-y parts of the rotations and of p are looked at."""
+    px, py, _ = pose.p
+    back = swapped(pose)
     ra, rb = table.margin[a], table.margin[b]
     size = table.radius[a] + table.radius[b] - ra - rb
     if table.kind[a] == CIRCLE:
@@ -99,17 +106,17 @@ def planar_contact(table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: 
         rb += table.size[b, 0]
     tie = FEATURE_TIE * size
     round_off = SAT_ROUND_OFF * (size + abs(px) + abs(py))
-    gap, nx, ny, x, y = _widest_gap(table, a, b, RA, RB, px, py, tie)
-    other, mx, my, u, v = _widest_gap(table, b, a, RB, RA, -px, -py, tie)
+    gap, nx, ny, x, y = _widest_gap(table, a, b, pose, tie)
+    other, mx, my, u, v = _widest_gap(table, b, a, back, tie)
     if other > gap:
         # from b's edge back to a: the point on a is the other one of the two
         gap, nx, ny = other, -mx, -my
         x, y = u + px - gap * nx, v + py - gap * ny
     distance = gap
     if not gap <= 0.0 or gap == -inf:
-        squared, x0, y0, u, v = _nearest(table, a, b, RA, RB, px, py)
+        squared, x0, y0, u, v = _nearest(table, a, b, pose)
         dx, dy = u - x0, v - y0
-        other, u, v, x1, y1 = _nearest(table, b, a, RB, RA, -px, -py)
+        other, u, v, x1, y1 = _nearest(table, b, a, back)
         if other < squared:
             dx, dy, x0, y0 = u - x1, v - y1, x1 + px, y1 + py
         distance = sqrt(dx * dx + dy * dy)
@@ -121,4 +128,4 @@ def planar_contact(table: Any, a: int, b: int, RA: Any, RB: Any, px: float, py: 
         else:
             distance, x, y = 0.0, x0, y0  # the centres of two circles coincide: every direction is as good
     bound = round_off + SAT_ROUND_OFF * (ra + rb)
-    write(out, distance - ra - rb, nx, ny, 0.0, x + ra * nx, y + ra * ny, 0.0, bound)
+    write(out, distance - ra - rb, (nx, ny, 0.0), (x + ra * nx, y + ra * ny, 0.0), bound)

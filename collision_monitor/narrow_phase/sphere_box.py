@@ -6,95 +6,98 @@ from math import copysign, sqrt
 from typing import Any
 
 from collision_monitor._jit import inlined
-from collision_monitor.narrow_phase.contact_row import EDGE, FACE, SURFACE, VERTEX, write
-from collision_monitor.narrow_phase.sphere_sphere import direction
+from collision_monitor.narrow_phase.contact_row import (
+    EDGE,
+    FACE,
+    FEATURE_INDEX_B,
+    FEATURE_TYPE_A,
+    FEATURE_TYPE_B,
+    SURFACE,
+    VERTEX,
+    write,
+)
+from collision_monitor.narrow_phase.vector import (
+    Vector,
+    direction,
+    opposite,
+    rotate,
+    rotate_back,
+    scaled,
+    sum_of_sizes,
+)
 from collision_monitor.tolerances import EPSILON
 
 
 @inlined
-def sphere_box_separation(
-    radius: float, hx: float, hy: float, hz: float, R: Any, px: float, py: float, pz: float, out: Any
-) -> float:
-    """Distance of the surfaces (m), negative where they overlap. R (3, 3) is the box's; p = box - sphere."""
-    qx = -(R[0, 0] * px + R[1, 0] * py + R[2, 0] * pz)
-    qy = -(R[0, 1] * px + R[1, 1] * py + R[2, 1] * pz)
-    qz = -(R[0, 2] * px + R[1, 2] * py + R[2, 2] * pz)
-    x = min(max(qx, -hx), hx) - qx
-    y = min(max(qy, -hy), hy) - qy
-    z = min(max(qz, -hz), hz) - qz
+def sphere_box_separation(radius: float, half: Vector, R: Any, p: Vector, out: Any) -> float:
+    """Distance of the surfaces (m), negative where they overlap. half, R (3, 3): the box's; p = box - sphere."""
+    q = opposite(rotate_back(R, p))
+    x, y, z = _to_box(q, half)
     length = sqrt(x * x + y * y + z * z)
     if length > 0.0:
-        x /= length
-        y /= length
-        z /= length
+        d = (x / length, y / length, z / length)
     else:
-        length, x, y, z = _nearest_face(qx, qy, qz, hx, hy, hz)
-    out[0] = R[0, 0] * x + R[0, 1] * y + R[0, 2] * z
-    out[1] = R[1, 0] * x + R[1, 1] * y + R[1, 2] * z
-    out[2] = R[2, 0] * x + R[2, 1] * y + R[2, 2] * z
-    return length - radius - 16.0 * EPSILON * (abs(px) + abs(py) + abs(pz))
+        length, d = _nearest_face(q, half)
+    out[0], out[1], out[2] = rotate(R, d)
+    return length - radius - 16.0 * EPSILON * sum_of_sizes(p)
 
 
 @inlined
-def _nearest_face(qx: float, qy: float, qz: float, hx: float, hy: float, hz: float) -> Any:
+def _to_box(q: Vector, half: Vector) -> Vector:
+    """From a point to the nearest point of the box."""
+    return (
+        min(max(q[0], -half[0]), half[0]) - q[0],
+        min(max(q[1], -half[1]), half[1]) - q[1],
+        min(max(q[2], -half[2]), half[2]) - q[2],
+    )
+
+
+@inlined
+def _nearest_face(q: Vector, half: Vector) -> tuple[float, Vector]:
     """Minus the depth of a point in a box, and the direction against the face it is nearest to; x wins ties, then y."""
-    dx = hx - abs(qx)
-    dy = hy - abs(qy)
-    dz = hz - abs(qz)
+    dx = half[0] - abs(q[0])
+    dy = half[1] - abs(q[1])
+    dz = half[2] - abs(q[2])
     if dx <= dy and dx <= dz:
-        return -dx, -copysign(1.0, qx), 0.0, 0.0
+        return -dx, (-copysign(1.0, q[0]), 0.0, 0.0)
     if dy <= dz:
-        return -dy, 0.0, -copysign(1.0, qy), 0.0
-    return -dz, 0.0, 0.0, -copysign(1.0, qz)
+        return -dy, (0.0, -copysign(1.0, q[1]), 0.0)
+    return -dz, (0.0, 0.0, -copysign(1.0, q[2]))
 
 
 @inlined
-def sphere_box_contact(
-    radius: float,
-    hx: float,
-    hy: float,
-    hz: float,
-    margin: float,
-    R: Any,
-    px: float,
-    py: float,
-    pz: float,
-    out: Any,
-) -> None:
+def sphere_box_contact(radius: float, half: Vector, margin: float, R: Any, p: Vector, out: Any) -> None:
     """radius with the sphere's margin, `margin` of the box (m). Features of the box as in box_box."""
-    qx = -(R[0, 0] * px + R[1, 0] * py + R[2, 0] * pz)
-    qy = -(R[0, 1] * px + R[1, 1] * py + R[2, 1] * pz)
-    qz = -(R[0, 2] * px + R[1, 2] * py + R[2, 2] * pz)
-    outside = int(abs(qx) > hx) + int(abs(qy) > hy) + int(abs(qz) > hz)
+    q = opposite(rotate_back(R, p))
+    qx, qy, qz = q
+    outside = int(abs(qx) > half[0]) + int(abs(qy) > half[1]) + int(abs(qz) > half[2])
     if outside > 0:
-        x = min(max(qx, -hx), hx) - qx
-        y = min(max(qy, -hy), hy) - qy
-        z = min(max(qz, -hz), hz) - qz
-        distance, x, y, z = direction(x, y, z)
+        distance, d = direction(_to_box(q, half))
     else:
-        distance, x, y, z = _nearest_face(qx, qy, qz, hx, hy, hz)
-    nx = R[0, 0] * x + R[0, 1] * y + R[0, 2] * z
-    ny = R[1, 0] * x + R[1, 1] * y + R[1, 2] * z
-    nz = R[2, 0] * x + R[2, 1] * y + R[2, 2] * z
-    bound = 16.0 * EPSILON * (abs(px) + abs(py) + abs(pz) + radius + margin)
-    write(out, distance - radius - margin, nx, ny, nz, nx * radius, ny * radius, nz * radius, bound)
-    out[11] = SURFACE
+        distance, d = _nearest_face(q, half)
+    n = rotate(R, d)
+    bound = 16.0 * EPSILON * (sum_of_sizes(p) + radius + margin)
+    write(out, distance - radius - margin, n, scaled(n, radius), bound)
+    out[FEATURE_TYPE_A] = SURFACE
     if outside <= 1:
-        out[13] = FACE
+        x, y, z = d
+        out[FEATURE_TYPE_B] = FACE
         if abs(x) >= abs(y) and abs(x) >= abs(z):
-            out[14] = 0.0 if x < 0.0 else 1.0
+            out[FEATURE_INDEX_B] = 0.0 if x < 0.0 else 1.0
         elif abs(y) >= abs(z):
-            out[14] = 2.0 if y < 0.0 else 3.0
+            out[FEATURE_INDEX_B] = 2.0 if y < 0.0 else 3.0
         else:
-            out[14] = 4.0 if z < 0.0 else 5.0
+            out[FEATURE_INDEX_B] = 4.0 if z < 0.0 else 5.0
     elif outside == 2:
-        out[13] = EDGE
-        if abs(qx) <= hx:
-            out[14] = 0.0 + (1.0 if qy > 0.0 else 0.0) + (2.0 if qz > 0.0 else 0.0)
-        elif abs(qy) <= hy:
-            out[14] = 4.0 + (1.0 if qz > 0.0 else 0.0) + (2.0 if qx > 0.0 else 0.0)
+        out[FEATURE_TYPE_B] = EDGE
+        if abs(qx) <= half[0]:
+            out[FEATURE_INDEX_B] = 0.0 + (1.0 if qy > 0.0 else 0.0) + (2.0 if qz > 0.0 else 0.0)
+        elif abs(qy) <= half[1]:
+            out[FEATURE_INDEX_B] = 4.0 + (1.0 if qz > 0.0 else 0.0) + (2.0 if qx > 0.0 else 0.0)
         else:
-            out[14] = 8.0 + (1.0 if qx > 0.0 else 0.0) + (2.0 if qy > 0.0 else 0.0)
+            out[FEATURE_INDEX_B] = 8.0 + (1.0 if qx > 0.0 else 0.0) + (2.0 if qy > 0.0 else 0.0)
     else:
-        out[13] = VERTEX
-        out[14] = (1.0 if qx > 0.0 else 0.0) + (2.0 if qy > 0.0 else 0.0) + (4.0 if qz > 0.0 else 0.0)
+        out[FEATURE_TYPE_B] = VERTEX
+        out[FEATURE_INDEX_B] = (
+            (1.0 if qx > 0.0 else 0.0) + (2.0 if qy > 0.0 else 0.0) + (4.0 if qz > 0.0 else 0.0)
+        )

@@ -6,25 +6,25 @@ from math import sqrt
 from typing import Any
 
 from collision_monitor._jit import device
-from collision_monitor.narrow_phase.contact_row import SURFACE, write
-from collision_monitor.narrow_phase.segment import across
+from collision_monitor.narrow_phase.contact_row import FEATURE_TYPE_A, SURFACE, write
+from collision_monitor.narrow_phase.vector import Vector, across, column, dot, scaled
 from collision_monitor.tolerances import SAT_ROUND_OFF
 
 
 @device
-def sphere_cone_contact(
-    radius: float, r: float, h: float, margin: float, R: Any, px: float, py: float, pz: float, out: Any
-) -> None:
+def sphere_cone_contact(radius: float, r: float, h: float, margin: float, R: Any, p: Vector, out: Any) -> None:
     """radius with the sphere's margin; base radius r, half height h and margin of the cone; R (3, 3) is the cone's."""
-    zx, zy, zz = R[0, 2], R[1, 2], R[2, 2]
+    px, py, pz = p
+    axis = column(R, 2)
+    zx, zy, zz = axis
     # the sphere's centre from the cone's: v up the axis, u away from it
-    v = -(zx * px + zy * py + zz * pz)
+    v = -dot(axis, p)
     x, y, z = -px - v * zx, -py - v * zy, -pz - v * zz
     u = sqrt(x * x + y * y + z * z)
     if u > SAT_ROUND_OFF * (r + h + abs(v)):
         x, y, z = x / u, y / u, z / u
     else:
-        x, y, z = across(zx, zy, zz, x, y, z)
+        x, y, z = across(axis, (x, y, z))
     length = sqrt(4.0 * h * h + r * r)
     slant = (2.0 * h * u + r * (v - h)) / length
     base = -h - v
@@ -48,7 +48,7 @@ def sphere_cone_contact(
         else:
             nu, nv = nu / distance, nv / distance
     # (nu, nv) points from the cone to the sphere
-    nx, ny, nz = -(nu * x + nv * zx), -(nu * y + nv * zy), -(nu * z + nv * zz)
+    n = (-(nu * x + nv * zx), -(nu * y + nv * zy), -(nu * z + nv * zz))
     bound = SAT_ROUND_OFF * (r + h + radius + margin + abs(px) + abs(py) + abs(pz))
-    write(out, distance - radius - margin, nx, ny, nz, radius * nx, radius * ny, radius * nz, bound)
-    out[11] = SURFACE
+    write(out, distance - radius - margin, n, scaled(n, radius), bound)
+    out[FEATURE_TYPE_A] = SURFACE

@@ -12,6 +12,7 @@ from math import inf
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, kernel
+from collision_monitor.narrow_phase.contact_row import BOUND
 from collision_monitor.prediction.bodies import next_pair
 from collision_monitor.prediction.body_impact import ShapePair, Tube, Window, contact_at, shape_impact
 from collision_monitor.prediction.impact_record import CLEAR, UNRESOLVED
@@ -68,7 +69,7 @@ def _first_certain(multibody, i, j, window, off, margin, work):
         b = first_b
         while a >= 0:
             distance = contact_at(table, parts, ShapePair(A, B, a, b), t, work.scratch)
-            if distance + work.scratch.out[10] - margin + wide <= 0.0:
+            if distance + work.scratch.out[BOUND] - margin + wide <= 0.0:
                 return t
             a, b = next_pair(parts, first_b, a, b)
     return inf

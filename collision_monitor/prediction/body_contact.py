@@ -6,8 +6,9 @@ from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE
+from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.dispatch import contact_within
+from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.bodies import next_pair, place_shape
 from collision_monitor.prediction.body_impact import CLOSING, closing_speed
 from collision_monitor.prediction.motion import (
@@ -108,14 +109,14 @@ def body_contact(multibody, i, j, time, query, scratch, result):
         if b == first_b:
             oa = place_shape(table, parts, a, R_i, R_a)
         ob = place_shape(table, parts, b, R_j, R_b)
-        x, y, z = px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]
+        pose = PairPose(R_a, R_b, (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]))
         tests += 1
         limit = min(wanted, best)
-        if contact_within(table, a, b, R_a, R_b, x, y, z, limit, out, scratch.work) and out[0] < best:
-            best = out[0]
+        if contact_within(table, a, b, pose, limit, out, scratch.work) and out[DISTANCE] < best:
+            best = out[DISTANCE]
             for c in range(3):
-                out[4 + c] += oa[c]
-                out[7 + c] += oa[c]
+                out[POINT_A + c] += oa[c]
+                out[POINT_B + c] += oa[c]
             for c in range(CONTACT_SIZE):
                 result[c] = out[c]
             result[SHAPE_I], result[SHAPE_J] = a, b
@@ -124,16 +125,16 @@ def body_contact(multibody, i, j, time, query, scratch, result):
         return False, tests
     result[CLOSING] = closing_now(bodies, i, j, now, result)
     excess = bodies.excess[i] + bodies.excess[j]
-    result[10] += widen + excess
+    result[BOUND] += widen + excess
     certain = best + excess <= query.margin
     if excess > 0.0 and best <= 0.0 and (bodies.concave[i] or bodies.concave[j]):
-        result[10] -= best
+        result[BOUND] -= best
         certain = excess <= query.margin
     result[STATUS] = TOUCHING if certain else UNSETTLED
     for c in range(3):
         at = position_now(bodies, i, now.age_i, c)
-        result[4 + c] += at
-        result[7 + c] += at
+        result[POINT_A + c] += at
+        result[POINT_B + c] += at
     return True, tests
 
 
@@ -145,15 +146,16 @@ def bounded_contact(bodies, i, j, now, reach, result):
     """
     distance = sqrt(now.p[0] * now.p[0] + now.p[1] * now.p[1] + now.p[2] * now.p[2])
     result[:] = 0.0
-    result[0] = distance
-    result[1] = 1.0
+    result[DISTANCE] = distance
+    result[NORMAL] = 1.0
     if distance > 0.0:
-        result[1], result[2], result[3] = now.p[0] / distance, now.p[1] / distance, now.p[2] / distance
+        for c in range(3):
+            result[NORMAL + c] = now.p[c] / distance
     for c in range(3):
-        result[4 + c] = position_now(bodies, i, now.age_i, c)
-        result[7 + c] = result[4 + c] + now.p[c]
-    result[10] = reach
+        result[POINT_A + c] = position_now(bodies, i, now.age_i, c)
+        result[POINT_B + c] = result[POINT_A + c] + now.p[c]
+    result[BOUND] = reach
     for c in range(3):
-        result[CLOSING] -= now.v[c] * result[1 + c]
+        result[CLOSING] -= now.v[c] * result[NORMAL + c]
     result[SHAPE_I], result[SHAPE_J] = bodies.first_shape[i], bodies.first_shape[j]
     result[STATUS] = UNSETTLED

@@ -13,8 +13,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.narrow_phase.contact_row import WORK_SIZE
-from collision_monitor.narrow_phase.dispatch import contact, separation
+from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
+from collision_monitor.narrow_phase.dispatch import pair_contact, separation
+from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.narrow_phase.work_memory import WORK_SIZE
 from collision_monitor.prediction.advance import Placed, advance
 from collision_monitor.prediction.bodies import next_pair, place_shape
 from collision_monitor.prediction.impact_record import (
@@ -79,7 +81,7 @@ class Scratch(NamedTuple):
     work: Any  # (WORK_SIZE,)
 
 
-CLOSING: Final = 15
+CLOSING: Final = CONTACT_SIZE
 """Column of Scratch.out with the closing speed (m/s), behind the contact row."""
 
 
@@ -126,9 +128,8 @@ def shape_impact(table, parts, pair, window, tube, query, scratch):
         oa = place_shape(table, parts, a, R_i, R_a)
         ob = place_shape(table, parts, b, R_j, R_b)
         px, py, pz = relative_position(A, B, t)
-        gap = separation(
-            table, a, b, R_a, R_b, px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2], out, scratch.work
-        )
+        pose = PairPose(R_a, R_b, (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]))
+        gap = separation(table, a, b, pose, out, scratch.work)
         gap -= query.margin + tube.start + tube.growth * (t - begin)
         if gap <= query.tolerance:
             if t > t_before:
@@ -172,14 +173,14 @@ def contact_at(table, parts, pair, t, scratch):
     oa = place_shape(table, parts, a, R_i, R_a)
     ob = place_shape(table, parts, b, R_j, R_b)
     p = relative_position(A, B, t)
-    x, y, z = p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]
-    contact(table, a, b, R_a, R_b, x, y, z, out, scratch.work)
+    pose = PairPose(R_a, R_b, (p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]))
+    pair_contact(table, a, b, pose, out, scratch.work)
     for k in range(3):
-        out[4 + k] += oa[k]
-        out[7 + k] += oa[k]
+        out[POINT_A + k] += oa[k]
+        out[POINT_B + k] += oa[k]
     v = relative_velocity(A, B, t)
     out[CLOSING] = closing_speed(v, (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz), p, out)
-    return out[0]
+    return out[DISTANCE]
 
 
 @inlined
@@ -188,12 +189,12 @@ def closing_speed(v, wa, wb, p, out):
 
     v: velocity of B relative to A; wa, wb: angular velocities; p: position of B relative to A.
     """
-    ax, ay, az = out[4], out[5], out[6]
-    bx, by, bz = out[7] - p[0], out[8] - p[1], out[9] - p[2]
+    ax, ay, az = out[POINT_A], out[POINT_A + 1], out[POINT_A + 2]
+    bx, by, bz = out[POINT_B] - p[0], out[POINT_B + 1] - p[1], out[POINT_B + 2] - p[2]
     vx = v[0] + (wb[1] * bz - wb[2] * by) - (wa[1] * az - wa[2] * ay)
     vy = v[1] + (wb[2] * bx - wb[0] * bz) - (wa[2] * ax - wa[0] * az)
     vz = v[2] + (wb[0] * by - wb[1] * bx) - (wa[0] * ay - wa[1] * ax)
-    return -(vx * out[1] + vy * out[2] + vz * out[3])
+    return -(vx * out[NORMAL] + vy * out[NORMAL + 1] + vz * out[NORMAL + 2])
 
 
 @inlined
@@ -208,7 +209,7 @@ def _certain_overlap(multibody, pair, start, guess, window, tube, query, scratch
     t = start + guess if guessed else start
     for _ in range(NEWTON_STEPS):
         distance = contact_at(multibody.table, multibody.parts, pair, t, scratch)
-        excess = distance + scratch.out[10] - query.margin + tube.start + tube.growth * (t - begin)
+        excess = distance + scratch.out[BOUND] - query.margin + tube.start + tube.growth * (t - begin)
         if excess <= 0.0:
             return t
         speed = scratch.out[CLOSING] - tube.growth
@@ -291,10 +292,10 @@ def body_impact(multibody, i, j, window, query, scratch, event):
 def _set_geometry(event, A, t, out):
     """Point, normal and closing speed of the impact, from a contact at time t about A's origin."""
     ta = t - A.time
-    event.point_x = A.x + (A.vx + 0.5 * A.ax * ta) * ta + 0.5 * (out[4] + out[7])
-    event.point_y = A.y + (A.vy + 0.5 * A.ay * ta) * ta + 0.5 * (out[5] + out[8])
-    event.point_z = A.z + (A.vz + 0.5 * A.az * ta) * ta + 0.5 * (out[6] + out[9])
-    event.normal_x, event.normal_y, event.normal_z = out[1], out[2], out[3]
+    event.point_x = A.x + (A.vx + 0.5 * A.ax * ta) * ta + 0.5 * (out[POINT_A] + out[POINT_B])
+    event.point_y = A.y + (A.vy + 0.5 * A.ay * ta) * ta + 0.5 * (out[POINT_A + 1] + out[POINT_B + 1])
+    event.point_z = A.z + (A.vz + 0.5 * A.az * ta) * ta + 0.5 * (out[POINT_A + 2] + out[POINT_B + 2])
+    event.normal_x, event.normal_y, event.normal_z = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
     event.closing_speed = out[CLOSING]
 
 

@@ -10,7 +10,8 @@ from math import inf
 from typing import Final
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.narrow_phase.support import core_support, rounding
+from collision_monitor.narrow_phase.core import rounding
+from collision_monitor.narrow_phase.support_value import core_support
 from collision_monitor.prediction.bodies import place_shape
 
 AXES: Final = 8

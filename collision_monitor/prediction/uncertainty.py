@@ -14,6 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import allocating_kernel, device, inlined
+from collision_monitor.narrow_phase.contact_row import NORMAL
 from collision_monitor.prediction.bodies import next_pair
 from collision_monitor.prediction.body_impact import (
     ImpactQuery,
@@ -98,7 +99,7 @@ def _gap_at(multibody, i, j, t, work):
         gap = contact_at(table, parts, ShapePair(A, B, a, b), t, work.scratch)
         if gap < best:
             best = gap
-            normal[0], normal[1], normal[2] = out[1], out[2], out[3]
+            normal[0], normal[1], normal[2] = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
         a, b = next_pair(parts, first_b, a, b)
     return best
 

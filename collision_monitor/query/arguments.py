@@ -9,7 +9,7 @@ from typing import Any
 from collision_monitor.errors import InputError
 
 
-def number(name: str, value: Any, positive: bool = False) -> float:
+def finite_number(name: str, value: Any, positive: bool = False) -> float:
     """A finite number, at least 0, or above it. Raises InputError."""
     try:
         result = float(value)
@@ -21,7 +21,7 @@ def number(name: str, value: Any, positive: bool = False) -> float:
     return result
 
 
-def count(name: str, value: Any) -> int:
+def whole_number(name: str, value: Any) -> int:
     """A whole number from 1. Raises InputError."""
     try:
         result = operator.index(value)

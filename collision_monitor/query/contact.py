@@ -19,10 +19,11 @@ from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape
+from collision_monitor.narrow_phase.contact_row import as_contacts
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.objects.models import containing_model, parse_model
 from collision_monitor.query.nearest_pieces import NearestPieces
-from collision_monitor.query.piece_table import Pieces, as_pieces, exact_pieces
+from collision_monitor.query.piece_table import PieceTable, exact_piece_table, piece_table
 from collision_monitor.records import Model
 from collision_monitor.tolerances import FEATURE_TIE, UNIT_QUATERNION
 
@@ -36,15 +37,18 @@ def _patch(found: NearestPieces, witness: Array) -> Array:
     radius = found.table.radius[found.pair]
     tie = FEATURE_TIE * float(radius[np.isfinite(radius)].sum())
     patches = []
+    best = found.best
     for pairs, rows in found.looked_at:
-        level = (rows[:, 0] <= found.best[0] + tie) & (rows[:, 1:4] @ found.best[1:4] >= 1.0 - FEATURE_TIE)
+        contacts = as_contacts(rows)
+        level = contacts["distance"] <= best["distance"] + tie
+        level &= contacts["normal"] @ best["normal"] >= 1.0 - FEATURE_TIE
         count, points = manifold_batch(found.table, found.position, found.rotation, pairs[level], rows[level])
         patches += [points[i, : count[i]] + found.position[pairs[level][i, 0]] for i in range(len(count))]
-    patch = patches[0] if len(patches) == 1 else outline(np.concatenate(patches), found.best[1:4], tie)
+    patch = patches[0] if len(patches) == 1 else outline(np.concatenate(patches), best["normal"], tie)
     if len(patch) == 1:
         return witness[None]
     # where A's origin is in the world
-    return np.asarray(patch + (witness - found.best[4:7] - found.position[found.pair[0]]))
+    return np.asarray(patch + (witness - best["point_a"] - found.position[found.pair[0]]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,13 +89,13 @@ class Contact:
         return self.point_b[None] if self._found is None else self.points_a + self.signed_distance * self.normal
 
 
-class _Side(NamedTuple):
-    """One of the two."""
+class _Posed(NamedTuple):
+    """One of the two objects at its pose, as what stands for it."""
 
     shapes: Sequence[tuple[Shape, Pose]]
     pose: Pose
     rotation: Array  # (3, 3), the pose's
-    pieces: Pieces
+    pieces: PieceTable
     outline: Sequence[tuple[Shape, Pose]]  # shapes that reach as far as the pieces
     model: Model
     excess: float
@@ -106,7 +110,7 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
     bound reaches to a translation that certainly parts them.
     Raises ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, or a model that is not offered.
     """
-    a, b = _side(shape_a, pose_a, model, "A"), _side(shape_b, pose_b, model, "B")
+    a, b = _posed(shape_a, pose_a, model, "A"), _posed(shape_b, pose_b, model, "B")
     planes = {is_planar(shape) for shape, _ in (*a.shapes, *b.shapes)}
     if len(planes) > 1:
         kinds = sorted({type(shape).__name__ for shape, _ in (*a.shapes, *b.shapes)})
@@ -118,53 +122,50 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
         _check_in_plane(a)
         _check_in_plane(b)
     offset = b.pose.position - a.pose.position
-    found: NearestPieces | None
     found = NearestPieces(a.pieces, (a.rotation, np.zeros(3)), b.pieces, (b.rotation, offset))
-    row = found.best.copy()
-    row[4:7] += found.position[found.pair[0]]
-    distance, bound = float(row[0]), float(row[10])
+    distance, bound = float(found.best["distance"]), float(found.best["bound"])
+    normal = found.best["normal"].copy()
     enclosed = distance > 0.0 and (_holds(a, b, offset) or _holds(b, a, -offset))
     if enclosed:
         # no faces meet, but one is inside of the other, at least this deep
-        distance, row[1:4] = -distance, -row[1:4]
-        found = None
+        distance, normal = -distance, -normal
+    point = a.pose.position + (found.best["point_a"] + found.position[found.pair[0]])
     convex = len(a.pieces) == len(b.pieces) == 1
     unbounded = distance == -np.inf  # a fact about the two, with no length to be wrong about
     if distance <= 0.0 and not convex and not unbounded:
-        bound += max(_parting(a, b, offset, row[1:4]) + distance, 0.0)
+        bound += max(_parting_translation(a, b, offset, normal) + distance, 0.0)
     excess = a.excess + b.excess
-    if distance <= 0.0 and excess > 0.0 and not all(len(exact_pieces(side.shapes)) == 1 for side in (a, b)):
+    if distance <= 0.0 and excess > 0.0 and not all(len(exact_piece_table(side.shapes)) == 1 for side in (a, b)):
         bound -= distance  # the models may overlap deeply where the concave objects do not meet at all
-    point = a.pose.position + row[4:7]
     return Contact(
         signed_distance=distance,
         error_bound=bound + excess,
-        normal=row[1:4],
+        normal=normal,
         point_a=point,
-        point_b=point.copy() if unbounded else point + distance * row[1:4],
+        point_b=point.copy() if unbounded else point + distance * normal,
         model_a=a.model,
         model_b=b.model,
-        _found=None if unbounded else found,
+        _found=None if enclosed or unbounded else found,
     )
 
 
-def _side(shape: Compound, pose: Pose, model: Model | str, name: str) -> _Side:
+def _posed(shape: Compound, pose: Pose, model: Model | str, name: str) -> _Posed:
     shapes = shape_pairs(shape, f"shape {name}")
     if not isinstance(pose, Pose):
         raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
     if parse_model(model) in (Model.AUTO, Model.EXACT):
-        return _Side(shapes, pose, pose.rotation, exact_pieces(shapes), shapes, Model.EXACT, 0.0)
+        return _Posed(shapes, pose, pose.rotation, exact_piece_table(shapes), shapes, Model.EXACT, 0.0)
     modelled = containing_model(shapes, model)
-    pieces = as_pieces(modelled.pieces)
-    return _Side(shapes, pose, pose.rotation, pieces, modelled.pieces, modelled.model, modelled.excess)
+    pieces = piece_table(modelled.pieces)
+    return _Posed(shapes, pose, pose.rotation, pieces, modelled.pieces, modelled.model, modelled.excess)
 
 
-def _check_in_plane(side: _Side) -> None:
+def _check_in_plane(side: _Posed) -> None:
     if abs(side.pose.rotation[2, 2]) < 1.0 - UNIT_QUATERNION or side.pose.rotation[2, 2] < 0.0:
         raise PoseError(f"expected a turn about z for a shape of the plane, got the quaternion {side.pose.quaternion}")
 
 
-def _holds(outer: _Side, inner: _Side, offset: Array) -> bool:
+def _holds(outer: _Posed, inner: _Posed, offset: Array) -> bool:
     """Whether a closed mesh of `outer` holds a piece of `inner`, which is `offset` away; no surfaces meet."""
     if outer.model is not Model.EXACT or len(outer.pieces) == 1:
         return False
@@ -181,7 +182,7 @@ def _holds(outer: _Side, inner: _Side, offset: Array) -> bool:
     return False
 
 
-def _parting(a: _Side, b: _Side, offset: Array, normal: Array) -> float:
+def _parting_translation(a: _Posed, b: _Posed, offset: Array, normal: Array) -> float:
     """Length (m) of the shortest of some translations that certainly part the two: along axes of either, and normal."""
     axes = [side.rotation @ direction for side in (a, b) for direction in _DIRECTIONS]
     planes = [

@@ -18,10 +18,11 @@ from numpy.typing import ArrayLike
 
 from collision_monitor._jit import allocating_kernel, device, inlined
 from collision_monitor.errors import InputError
-from collision_monitor.query.arguments import count, number
+from collision_monitor.narrow_phase.vector import cross, dot
+from collision_monitor.query.arguments import finite_number, whole_number
 from collision_monitor.tolerances import EPSILON, LARGEST_INPUT
 
-BUDGET: Final = 8192
+MOST_BOXES: Final = 8192
 """Boxes for one query, below 1 ms in all; an easy query takes one, a hit about a hundred."""
 
 TOLERANCE: Final = 1e-6
@@ -71,7 +72,7 @@ class FeatureImpact:
 
 
 def vertex_face_impact(
-    x: ArrayLike, separation: float = 0.0, tolerance: float | None = None, budget: int = BUDGET
+    x: ArrayLike, separation: float = 0.0, tolerance: float | None = None, budget: int = MOST_BOXES
 ) -> FeatureImpact:
     """Whether a vertex meets a triangle. x (..., 8, 3): v, f0, f1, f2 at the start, then at the end of the step (m).
 
@@ -83,7 +84,7 @@ def vertex_face_impact(
 
 
 def edge_edge_impact(
-    x: ArrayLike, separation: float = 0.0, tolerance: float | None = None, budget: int = BUDGET
+    x: ArrayLike, separation: float = 0.0, tolerance: float | None = None, budget: int = MOST_BOXES
 ) -> FeatureImpact:
     """Whether two edges meet. x (..., 8, 3): a0, a1, b0, b1 at the start, then at the end; the rest as for vertices."""
     return _impacts(x, False, separation, tolerance, budget)
@@ -98,11 +99,11 @@ def _impacts(x: ArrayLike, face: bool, separation: float, tolerance: float | Non
         raise InputError(f"x: expected four points at the start and at the end, (..., 8, 3), got shape {points.shape}")
     if not (np.abs(points) <= LARGEST_INPUT).all():
         raise InputError(f"x: expected finite coordinates up to {LARGEST_INPUT:g}, got NaN, infinity or larger")
-    wanted, most = number("separation", separation), count("budget", budget)
-    near = 0.0 if tolerance is None else number("tolerance", tolerance, positive=True)
+    wanted, most = finite_number("separation", separation), whole_number("budget", budget)
+    near = 0.0 if tolerance is None else finite_number("tolerance", tolerance, positive=True)
     flat = points.reshape(-1, 8, 3)
     status, lower, upper = np.empty(len(flat), np.uint8), np.empty(len(flat)), np.empty(len(flat))
-    _solve(flat, face, wanted, near, most, status, lower, upper)
+    _solve(flat, face, wanted, near, most, (status, lower, upper))
     leading = points.shape[:-2]
     if leading == ():
         return FeatureImpact(str(_NAMES[status[0]]), float(lower[0]), float(upper[0]))
@@ -113,9 +114,8 @@ def _impacts(x: ArrayLike, face: bool, separation: float, tolerance: float | Non
 
 
 @allocating_kernel
-def _solve(
-    x: Any, face: bool, separation: float, tolerance: float, budget: int, status: Any, lower: Any, upper: Any
-) -> None:
+def _solve(x: Any, face: bool, separation: float, tolerance: float, most: int, answers: Any) -> None:
+    status, lower, upper = answers
     terms = np.zeros((_AXES, 7))
     boxes = np.zeros((_DEPTH, 6))
     for q in range(x.shape[0]):
@@ -129,7 +129,7 @@ def _solve(
                 status[q] = _HIT if settled else _CLEAR
                 lower[q] = upper[q] = begin if settled else math.inf
                 continue
-        status[q], lower[q], upper[q] = _first_root(terms, boxes, face, separation, near, budget, begin)
+        status[q], lower[q], upper[q] = _first_root(terms, boxes, face, separation, near, most, begin)
 
 
 @device
@@ -190,20 +190,21 @@ def _set_terms(x: Any, face: bool, separation: float, terms: Any) -> float:
 
 
 @device
-def _may_hold(
-    terms: Any, face: bool, separation: float, t0: float, t1: float, u0: float, u1: float, w0: float, w1: float
-) -> bool:
-    """Whether F may come within the separation of 0 in the box."""
+def _may_hold(terms: Any, face: bool, separation: float, t: Any, u: Any, w: Any) -> bool:
+    """Whether F may come within the separation of 0 in the box of three intervals (begin, end)."""
+    t0, t1 = t
+    u0, u1 = u
+    w0, w1 = w
     if face:  # the corner beyond u + w = 1 is not of the triangle
         u1, w1 = min(u1, 1.0 - w0), min(w1, 1.0 - u0)
     squared, slack = 0.0, separation
     for k in range(_AXES):
         low, high = math.inf, -math.inf
         for end in range(2):
-            t = t0 if end == 0 else t1
-            a = terms[k, 0] + t * (terms[k, 3] - terms[k, 0])
-            b = terms[k, 1] + t * (terms[k, 4] - terms[k, 1])
-            c = terms[k, 2] + t * (terms[k, 5] - terms[k, 2])
+            at = t0 if end == 0 else t1
+            a = terms[k, 0] + at * (terms[k, 3] - terms[k, 0])
+            b = terms[k, 1] + at * (terms[k, 4] - terms[k, 1])
+            c = terms[k, 2] + at * (terms[k, 5] - terms[k, 2])
             low = min(low, a + min(u0 * b, u1 * b) + min(w0 * c, w1 * c))
             high = max(high, a + max(u0 * b, u1 * b) + max(w0 * c, w1 * c))
         gap = max(low, -high, 0.0)
@@ -216,7 +217,7 @@ def _may_hold(
 
 
 @device
-def _first_root(terms: Any, boxes: Any, face: bool, separation: float, near: float, budget: int, begin: float) -> Any:
+def _first_root(terms: Any, boxes: Any, face: bool, separation: float, near: float, most: int, begin: float) -> Any:
     """(status, lower, upper) of one query, which is known to have no root before `begin`."""
     along_t = along_u = along_w = 0.0
     for k in range(3):
@@ -241,12 +242,12 @@ def _first_root(terms: Any, boxes: Any, face: bool, separation: float, near: flo
         if t1 > latest:  # of this box, too, only what is clearly before it matters
             t1 = latest
             lower = min(lower, latest)
-        if looked == budget:
+        if looked == most:
             for k in range(waiting + 1):
                 lower = min(lower, boxes[k, 0])
             break
         looked += 1
-        if (face and u0 + w0 > 1.0) or not _may_hold(terms, face, separation, t0, t1, u0, u1, w0, w1):
+        if (face and u0 + w0 > 1.0) or not _may_hold(terms, face, separation, (t0, t1), (u0, u1), (w0, w1)):
             continue
         by_t, by_u, by_w = along_t * (t1 - t0), along_u * (u1 - u0), along_w * (w1 - w0)
         largest = max(by_t, by_u, by_w)
@@ -327,34 +328,24 @@ def _distance(terms: Any, face: bool, t: float) -> float:
         squared, s = _on_edge(a, c, 1.0, b)
         if squared < best:
             best, u, w = squared, 1.0, s
-    n = _cross(b, c)
-    nn = _dot(n, n)
-    if nn > _PARALLEL_SIN2 * _dot(b, b) * _dot(c, c):
+    n = cross(b, c)
+    nn = dot(n, n)
+    if nn > _PARALLEL_SIN2 * dot(b, b) * dot(c, c):
         # from the border's point, not from a: what is left to go is small, and so is what the round-off of n does to it
         f = (a[0] + u * b[0] + w * c[0], a[1] + u * b[1] + w * c[1], a[2] + u * b[2] + w * c[2])
-        u -= _dot(_cross(f, c), n) / nn
-        w += _dot(_cross(f, b), n) / nn
+        u -= dot(cross(f, c), n) / nn
+        w += dot(cross(f, b), n) / nn
         outside = max(-u, -w, u + w - 1.0) if face else max(-u, -w, u - 1.0, w - 1.0)
         if outside <= _BORDER:
-            best = min(best, _dot(f, n) ** 2 / nn)
+            best = min(best, dot(f, n) ** 2 / nn)
     return math.sqrt(best)
-
-
-@inlined
-def _cross(a: Any, b: Any) -> Any:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@inlined
-def _dot(a: Any, b: Any) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @inlined
 def _on_edge(a: Any, along: Any, fixed: float, across: Any) -> Any:
     """Least squared distance of 0 from a + fixed across + s along for s in 0 … 1, and s."""
     x, y, z = a[0] + fixed * across[0], a[1] + fixed * across[1], a[2] + fixed * across[2]
-    squared = _dot(along, along)
+    squared = dot(along, along)
     s = -(x * along[0] + y * along[1] + z * along[2]) / squared if squared > 0.0 else 0.0
     s = min(max(s, 0.0), 1.0)
     x, y, z = x + s * along[0], y + s * along[1], z + s * along[2]

@@ -1,8 +1,8 @@
 """The classical ways to a time of impact under their names, to be compared: benchmarks/impact_methods.py.
 
-Each takes two convex shapes with N motions (states as in impact_batch.py, (N, 13)) and the horizon (s), and returns the
-times (N,) of the first impacts, infinite for none. Only conservative advancement holds for every motion and misses
-nothing; the others say here what they need, or what they miss. (Ericson, Real-Time Collision Detection, 5.5)
+Each takes two convex shapes with N motions (states as in time_of_impact_batch.py, (N, 13)) and the horizon (s), and
+returns the times (N,) of the first impacts, infinite for none. Only conservative advancement holds for every motion and
+misses nothing; the others say here what they need, or what they miss. (Ericson, Real-Time Collision Detection, 5.5)
 """
 
 from __future__ import annotations
@@ -21,8 +21,14 @@ from collision_monitor.geometry.shapes import Box, HalfSpace, Shape, Sphere
 from collision_monitor.prediction.bodies import Multibody, make_bodies
 from collision_monitor.prediction.body_impact import ShapePair, contact_at, make_scratch
 from collision_monitor.prediction.sphere_interval import sphere_interval
-from collision_monitor.query.moving_pair import Body, Query, Scene, first_impacts, make_body, make_scene
-from collision_monitor.query.time_of_impact import BUDGET
+from collision_monitor.query.moving_pair import (
+    MotionQuery,
+    MovingShape,
+    first_impacts,
+    lay_out_pair,
+    make_moving_shape,
+)
+from collision_monitor.query.time_of_impact import ITERATIONS
 from collision_monitor.tolerances import PARALLEL_SIN2
 
 Array = NDArray[np.float64]
@@ -35,18 +41,20 @@ HALVINGS: Final = 30
 """Of the step in which they met: 2e-11 s are left."""
 
 
-def _bodies(shape_a: Shape, shape_b: Shape) -> tuple[Body, Body]:
+def _convex_shapes(shape_a: Shape, shape_b: Shape) -> tuple[MovingShape, MovingShape]:
     still = Motion(Pose())
-    bodies = make_body(shape_a, still, "A"), make_body(shape_b, still, "B")
+    bodies = make_moving_shape(shape_a, still, "A"), make_moving_shape(shape_b, still, "B")
     if any(len(body.pieces) > 1 for body in bodies):
         raise UnsupportedError("expected convex shapes; supported are all but concave Mesh and Polygon")
     return bodies
 
 
-def lay_out(a: Body, b: Body, state_a: Array, state_b: Array, horizon: float) -> tuple[Scene, NDArray[np.int32]]:
+def lay_out_motions(
+    a: MovingShape, b: MovingShape, state_a: Array, state_b: Array, horizon: float
+) -> tuple[Multibody, NDArray[np.int32]]:
     """The states (N, 13) as N bodies like a and N like b, and the pairs (N, 2) of those in one row."""
     count = len(state_a)
-    two = make_scene(a, b, horizon)
+    two = lay_out_pair(a, b, horizon)
     bodies = make_bodies(2 * count)
     for k, state in enumerate((state_a, state_b)):
         rows = slice(k * count, (k + 1) * count)
@@ -59,7 +67,7 @@ def lay_out(a: Body, b: Body, state_a: Array, state_b: Array, horizon: float) ->
         bodies.spin_radius[rows] = two.bodies.spin_radius[k]
     bodies.id[:] = np.arange(2 * count)
     pairs = np.arange(2 * count, dtype=np.int32).reshape(2, count).T.copy()
-    return Scene(two.table, two.parts, bodies), pairs
+    return Multibody(two.table, two.parts, bodies), pairs
 
 
 def closed_form(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float) -> Array:
@@ -78,9 +86,9 @@ def closed_form(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: flo
 
 def swept_bounds(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float) -> Array:
     """When the bounding spheres first meet: a lower bound, whatever turns inside of them."""
-    scene, pairs = lay_out(*_bodies(shape_a, shape_b), a, b, horizon)
+    multibody, pairs = lay_out_motions(*_convex_shapes(shape_a, shape_b), a, b, horizon)
     times = np.empty(len(a))
-    _swept_bounds(scene.bodies.motion, pairs, horizon, times)
+    _swept_bounds(multibody.bodies.motion, pairs, horizon, times)
     return times
 
 
@@ -91,9 +99,9 @@ def swept_sat(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float
     """
     if not (isinstance(shape_a, Box) and isinstance(shape_b, Box)):
         raise UnsupportedError("swept_sat: supported is Box with Box")
-    scene, pairs = lay_out(*_bodies(shape_a, shape_b), a, b, horizon)
+    multibody, pairs = lay_out_motions(*_convex_shapes(shape_a, shape_b), a, b, horizon)
     times = np.empty(len(a))
-    _swept_sat(scene.table, scene.bodies, pairs, horizon, times)
+    _swept_sat(multibody.table, multibody.bodies, pairs, horizon, times)
     return times
 
 
@@ -101,9 +109,9 @@ def conservative_advancement(
     shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float, tolerance: float = 1e-6
 ) -> Array:
     """The lower ends of what `time_of_impact` answers: never late, and early by what the tolerance (m) allows."""
-    scene, pairs = lay_out(*_bodies(shape_a, shape_b), a, b, horizon)
+    multibody, pairs = lay_out_motions(*_convex_shapes(shape_a, shape_b), a, b, horizon)
     times = np.full(len(a), math.inf)
-    events = first_impacts(scene, pairs, 0.0, Query(horizon, tolerance, 0.0, BUDGET))
+    events = first_impacts(multibody, pairs, 0.0, MotionQuery(horizon, tolerance, 0.0, ITERATIONS))
     times[events["i"]] = events["lower"]
     return times
 
@@ -112,9 +120,9 @@ def bisection(
     shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float, step: float = STEP, halvings: int = HALVINGS
 ) -> Array:
     """Step by step until they overlap, then back up, halving the step. What comes and goes within a step is missed."""
-    scene, pairs = lay_out(*_bodies(shape_a, shape_b), a, b, horizon)
+    multibody, pairs = lay_out_motions(*_convex_shapes(shape_a, shape_b), a, b, horizon)
     times = np.empty(len(a))
-    _bisect(Multibody(*scene), pairs, horizon, step, halvings, times, make_scratch())
+    _bisect(multibody, pairs, horizon, step, halvings, times, make_scratch())
     return times
 
 

@@ -15,6 +15,14 @@ _SMALLEST: Final = 1e-240
 """m^4/s^2, as in time_of_impact.py: below it products of lengths and speeds lose digits."""
 
 
+class ImpactTimes(NamedTuple):
+    """Answers for N motions."""
+
+    lower: Any  # (N,) s
+    upper: Any  # (N,) s
+    left: Any  # (N,) bool: left open
+
+
 @kernel
 def normalise_states(state):
     """Normalise the quaternions of states (N, 13) in place.
@@ -41,26 +49,18 @@ def _set_motion(motion, state, k):
     motion.wx, motion.wy, motion.wz = state[k, 10], state[k, 11], state[k, 12]
 
 
-class RowImpacts(NamedTuple):
-    """Where the kernel writes; `left` marks rows that touch at the start and stay open."""
-
-    event: Any  # (1,) IMPACT: scratch
-    lower: Any  # (N,) s
-    upper: Any  # (N,) s
-    left: Any  # (N,) bool
-
-
 @kernel
-def impacts_of_rows(multibody, states, rows, horizon, queries, scratch, found):
-    """First impacts of the two bodies moving as in `rows` of their states (2, N, 13), into found.
+def impacts_of_rows(multibody, states, rows, horizon, queries, memory, times):
+    """First impacts of two bodies moving as in `rows` of the states, two arrays (N, 13); the rest of `times` stays.
 
-    queries: the ImpactQuery, and the one for what overlaps at the start by more than touching, which is an impact at 0.
-    found: RowImpacts; other rows stay.
+    queries: the ImpactQuery, and the one for overlaps deeper than touching at the start, which are impacts at 0.
+    times.left: touches at the start and stays open. memory: Scratch, and a place for an IMPACT.
     """
     bodies = multibody.bodies
     state_a, state_b = states
     query, deep = queries
-    event, lower, upper, left = found
+    scratch, event = memory
+    lower, upper, left = times
     window = Window(0.0, horizon)
     q_a, q_b = state_a[:, 3:7], state_b[:, 3:7]
     for r in range(len(rows)):
@@ -86,13 +86,14 @@ def impacts_of_rows(multibody, states, rows, horizon, queries, scratch, found):
 
 
 @kernel
-def impacts_of_spheres(a, b, reach, horizon, lower, upper, left):
+def impacts_of_spheres(a, b, reach, horizon, times):
     """The same in closed form for spheres whose radii add up to `reach` (m); a, b: columns of the states, (13, N).
 
     As `sphere_interval`, but the same for all and without a branch, so that the processor does eight at once: the first
-    root c / (-b + sqrt(D)), rounded outward for the lower end and inward for the upper one. left (N,) bool: what
-    touches at the start, grazes or underflows, which this leaves open.
+    root c / (-b + sqrt(D)), rounded outward for the lower end and inward for the upper one. times.left: what touches
+    at the start, grazes or underflows, which this leaves open.
     """
+    lower, upper, left = times
     certain = reach * (1.0 - 8.0 * EPSILON)  # the radii are rounded up by nearly as much
     outer, inner = reach * reach, certain * certain
     for k in range(len(lower)):

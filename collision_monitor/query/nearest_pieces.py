@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.boxes import ranges
 from collision_monitor.geometry.shape_table import ShapeTable, join
+from collision_monitor.narrow_phase.contact_row import CONTACT_ROW, DISTANCE, as_contacts
 from collision_monitor.narrow_phase.dispatch import contact_batch
-from collision_monitor.query.piece_table import Pieces
+from collision_monitor.query.piece_table import PieceTable
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -25,24 +26,24 @@ FIRST_BATCH: Final = 64
 ALL_PAIRS: Final = 2048
 """Pairs of pieces up to which all bounding spheres are compared: that is as fast as one way down the trees."""
 
-AT_ONCE: Final = 1024
+PAIRS_AT_ONCE: Final = 1024
 """Pairs of spheres that go down the trees together. Larger: more of them before anything near is known."""
 
 
 class NearestPieces:
-    """The search, and what it found: `best`, the contact (15,) of the nearest or deepest pair of pieces, and `pair`.
+    """The search, and what it found: `best`, the contact (CONTACT_ROW) of the nearest or deepest pieces, and `pair`.
 
     table, position, rotation: of the pieces of both, A's first, about one origin in the same axes. looked_at: all pairs
-    (m, 2) that were tested, in batches with their contacts (m, 15): those of all that are as near as the nearest.
+    (m, 2) that were tested, in batches with their contacts (m, CONTACT_SIZE): those of all as near as the nearest.
     """
 
-    def __init__(self, a: Pieces, X_A: tuple[Array, Array], b: Pieces, X_B: tuple[Array, Array]) -> None:
+    def __init__(self, a: PieceTable, X_A: tuple[Array, Array], b: PieceTable, X_B: tuple[Array, Array]) -> None:
         """X: rotation (3, 3) and position (3,) of each."""
         self.table: ShapeTable = join([a.table, b.table])
         self.position = np.concatenate([a.position @ X_A[0].T + X_A[1], b.position @ X_B[0].T + X_B[1]])
         self.rotation = np.concatenate([X_A[0] @ a.rotation, X_B[0] @ b.rotation])
         self.looked_at: list[tuple[NDArray[np.int32], Array]] = []
-        self.best: Any = np.full(1, np.inf)
+        self.best: Any = np.full(1, np.inf, CONTACT_ROW)[0]
         self.pair = np.zeros(2, np.int32)
         self._first_of_b = len(a)
         if len(a) * len(b) <= ALL_PAIRS:
@@ -57,17 +58,17 @@ class NearestPieces:
         lower = np.linalg.norm(self.position[j] - self.position[i], axis=1) - (radius[i] + radius[j])
         order = np.argsort(lower, kind="stable")
         begin, size = 0, FIRST_BATCH
-        while begin < len(order) and lower[order[begin]] <= self.best[0]:
+        while begin < len(order) and lower[order[begin]] <= self.best["distance"]:
             some = order[begin : begin + size]
             pairs = np.stack([i[some], j[some]], axis=1).astype(np.int32)
             rows = contact_batch(self.table, self.position, self.rotation, pairs)
             self.looked_at.append((pairs, rows))
-            k = int(rows[:, 0].argmin())
-            if rows[k, 0] < self.best[0]:
-                self.best, self.pair = rows[k].copy(), pairs[k]
+            k = int(rows[:, DISTANCE].argmin())
+            if rows[k, DISTANCE] < self.best["distance"]:
+                self.best, self.pair = as_contacts(rows)[k].copy(), pairs[k]
             begin, size = begin + size, 2 * size
 
-    def _descend(self, a: Pieces, X_A: tuple[Array, Array], b: Pieces, X_B: tuple[Array, Array]) -> None:
+    def _descend(self, a: PieceTable, X_A: tuple[Array, Array], b: PieceTable, X_B: tuple[Array, Array]) -> None:
         """From the whole of both to their halves, the nearest first; what is farther than what was found stays out."""
         trees = a.spheres, b.spheres
         centers = [[c @ R.T + p for c in tree.center] for tree, (R, p) in zip(trees, (X_A, X_B), strict=True)]
@@ -76,7 +77,7 @@ class NearestPieces:
         farthest = np.inf  # some pair is as near as that
         while stack:
             level, nodes, lower = stack.pop()
-            farthest = min(farthest, self.best[0])
+            farthest = min(farthest, self.best["distance"])
             nodes = nodes[:, lower <= farthest]
             if level == last:
                 self._look_at(*_leaves(trees, nodes))
@@ -93,8 +94,8 @@ class NearestPieces:
             lower = apart - radii
             farthest = min(farthest, float((apart + radii).min(initial=np.inf)))
             order = np.argsort(lower, kind="stable")
-            for begin in reversed(range(0, len(order), AT_ONCE)):
-                some = order[begin : begin + AT_ONCE]
+            for begin in reversed(range(0, len(order), PAIRS_AT_ONCE)):
+                some = order[begin : begin + PAIRS_AT_ONCE]
                 stack.append((level, nodes[:, some], lower[some]))
 
 

@@ -33,7 +33,7 @@ class SphereLevels:
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class PieceTable:
     """n convex pieces: a table of their shapes, and their poses in the object's frame.
 
     inner (m, 3): points of them, at least one of each connected part.
@@ -64,7 +64,7 @@ class Pieces:
         return SphereLevels(centers, radii, tree.order, tree.first)
 
 
-def exact_pieces(shapes: Sequence[tuple[Shape, Pose]]) -> Pieces:
+def exact_piece_table(shapes: Sequence[tuple[Shape, Pose]]) -> PieceTable:
     """The pieces of an object as it is. They are remembered: a shape never changes."""
     parts = []
     for shape, pose in shapes:
@@ -72,28 +72,28 @@ def exact_pieces(shapes: Sequence[tuple[Shape, Pose]]) -> Pieces:
         if pose.position.any() or pose.quaternion[3] != 1.0:
             R = pose.rotation
             turned = (own.position @ R.T + pose.position, R @ own.rotation, own.inner @ R.T + pose.position)
-            own = Pieces(own.table, *turned)
+            own = PieceTable(own.table, *turned)
         parts.append(own)
     if len(parts) == 1:
         return parts[0]
     columns = ([getattr(part, name) for part in parts] for name in ("position", "rotation", "inner"))
-    return Pieces(join([part.table for part in parts]), *map(np.concatenate, columns))
+    return PieceTable(join([part.table for part in parts]), *map(np.concatenate, columns))
 
 
 @lru_cache(maxsize=1024)
-def _of_convex(shape: Shape) -> Pieces:
-    return as_pieces(((shape, Pose()),))
+def _of_convex(shape: Shape) -> PieceTable:
+    return piece_table(((shape, Pose()),))
 
 
 @lru_cache(maxsize=64)
-def _of_concave(shape: Mesh | Polygon) -> Pieces:
+def _of_concave(shape: Mesh | Polygon) -> PieceTable:
     if isinstance(shape, Mesh) and not is_convex_mesh(shape):
         corners = shape.vertices[shape.faces]
         centers = corners.mean(axis=1)  # about its own centre a triangle has a small bounding sphere, and its digits
         rotation = np.tile(np.eye(3), (len(corners), 1, 1))
         inner = centers[_one_of_each_part(shape.faces, len(shape.vertices))]
-        return Pieces(triangle_table(corners - centers[:, None]), centers, rotation, inner)
-    return as_pieces(convex_pieces(shape))
+        return PieceTable(triangle_table(corners - centers[:, None]), centers, rotation, inner)
+    return piece_table(convex_pieces(shape))
 
 
 def _one_of_each_part(faces: Indices, vertices: int) -> Indices:
@@ -107,7 +107,7 @@ def _one_of_each_part(faces: Indices, vertices: int) -> Indices:
     return np.asarray(np.unique(part[faces[:, 0]], return_index=True)[1])
 
 
-def as_pieces(pieces: Sequence[tuple[Shape, Pose]]) -> Pieces:
+def piece_table(pieces: Sequence[tuple[Shape, Pose]]) -> PieceTable:
     """Convex shapes with their poses in the object's frame."""
     builder = ShapeTableBuilder(slots=len(pieces), vertices=0)
     for shape, _ in pieces:
@@ -115,7 +115,7 @@ def as_pieces(pieces: Sequence[tuple[Shape, Pose]]) -> Pieces:
     position = np.stack([pose.position for _, pose in pieces])
     rotation = np.stack([pose.rotation for _, pose in pieces])
     middle = np.array([_point_of(shape) for shape, _ in pieces])
-    return Pieces(builder.used, position, rotation, position + np.einsum("nij,nj->ni", rotation, middle))
+    return PieceTable(builder.used, position, rotation, position + np.einsum("nij,nj->ni", rotation, middle))
 
 
 def _point_of(shape: Shape) -> Array:

@@ -12,13 +12,13 @@ from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.pose import Motion
 from collision_monitor.geometry.shapes import HalfSpace
 from collision_monitor.prediction.impact_record import HIT
-from collision_monitor.query.arguments import count, number
+from collision_monitor.query.arguments import finite_number, whole_number
 from collision_monitor.query.contact import Compound, Contact, contact
-from collision_monitor.query.moving_pair import Body, Query, first_impacts, make_body, make_scene
+from collision_monitor.query.moving_pair import MotionQuery, MovingShape, first_impacts, lay_out_pair, make_moving_shape
 from collision_monitor.query.touching import follow
 from collision_monitor.tolerances import TOUCHING
 
-BUDGET: Final = 1000
+ITERATIONS: Final = 1000
 """Distance queries for one pair of pieces; hardly any pair needs more than 20."""
 
 
@@ -49,7 +49,7 @@ def time_of_impact(
     horizon: float = 2.0,
     tolerance: float = 1e-6,
     separation: float = 0.0,
-    iterations: int = BUDGET,
+    iterations: int = ITERATIONS,
 ) -> Impact:
     """First time in [0, horizon] (s) at which two shapes or compounds are within `separation` (m) of each other.
 
@@ -60,15 +60,15 @@ def time_of_impact(
     Raises InputError, ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, two HalfSpaces.
     """
     query = check_query(horizon, tolerance, separation, iterations)
-    a, b = make_body(shape_a, motion_a, "A"), make_body(shape_b, motion_b, "B")
+    a, b = make_moving_shape(shape_a, motion_a, "A"), make_moving_shape(shape_b, motion_b, "B")
     check_bounded(a, b)
     start = contact(a.shapes, a.motion.pose, b.shapes, b.motion.pose)
-    scene = make_scene(a, b, query.horizon)
-    radii = scene.bodies.motion["radius"]
+    multibody = lay_out_pair(a, b, query.horizon)
+    radii = multibody.bodies.motion["radius"]
     round_off = TOUCHING * float(radii[np.isfinite(radii)].sum())
     if start.signed_distance < query.separation - round_off:
         return Impact("hit", 0.0, 0.0, start)
-    events = first_impacts(scene, np.array([[0, 1]], np.int32), 0.0, query)
+    events = first_impacts(multibody, np.array([[0, 1]], np.int32), 0.0, query)
     if not len(events):
         return _CLEAR
     lower = float(events[0]["lower"])
@@ -83,17 +83,17 @@ def time_of_impact(
     return Impact("hit" if certain else "unresolved", lower, upper if certain else math.inf, meeting)
 
 
-def check_query(horizon: float, tolerance: float, separation: float, iterations: int) -> Query:
+def check_query(horizon: float, tolerance: float, separation: float, iterations: int) -> MotionQuery:
     """What is asked for, checked. Raises InputError."""
-    return Query(
-        horizon=number("horizon", horizon),
-        tolerance=number("tolerance", tolerance, positive=True),
-        separation=number("separation", separation),
-        budget=count("iterations", iterations),
+    return MotionQuery(
+        horizon=finite_number("horizon", horizon),
+        tolerance=finite_number("tolerance", tolerance, positive=True),
+        separation=finite_number("separation", separation),
+        iterations=whole_number("iterations", iterations),
     )
 
 
-def check_bounded(a: Body, b: Body) -> None:
+def check_bounded(a: MovingShape, b: MovingShape) -> None:
     """Raises UnsupportedError for two bodies without an end."""
     if all(any(isinstance(s, HalfSpace) for s, _ in body.shapes) for body in (a, b)):
         raise UnsupportedError("two HalfSpaces: expected one at most; every other shape meets a HalfSpace")

@@ -13,13 +13,12 @@ from collision_monitor.errors import InputError, PoseError
 from collision_monitor.geometry.planar import is_planar
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import HalfSpace, Mesh
-from collision_monitor.prediction.bodies import Multibody
 from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.query.contact import Compound
-from collision_monitor.query.impact_rows import RowImpacts, impacts_of_rows, impacts_of_spheres, normalise_states
-from collision_monitor.query.moving_pair import Body, Query, make_body, make_scene
-from collision_monitor.query.time_of_impact import BUDGET, check_bounded, check_query, time_of_impact
+from collision_monitor.query.impact_rows import ImpactTimes, impacts_of_rows, impacts_of_spheres, normalise_states
+from collision_monitor.query.moving_pair import MotionQuery, MovingShape, lay_out_pair, make_moving_shape
+from collision_monitor.query.time_of_impact import ITERATIONS, check_bounded, check_query, time_of_impact
 from collision_monitor.tolerances import LARGEST_INPUT, TOUCHING, UNIT_QUATERNION
 
 Array = NDArray[np.float64]
@@ -46,7 +45,7 @@ def time_of_impact_batch(
     horizon: float = 2.0,
     tolerance: float = 1e-6,
     separation: float = 0.0,
-    iterations: int = BUDGET,
+    iterations: int = ITERATIONS,
 ) -> Impacts:
     """`time_of_impact` for poses (N, 7) x y z qx qy qz qw and twists (N, 6) vx vy vz wx wy wz; one row stands for all.
 
@@ -54,14 +53,14 @@ def time_of_impact_batch(
     in the plane or of concave meshes. Raises as `time_of_impact` does.
     """
     query = check_query(horizon, tolerance, separation, iterations)
-    a, b = make_body(shape_a, _STILL, "A"), make_body(shape_b, _STILL, "B")
+    a, b = make_moving_shape(shape_a, _STILL, "A"), make_moving_shape(shape_b, _STILL, "B")
     check_bounded(a, b)
     state_a, state_b = check_states(poses_a, twists_a, poses_b, twists_b)
     count = len(state_a)
-    lower, upper = np.full(count, math.inf), np.full(count, math.inf)
-    alone = np.ones(count, bool)
+    times = ImpactTimes(np.full(count, math.inf), np.full(count, math.inf), np.ones(count, bool))
     if not _is_special(a, b, state_a, state_b):
-        _solve(a, b, state_a, state_b, query, lower, upper, alone)
+        _solve(a, b, (state_a, state_b), query, times)
+    lower, upper, alone = times
     status = np.where(lower == math.inf, "clear", np.where(upper == math.inf, "unresolved", "hit"))
     for k in np.flatnonzero(alone):
         one = time_of_impact(a.shapes, _motion(state_a[k]), b.shapes, _motion(state_b[k]), *query)
@@ -69,7 +68,7 @@ def time_of_impact_batch(
     return Impacts(status, lower, upper)
 
 
-def _is_special(a: Body, b: Body, state_a: Array, state_b: Array) -> bool:
+def _is_special(a: MovingShape, b: MovingShape, state_a: Array, state_b: Array) -> bool:
     """Whether the kernel alone does not answer: plane shapes, meshes that may hold the other, turning half-spaces."""
     for body, state in ((a, state_a), (b, state_b)):
         for shape, _ in body.shapes:
@@ -122,17 +121,17 @@ def _motion(state: Array) -> Motion:
 
 
 def _solve(
-    a: Body, b: Body, state_a: Array, state_b: Array, query: Query, lower: Array, upper: Array, left: NDArray[np.bool_]
+    a: MovingShape, b: MovingShape, states: tuple[Array, Array], query: MotionQuery, times: ImpactTimes
 ) -> None:
-    """Fill lower, upper and left (N,): which touch at the start and are left open."""
-    scene = make_scene(a, b, query.horizon)
-    radii = scene.bodies.motion["radius"]
-    rows = np.arange(len(state_a))
-    if not scene.bodies.spin_radius.any():  # two spheres
+    """Fill the times; left open are those that touch at the start."""
+    multibody = lay_out_pair(a, b, query.horizon)
+    radii = multibody.bodies.motion["radius"]
+    rows = np.arange(len(times.lower))
+    if not multibody.bodies.spin_radius.any():  # two spheres
         reach = float(radii.sum()) + query.separation
-        impacts_of_spheres(state_a.T.copy(), state_b.T.copy(), reach, query.horizon, lower, upper, left)
-        rows = np.flatnonzero(left)
+        impacts_of_spheres(states[0].T.copy(), states[1].T.copy(), reach, query.horizon, times)
+        rows = np.flatnonzero(times.left)
     deep = query.separation - TOUCHING * float(radii[np.isfinite(radii)].sum())
-    queries = tuple(ImpactQuery(margin, query.tolerance, query.budget) for margin in (query.separation, deep))
-    found = RowImpacts(np.zeros(1, IMPACT), lower, upper, left)
-    impacts_of_rows(Multibody(*scene), (state_a, state_b), rows, query.horizon, queries, make_scratch(), found)
+    queries = tuple(ImpactQuery(margin, query.tolerance, query.iterations) for margin in (query.separation, deep))
+    memory = (make_scratch(), np.zeros(1, IMPACT))
+    impacts_of_rows(multibody, states, rows, query.horizon, queries, memory, times)

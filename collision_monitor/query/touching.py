@@ -17,17 +17,19 @@ from numpy.typing import NDArray
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import Capsule, Circle, Cone, Cylinder, Sphere
+from collision_monitor.narrow_phase.contact_row import as_contacts
 from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.prediction.bodies import Multibody
 from collision_monitor.prediction.impact_record import HIT
 from collision_monitor.query.contact import contact
-from collision_monitor.query.moving_pair import Body, Query, Scene, first_impacts, make_scene
+from collision_monitor.query.moving_pair import MotionQuery, MovingShape, first_impacts, lay_out_pair
 
 Array = NDArray[np.float64]
 
-HALVINGS: Final = 80
+PARTING_TIMES: Final = 80
 """Times that are tried for the parting of shapes that touch: the horizon, half of it, …: down to 1e-24 of it."""
 
-PROBES: Final = 40
+DEEPENING_TIMES: Final = 40
 """The same for their going deeper, which costs a distance query each: down to 1e-12 of the horizon."""
 
 ALIGNED: Final = 1e-12
@@ -35,61 +37,63 @@ ALIGNED: Final = 1e-12
 Larger: comes near that. Smaller: a wheel whose axis is rounded no longer rolls."""
 
 
-class Outcome(NamedTuple):
+class ImpactInterval(NamedTuple):
     """The first impact of bodies that touch at the start; no impact: lower is infinite, a doubtful one: upper is."""
 
     lower: float
     upper: float
 
 
-def _outcome(event: np.void) -> Outcome:
-    return Outcome(float(event["lower"]), float(event["upper"]) if event["status"] == HIT else math.inf)
+def _interval(event: np.void) -> ImpactInterval:
+    return ImpactInterval(float(event["lower"]), float(event["upper"]) if event["status"] == HIT else math.inf)
 
 
-def follow(a: Body, b: Body, query: Query, round_off: float) -> Outcome:
+def follow(a: MovingShape, b: MovingShape, query: MotionQuery, round_off: float) -> ImpactInterval:
     """When two bodies that touch at the start, no deeper than `round_off` (m), come nearer to each other than that."""
-    scene = make_scene(a, b, query.horizon, apart=True)
-    touching, later = _pairs(a, b, scene, query)
-    directions = [row[1:4] for _, _, row in touching]
-    for i, j, row in touching:
+    multibody = lay_out_pair(a, b, query.horizon, apart=True)
+    touching, later = _pairs(a, b, multibody, query)
+    directions = [normal for _, _, normal in touching]
+    for i, j, normal in touching:
         parted = -math.inf
-        for n in chain([row[1:4]], directions):
-            parted = max(parted, _parting(_Piece(a, i), _Piece(b, j), n, query, round_off))
+        for n in chain([normal], directions):
+            parted = max(parted, _parting_time(_Piece(a, i), _Piece(b, j), n, query, round_off))
             if parted > 0.0:
                 break
         if parted <= 0.0:
             pairs = np.array([(i, len(a.pieces) + j) for i, j, _ in touching], np.int32)
-            return Outcome(0.0, _deep_by(a, b, scene, pairs, query, round_off))
+            return ImpactInterval(0.0, _deep_by(a, b, multibody, pairs, query, round_off))
         if parted < query.horizon:
-            again = first_impacts(scene, np.array([[i, len(a.pieces) + j]], np.int32), parted, query)
-            later += [_outcome(event) for event in again]
+            again = first_impacts(multibody, np.array([[i, len(a.pieces) + j]], np.int32), parted, query)
+            later += [_interval(event) for event in again]
     if not later:
-        return Outcome(math.inf, math.inf)
-    return Outcome(min(e.lower for e in later), min(e.upper for e in later))
+        return ImpactInterval(math.inf, math.inf)
+    return ImpactInterval(min(e.lower for e in later), min(e.upper for e in later))
 
 
-def _pairs(a: Body, b: Body, scene: Scene, query: Query) -> tuple[list[tuple[int, int, Array]], list[Outcome]]:
-    """The pairs of pieces that touch, as (i, j, contact), and the impacts of the others."""
+def _pairs(
+    a: MovingShape, b: MovingShape, multibody: Multibody, query: MotionQuery
+) -> tuple[list[tuple[int, int, Array]], list[ImpactInterval]]:
+    """The pairs of pieces that touch, as (i, j, normal), and the impacts of the others."""
     n, m = len(a.pieces), len(b.pieces)
     rotation = np.stack([body.motion.pose.rotation @ pose.rotation for body in (a, b) for _, pose in body.pieces])
     offset = b.motion.pose.position - a.motion.pose.position
     position = np.stack([body.motion.pose.rotation @ pose.position for body in (a, b) for _, pose in body.pieces])
     position[n:] += offset
     touching: list[tuple[int, int, Array]] = []
-    later: list[Outcome] = []
+    later: list[ImpactInterval] = []
     for i in range(n):
-        events = first_impacts(scene, np.array([(i, n + j) for j in range(m)], np.int32), 0.0, query)
-        later += [_outcome(event) for event in events if event["lower"] > 0.0]
+        events = first_impacts(multibody, np.array([(i, n + j) for j in range(m)], np.int32), 0.0, query)
+        later += [_interval(event) for event in events if event["lower"] > 0.0]
         at_once = np.array([(e["i"], e["j"]) for e in events if e["lower"] <= 0.0], np.int32).reshape(-1, 2)
-        rows = contact_batch(scene.table, position, rotation, at_once)
-        touching += [(i, int(j) - n, row) for (_, j), row in zip(at_once, rows, strict=True)]
+        normals = as_contacts(contact_batch(multibody.table, position, rotation, at_once))["normal"]
+        touching += [(i, int(j) - n, normal) for (_, j), normal in zip(at_once, normals, strict=True)]
     return touching, later
 
 
 class _Piece:
     """A convex piece of a moving body, in world axes at the start, about the body's origin."""
 
-    def __init__(self, body: Body, index: int) -> None:
+    def __init__(self, body: MovingShape, index: int) -> None:
         self.shape, pose = body.pieces[index]
         self.origin, self.velocity, self.angular = body.motion.pose.position, body.motion.linear, body.motion.angular
         self.acceleration = body.motion.acceleration
@@ -132,13 +136,13 @@ class _Piece:
         )
 
 
-def _parting(a: _Piece, b: _Piece, n: Array, query: Query, round_off: float) -> float:
+def _parting_time(a: _Piece, b: _Piece, n: Array, query: MotionQuery, round_off: float) -> float:
     """A time until which they certainly go no deeper; they are apart then, or it is the horizon; 0 where none is."""
     between = b.origin - a.origin + (b.offset - a.offset)
     gap = float(n @ between) - float(a.support(n[None])[0]) - float(b.support(-n[None])[0]) - query.separation
     if not gap >= -round_off:
         return 0.0
-    times: Array = query.horizon * np.exp2(-np.arange(HALVINGS, dtype=np.float64))
+    times: Array = query.horizon * np.exp2(-np.arange(PARTING_TIMES, dtype=np.float64))
     least = gap + times * float(n @ (b.velocity - a.velocity)) - a.advance(n, times) - b.advance(-n, times)
     # seen along the axes of SAT, boxes are half as far apart as they are at least: enough for a new start
     least += 0.5 * times**2 * min(0.0, float(n @ (b.acceleration - a.acceleration)))  # so that it stays concave
@@ -148,15 +152,17 @@ def _parting(a: _Piece, b: _Piece, n: Array, query: Query, round_off: float) -> 
     return query.horizon if least[0] >= -round_off else 0.0
 
 
-def _deep_by(a: Body, b: Body, scene: Scene, pairs: NDArray[np.int32], query: Query, round_off: float) -> float:
+def _deep_by(
+    a: MovingShape, b: MovingShape, multibody: Multibody, pairs: NDArray[np.int32], query: MotionQuery, round_off: float
+) -> float:
     """A time at which they are deeper than `round_off` for certain, early where that is easy; infinite: none found."""
     wanted = query.separation - 2.0 * round_off
-    events = first_impacts(scene, pairs, 0.0, query, wanted)
+    events = first_impacts(multibody, pairs, 0.0, query, wanted)
     sure = [float(e["upper"]) for e in events if e["status"] == HIT and e["upper"] <= query.horizon]
     if sure:
         return min(sure)
     found = math.inf
-    for t in query.horizon * 0.5 ** np.arange(PROBES):
+    for t in query.horizon * 0.5 ** np.arange(DEEPENING_TIMES):
         distance = contact(a.shapes, a.motion.at(t), b.shapes, b.motion.at(t)).signed_distance
         if distance < wanted:
             found = float(t)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from collision_monitor.detection.detector import Contacts, Detector
+from collision_monitor.detection.detector import DetectedContacts, Detector
 from collision_monitor.errors import InputError, PoseError, UnsupportedError
 from collision_monitor.geometry.pose import rotation_matrix
 from collision_monitor.geometry.shape_table import ShapeTableBuilder
@@ -73,7 +73,9 @@ def every_pair(shapes: list[Shape], positions: Array, quaternions: Array, margin
     return pairs[near], contacts[near]
 
 
-def check(found: Contacts, shapes: list[Shape], positions: Array, quaternions: Array, margin: float = 0.0) -> None:
+def check(
+    found: DetectedContacts, shapes: list[Shape], positions: Array, quaternions: Array, margin: float = 0.0
+) -> None:
     pairs, contacts = every_pair(shapes, positions, quaternions, margin)
     assert np.array_equal(found.pairs, pairs)
     sized = 1e-9  # of the size, which is about 1 m; curved shapes answer within their own stated bound

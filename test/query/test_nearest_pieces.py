@@ -13,7 +13,7 @@ from collision_monitor.geometry.shape_table import join
 from collision_monitor.geometry.shapes import Box, Capsule, Circle, HalfSpace, Mesh, Polygon, Sphere
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.query.nearest_pieces import ALL_PAIRS, NearestPieces
-from collision_monitor.query.piece_table import Pieces, as_pieces, exact_pieces
+from collision_monitor.query.piece_table import PieceTable, exact_piece_table, piece_table
 
 
 def torus(major: int, minor: int) -> Mesh:
@@ -35,7 +35,7 @@ def kinds(rng: np.random.Generator, count: int) -> list[tuple[cm.Shape, Pose]]:
     return [(shapes[k % 3], Pose(rng.uniform(-2, 2, 3), quaternions[k])) for k in range(count)]
 
 
-def nearest_of_all(a: Pieces, b: Pieces, R: np.ndarray, p: np.ndarray) -> float:
+def nearest_of_all(a: PieceTable, b: PieceTable, R: np.ndarray, p: np.ndarray) -> float:
     table = join([a.table, b.table])
     position = np.concatenate([a.position, b.position @ R.T + p])
     rotation = np.concatenate([a.rotation, R @ b.rotation])
@@ -49,13 +49,13 @@ def test_it_finds_what_looking_at_all_pairs_finds(objects: str) -> None:
     identity = np.eye(3), np.zeros(3)
     for _ in range(12):
         if objects == "soups":
-            a, b = (exact_pieces(((soup(rng, count), Pose()),)) for count in (130, 90))
+            a, b = (exact_piece_table(((soup(rng, count), Pose()),)) for count in (130, 90))
         elif objects == "few":
-            a, b = as_pieces(kinds(rng, 3)), as_pieces(kinds(rng, 40))
+            a, b = piece_table(kinds(rng, 3)), piece_table(kinds(rng, 40))
         else:
-            a, b = as_pieces(kinds(rng, 60)), as_pieces(kinds(rng, 70))
+            a, b = piece_table(kinds(rng, 60)), piece_table(kinds(rng, 70))
             if objects == "ground":
-                b = exact_pieces([*kinds(rng, 70), (HalfSpace((0, 0, 1)), Pose((0, 0, -rng.uniform(1.0, 4.0))))])
+                b = exact_piece_table([*kinds(rng, 70), (HalfSpace((0, 0, 1)), Pose((0, 0, -rng.uniform(1.0, 4.0))))])
         assert (len(a) * len(b) > ALL_PAIRS) == (objects != "few")
         R, p = Rotation.random(rng=rng).as_matrix(), rng.uniform(-1, 1, 3) * rng.choice([0.1, 3, 8])
         found = NearestPieces(a, identity, b, (R, p))
@@ -63,7 +63,7 @@ def test_it_finds_what_looking_at_all_pairs_finds(objects: str) -> None:
 
 
 def test_few_pairs_of_triangles_are_looked_at() -> None:
-    ring = exact_pieces(((torus(64, 16), Pose()),))
+    ring = exact_piece_table(((torus(64, 16), Pose()),))
     rng = np.random.default_rng(2)
     for far in (0.3, 1.5, 3.0, 10.0):
         place = Rotation.random(rng=rng).as_matrix(), far * np.array([0.6, 0.0, 0.8])
@@ -91,7 +91,7 @@ def test_meshes_of_many_triangles() -> None:
 def test_concave_polygons_of_many_parts() -> None:
     angle = np.linspace(0, 2 * np.pi, 160, endpoint=False)
     star = np.stack([np.cos(angle), np.sin(angle)], axis=1) * np.where(np.arange(160) % 2, 1.0, 2.0)[:, None]
-    a = exact_pieces(((Polygon(star), Pose()),))
+    a = exact_piece_table(((Polygon(star), Pose()),))
     assert len(a) ** 2 > ALL_PAIRS
     c = cm.contact(Polygon(star), Pose(), Polygon(star), Pose((5.0, 0, 0)))
     assert c.signed_distance == pytest.approx(1.0)

@@ -1,0 +1,70 @@
+"""The core of a shape: the shape without the radius that rounds it, for which GJK and EPA answer.
+
+A core is a point for a sphere, a segment for a capsule, else the shape itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from collision_monitor._jit import inlined
+from collision_monitor.geometry.shape_table import BOX, CAPSULE, SPHERE
+from collision_monitor.narrow_phase.vector import Vector
+
+
+class Core(NamedTuple):
+    """A slot of the shape table, as support points read it."""
+
+    kind: Any
+    size: Any  # three numbers, see ShapeTable
+    first: Any  # of a hull's vertices
+    count: Any
+    vertices: Any  # (3, V): those of the table
+
+
+@inlined
+def half_extents(table: Any, slot: int) -> Vector:
+    """Half extents (m) of a box: the first three numbers of a shape's size."""
+    return table.size[slot, 0], table.size[slot, 1], table.size[slot, 2]
+
+
+@inlined
+def core_of(table: Any, slot: int) -> Core:
+    """The core of a shape."""
+    size = half_extents(table, slot)
+    return Core(table.kind[slot], size, table.vertex_start[slot], table.vertex_count[slot], table.vertices)
+
+
+@inlined
+def core_radius(table: Any, slot: int) -> float:
+    """Radius (m) by which the core of a shape without margin is grown: 0 but for spheres and capsules."""
+    kind = table.kind[slot]
+    return table.size[slot, 0] if kind == SPHERE or kind == CAPSULE else 0.0
+
+
+@inlined
+def rounding(table: Any, slot: int) -> float:
+    """Radius (m) of the sphere that rounds the core, margin included."""
+    return core_radius(table, slot) + table.margin[slot]
+
+
+@inlined
+def core_length(table: Any, slot: int) -> float:
+    """Length (m) that the round-off of a core is measured by."""
+    return table.radius[slot] - table.margin[slot]
+
+
+@inlined
+def is_centred_box(kind: int) -> bool:
+    """Whether the core is a box about its origin: a segment for a capsule, a point for a sphere."""
+    return kind == BOX or kind == CAPSULE or kind == SPHERE
+
+
+@inlined
+def core_box(table: Any, slot: int) -> Vector:
+    """Half extents (m) of such a core."""
+    if table.kind[slot] == BOX:
+        return half_extents(table, slot)
+    if table.kind[slot] == CAPSULE:
+        return 0.0, 0.0, table.size[slot, 1]
+    return 0.0, 0.0, 0.0
