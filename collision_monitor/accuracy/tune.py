@@ -37,7 +37,7 @@ TOLERANCES: Final = (
 
 @dataclass(frozen=True)
 class Demands:
-    """Upper limits of a user. None: no limit.
+    """Upper limits that a user sets. None: no limit.
 
     distance_error: m, of the worst contact. ttc_error: s, of 99 % of the predictions. budget_ms: ms, of 99 % of the
     steps.
