@@ -1,1 +1,1 @@
-"""What speed costs: trade-off, tuning, extremes."""
+"""Measurements of speed against accuracy: trade-off, tuning, extremes, detection time."""

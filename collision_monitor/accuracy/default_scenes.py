@@ -1,19 +1,19 @@
-"""The scenes that are measured where none is named, with their noise and their duration."""
+"""Scenes that are measured by default, with their noise and duration."""
 
 from __future__ import annotations
 
 from typing import Final
 
 MESH_SCENE: Final = "arm"
-"""The scene whose shapes matter, not its profile: its rows are models."""
+"""Scene that measures models of its shapes, in place of profiles."""
 
 TRACK_SCENE: Final = "trajectory"
 
 DEFAULT_SCENES: Final = ("fleet", "clutter", "swarm", "particles", "crossing", MESH_SCENE)
-"""The scenes that are measured where none is named; and TRACK_SCENE, where a path is given."""
+"""Scenes that are measured if none is named. A path adds TRACK_SCENE."""
 
 STATE_NOISE: Final = {"fleet": 0.005}
-"""Noise of the states of scenes, where none is given. Where no scene is named, the true states are measured too."""
+"""Default noise of the states of a scene. If no scene is named, its exact states are measured too."""
 
 DEFAULT_DURATION: Final = 5.0
-"""s"""
+"""Duration of a scene (s)."""

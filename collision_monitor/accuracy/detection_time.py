@@ -1,4 +1,4 @@
-"""How long full detection takes, every pose new in each frame."""
+"""Time of full contact detection, with new poses in every frame."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ if TYPE_CHECKING:
     from collision_monitor.world.moving_bodies import MovingBodies
 
 WARM_UP_FRAMES: Final = 2
-"""Frames at the start that are not counted."""
+"""Frames at the start that do not count."""
 CHECKED_FRAME: Final = 4
-"""The frame whose number of pairs is told; the one that other systems' answers are compared at."""
+"""Frame whose number of pairs is reported. The answers of other systems are compared at this frame."""
 
 
 def time_detection(scene: MovingBodies, threads: int, frames: int | None = None) -> dict[str, Any]:
-    """Median and 99th percentile (ms) of a frame of a scene, and what was measured."""
+    """Return median, 99th percentile and minimum (ms) of the time per frame, with the settings of the measurement."""
     from collision_monitor.detection.detector import (
-        Detector,  # here, for it loads the compiler: the help of a command need not wait
+        Detector,  # imported here because it loads the compiler, which would slow --help down
     )
 
     detector = Detector(scene.shapes, threads=threads)
-    detector.detect(scene.positions[0], scene.quaternions[0])  # compiles, where nothing is cached
+    detector.detect(scene.positions[0], scene.quaternions[0])  # compiles the kernels if they are not cached
     count = min(frames or len(scene.positions), len(scene.positions))
     warm_up = min(WARM_UP_FRAMES, count - 1)
     milliseconds, pairs = [], 0

@@ -1,6 +1,6 @@
-"""The same questions answered in decimals of 60 digits: slow, obvious, and right to far beyond a float's last digit.
+"""Reference answers in decimals of 60 digits: slow, simple, and correct far beyond the last digit of a float.
 
-Floats are taken as the exact numbers that they are. Vectors are lists of Decimal.
+A float is converted to the exact number that it represents. Vectors are lists of Decimal.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Matrix = list[Vector]
 
 
 def exactly(function: Any) -> Any:
-    """Run a function in decimals of DIGITS digits."""
+    """Make a function compute with DIGITS decimal digits."""
 
     @wraps(function)
     def run(*arguments: Any) -> Any:
@@ -30,32 +30,32 @@ def exactly(function: Any) -> Any:
 
 
 def vector(values: Iterable[float]) -> Vector:
-    """Floats as decimals, exactly."""
+    """Convert floats to decimals without rounding."""
     return [Decimal(float(x)) for x in values]
 
 
 def dot(a: Vector, b: Vector) -> Decimal:
-    """a . b"""
+    """Return a . b."""
     return sum((x * y for x, y in zip(a, b, strict=True)), Decimal(0))
 
 
 def minus(a: Vector, b: Vector) -> Vector:
-    """a - b"""
+    """Return a - b."""
     return [x - y for x, y in zip(a, b, strict=True)]
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """a x b"""
+    """Return a x b."""
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def length(a: Vector) -> Decimal:
-    """|a|"""
+    """Return |a|."""
     return dot(a, a).sqrt()
 
 
 def axes(quaternion: Sequence[float]) -> Matrix:
-    """Columns of the rotation matrix of a quaternion (x, y, z, w) that is made a unit one here."""
+    """Columns of the rotation matrix of a quaternion (x, y, z, w) of any length."""
     x, y, z, w = vector(quaternion)
     s = 2 / (x * x + y * y + z * z + w * w)
     return [
@@ -67,7 +67,7 @@ def axes(quaternion: Sequence[float]) -> Matrix:
 
 @exactly
 def sphere_sphere(p: Sequence[float], q: Sequence[float], r: float, s: float) -> Decimal:
-    """Signed distance of two spheres at p and q."""
+    """Signed distance of two spheres at p and q with radii r and s."""
     return length(minus(vector(q), vector(p))) - Decimal(r) - Decimal(s)
 
 
@@ -75,7 +75,7 @@ def sphere_sphere(p: Sequence[float], q: Sequence[float], r: float, s: float) ->
 def sphere_box(
     p: Sequence[float], r: float, q: Sequence[float], turn: Sequence[float], size: Sequence[float]
 ) -> Decimal:
-    """Signed distance of a sphere at p from a box at q: to the nearest point, or out of the nearest face."""
+    """Signed distance of a sphere at p and a box at q. With the centre inside, the depth is to the nearest face."""
     offset = minus(vector(p), vector(q))
     local = [dot(offset, axis) for axis in axes(turn)]
     out = [abs(x) - Decimal(s) / 2 for x, s in zip(local, size, strict=True)]
@@ -89,7 +89,7 @@ def capsule_capsule(
     p: Sequence[float], u: Sequence[float], r: float, core_a: float,
     q: Sequence[float], v: Sequence[float], s: float, core_b: float,
 ) -> Decimal:  # fmt: skip
-    """Signed distance of capsules at p and q, turned by u and v, of radii r and s and core lengths l and m."""
+    """Signed distance of capsules at p and q with quaternions u and v, radii r and s, cores of core_a and core_b."""
     a, b = axes(u)[2], axes(v)[2]
     offset = minus(vector(q), vector(p))
     half_a, half_b = Decimal(core_a) / 2, Decimal(core_b) / 2
@@ -119,7 +119,7 @@ def box_box_depth(
     p: Sequence[float], u: Sequence[float], size_a: Sequence[float],
     q: Sequence[float], v: Sequence[float], size_b: Sequence[float],
 ) -> Decimal | None:  # fmt: skip
-    """Signed distance (negative) of boxes that overlap, by all fifteen axes; None where they do not."""
+    """Signed distance (negative) of overlapping boxes by the SAT with all fifteen axes. None if they do not overlap."""
     A, B = axes(u), axes(v)
     half_a, half_b = ([Decimal(float(s)) / 2 for s in size] for size in (size_a, size_b))
     offset = minus(vector(q), vector(p))
@@ -137,7 +137,7 @@ def box_box_depth(
 
 @exactly
 def spheres_meet(p: Sequence[float], v: Sequence[float], reach: Sequence[float]) -> Decimal | None:
-    """First time at which |p + v t| is the sum of `reach`, t >= 0; None: never."""
+    """Return the first time t >= 0 at which |p + v t| is at most the sum of `reach`, or None."""
     P, V, R = vector(p), vector(v), sum(vector(reach), Decimal(0))
     a, b, c = dot(V, V), dot(P, V), dot(P, P) - R * R
     if c <= 0:
@@ -152,7 +152,7 @@ def spheres_meet(p: Sequence[float], v: Sequence[float], reach: Sequence[float])
 def aligned_boxes_meet(
     p: Sequence[float], v: Sequence[float], size_a: Sequence[float], size_b: Sequence[float]
 ) -> Decimal | None:
-    """First time at which boxes that are not turned touch, the second one at p with velocity v; None: never."""
+    """Return the first time at which axis-aligned boxes touch, or None. The second box is at p with velocity v."""
     enter, leave = Decimal(0), Decimal("Infinity")
     for x, w, a, b in zip(vector(p), vector(v), vector(size_a), vector(size_b), strict=True):
         reach = (a + b) / 2

@@ -1,4 +1,4 @@
-"""Single answers against exact ones: how far off each number is, and whether the truth is within its stated bound."""
+"""Comparison of single answers with exact ones: the error of each number, relative to its stated bound."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Configuration:
-    """What is varied, lengths in m: size of both, ratio of the second to the first, distance from the origin and gap in
-    sizes, speed, spin and horizon as named, angle between the axes (rad), thickness of the boxes in sizes.
+    """Parameters of a random pair of bodies. None: chosen at random.
+
+    size: m. ratio: size of the second to the first body. origin, gap, thickness (of the boxes): in sizes. speed: m/s.
+    spin: rad/s. horizon: s. angle: rad, between the orientations.
     """
 
     size: float = 1.0
@@ -41,9 +43,10 @@ class Configuration:
 
 @dataclass(frozen=True)
 class Sample:
-    """One answer. error: its distance from the truth, as a part of `scale`. ratio: error over the stated bound.
+    """Comparison of one answer with the exact one.
 
-    ratio > 1: the truth is outside of what was stated. finite: whether all of the answer's numbers are.
+    error: relative to the sizes of both bodies, or to the time of impact. ratio: error divided by the stated bound. If
+    it is above 1, the exact answer is outside the bound. finite: whether all numbers of the answer are finite.
     """
 
     quantity: str
@@ -63,7 +66,7 @@ def _direction(rng: Rng) -> Floats:
 
 
 def _near(turn: Floats, angle: float, rng: Rng) -> Floats:
-    """The orientation, turned on by the angle about some axis."""
+    """Rotate an orientation by an angle (rad) about a random axis."""
     axis = _direction(rng) * math.sin(angle / 2)
     x, y, z, w = *axis, math.cos(angle / 2)
     a, b, c, d = turn
@@ -75,7 +78,7 @@ def _near(turn: Floats, angle: float, rng: Rng) -> Floats:
 
 
 def samples_of(case: Configuration, rng: Rng) -> Iterator[Sample]:
-    """One answer of each quantity in this configuration, at random, against the exact one."""
+    """Yield one comparison of each quantity, on random bodies of this configuration."""
     size, other = case.size, case.size * case.ratio
     at = case.origin * size * _direction(rng)
     gap = (case.gap if case.gap is not None else rng.uniform(0.05, 1.0)) * size
@@ -119,7 +122,7 @@ def samples_of(case: Configuration, rng: Rng) -> Iterator[Sample]:
 
 
 def _facing(box: Floats, turn: Floats, rng: Rng, gap: float) -> Floats:
-    """Offset of a point `gap` off one face of a box with this orientation, from the point to the box's centre."""
+    """Offset from a point to the centre of a box. The point is at a distance of `gap` from a random face of the box."""
     k = int(rng.integers(3))
     local = box / 2 * rng.uniform(-0.9, 0.9, 3)
     local[k] = box[k] / 2 + gap
@@ -141,13 +144,13 @@ def _ratio(error: float, bound: float) -> float:
 def _meeting(
     quantity: str, case: Configuration, shape_a: Any, shape_b: Any, offset: Floats, rng: Rng, at: Floats
 ) -> Sample:
-    """The interval of the first impact against the exact time; its error is that of the end that is farther off."""
+    """Compare the interval of the first impact with the exact time. The error is that of the lower end."""
     spheres = isinstance(shape_a, Sphere)
     distance = float(np.linalg.norm(offset))
     velocity = -offset / distance * case.speed + 0.05 * case.speed * rng.normal(size=3)
-    start = at + offset  # rounded: what is asked is what is answered
+    start = at + offset  # rounded here, so that the exact answer has the same input
     p = start - at
-    # a ball that spins is the same ball; boxes are left as they are
+    # spin does not change a ball; boxes do not spin, because the exact answer needs aligned boxes
     spin = case.spin * _direction(rng) if spheres else np.zeros(3)
     a, b = Motion(Pose(at), (0, 0, 0), spin), Motion(Pose(start), velocity, -spin)
     tolerance = 1e-9 * case.size
@@ -171,7 +174,7 @@ def _meeting(
 
 
 def stamp_samples() -> Iterator[Sample]:
-    """A monitor's answers at stamps near 2^63 ns and near 0: the same."""
+    """Yield a comparison of a monitor's answers at stamps near 2^63 ns with those near 0."""
     answers = []
     for begin in (0, 2**63 - 10**10):
         monitor = Monitor("exact")

@@ -1,4 +1,4 @@
-"""Numerical stability: the worst answers over sweeps of sizes, ratios, distances, gaps, speeds, angles and times."""
+"""Numerical stability: the largest errors over sweeps of sizes, ratios, distances, gaps, speeds, angles and times."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from collision_monitor.accuracy.exact_comparison import Configuration, Sample, s
 
 @dataclass
 class WorstCase:
-    """The worst of one quantity over one sweep; at: the sweep's value where the error is worst."""
+    """Largest errors of one quantity over one sweep.
+
+    at: value of the sweep with the largest error. curve: largest error by value. error, ratio: see Sample.
+    """
 
     sweep: str
     quantity: str
@@ -27,7 +30,7 @@ class WorstCase:
 
     @property
     def holds(self) -> bool:
-        """Whether every answer was finite and every truth within its bound."""
+        """Whether every answer is finite and every exact answer is within its bound."""
         return self.not_finite == 0 and self.ratio <= 1.0
 
 
@@ -43,11 +46,14 @@ SWEEPS: Final[dict[str, tuple[str, list[float], Callable[[float], Configuration]
     "thickness": ("sizes", [10.0**k for k in range(-9, 1)], lambda x: Configuration(thickness=x)),
     "near zero": ("m", [10.0**k for k in range(-150, -9, 20)], lambda x: Configuration(size=x, speed=x)),
 }
-"""Name -> unit, values, and the configuration of a value."""
+"""Unit, values, and function from a value to its configuration, by the name of the sweep."""
 
 
 def run(samples: int = 12, seed: int = 1, progress: Callable[[int], None] = lambda done: None) -> list[WorstCase]:
-    """A row for each sweep and quantity; samples: of each quantity at each value. progress: told of each value done."""
+    """Return a row for each sweep and quantity.
+
+    samples: of each quantity at each value. progress: called with 1 after each value.
+    """
     rows: dict[tuple[str, str], WorstCase] = {}
     for name, (_, values, configuration_of) in SWEEPS.items():
         for value in values:
@@ -63,7 +69,7 @@ def run(samples: int = 12, seed: int = 1, progress: Callable[[int], None] = lamb
 
 
 def steps() -> int:
-    """How many values `run` tells of."""
+    """Number of values for which `run` calls `progress`."""
     return sum(len(values) for _, values, _ in SWEEPS.values())
 
 

@@ -1,4 +1,4 @@
-"""What monitors are measured on: simulated scenes, recorded tracks and recorded sessions, as steps."""
+"""Inputs of the measurements: steps of simulated scenes, recorded tracks and recorded sessions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from collision_monitor.world.trajectory import clip_paths
 
 
 class Workload(NamedTuple):
-    """A scene or a session: name, objects, steps, and the noise of the states (see `world.measured`)."""
+    """A scene or session: its name, objects, steps, and the noise of its states (see `world.measured`)."""
 
     name: str
     descriptions: list[ObjectDescription]
@@ -27,9 +27,9 @@ class Workload(NamedTuple):
 
 
 def recorded(path: Path) -> Workload:
-    """A session, all its objects known from the first step on, as they were described last.
+    """Read a session. All objects exist from the first step on, with their last description.
 
-    What is malformed is left out. Raises InputError where there is nothing, SessionError.
+    Malformed messages are skipped. Raises SessionError; InputError if the session has no objects or no states.
     """
     described: dict[int, ObjectDescription] = {}
     steps = []
@@ -55,9 +55,9 @@ def simulated(
     noise: float | None = None,
     duration: float | None = None,
 ) -> Iterator[Workload]:
-    """Each scene played from its start; of recorded tracks, each clip is one. None: as in `default_scenes`.
+    """Yield each scene from its start. Each clip of recorded tracks is a scene. None: see `default_scenes`.
 
-    duration: s, of each scene (None: DEFAULT_DURATION, or all of recorded tracks). Raises InputError, see `make_scene`.
+    duration: s, of each scene (None: DEFAULT_DURATION, or the whole clip). Raises InputError, see `make_scene`.
     """
     for name, scene_noise in _scenes(scenes, path, noise):
         for clip in clip_paths(path) if name == TRACK_SCENE and path else [path]:
@@ -72,7 +72,7 @@ def simulated(
 
 
 def _scenes(names: Sequence[str] | None, path: Path | None, noise: float | None) -> list[tuple[str, float]]:
-    """Names of scenes, and the noise of their states."""
+    """Return the names of the scenes with the noise of their states."""
     chosen = names or [*DEFAULT_SCENES, *([TRACK_SCENE] if path else [])]
     if noise is not None:
         return [(name, noise) for name in chosen]

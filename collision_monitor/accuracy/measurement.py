@@ -1,4 +1,4 @@
-"""The cost and the errors of one profile, or of one model of the shapes, on one scene."""
+"""Time and errors of one profile, or of one model of the shapes, on one scene."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Errors:
-    """Of a number of answers, in their unit; NaN where there was none."""
+    """Median, 99th percentile and largest absolute error of answers, in their unit. NaN: no answers."""
 
     median: float
     p99: float
@@ -19,7 +19,7 @@ class Errors:
 
     @classmethod
     def of(cls, values: Sequence[float]) -> Errors:
-        """Of these absolute values."""
+        """Return the statistics of these errors."""
         if not values:
             return cls(np.nan, np.nan, np.nan)
         found = np.abs(values)
@@ -28,7 +28,7 @@ class Errors:
 
 @dataclass(frozen=True)
 class Measurement:
-    """One profile, or one model of the shapes, on one scene."""
+    """Result of one profile, or one model of the shapes, on one scene."""
 
     scene: str
     profile: str
@@ -36,46 +36,47 @@ class Measurement:
     objects: int
     steps: int
     step_ms: float
-    """Median time of a step."""
+    """Median time of a step (ms)."""
     step_ms_p99: float
+    """99th percentile of the time of a step (ms)."""
     pair_us: float
-    """Time of all steps by the pairs that were examined or predicted in them."""
+    """Total time divided by the number of pairs that were examined or predicted (µs)."""
     alarms: int
-    """Contacts and predictions of all steps, a pair counted at each step."""
+    """Pairs in contact or predicted, summed over all steps."""
     false_alarms: int
-    """Of these, the ones that the truth does not have at that step."""
+    """Alarms that the exact answers do not have at that step."""
     misses: int
-    """Pairs and steps of the truth with neither contact nor prediction, but for impacts at the very horizon."""
+    """Pairs of the exact answers without an alarm, summed over all steps. Impacts close to the horizon do not count."""
     distance_error_m: float
-    """Worst, over the contacts that both have."""
+    """Largest error of the distance (m), over the contacts that both have."""
     ttc_error_s: Errors
-    """Over the predictions that both have, and of which the truth is that they hit."""
+    """Errors of the time to collision (s), over the predictions that both have and whose exact status is HIT."""
     compared: int
-    """Answers that both have and that state a bound: predictions, or of models distances."""
+    """Answers that both have and that state a bound: predictions, or distances for models."""
     outside_bound: int
-    """Of these, intervals that the true time is not in; of models, distances that are off by more than stated."""
+    """Compared answers whose bound does not hold: the interval or the distance excludes the exact value."""
     distance_error_part: float = np.nan
-    """Of models: the worst distance error as part of the size of the smaller of the two."""
+    """Largest error of the distance of models, divided by the size of the smaller object."""
     noise: float = 0.0
-    """Of the scene's states (m, rad, m/s and rad/s), see `world.measured`."""
+    """Noise of the scene's states (m, rad, m/s and rad/s), see `world.measured`."""
 
     @property
     def label(self) -> str:
-        """The scene, for people."""
+        """Name of the scene with its noise."""
         return f"{self.scene} ± {self.noise:g}" if self.noise else self.scene
 
     @property
     def within_bound(self) -> float:
-        """Part of the compared answers whose bound holds; NaN where there was none."""
+        """Fraction of the compared answers whose bound holds. NaN: no answers."""
         return 1.0 - self.outside_bound / self.compared if self.compared else np.nan
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON; what there is none of is null."""
+        """Return plain values for JSON, with null for NaN."""
         return _without_nan(asdict(self) | {"within_bound": self.within_bound})
 
 
 def labels_of_models(rows: Iterable[Measurement]) -> set[str]:
-    """Labels of the scenes whose rows are models, in place of profiles."""
+    """Labels of the scenes whose rows are models and not profiles."""
     return {row.label for row in rows if row.model != "exact"}
 
 

@@ -1,4 +1,4 @@
-"""What coarser shapes save and cost: a scene of meshes through a monitor with each model, against their triangles."""
+"""Time and errors of models of the shapes, against the distances of the exact shapes."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
 
 NEAR: Final = 0.3
-"""m: pairs up to this far apart are compared."""
+"""Largest distance of the pairs that are compared (m)."""
 
 COMPARED_STEPS: Final = 12
-"""Steps, evenly spread, at which they are: triangles against triangles take most of a second for a pair."""
+"""Number of steps, evenly spread, that are compared. A pair of triangle meshes takes most of a second."""
 
 MODELS: Final = (Model.SPHERE, Model.OBB, Model.KDOP26, Model.CONVEX_HULL)
 
@@ -40,10 +40,11 @@ def model_tradeoff(
     models: Sequence[Model | str] = MODELS,
     progress: Callable[[int], None] = lambda done: None,
 ) -> list[Measurement]:
-    """A row for `exact`, by `contact` of the shapes as they are, then one for each model. Raises InputError.
+    """Return a row for `exact`, which is `contact` of the exact shapes, then a row for each model. Raises InputError.
 
-    Told are the pairs up to NEAR apart. An alarm is a pair that is said to touch; a miss, one that touches and is not.
-    progress is told how many steps were just done, of len(steps) * len(models) + min(COMPARED_STEPS, len(steps)).
+    Pairs up to NEAR apart are compared. An alarm is a pair that is reported to touch. A miss is a pair that touches and
+    is not reported. progress: called with the number of steps just done; the total is
+    len(steps) * len(models) + min(COMPARED_STEPS, len(steps)).
     """
     if not steps:
         raise InputError(f"scene {scene}: expected at least one step, there is none")
@@ -74,7 +75,7 @@ def model_tradeoff(
 
 
 def _exact(described: list[ObjectDescription], states: NDArray[np.void], pairs: set[Pair]) -> dict[Pair, float]:
-    """Signed distances (m) of the shapes themselves."""
+    """Signed distances (m) of the exact shapes."""
     shapes = {each.object_id: each.shapes for each in described}
     poses = {each.object_id: each.pose for each in described if each.pose is not None}
     poses |= {int(row["id"]): Pose(row["position"], row["quaternion"]) for row in states}
@@ -82,7 +83,7 @@ def _exact(described: list[ObjectDescription], states: NDArray[np.void], pairs: 
 
 
 def _size(description: ObjectDescription) -> float:
-    """Diameter (m) of its smallest box."""
+    """Diagonal (m) of the AABB of an object."""
     piece, _ = containing_model(description.shapes, Model.AABB).pieces[0]
     assert isinstance(piece, Box)
     return float(np.linalg.norm(piece.size))
@@ -104,7 +105,8 @@ def _measurement(
         really = {pair for pair, distance in truth.items() if distance <= 0.0}
         alarms, false_alarms = alarms + len(touching), false_alarms + len(touching - really)
         misses += len(really - touching)
-        for pair in told.keys() - really:  # where they overlap, the depths of a mesh and its model are not comparable
+        # overlapping pairs are excluded, because the depths of a mesh and of its model are not comparable
+        for pair in told.keys() - really:
             off = abs(float(told[pair]["signed_distance"]) - truth[pair])
             compared += 1
             outside += bool(off > told[pair]["error_bound"] + 1e-9)

@@ -1,4 +1,4 @@
-"""Pictures of what was measured, as image files: time against error, and error over what is varied."""
+"""Figures of the measurements as image files: time against error, and errors over each sweep."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from collision_monitor.accuracy.extremes import SWEEPS, WorstCase
 from collision_monitor.accuracy.measurement import Measurement, labels_of_models
 
 MOST_IN_LEGEND: Final = 4
-"""Points of a panel; more have their names beside them."""
+"""Largest number of points that a panel names in its legend. More points have their names beside them."""
 
 
 def draw_tradeoff(rows: Sequence[Measurement], path: Path) -> None:
-    """Time against error, a panel for each scene. Raises OSError."""
+    """Draw time against error, one panel per scene. Raises OSError."""
     scenes = list(dict.fromkeys(row.label for row in rows))
     of_models = labels_of_models(rows)
     columns = min(len(scenes), 3)
@@ -53,9 +53,9 @@ def draw_tradeoff(rows: Sequence[Measurement], path: Path) -> None:
 
 
 def _draw_models(panel: Any, scene: str, rows: Sequence[Measurement]) -> None:
-    """Time against the error of the distance, both over some orders of magnitude."""
+    """Draw time against the error of the distance, both on logarithmic scales."""
     panel.set(title=scene, xlabel="worst error of the distance (m)", ylabel="ms per step", yscale="log")
-    panel.set_xscale("symlog", linthresh=1e-3)  # the shapes as they are have none
+    panel.set_xscale("symlog", linthresh=1e-3)  # the exact shapes have no error
     for row in rows:
         panel.scatter(row.distance_error_m, row.step_ms, s=60, label=row.model)
     panel.legend(loc="upper right")
@@ -63,7 +63,7 @@ def _draw_models(panel: Any, scene: str, rows: Sequence[Measurement]) -> None:
 
 
 def draw_extremes(rows: Sequence[WorstCase], path: Path) -> None:
-    """Errors over what is varied, a panel for each sweep. Raises OSError."""
+    """Draw the errors over the varied quantity, one panel per sweep. Raises OSError."""
     names = list(SWEEPS)
     with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
         figure = Figure(figsize=(13, 6.2), layout="constrained")

@@ -1,4 +1,4 @@
-"""A monitor's answers to a sequence of steps, and how long they took."""
+"""Answers of a monitor to a sequence of steps, with the time of each step."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import Phase
 
 Step = tuple[int, NDArray[np.void]]
-"""A stamp (ns) and records.STATE."""
+"""Stamp (ns) and states (records.STATE)."""
 
 
 @dataclass(frozen=True)
 class Played:
-    """What a monitor answered at each step, and how long that took (s)."""
+    """Answer of a monitor and duration (s) of each step."""
 
     answers: list[StepResult]
     seconds: NDArray[np.float64]
 
     def cost(self) -> dict[str, Any]:
-        """Of a row; without the first step, which takes everything in."""
+        """Return the times of a Measurement, without the first step, which initialises everything."""
         warm = self.seconds[1:] if len(self.seconds) > 1 else self.seconds
         pairs = sum(a.status.narrow_phase_tests + a.status.impact_queries for a in self.answers[1:] or self.answers)
         return {
@@ -40,7 +40,7 @@ class Played:
 def play(
     monitor: Monitor, described: Iterable[ObjectDescription], steps: Sequence[Step], progress: Callable[[int], None]
 ) -> Played:
-    """Describe everything, then take all steps. progress: told of each."""
+    """Describe all objects to a monitor, then run all steps. progress: called with 1 after each step."""
     for description in described:
         monitor.describe(description)
     answers, seconds = [], np.empty(len(steps))
@@ -53,11 +53,11 @@ def play(
 
 
 def by_pair(answers: NDArray[np.void]) -> dict[tuple[int, int], Any]:
-    """Rows of contacts or predictions by the ids of their pair."""
+    """Return the rows of contacts or predictions by the ids of their pair."""
     return {(int(answer["id_a"]), int(answer["id_b"])): answer for answer in answers}
 
 
 def contacts_by_pair(answer: StepResult) -> dict[tuple[int, int], Any]:
-    """Of each pair in contact, or within the contact margin, the row that states its distance."""
+    """Return the row with the distance of each pair in contact or within the contact margin."""
     rows = answer.contacts
     return by_pair(rows.compress((rows["phase"] != Phase.END) & (rows["point_index"] == 0)))

@@ -1,4 +1,4 @@
-"""What speed costs in accuracy: one scene through each profile, against exact answers computed anew at every step."""
+"""Time and errors of each profile on one scene, against exact answers that are recomputed at every step."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from collision_monitor.records import PredictionStatus
 from collision_monitor.settings.profile import Profile
 
 REFERENCE = "exact"
-"""The profile whose recomputation is the truth, without what is uncertain: that is no error of a profile."""
+"""Profile of the exact answers. Uncertainty is off, because the uncertainty of the states is no error of a profile."""
 
 
 def profile_tradeoff(
@@ -28,9 +28,9 @@ def profile_tradeoff(
     profiles: Sequence[str | Profile],
     progress: Callable[[int], None] = lambda done: None,
 ) -> list[Measurement]:
-    """A row for each profile, in their order; the horizon of the truth is the profile's own. Raises InputError.
+    """Return a row for each profile, in order. The exact answers use the horizon of the profile. Raises InputError.
 
-    progress is told how many steps were just done, of len(steps) * 2 * len(profiles) in all.
+    progress: called with the number of steps just done; the total is len(steps) * 2 * len(profiles).
     """
     if not steps:
         raise InputError(f"scene {scene}: expected at least one step, there is none")
@@ -51,7 +51,7 @@ def profile_tradeoff(
 
 
 def _stated(answer: StepResult) -> NDArray[np.void]:
-    """The predictions of stated motions: not those that only what is uncertain could bring about."""
+    """Return the predictions of the stated motions, without those that are possible only through uncertainty."""
     return answer.predictions.compress(answer.predictions["status"] != PredictionStatus.POSSIBLE)
 
 

@@ -1,4 +1,4 @@
-"""The slow obvious monitor: every prediction is computed anew at every step. What the event list is tested against."""
+"""A slow and simple monitor that recomputes every prediction at every step. The event list is tested against it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from collision_monitor.settings.profile import Profile
 
 
 class ReferenceMonitor(Monitor):
-    """A Monitor that trusts no earlier prediction and allows no body to be off its stated motion."""
+    """A Monitor that reuses no earlier prediction and allows no deviation from the stated motions."""
 
     def __init__(self, profile: str | Profile = "balanced") -> None:
         super().__init__(profile)
@@ -30,7 +30,7 @@ class ReferenceMonitor(Monitor):
 
 
 class _RestartAll(Tracking):
-    """Starts every body anew at every step."""
+    """Restarts the motion of every body at every step."""
 
     def _moved(self, step: StepContext, uncertain: UncertainPredictions) -> tuple[Slots, Slots]:
         roster = step.roster
@@ -40,10 +40,10 @@ class _RestartAll(Tracking):
 
 
 def disagreements(mine: StepResult, reference: StepResult, horizon: float) -> list[str]:
-    """What `mine` says beyond its own bounds against recomputation from the same states, as sentences.
+    """Return the contradictions of an answer and the recomputation from the same states, one sentence each.
 
-    Both must tell the same contacts. A collision that is certain in one must be stated in the other, and the two
-    intervals of its time must meet; near the horizon (s) one may not see it yet.
+    Both must report the same contacts. If a collision is certain in one of them, the other must report it too, and the
+    two intervals of its time must overlap. Near the horizon (s) one of them may not report it yet.
     """
     found = []
     touching = [by_pair(result.contacts[result.contacts["phase"] != Phase.END]).keys() for result in (mine, reference)]

@@ -1,4 +1,4 @@
-"""What speed costs, on any number of inputs: each through profiles, or through models of its shapes."""
+"""Trade-off of time and errors on several inputs: each through profiles, or through models of its shapes."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from collision_monitor.accuracy.profile_tradeoff import profile_tradeoff
 from collision_monitor.settings.profile import Profile
 
 ProgressBar = Callable[[str, int], AbstractContextManager[Callable[[int], None]]]
-"""Opens a bar with a name and a total number of steps; the function that it gives takes the steps just done."""
+"""Opens a bar with a name and a total number of steps. Yields a function of the number of steps just done."""
 
 
 def tradeoff(
     inputs: Iterable[Workload], profiles: Sequence[Profile], models: Sequence[str] | None, progress_bar: ProgressBar
 ) -> list[Measurement]:
-    """The rows of each input: of the models, where some are named or the scene is MESH_SCENE, else of the profiles.
+    """Return the rows of each input: of models if models are named or the scene is MESH_SCENE, otherwise of profiles.
 
     Raises InputError.
     """

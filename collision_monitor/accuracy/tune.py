@@ -1,7 +1,7 @@
-"""The cheapest tolerances that keep the errors of a recording below what its user allows.
+"""Search for the cheapest tolerances that meet a user's demands on a recording.
 
-The profile `balanced` is made looser and tighter in steps; each, and `fast` and `exact`, is measured on the recording
-against exact answers. Of those that meet every demand the cheapest is taken; of those that cost the same, the tightest.
+The candidates are `fast`, `exact`, and `balanced` with looser and tighter tolerances. Each is measured on the recording
+against exact answers. The cheapest that meets every demand is chosen, or the tightest of those that cost the same.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from collision_monitor.pipeline.topics import PARAMETER_SECTION
 from collision_monitor.settings.profile import Profile
 
 FACTORS: Final = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.01)
-"""Of the tolerances of `balanced`, from loose to tight; `fast` is tried before them and `exact` after them."""
+"""Factors of the tolerances of `balanced`, from loose to tight. `fast` is tried before them and `exact` after them."""
 
 TIMING_NOISE: Final = 1.05
-"""Times that differ by less than this factor count as the same."""
+"""Times that differ by less than this factor count as equal."""
 
 TOLERANCES: Final = (
     "impact_tolerance",
@@ -37,9 +37,10 @@ TOLERANCES: Final = (
 
 @dataclass(frozen=True)
 class Demands:
-    """What must hold; None: nothing is asked. Lengths in m, times in s and ms.
+    """Upper limits that a user sets. None: no limit.
 
-    distance_error: the worst of all contacts. ttc_error: of 99 % of the predictions. budget_ms: of 99 % of the steps.
+    distance_error: m, of the worst contact. ttc_error: s, of 99 % of the predictions. budget_ms: ms, of 99 % of the
+    steps.
     """
 
     distance_error: float | None = None
@@ -47,7 +48,7 @@ class Demands:
     budget_ms: float | None = None
 
     def failures(self, row: Measurement) -> list[str]:
-        """The demands that a row does not meet, in words: what was asked and what is there."""
+        """Return a sentence for each demand that a row does not meet, with the measured value and the limit."""
         found = []
         if row.misses:
             found.append(f"{row.misses} collisions missed")
@@ -58,14 +59,14 @@ class Demands:
             ("TTC error", self.ttc_error, row.ttc_error_s.p99, "s"),
             ("step time", self.budget_ms, row.step_ms_p99, "ms"),
         ):
-            if most is not None and value > most:  # NaN: there was none
+            if most is not None and value > most:  # NaN (no answers) meets the demand
                 found.append(f"{name} {value:.3g} {unit}, {value / most:.3g} times the {most:g} {unit} allowed")
         return found
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One profile on the recording; failures: the demands that it does not meet."""
+    """Measurement of one profile on the recording. failures: demands that it does not meet."""
 
     profile: Profile
     measurement: Measurement
@@ -73,7 +74,7 @@ class Trial:
 
 
 def candidates(horizon: float, contact_margin: float) -> list[Profile]:
-    """The profiles that are tried: `fast`, which leaves out what is uncertain, and the others from loose to tight."""
+    """Return the profiles to try: `fast`, which ignores uncertainty, then the others from loose to tight."""
     base = Profile.named("balanced").replace(horizon=horizon, contact_margin=contact_margin)
     loose = [
         base.replace(
@@ -86,7 +87,7 @@ def candidates(horizon: float, contact_margin: float) -> list[Profile]:
 
 
 def _scaled(name: str, value: float) -> float:
-    """Within the range of the setting."""
+    """Clip a value to the range of its setting."""
     setting = next(each for each in Profile.fields() if each.name == name)
     return float(f"{min(max(value, setting.minimum), setting.maximum):.6g}")
 
@@ -101,9 +102,10 @@ def tune(
     contact_margin: float = 0.0,
     progress: Callable[[int], None] = lambda done: None,
 ) -> tuple[Profile | None, list[Trial]]:
-    """The profile to take, or None where none meets the demands, and all trials from loose to tight. Raises InputError.
+    """Return the chosen profile, or None if none meets the demands, and all trials from loose to tight.
 
-    progress is told how many steps were just done, of len(steps) * 2 * len(candidates(…)) in all.
+    progress: called with the number of steps just done; the total is len(steps) * 2 * len(candidates(…)).
+    Raises InputError.
     """
     for name, value in vars(demands).items():
         if value is not None and not value > 0.0:
@@ -112,14 +114,14 @@ def tune(
     rows = profile_tradeoff(scene, descriptions, steps, profiles, progress)
     trials = [Trial(profile, row, demands.failures(row)) for profile, row in zip(profiles, rows, strict=True)]
     good = [trial for trial in trials if not trial.failures]
-    # what costs the same but for the clock's noise may as well be the tightest
+    # profiles that differ only by timing noise cost the same: take the tightest
     least = min((trial.measurement.step_ms for trial in good), default=0.0)
     cheap = [trial for trial in good if trial.measurement.step_ms <= TIMING_NOISE * least]
     return (cheap[-1].profile if cheap else None), trials
 
 
 def parameter_file(profile: Profile, notes: list[str]) -> str:
-    """The profile as a file of parameters for the node, with notes as comments."""
+    """Return a profile as a parameter file for the node, with notes as comments."""
     settings: dict[str, float | int | str] = {"profile": "balanced"}
     base = Profile.named("balanced")
     settings |= {

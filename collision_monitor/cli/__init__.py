@@ -1,1 +1,1 @@
-"""The command line: one thin file per command, heavy imports inside the command functions."""
+"""Command line: one thin module per command. Slow imports are inside the command functions, so --help stays fast."""

@@ -1,4 +1,4 @@
-"""`collision-monitor bench`: how long full detection takes, every pose new in each frame."""
+"""`collision-monitor bench`: measure the time of full contact detection, with new poses in every frame."""
 
 from __future__ import annotations
 
@@ -11,40 +11,53 @@ from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.quantities import whole
 
 DESCRIPTION = """\
-Time full detection: NumPy poses in, NumPy pairs, distances, normals and points out, every pose new in each frame.
-The scenes move and turn at random at a fixed contact density; the time told is the median over the frames.
+Measure how long it takes to find all contacts of N moving bodies.
+
+Every pose is new in every frame. The input is NumPy arrays of poses; the output is NumPy arrays of
+pairs, signed distances, normals and points. The bodies move and turn at random, and the density of
+contacts does not depend on N. The command prints the median and the 99th percentile of the time
+per frame, and the number of colliding pairs.
 """
 EPILOG = """\
 examples:
   collision-monitor bench --scene boxes --n 10000
   collision-monitor bench --scene hulls --n 1000 --threads 1 --json
   collision-monitor bench --scene-file scene.npz --json
+
+exit codes:
+  0  done
+  1  the scene, the file or the number of threads cannot be used
 """
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the command to the `collision-monitor` parser."""
+    """Register the command and its options."""
     parser = subparsers.add_parser(
         "bench",
-        help="time the detection of all contacts",
+        help="measure the time to find all contacts",
         description=DESCRIPTION,
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--scene", default="boxes", metavar="NAME", help="boxes (default), spheres, mixed or hulls")
-    parser.add_argument("--n", type=whole(1), default=10_000, metavar="N", help="how many objects (default: 10000)")
-    parser.add_argument("--seed", type=whole(0), default=1, metavar="S", help="of the random scene (default: 1)")
-    parser.add_argument("--scene-file", type=Path, metavar="FILE", help="a saved scene (.npz) instead")
+    parser.add_argument("--n", type=whole(1), default=10_000, metavar="N", help="number of bodies (default: 10000)")
+    parser.add_argument("--seed", type=whole(0), default=1, metavar="S", help="seed of the random scene (default: 1)")
+    parser.add_argument("--scene-file", type=Path, metavar="FILE", help="measure a saved scene (.npz) instead")
     parser.add_argument(
-        "--frames", type=whole(1), metavar="F", help=f"frames, {WARM_UP_FRAMES} uncounted (default: 12)"
+        "--frames",
+        type=whole(1),
+        metavar="F",
+        help=f"number of frames; the first {WARM_UP_FRAMES} are not counted (default: 12)",
     )
-    parser.add_argument("--threads", type=whole(1), metavar="T", help="default: 2, or 1 where there is one core")
+    parser.add_argument(
+        "--threads", type=whole(1), metavar="T", help="number of threads (default: 2, or 1 on a single core)"
+    )
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
     parser.set_defaults(command=bench_command)
 
 
 def bench_command(args: argparse.Namespace) -> int:
-    """Run the benchmark. Raises InputError."""
+    """Run the benchmark, print the result and return the exit code. Raises InputError."""
     from collision_monitor.accuracy.detection_time import time_detection
     from collision_monitor.detection.detector import default_threads
     from collision_monitor.world.moving_bodies import FRAMES, load_moving_bodies, make_moving_bodies

@@ -1,4 +1,4 @@
-"""`collision-monitor check`: recorded sessions as regression tests."""
+"""`collision-monitor check`: test recorded sessions against expectations."""
 
 from __future__ import annotations
 
@@ -20,41 +20,55 @@ if TYPE_CHECKING:
 
 EXAMPLE = """\
 expect:
-  - contact: [cart, person_3]     # they touch, first within this window (s from the session's first step)
-    between: [4.0, 4.2]
-  - no_contact: [cart, "wall_*"]  # never, as far as is known; names with wildcards, or ids; any: no pair at all
-  - no_prediction: any            # no collision is predicted to be due sooner than this
+  - contact: [cart, person_3]     # the first contact of the two begins in this window
+    between: [4.0, 4.2]           # s from the first step of the session
+  - no_contact: [cart, "wall_*"]  # the two never touch; an unresolved contact fails
+  - no_prediction: any            # no collision is predicted to begin sooner than this
     under: 0.5                    # s
-  - warned: any                   # each contact was predicted without a break from this long before it on
+  - warned: any                   # every contact is predicted without a break for this long before it
     before: 0.8                   # s
-  - step_time_p99: 0.005          # s, at most
-  - replay: identical             # today's program gives the same answers, byte by byte
-  - complete: true                # nothing is missing, nothing was refused or lost
+  - step_time_p99: 0.005          # s; 99 % of the steps take at most this long
+  - replay: identical             # a replay gives the same answers, byte by byte
+  - complete: true                # no message is missing, refused or lost
 """
 
 EPILOG = f"""\
-expectations.yaml, with everything that can be expected:
+examples:
+  collision-monitor check run.mcap --expect expectations.yaml
+  collision-monitor check runs --expect expectations.yaml --replay fast   answers of the profile fast
+  collision-monitor check "runs/*.mcap" --expect expectations.yaml --junit results.xml
+
+expectations.yaml, with every kind of expectation:
 
 {EXAMPLE}
-exit codes: 0 all hold, 1 a session could not be read, 2 expectations.yaml is not as it should be,
-3 an expectation does not hold
+Objects are given by name, with wildcards, or by id. `any` selects every pair. If messages are
+missing, an expectation that something did not happen fails with "not known".
+
+exit codes:
+  0  all expectations hold
+  1  a session cannot be read
+  2  wrong usage, or the expectations file is not valid
+  3  an expectation does not hold
 """
 
 
 def add_parser(subparsers: Any) -> None:
-    """Register the command."""
+    """Register the command and its options."""
     parser = subparsers.add_parser(
         "check",
-        help="test recorded sessions against what is expected of them",
-        description="Test recorded sessions against what is expected: who touches whom and when, how early predicted.",
+        help="test recorded sessions against expectations",
+        description="Test recorded sessions against expectations: which objects touch and when, and how early that is\n"
+        "predicted. Prints each expectation as ok or FAILED, with the observed value.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("sessions", nargs="+", metavar="SESSION", help="session files, folders of them, or wildcards")
-    parser.add_argument("--expect", type=Path, required=True, metavar="FILE", help="the expectations, YAML")
+    parser.add_argument(
+        "sessions", nargs="+", metavar="SESSION", help="session files, folders of sessions, or wildcards"
+    )
+    parser.add_argument("--expect", type=Path, required=True, metavar="FILE", help="file of expectations (YAML)")
     parser.add_argument(
         "--replay", nargs="?", const="", metavar="PROFILE",
-        help="check what this program answers to the inputs, with the recorded profile or this one",
+        help="check the answers of a replay, with the recorded profile or with PROFILE",
     )  # fmt: skip
     add_engine(parser)
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
@@ -63,7 +77,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def check_command(args: argparse.Namespace) -> int:
-    """Return the exit code. Raises InputError, UnsupportedError."""
+    """Run the command and return the exit code. Raises InputError, UnsupportedError."""
     from collision_monitor.session.history.check import check_sessions, junit_xml
     from collision_monitor.session.history.expectations import read_expectations
     from collision_monitor.session.many import find_sessions
@@ -78,7 +92,7 @@ def check_command(args: argparse.Namespace) -> int:
         return ExitCode.USAGE
     paths = find_sessions(args.sessions)
     if args.junit is not None:
-        with writing(args.junit):  # an error comes before the work is done, not after it
+        with writing(args.junit):  # report an error before the long work, not after it
             args.junit.open("a").close()
     results = []
     with progress_bar("check", len(paths)) as done:

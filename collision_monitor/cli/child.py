@@ -1,4 +1,4 @@
-"""A `collision-monitor` command in a process of its own."""
+"""A `collision-monitor` command that runs in its own process."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from types import TracebackType
 from collision_monitor.errors import CollisionMonitorError
 
 LINES = 8
-"""Of the process's last words, in an error."""
+"""Last lines of the process's output that an error shows."""
 PATIENCE = 10.0
-"""s from the request to stop until the process is killed."""
+"""Time from the request to stop until the process is killed (s)."""
 
 
 PR_SET_PDEATHSIG = 1
-"""From <linux/prctl.h>: the signal that this process gets when its parent ends, however that ends."""
-_prctl = getattr(ctypes.CDLL(None), "prctl", None)  # looked up here: little may be done between fork and exec
+"""Option of prctl (<linux/prctl.h>) that sets the signal a process gets when its parent ends for any reason."""
+_prctl = getattr(ctypes.CDLL(None), "prctl", None)  # looked up here because few calls are safe between fork and exec
 
 
 def _end_with_parent() -> None:
-    """In the new process, before it becomes another program: let it stop as by Ctrl-C where its parent is killed."""
+    """Make this new process stop, as by Ctrl-C, if its parent is killed. Runs between fork and exec."""
     if _prctl is not None:
         _prctl(PR_SET_PDEATHSIG, signal.SIGINT)
 
 
 class ProcessError(CollisionMonitorError):
-    """A process that failed; the text ends with its own last words."""
+    """A process failed. The text ends with the last lines of its output."""
 
 
 class Child:
-    """Runs until `finish`; killed where a `with` block is left before."""
+    """A process that runs until `finish`. The end of the `with` block kills it if it still runs."""
 
     def __init__(self, *arguments: str) -> None:
         self._name = arguments[0]
@@ -49,23 +49,23 @@ class Child:
 
     @property
     def pid(self) -> int:
-        """Of the process."""
+        """Process id."""
         return self._process.pid
 
     def words(self) -> str:
-        """What it has printed so far, both streams."""
-        file = self._words.fileno()  # pread, because the process shares our place in the file
+        """Return what the process has written to stdout and stderr so far."""
+        file = self._words.fileno()  # pread, because the process shares the file offset
         return os.pread(file, os.fstat(file).st_size, 0).decode(errors="replace")
 
     def running(self) -> bool:
-        """Raises ProcessError where it has failed."""
+        """Return whether the process still runs. Raises ProcessError if it failed."""
         code = self._process.poll()
         if code:
             raise self._error(f"exit code {code}")
         return code is None
 
     def finish(self) -> None:
-        """Ask it to stop, and wait. Raises ProcessError where it does not stop or does so with an exit code."""
+        """Ask the process to stop and wait. Raises ProcessError if it does not stop or if its exit code is not 0."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGINT)
         try:

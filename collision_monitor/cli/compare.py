@@ -1,4 +1,4 @@
-"""`collision-monitor compare`: what changed between two sessions, or between two profiles on one session."""
+"""`collision-monitor compare`: list the differences of two sessions, or of one session under two profiles."""
 
 from __future__ import annotations
 
@@ -22,40 +22,55 @@ if TYPE_CHECKING:
 EPILOG = """\
 examples:
   collision-monitor compare yesterday.mcap today.mcap
-  collision-monitor compare run.mcap --profile fast --profile exact     one session, replayed with each
-  collision-monitor compare run.mcap --profile fast                     what was recorded, and a replay
-  collision-monitor compare before.mcap after.mcap --replay             both replayed with today's program
+  collision-monitor compare run.mcap --profile fast --profile exact   two replays of one session
+  collision-monitor compare run.mcap --profile fast                   the recorded answers and a replay
+  collision-monitor compare before.mcap after.mcap --replay           replays of both sessions
 
-Objects are the same where their names are. Times count from A's first step; B's too where the stamps of both overlap,
-else from its own. Step times are shown and never count as a difference.
+A warning is a certain prediction that no collision followed. Objects are matched by name. Times
+count from the first step of A, also for B if the stamps of the sessions overlap. Otherwise the
+times of B count from its own first step. Step times are shown but never count as a difference.
 
-exit codes: 0 the same collisions and warnings, 1 a session cannot be read, 3 they differ (it is said in what),
-4 no difference was found, but something is missing in a session
+exit codes:
+  0  the same collisions and warnings
+  1  a session cannot be read
+  3  the sessions differ
+  4  no difference was found, but a session is incomplete
 """
 
 
 def add_parser(subparsers: Any) -> None:
-    """Register the command."""
+    """Register the command and its options."""
     parser = subparsers.add_parser(
         "compare",
-        help="what changed between two sessions, or two profiles on one session",
-        description="Compare collisions, how early they were predicted, warnings that came to nothing, and the cost.",
+        help="list the differences of two sessions, or of two profiles on one session",
+        description="Compare two sessions, or one session under two profiles, as A and B. Prints totals and step\n"
+        "times of both sides, then every collision and warning that differs.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION", help="one with profiles, or two: A and B")
-    parser.add_argument("--profile", action="append", default=[], metavar="NAME", help="may be given again")
-    parser.add_argument("--replay", action="store_true", help="of two sessions: today's answers, not the recorded ones")
     parser.add_argument(
-        "--tolerance", type=positive, default=0.0, metavar="S", help="times that differ less are the same (default: 0)"
+        "sessions",
+        nargs="+",
+        type=Path,
+        metavar="SESSION",
+        help="two sessions (A and B), or one session with --profile",
     )
-    parser.add_argument("--limit", type=whole(1), default=20, metavar="N", help="changes that are listed (default: 20)")
+    parser.add_argument(
+        "--profile", action="append", default=[], metavar="NAME", help="replay with this profile; may be repeated"
+    )
+    parser.add_argument("--replay", action="store_true", help="compare answers of a replay, not the recorded ones")
+    parser.add_argument(
+        "--tolerance", type=positive, default=0.0, metavar="S", help="largest difference of equal times (s, default: 0)"
+    )
+    parser.add_argument(
+        "--limit", type=whole(1), default=20, metavar="N", help="largest number of differences to list (default: 20)"
+    )
     parser.add_argument("--json", action="store_true", help="print everything as one JSON object")
     parser.set_defaults(command=compare_command)
 
 
 def compare_command(args: argparse.Namespace) -> int:
-    """Return the exit code. Raises InputError, ProfileError, SessionError."""
+    """Run the command and return the exit code. Raises InputError, ProfileError, SessionError."""
     from collision_monitor.session.history.changes import changes
 
     a, b = (_history(path, profile) for path, profile in _sides(args))
@@ -67,7 +82,7 @@ def compare_command(args: argparse.Namespace) -> int:
 
 
 def _sides(args: argparse.Namespace) -> list[tuple[Path, str | None]]:
-    """The session and the profile of each side; None: as recorded, an empty name: replayed with the recorded one."""
+    """Return session and profile of each side. None: recorded answers. Empty: replay with the recorded profile."""
     paths, profiles = args.sessions, args.profile
     match len(paths), len(profiles):
         case 2, 0:

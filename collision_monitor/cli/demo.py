@@ -1,4 +1,4 @@
-"""`collision-monitor demo`: a scene and a monitor in processes of their own, watched live, then replayed."""
+"""`collision-monitor demo`: run a scene and a monitor in two processes, show them live, then replay the session."""
 
 from __future__ import annotations
 
@@ -21,34 +21,69 @@ if TYPE_CHECKING:
     from collision_monitor.ros.viewer import Viewer
 
 START_PATIENCE = 180.0
-"""s for the monitor to answer; the first start on a machine may have to compile its kernels."""
+"""Time for the monitor to answer (s). Its first start on a machine may have to compile the kernels."""
 FRAME = 0.25
-"""s between two pictures."""
+"""Time between two pictures (s)."""
 LINE = 1.0
-"""s between two lines where the output is no terminal."""
+"""Time between two lines if the output is not a terminal (s)."""
+
+DESCRIPTION = """\
+Run a simulated scene and a monitor as two processes, and show live which objects touch now and
+which will touch next.
+
+The demo records a session. When the scene ends, it replays the session without ROS and compares
+every answer byte by byte. It prints a live table in a terminal, and one line per second otherwise.
+"""
+EPILOG = """\
+examples:
+  collision-monitor demo
+  collision-monitor demo --scene swarm --objects 300 --duration 30
+  collision-monitor demo --scene trajectory --path tracks --output sessions/tracks.mcap
+
+exit codes:
+  0    the replay gives the same bytes
+  1    a process failed, or the session file already exists
+  3    the replay gives different answers
+  4    the replay cannot be compared
+  130  interrupted
+"""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the command to the `collision-monitor` parser."""
+    """Register the command and its options."""
     parser = subparsers.add_parser(
         "demo",
-        help="a scene and a monitor, live in this terminal",
-        description="Start a monitor and a scene as two processes, show what touches now and what will touch next, "
-        "record it, then replay the recording without ROS and compare every answer.",
+        help="run a scene and a monitor, and show them live",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--scene", default="fleet", metavar="NAME", help="see `world --list` (default: fleet)")
-    parser.add_argument("--objects", type=whole(1), metavar="N", help="how many move (default: the scene's own number)")
-    parser.add_argument("--duration", type=positive, default=10.0, metavar="S", help="seconds (default: 10)")
-    parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="of the random numbers (default: 1)")
-    parser.add_argument("--path", metavar="FILE", help="recorded tracks, for the scene `trajectory`")
-    parser.add_argument("--noise", type=positive, metavar="S", help="of the states, see `world --help`")
-    parser.add_argument("--output", type=Path, metavar="PATH", help="session file (default: sessions/SCENE-DATE.mcap)")
-    parser.add_argument("--capture", type=Path, metavar="FILE", help="save the last picture of the table as SVG")
+    parser.add_argument(
+        "--scene",
+        default="fleet",
+        metavar="NAME",
+        help="scene; `collision-monitor world --list` shows all (default: fleet)",
+    )
+    parser.add_argument(
+        "--objects", type=whole(1), metavar="N", help="number of moving objects (default: depends on the scene)"
+    )
+    parser.add_argument(
+        "--duration", type=positive, default=10.0, metavar="S", help="duration of the scene (s, default: 10)"
+    )
+    parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="seed of the random numbers (default: 1)")
+    parser.add_argument("--path", metavar="FILE", help="recorded tracks for the scene `trajectory`")
+    parser.add_argument(
+        "--noise", type=positive, metavar="S", help="standard deviation of the states (m, rad, m/s, rad/s)"
+    )
+    parser.add_argument(
+        "--output", type=Path, metavar="PATH", help="new session file (default: sessions/SCENE-DATE.mcap)"
+    )
+    parser.add_argument("--capture", type=Path, metavar="FILE", help="save the last table as SVG")
     parser.set_defaults(command=demo_command)
 
 
 def demo_command(args: argparse.Namespace) -> int:
-    """Exit code 0 only where everything worked and the replay gave the same bytes. Raises ProcessError, InputError."""
+    """Run the demo and return the exit code: 0 if the replay gave the same bytes. Raises ProcessError, InputError."""
     stop = StopRequest().install()
     from collision_monitor.world import describe
 
@@ -65,7 +100,7 @@ def demo_command(args: argparse.Namespace) -> int:
 
 
 def _watch(args: argparse.Namespace, session: Path, stop: StopRequest) -> bool:
-    """From the start of both processes to the finished session file. False: interrupted before there was one."""
+    """Run both processes until the session file is complete. Return False if interrupted before the scene began."""
     scene = ["world", args.scene, "--duration", str(args.duration), "--seed", str(args.seed)]
     if args.path:
         scene += ["--path", args.path]
@@ -82,7 +117,7 @@ def _watch(args: argparse.Namespace, session: Path, stop: StopRequest) -> bool:
             return False
         with Child(*scene) as world:
             picture = _show(viewer, args.scene, [monitor, world], stop)
-            if not stop.received:  # else it may be starting still, and has nothing to finish
+            if not stop.received:  # otherwise it may still be starting and has nothing to finish
                 world.finish()
         monitor.finish()
         viewer.close()
@@ -92,7 +127,7 @@ def _watch(args: argparse.Namespace, session: Path, stop: StopRequest) -> bool:
 
 
 def _wait_for_answer(viewer: Viewer, monitor: Child, stop: StopRequest) -> None:
-    """Until the first status: the monitor publishes one as soon as it listens."""
+    """Wait for the first status, which the monitor publishes as soon as it listens. Raises ProcessError."""
     patience = time.monotonic() + START_PATIENCE
     while viewer.status is None and not stop.received:
         viewer.listen(until=time.monotonic() + FRAME)
@@ -102,7 +137,7 @@ def _wait_for_answer(viewer: Viewer, monitor: Child, stop: StopRequest) -> None:
 
 
 def _show(viewer: Viewer, scene: str, children: list[Child], stop: StopRequest) -> Picture:
-    """Draw until the scene is over; the last picture."""
+    """Draw until the scene ends and return the last picture."""
     from rich.console import Console
     from rich.live import Live
 
@@ -151,7 +186,7 @@ def _capture(picture: Picture, path: Path) -> None:
 
 
 def _new_file(chosen: Path | None, scene: str) -> Path:
-    """A path where no file is yet, in a folder that exists. Raises InputError."""
+    """Return the path of a new file and create its folder. Raises InputError if that is not possible."""
     if chosen is None:
         chosen = Path("sessions") / f"{scene}-{datetime.now():%Y%m%d-%H%M%S}.mcap"
     if chosen.exists():
@@ -164,7 +199,7 @@ def _new_file(chosen: Path | None, scene: str) -> Path:
 
 
 def _replay(session: Path) -> int:
-    """Replay without ROS and compare; the last lines of the demo."""
+    """Replay without ROS, compare, and print the last lines of the demo. Return the exit code."""
     from collision_monitor.session import Session
     from collision_monitor.session.replaying.replay import replay
     from collision_monitor.session.replaying.replay_report import Verdict

@@ -1,4 +1,4 @@
-"""Options of the commands that take many sessions: how many at a time, and where."""
+"""Options of the commands that process many sessions in parallel."""
 
 from __future__ import annotations
 
@@ -12,20 +12,22 @@ if TYPE_CHECKING:
 
 
 def add_engine(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument("--jobs", type=whole(1), metavar="N", help="sessions at a time (default: one for each core)")
+    """Add the options to a command."""
+    parser.add_argument(
+        "--jobs", type=whole(1), metavar="N", help="number of sessions at a time (default: one per core)"
+    )
     parser.add_argument(
         "--engine", choices=("processes", "ray"), default="processes",
-        help="where: processes of this machine (the default), or Ray, which is an extra: collision_monitor[ray]",
+        help="run in processes on this machine (default), or on Ray (needs `pip install collision_monitor[ray]`)",
     )  # fmt: skip
     parser.add_argument(
         "--address", metavar="HOST:PORT",
-        help="of a Ray cluster whose machines see the files under the same paths (default: Ray on this machine)",
+        help="Ray cluster; its machines must see the files under the same paths (default: Ray on this machine)",
     )  # fmt: skip
 
 
 def engine_of(args: argparse.Namespace) -> Engine:
-    """What the options say."""
+    """Return the engine that the options select."""
     from collision_monitor.session.many import Engine
 
     return Engine(args.engine, args.jobs, args.address)

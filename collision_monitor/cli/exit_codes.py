@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class ExitCode(IntEnum):
-    """What a command came to. Each command's own help says which of these it returns, and when."""
+    """Result of a command. The --help of each command lists the codes that it returns."""
 
     DONE = 0
     ERROR = 1
@@ -14,6 +14,6 @@ class ExitCode(IntEnum):
     NOT_AS_EXPECTED = 3
     NOT_KNOWN = 4
     INTERRUPTED = 128 + 2
-    """As a shell reports SIGINT."""
+    """The code by which a shell reports SIGINT."""
     BROKEN_PIPE = 128 + 13
-    """As a shell reports SIGPIPE."""
+    """The code by which a shell reports SIGPIPE."""

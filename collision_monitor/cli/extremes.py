@@ -1,4 +1,4 @@
-"""`collision-monitor extremes`: how right the numbers are at the ends of the scales, against exact ones."""
+"""`collision-monitor extremes`: measure the numerical error at extreme scales against exact answers."""
 
 from __future__ import annotations
 
@@ -17,32 +17,45 @@ if TYPE_CHECKING:
     from collision_monitor.accuracy.extremes import WorstCase
 
 EPILOG = """\
-error: worst distance of a number from the exact one (60 digits), as a part of the sizes involved; of a time, as a part
-of it, with the interval asked to 1e-9 of the size. within: worst error as a part of the bound that the answer states,
-or whether the interval holds the true time. at: where on the scale the error is worst.
+columns:
+  error   largest error against the exact answer (60 digits), relative to the sizes involved. For a
+          time of impact it is relative to that time, with a tolerance of 1e-9 of the size.
+  at      value on the scale at which the error is largest
+  within  largest error relative to the bound that the answer states. For a time of impact: whether
+          the interval contains the exact time. OUTSIDE: a bound is violated.
 
-exit codes: 0 every truth is within its bound and every number finite, 3 not so
+examples:
+  collision-monitor extremes
+  collision-monitor extremes --samples 50 --seed 7 --png extremes.png
+
+exit codes:
+  0  every number is finite and every exact answer is within its bound
+  1  the picture cannot be written
+  3  a number is not finite, or an exact answer is outside its bound
 """
 
 
 def add_parser(subparsers: Any) -> None:
-    """Register the command."""
+    """Register the command and its options."""
     parser = subparsers.add_parser(
         "extremes",
-        help="numerical stability from 1e-150 m to 1e18 m, against exact numbers",
-        description="Compare answers with exact ones over sizes, ratios, distances, gaps, speeds, angles and times.",
+        help="measure the numerical error from 1e-150 m to 1e18 m",
+        description="Compare answers with exact ones over sizes, ratios, distances, gaps, speeds, angles and times.\n"
+        "Prints a row for each scale and kind of answer.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--samples", type=whole(1), default=12, metavar="N", help="at each place (default: 12)")
-    parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="of the random numbers (default: 1)")
+    parser.add_argument(
+        "--samples", type=whole(1), default=12, metavar="N", help="number of samples at each value (default: 12)"
+    )
+    parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="seed of the random numbers (default: 1)")
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
-    parser.add_argument("--png", type=Path, metavar="FILE", help="draw the errors, a panel for each scale")
+    parser.add_argument("--png", type=Path, metavar="FILE", help="draw the errors, one panel per scale")
     parser.set_defaults(command=extremes_command)
 
 
 def extremes_command(args: argparse.Namespace) -> int:
-    """Return the exit code. Raises InputError."""
+    """Run the command and return the exit code. Raises InputError."""
     from collision_monitor.accuracy import extremes
 
     with progress_bar("extremes", extremes.steps()) as done:

@@ -1,4 +1,4 @@
-"""`collision-monitor import`: a bag of another program as a session."""
+"""`collision-monitor import`: make a session from a bag of another program."""
 
 from __future__ import annotations
 
@@ -17,46 +17,63 @@ if TYPE_CHECKING:
     from collision_monitor.sources import Imported
 
 DESCRIPTION = """\
-Make a session of a bag that holds nav_msgs/Odometry, geometry_msgs/PoseStamped (or WithCovariance), tf2_msgs/TFMessage
-or visualization_msgs/Marker and MarkerArray. A mapping file says which topic tells where which object is:
+Make a session from a ROS bag, and let the monitor answer it. The bag may hold nav_msgs/Odometry,
+geometry_msgs/PoseStamped or PoseWithCovarianceStamped, tf2_msgs/TFMessage, and
+visualization_msgs/Marker or MarkerArray. A mapping file gives the topic and the shape of each
+object:
 
-  frame: map                       # of the session; poses in other frames are brought there by the bag's tf
-  stamps: header                   # or `received`: when the bag got the message
+  frame: map                       # frame of the session; other poses are transformed by the bag's tf
+  stamps: header                   # or `received`: the time at which the bag received the message
   objects:
     cart:     {topic: /cart/odom, shape: {box: [1.2, 0.8, 0.5], at: [0, 0, 0.25]}}
     person_1: {topic: /tf, frame: person_1, shape: {capsule: [0.3, 1.1]}}
-    crate:    {topic: /markers, marker: {ns: crates, id: 7}}         # the marker's own shape
-    walls:    {topic: /markers, marker: {ns: walls}, static: true}   # all markers of the namespace
+    crate:    {topic: /markers, marker: {ns: crates, id: 7}}         # with the shape of the marker
+    walls:    {topic: /markers, marker: {ns: walls}, static: true}   # every marker of the namespace
     floor:    {static: true, shape: {half_space: [0, 0, 1, 0]}}
 
-Without --map the bag must hold a monitor's own inputs, as `ros2 bag record` takes them.
+Without --map, the bag must hold the inputs of a monitor, recorded by `ros2 bag record`. The command
+prints the number of states of each object, and what was skipped or refused, with the reason.
 """
 EPILOG = """\
-exit codes: 0 all of it was imported, 1 it cannot be imported, 3 something was left out (it is said what)
+examples:
+  collision-monitor import bag --map map.yaml -o run.mcap
+  collision-monitor import bag.mcap -o run.mcap --node object_monitor --profile exact
+
+exit codes:
+  0  everything was imported
+  1  the bag cannot be imported
+  3  something was skipped or refused, or an object has no state
 """
 
 
 def add_parser(subparsers: Any) -> None:
-    """Register the command."""
+    """Register the command and its options."""
     parser = subparsers.add_parser(
         "import",
-        help="make a session of a bag with odometry, poses, transforms or markers",
+        help="make a session from a bag with odometry, poses, transforms or markers",
         description=DESCRIPTION,
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("bag", type=Path, metavar="BAG", help="an .mcap or .db3 file, or the folder of a bag")
-    parser.add_argument("--map", type=Path, metavar="FILE", help="the mapping file (YAML)")
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help="the new session (.mcap)")
-    parser.add_argument("--profile", default="balanced", metavar="NAME", help="fast, balanced (default) or exact")
-    parser.add_argument("--node", metavar="NAME", help="without --map: the monitor whose inputs are taken")
+    parser.add_argument("bag", type=Path, metavar="BAG", help=".mcap or .db3 file, or the folder of a bag")
+    parser.add_argument("--map", type=Path, metavar="FILE", help="mapping file (YAML)")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help="new session (.mcap)")
+    parser.add_argument(
+        "--profile",
+        default="balanced",
+        metavar="NAME",
+        help="profile of the monitor: fast, balanced (default) or exact",
+    )
+    parser.add_argument(
+        "--node", metavar="NAME", help="without --map: monitor whose inputs are imported, if there are several"
+    )
     parser.add_argument("--force", action="store_true", help="overwrite OUT")
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
     parser.set_defaults(command=import_command)
 
 
 def import_command(args: argparse.Namespace) -> int:
-    """Return the exit code. Raises SessionError, InputError."""
+    """Run the command and return the exit code. Raises SessionError, InputError."""
     from collision_monitor.sources import import_bag, load_mapping
 
     mapping = None if args.map is None else load_mapping(args.map)
@@ -79,7 +96,7 @@ def import_command(args: argparse.Namespace) -> int:
 
 @contextmanager
 def _progress() -> Iterator[Callable[[Imported], None] | None]:
-    """The number of messages on stderr, where that is a terminal."""
+    """Show the number of messages on stderr if it is a terminal."""
     if not sys.stderr.isatty():
         yield None
         return

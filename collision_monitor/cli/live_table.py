@@ -1,4 +1,4 @@
-"""What touches now and what will touch next, as a table for a terminal and as a line for a pipe."""
+"""Current contacts and next collisions, as tables for a terminal and as a line for a pipe."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from collision_monitor.records import Phase, PredictionStatus
 
 CONTACT_ROWS = 5
 PREDICTION_ROWS = 10
-"""The tables keep their height, so that nothing jumps."""
+"""The tables have a fixed number of rows, so that the picture does not jump."""
 
 _RECORDING = {0: "not recording", 1: "recording", 2: "RECORDING FAILED"}
 
 
 @dataclass(frozen=True)
 class Picture:
-    """What was heard last, `elapsed` seconds after the start; None: nothing yet."""
+    """Newest messages of the monitor, `elapsed` s after its first answer. None: no message received yet."""
 
     title: str
     elapsed: float
@@ -31,7 +31,7 @@ class Picture:
     status: codec.MonitorStatus
 
     def table(self) -> RenderableType:
-        """For a terminal."""
+        """Return the tables for a terminal."""
         return Group(
             Text(f"{self.title}  {self.elapsed:4.1f} s", style="bold"),
             self._contact_table(),
@@ -40,7 +40,7 @@ class Picture:
         )
 
     def line(self) -> str:
-        """The same in one line: the soonest impact stands for all."""
+        """Return the totals and the soonest predicted collision in one line."""
         line = f"{self.elapsed:4.0f} s  {self.status.contacts} touching, {self.status.predictions} predicted"
         if self.predictions is not None and len(self.predictions.predictions):
             first = self.predictions.predictions[0]

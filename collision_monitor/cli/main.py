@@ -1,4 +1,4 @@
-"""`collision-monitor`: parse the command line, run the command, turn errors into one line and an exit code."""
+"""`collision-monitor`: parse the command line, run the command, and turn errors into one line and an exit code."""
 
 from __future__ import annotations
 
@@ -18,31 +18,39 @@ COMMANDS: Final = (
     "demo", "run", "world", "replay", "report", "compare",
     "check", "salvage", "import", "tradeoff", "tune", "extremes", "bench",
 )  # fmt: skip
-"""In the order of `--help`. Each is a module of this package (`import_` for import) with `add_parser(subparsers)`."""
+"""Commands in the order of `--help`. Each is a module of this package (`import_` for import) with an `add_parser`."""
 
-DESCRIPTION = "What touches now, what will touch next, when, and how sure that is: a ROS 2 collision monitor."
+DESCRIPTION = """\
+A ROS 2 collision monitor: reports which objects touch now, which will touch next, when, and with
+which error bounds. Records sessions, replays them exactly, and analyses them.
+"""
 
 EPILOG = """\
 examples:
-  collision-monitor demo                                  a scene and a monitor, live in this terminal
-  collision-monitor run --record run.mcap                 the monitor node, recording what it sees and says
-  collision-monitor world --list                          the scenes that can be played to it
-  collision-monitor world crossing                        play one of them
-  collision-monitor replay run.mcap                       the same answers again, without ROS; differences are shown
-  collision-monitor report run.mcap                       what happened, as one HTML page
-  collision-monitor compare before.mcap after.mcap        what changed between two sessions, or two profiles on one
-  collision-monitor check run.mcap --expect expected.yaml recorded sessions as regression tests
-  collision-monitor salvage cut.mcap -o whole.mcap        what is whole in a damaged recording
-  collision-monitor import bag --map map.yaml -o run.mcap odometry, poses, tf or markers as a session
-  collision-monitor tradeoff --scene fleet                what each profile costs and how wrong it is
-  collision-monitor tune run.mcap --max-ttc-error 0.05    the cheapest settings that are good enough
-  collision-monitor extremes                              how right the numbers are from 1e-150 m to 1e18 m
-  collision-monitor bench --scene boxes --n 10000         how long it takes to find all contacts
+  collision-monitor demo                                   live demo with a simulated scene
+  collision-monitor run --record run.mcap                  run the monitor node and record a session
+  collision-monitor world --list                           list the simulated scenes
+  collision-monitor world crossing                         publish one of them
+  collision-monitor replay run.mcap                        replay without ROS and compare the answers
+  collision-monitor report run.mcap                        write an HTML page about a session
+  collision-monitor compare before.mcap after.mcap         list the differences of two sessions
+  collision-monitor check run.mcap --expect expected.yaml  use a session as a regression test
+  collision-monitor salvage cut.mcap -o whole.mcap         recover a damaged recording
+  collision-monitor import bag --map map.yaml -o run.mcap  make a session from a bag
+  collision-monitor tradeoff --scene fleet                 measure time and errors of each profile
+  collision-monitor tune run.mcap --max-ttc-error 0.05     find the cheapest sufficient settings
+  collision-monitor extremes                               measure errors at extreme scales
+  collision-monitor bench --scene boxes --n 10000          measure the time to find all contacts
 
-exit codes: 0 done, 1 error, 2 wrong usage, 130 interrupted; 3 not as expected: replay and compare, the answers differ;
-check, an expectation does not hold; salvage, something is missing; 4 cannot be told: replay, the answers cannot be
-compared; compare, not all is known
-`collision-monitor COMMAND --help` says more about each command.
+exit codes:
+  0    done
+  1    error; one line on stderr explains it
+  2    wrong usage
+  3    the result is not as expected, for example: answers differ, an expectation fails
+  4    the result is not known, for example: a recording is incomplete
+  130  interrupted
+
+`collision-monitor COMMAND --help` explains each command.
 """
 
 
@@ -63,7 +71,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line (default: the process's own) and return the exit code."""
+    """Run a command line (default: sys.argv) and return the exit code."""
     try:
         args = make_parser().parse_args(arguments)
         command: Callable[[argparse.Namespace], int] = args.command
@@ -79,11 +87,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return ExitCode.INTERRUPTED
     except BrokenPipeError:
-        # The reader (head, less) went away. Point stdout elsewhere, or Python complains again when it exits.
+        # The reader (head, less) closed the pipe. Redirect stdout, or Python reports the error again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ExitCode.BROKEN_PIPE
 
 
 def replay_main() -> int:
-    """`ros2 run collision_monitor replay …`: the command of that name."""
+    """Entry point of `ros2 run collision_monitor replay …`. Returns the exit code."""
     return main(["replay", *sys.argv[1:]])

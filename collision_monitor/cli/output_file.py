@@ -1,4 +1,4 @@
-"""A file that a command writes for its user."""
+"""Error handling of the files that a command writes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collision_monitor.errors import InputError
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turns the OSError of a file that cannot be written into an InputError."""
+    """Raise InputError in place of the OSError of a file that cannot be written."""
     try:
         yield
     except OSError as error:

@@ -1,4 +1,4 @@
-"""A look at a parameter file before ROS reads it: ROS says nothing of a file that is for nobody."""
+"""Check of a parameter file before ROS reads it, because ROS silently ignores parameters for other nodes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collision_monitor.pipeline.topics import NODE, PARAMETER_SECTION
 
 
 def check_parameter_file(path: Path) -> None:
-    """Raises InputError where the file is not there, is no YAML, or holds nothing for the monitor."""
+    """Raise InputError if the file cannot be read, is not YAML, or holds no parameters for the monitor."""
     try:
         content = yaml.safe_load(path.read_text())
     except OSError as error:

@@ -1,4 +1,4 @@
-"""A progress bar on stderr for long work, where that is a terminal."""
+"""A progress bar on stderr, shown only if stderr is a terminal."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def progress_bar(name: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Gives a function that is told how much more of `total` was done."""
+    """Yield a function that advances the bar by the given part of `total`."""
     if not sys.stderr.isatty():
         yield lambda done: None
         return
@@ -22,7 +22,7 @@ def progress_bar(name: str, total: int) -> Iterator[Callable[[int], None]]:
 
     columns = (TextColumn(name), BarColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
-    # what is printed meanwhile goes above the bar only where it goes to the terminal at all, not into a file or pipe
+    # redirect printed lines above the bar only if stdout is a terminal, not a file or pipe
     with Progress(*columns, console=console, transient=True, redirect_stdout=sys.stdout.isatty()) as bar:
         task = bar.add_task("", total=total)
         yield lambda done: bar.update(task, advance=done)
@@ -30,7 +30,7 @@ def progress_bar(name: str, total: int) -> Iterator[Callable[[int], None]]:
 
 @contextmanager
 def session_bar(name: str, session: Session) -> Iterator[Callable[[], None]]:
-    """Gives a function that shows how far the session was read."""
+    """Yield a function that moves the bar to the read position of the session."""
     with progress_bar(name, session.size) as done:
         last = 0
 

@@ -1,4 +1,4 @@
-"""Numbers on the command line, with their range: what is outside is wrong usage, exit code 2."""
+"""Number types of command line options. A value out of range is wrong usage, exit code 2."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 
 def whole(least: int) -> Callable[[str], int]:
-    """A whole number from `least` on."""
+    """Return a parser of whole numbers that are at least `least`."""
 
     def parse(text: str) -> int:
         try:
@@ -23,7 +23,7 @@ def whole(least: int) -> Callable[[str], int]:
 
 
 def positive(text: str) -> float:
-    """A finite number above 0."""
+    """Parse a finite number above 0."""
     value = _finite(text)
     if not value > 0.0:
         raise argparse.ArgumentTypeError(f"expected a number above 0, got {text!r}")
@@ -31,7 +31,7 @@ def positive(text: str) -> float:
 
 
 def not_negative(text: str) -> float:
-    """A finite number, at least 0."""
+    """Parse a finite number that is at least 0."""
     value = _finite(text)
     if not value >= 0.0:
         raise argparse.ArgumentTypeError(f"expected a number, at least 0, got {text!r}")
@@ -39,7 +39,7 @@ def not_negative(text: str) -> float:
 
 
 def _finite(text: str) -> float:
-    """NaN where the text is no finite number."""
+    """Parse a number. Return NaN if the text is not a finite number."""
     try:
         value = float(text)
     except ValueError:
@@ -48,7 +48,7 @@ def _finite(text: str) -> float:
 
 
 def size(text: str) -> int:
-    """Bytes above 0: `500M` is 500,000,000."""
+    """Parse a number of bytes above 0. `500M` is 500,000,000."""
     factor = {"K": 10**3, "M": 10**6, "G": 10**9}.get(text[-1:].upper(), 1)
     number = text if factor == 1 else text[:-1]
     if not (number.isdecimal() and int(number)):

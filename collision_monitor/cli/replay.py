@@ -1,4 +1,4 @@
-"""`collision-monitor replay`: the same inputs again, without ROS, and are the answers the same bytes?"""
+"""`collision-monitor replay`: replay the recorded inputs without ROS and compare the answers byte by byte."""
 
 from __future__ import annotations
 
@@ -23,31 +23,53 @@ if TYPE_CHECKING:
     from collision_monitor.session.replaying.replay_report import ReplayReport
 
 EPILOG = """\
-exit codes: 0 the answers are identical, 1 the session cannot be read, 3 they differ (the first difference is named),
-4 they cannot be compared: they differ and were recorded by another version or machine, or messages are missing;
-of several sessions: the first of 1, 3, 4 that one of them came to
+examples:
+  collision-monitor replay run.mcap
+  collision-monitor replay run.mcap --from 60 --cut bug.mcap    a short session with the first difference
+  collision-monitor replay old.mcap --tolerance 1e-6            a session of another version
+  collision-monitor replay sessions --jobs 4                    every session in a folder
+
+exit codes:
+  0  the answers are identical
+  1  a session cannot be read
+  3  the answers differ
+  4  the answers cannot be compared: they differ and were recorded by another version or machine, or
+     messages are missing
+With several sessions, the exit code is the smallest that is not 0.
 """
 
 
 def add_parser(subparsers: Any) -> None:
-    """Register the command."""
+    """Register the command and its options."""
     parser = subparsers.add_parser(
         "replay",
         help="replay a session and compare the answers byte by byte",
-        description="Feed the recorded inputs to the same pipeline, without ROS, and compare its answers byte by byte.",
+        description="Feed the recorded inputs to the monitor, without ROS, and compare its answers with the recorded\n"
+        "ones, byte by byte. Prints the digest of the answers, the first difference with its inputs, and the\n"
+        "verdict.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("sessions", nargs="+", metavar="SESSION", help="session files, folders of them, or wildcards")
-    parser.add_argument("--threads", type=int, metavar="N", help="threads of the kernels (default: as recorded)")
+    parser.add_argument(
+        "sessions", nargs="+", metavar="SESSION", help="session files, folders of sessions, or wildcards"
+    )
+    parser.add_argument("--threads", type=int, metavar="N", help="number of threads (default: as recorded)")
     parser.add_argument(
         "--from", dest="start", type=not_negative, metavar="T", default=0.0,
-        help="begin with the last snapshot before T seconds after the first message (default: 0)",
+        help="start at the last snapshot before this time (s from the first message, default: 0)",
     )  # fmt: skip
     parser.add_argument(
-        "--tolerance", type=positive, metavar="X", help="for other versions: equal is what differs by no more (m, s)"
+        "--tolerance",
+        type=positive,
+        metavar="X",
+        help="for sessions of other versions: largest difference of equal numbers (m, s)",
     )
-    parser.add_argument("--cut", type=Path, metavar="OUT", help="where answers differ, write the session up to there")
+    parser.add_argument(
+        "--cut",
+        type=Path,
+        metavar="OUT",
+        help="if answers differ, write a short session that shows the first difference",
+    )
     parser.add_argument("--force", action="store_true", help="overwrite OUT")
     add_engine(parser)
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
@@ -55,7 +77,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def replay_command(args: argparse.Namespace) -> int:
-    """Return the exit code. Raises InputError, SessionError."""
+    """Run the command and return the exit code. Raises InputError, SessionError."""
     from collision_monitor.session import Session
     from collision_monitor.session.many import find_sessions
     from collision_monitor.session.replaying.replay import replay
@@ -79,7 +101,7 @@ def replay_command(args: argparse.Namespace) -> int:
 
 @dataclass(frozen=True)
 class _Replayed:
-    """A session and what its replay came to, or why it could not be read."""
+    """Replay report of a session, or the reason why the session could not be read."""
 
     report: ReplayReport | None
     error: str = ""
@@ -122,7 +144,7 @@ def _replay_many(paths: list[Path], args: argparse.Namespace) -> int:
 
 
 def _as_lines(path: Path, each: _Replayed) -> str:
-    """Nothing in it depends on how long it took: it is the same for any number of jobs."""
+    """Return the result as text, without durations, so that it is the same for any number of jobs."""
     if each.report is None:
         return f"{path}: cannot be read\n  {each.error}"
     report = each.report
@@ -134,7 +156,7 @@ def _as_lines(path: Path, each: _Replayed) -> str:
 
 @contextmanager
 def _progress_bar(session: Session) -> Iterator[Callable[[ReplayReport], None] | None]:
-    """A bar on stderr, where that is a terminal."""
+    """Show a progress bar on stderr if it is a terminal."""
     if not sys.stderr.isatty():
         yield None
         return

@@ -1,4 +1,4 @@
-"""`collision-monitor report`: a session as one HTML file that people look at."""
+"""`collision-monitor report`: write one HTML page about a session."""
 
 from __future__ import annotations
 
@@ -10,27 +10,49 @@ from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.progress import session_bar
 from collision_monitor.errors import SessionError
 
+DESCRIPTION = """\
+Write one HTML page about a session: the verdict, a timeline, predicted against actual times of
+contact, distances, tracks from above, and step times. The page is a single file that loads nothing
+else. The command prints the path of each file that it writes.
+"""
+EPILOG = """\
+examples:
+  collision-monitor report run.mcap                          write run.html
+  collision-monitor report run.mcap -o page.html --png figs  write the figures as PNG files too
+  collision-monitor report run.mcap --replay fast            report the answers of the profile fast
+
+exit codes:
+  0  the page was written
+  1  the session cannot be read, or a file cannot be written
+"""
+
 
 def add_parser(subparsers: Any) -> None:
-    """Register the command."""
+    """Register the command and its options."""
     parser = subparsers.add_parser(
         "report",
-        help="a session as one HTML page: collisions, how early they were predicted, tracks",
-        description="Write one HTML file that needs nothing else: verdict, timeline, predicted against actual, tracks.",
+        help="write an HTML page about a session: collisions, warnings, tracks",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("session", type=Path, metavar="SESSION", help="a .mcap file, or a folder that holds one")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: SESSION.html, where you are")
-    parser.add_argument("--png", type=Path, metavar="FOLDER", help="write the pictures there too")
+    parser.add_argument("session", type=Path, metavar="SESSION", help=".mcap file, or a folder that holds one session")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="HTML file (default: SESSION.html in the current folder)"
+    )
+    parser.add_argument(
+        "--png", type=Path, metavar="FOLDER", help="also write the figures as PNG files into this folder"
+    )
     parser.add_argument(
         "--replay", nargs="?", const="", metavar="PROFILE",
-        help="report what this program answers to the inputs, with the recorded profile or this one",
+        help="report the answers of a replay, with the recorded profile or with PROFILE",
     )  # fmt: skip
-    parser.add_argument("--force", action="store_true", help="overwrite what is there")
+    parser.add_argument("--force", action="store_true", help="overwrite existing files")
     parser.set_defaults(command=report_command)
 
 
 def report_command(args: argparse.Namespace) -> int:
-    """Return the exit code. Raises SessionError, ProfileError."""
+    """Run the command and return the exit code. Raises SessionError, ProfileError."""
     from collision_monitor.report import check_outputs, write_report
     from collision_monitor.session import Session
     from collision_monitor.session.history.read_history import read_history
@@ -39,7 +61,7 @@ def report_command(args: argparse.Namespace) -> int:
     output = args.output or Path(f"{args.session.resolve().stem}.html")
     if output.exists() and output.samefile(args.session):
         raise SessionError(f"{output}: expected another file than the session itself")
-    check_outputs([output], args.force)  # before what takes long
+    check_outputs([output], args.force)  # before the long work
     with session_bar("report", session) as show:
         history = read_history(session, args.replay, show)
     for file in write_report(history, output, pictures=args.png, overwrite=args.force):

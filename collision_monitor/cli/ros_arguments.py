@@ -1,4 +1,4 @@
-"""Options of the command line as ROS parameters."""
+"""Conversion of command line options to ROS parameters."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 
 
 def parameters(**values: str | int | float | Path | None) -> list[str]:
-    """`-p name:=value` for each value that is not None, to be put behind --ros-args.
+    """Return `-p name:=value` for each value that is not None. The list follows --ros-args.
 
-    ROS reads the values as YAML, so texts are quoted: a file named `7` or `yes` stays a text.
+    ROS reads the values as YAML. Strings are quoted, so that a file named `7` or `yes` stays a string.
     """
     found = []
     for name, value in values.items():

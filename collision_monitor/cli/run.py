@@ -1,4 +1,4 @@
-"""`collision-monitor run`: the monitor node."""
+"""`collision-monitor run`: run the monitor node."""
 
 from __future__ import annotations
 
@@ -12,19 +12,28 @@ from collision_monitor.errors import InputError, SessionError
 from collision_monitor.ros.executables import monitor
 
 DESCRIPTION = """\
-Monitor objects: subscribes to ~/objects/shapes and ~/objects/states, publishes ~/contacts, ~/predictions, ~/status
-and ~/markers (the node is named object_monitor). Ctrl-C stops it and finishes the recording.
+Run the monitor as the ROS 2 node object_monitor. It subscribes to ~/objects/shapes and
+~/objects/states, and publishes ~/contacts, ~/predictions, ~/status and ~/markers. It prints ROS log
+messages. Ctrl-C stops the node and completes the recording.
 """
 EPILOG = """\
-Everything after --ros-args goes to ROS, for example:
+examples:
+  collision-monitor run --params config/monitor.yaml
+  collision-monitor run --record shift_1 --split-size 500M            a rosbag2 folder of files
+  collision-monitor run --record near_misses --on-event --before 20   one file per collision
   collision-monitor run --record run.mcap --ros-args -p horizon:=1.0 -r __ns:=/hall_2
-  collision-monitor run --record shift_1 --split-size 500M            a folder of files, as ros2 bag record makes it
-  collision-monitor run --record near_misses --on-event --before 20   one file for each time something touches
+
+ROS gets all arguments after --ros-args.
+
+exit codes:
+  0  stopped by Ctrl-C or SIGTERM
+  1  --params or --record cannot be used
+  2  wrong usage, or the node refuses a parameter
 """
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the command to the `collision-monitor` parser."""
+    """Register the command and its options."""
     parser = subparsers.add_parser(
         "run",
         help="run the monitor node",
@@ -32,22 +41,37 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--params", type=Path, metavar="FILE", help="parameters (YAML), such as config/monitor.yaml")
-    parser.add_argument("--record", type=Path, metavar="PATH", help="write the session: a new .mcap file, or a folder")
-    parser.add_argument("--split-size", type=size, metavar="SIZE", help="a new file from this size on, such as 500M")
-    parser.add_argument("--split-duration", type=positive, metavar="S", help="a new file every S seconds")
-    parser.add_argument("--on-event", action="store_true", help="keep only what is around collisions")
     parser.add_argument(
-        "--before", type=positive, metavar="S", help="--on-event: so long before it begins (default: 10)"
+        "--params", type=Path, metavar="FILE", help="parameter file (YAML), for example config/monitor.yaml"
     )
-    parser.add_argument("--after", type=positive, metavar="S", help="--on-event: so long after it begins (default: 5)")
-    parser.add_argument("--profile", metavar="NAME", help="where the settings start from: fast, balanced or exact")
-    parser.add_argument("--ros-args", nargs=argparse.REMAINDER, default=[], metavar="…", help="passed on to ROS")
+    parser.add_argument(
+        "--record", type=Path, metavar="PATH", help="record the session to a new .mcap file or a new folder"
+    )
+    parser.add_argument(
+        "--split-size", type=size, metavar="SIZE", help="start a new file in the folder at this size, for example 500M"
+    )
+    parser.add_argument(
+        "--split-duration", type=positive, metavar="S", help="start a new file in the folder every S seconds"
+    )
+    parser.add_argument(
+        "--on-event", action="store_true", help="record only the time around collisions, each in its own file"
+    )
+    parser.add_argument(
+        "--before",
+        type=positive,
+        metavar="S",
+        help="with --on-event: time to keep before a collision begins (s, default: 10)",
+    )
+    parser.add_argument(
+        "--after", type=positive, metavar="S", help="with --on-event: time to keep after it begins (s, default: 5)"
+    )
+    parser.add_argument("--profile", metavar="NAME", help="profile that sets the defaults: fast, balanced or exact")
+    parser.add_argument("--ros-args", nargs=argparse.REMAINDER, default=[], metavar="…", help="arguments for ROS")
     parser.set_defaults(command=run_command)
 
 
 def run_command(args: argparse.Namespace) -> int:
-    """Run the node until SIGINT or SIGTERM. Raises InputError, SessionError for a recording that is there already."""
+    """Run the node until SIGINT or SIGTERM. Raises InputError, SessionError (the recording exists already)."""
     if args.record is not None and args.record.exists():
         raise SessionError(f"--record: expected the name of a new file, {args.record} is there already")
     several = args.split_size is not None or args.split_duration is not None or args.on_event

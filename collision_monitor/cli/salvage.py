@@ -1,4 +1,4 @@
-"""`collision-monitor salvage`: what is whole in a damaged recording, as a new one."""
+"""`collision-monitor salvage`: copy the complete messages of a damaged recording into a new one."""
 
 from __future__ import annotations
 
@@ -11,32 +11,41 @@ from typing import Any
 from collision_monitor.cli.exit_codes import ExitCode
 
 EPILOG = """\
-A chunk of messages counts where its checksum is right. What is complete in a chunk whose checksum is wrong is left out,
-or kept with --unverified; what is complete and has no checksum is kept, and said to be unverified.
+Messages in a chunk with a correct checksum are copied. Complete messages in a chunk with a wrong
+checksum are dropped, or kept with --unverified. Complete messages without a checksum are kept and
+counted as unverified.
 
-exit codes: 0 everything is there, 1 nothing could be recovered, 3 something is missing (it is said what)
+examples:
+  collision-monitor salvage cut.mcap -o whole.mcap
+  collision-monitor salvage cut.mcap -o whole.mcap --unverified --json
+
+exit codes:
+  0  nothing is missing
+  1  nothing could be recovered
+  3  something is missing
 """
 
 
 def add_parser(subparsers: Any) -> None:
-    """Register the command."""
+    """Register the command and its options."""
     parser = subparsers.add_parser(
         "salvage",
-        help="recover what is whole in a recording that was cut off or damaged",
-        description="Copy every complete message of a cut, overwritten or bit-flipped MCAP file into a new one.",
+        help="recover the complete messages of a damaged recording",
+        description="Copy every complete message of a damaged MCAP file into a new file. The damaged file may be cut\n"
+        "off or overwritten, or have flipped bits. Prints the number of messages of each topic, and every loss.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("session", type=Path, metavar="SESSION", help="the damaged .mcap file")
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help="the new .mcap file")
-    parser.add_argument("--unverified", action="store_true", help="keep messages from chunks with a wrong checksum too")
+    parser.add_argument("session", type=Path, metavar="SESSION", help="damaged .mcap file")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help="new .mcap file")
+    parser.add_argument("--unverified", action="store_true", help="also keep messages of chunks with a wrong checksum")
     parser.add_argument("--force", action="store_true", help="overwrite OUT")
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
     parser.set_defaults(command=salvage_command)
 
 
 def salvage_command(args: argparse.Namespace) -> int:
-    """Return the exit code. Raises SessionError."""
+    """Run the command and return the exit code. Raises SessionError."""
     from collision_monitor.session.mcap.salvage import salvage
 
     result = salvage(args.session, args.output, unverified=args.unverified, overwrite=args.force)

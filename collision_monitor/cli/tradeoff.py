@@ -1,4 +1,4 @@
-"""`collision-monitor tradeoff`: what each profile costs and how wrong it is, on scenes or on a recorded session."""
+"""`collision-monitor tradeoff`: measure the time and the errors of each profile, on scenes or on a recorded session."""
 
 from __future__ import annotations
 
@@ -21,60 +21,75 @@ if TYPE_CHECKING:
     from collision_monitor.accuracy.measurement import Measurement
 
 DESCRIPTION = """\
-Run scenes, or a recorded session, through the profiles, and compare every answer with exact ones that are computed
-anew at every step: time per step, false alarms, misses, errors of distance and of time to collision.
+Measure the time and the errors of each profile. Every profile runs on scenes, or on a recorded
+session. Each answer is compared with an exact one, which is recomputed at every step. The command
+prints a row for each scene and profile: time per step, alarms, false alarms, misses, error of the
+distance and of the time to collision (TTC), and the part of the answers whose bound holds.
 """
 EPILOG = """\
 examples:
   collision-monitor tradeoff --scene fleet
   collision-monitor tradeoff --scene fleet --scene clutter --png tradeoff.png
   collision-monitor tradeoff run.mcap --profile fast --profile exact --json
-  collision-monitor tradeoff --scene fleet --noise 0                         with true states in place of measured ones
-  collision-monitor tradeoff --path ../shared/data/citr                      recorded tracks too
-  collision-monitor tradeoff --scene arm --model obb --model convex_hull     models against the meshes themselves
+  collision-monitor tradeoff --scene fleet --noise 0                      with exact states
+  collision-monitor tradeoff --path ../shared/data/citr                   with recorded tracks too
+  collision-monitor tradeoff --scene arm --model obb --model convex_hull  models against the meshes
 
-A pair counts as an alarm at each step at which it is told, as a contact or as a prediction. A false alarm is one that
-the exact answers do not have at that step: mostly a near miss, within the tolerance that the profile declares.
-The states of the fleet are those of a localiser: off by 5 mm, 5 mrad, 5 mm/s and 5 mrad/s, and declared to be so.
+An alarm is a pair that is reported at a step, as a contact or as a prediction. An alarm is false if
+the exact answers do not have the pair at that step. Most false alarms are near misses within the
+tolerance of the profile. The states of the scene fleet have the noise of a localiser, 5 mm, 5 mrad,
+5 mm/s and 5 mrad/s, and declare it.
+
+exit codes:
+  0  done
+  1  the session, a scene or a profile cannot be used, or a file cannot be written
 """
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the command to the `collision-monitor` parser."""
+    """Register the command and its options."""
     parser = subparsers.add_parser(
         "tradeoff",
-        help="measure what each profile costs and how wrong it is",
+        help="measure the time and the errors of each profile",
         description=DESCRIPTION,
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("session", nargs="?", type=Path, metavar="SESSION", help="a recording, in place of scenes")
+    parser.add_argument("session", nargs="?", type=Path, metavar="SESSION", help="recorded session, in place of scenes")
     parser.add_argument(
-        "--scene", action="append", metavar="NAME", help=f"may be given again (default: {', '.join(DEFAULT_SCENES)})"
+        "--scene",
+        action="append",
+        metavar="NAME",
+        help=f"scene; may be repeated (default: {', '.join(DEFAULT_SCENES)})",
     )
-    parser.add_argument("--path", type=Path, metavar="FILE", help="recorded tracks, for the scene `trajectory`")
+    parser.add_argument("--path", type=Path, metavar="FILE", help="recorded tracks for the scene `trajectory`")
     parser.add_argument(
         "--noise", type=not_negative, metavar="S",
-        help="standard deviation of the states in m, rad, m/s and rad/s (default: 0.005 for the fleet, else 0)",
+        help="standard deviation of the states (m, rad, m/s and rad/s; default: 0.005 for fleet, otherwise 0)",
     )  # fmt: skip
-    parser.add_argument("--objects", type=whole(1), metavar="N", help="how many move (default: the scene's own number)")
     parser.add_argument(
-        "--seconds", type=positive, metavar="S", help="of each scene (default: 5, all of recorded tracks)"
+        "--objects", type=whole(1), metavar="N", help="number of moving objects (default: depends on the scene)"
     )
-    parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="of the random numbers (default: 1)")
-    parser.add_argument("--profile", action="append", metavar="NAME", help="may be given again (default: all)")
+    parser.add_argument(
+        "--seconds",
+        type=positive,
+        metavar="S",
+        help="duration of each scene (s, default: 5, or all of the recorded tracks)",
+    )
+    parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="seed of the random numbers (default: 1)")
+    parser.add_argument("--profile", action="append", metavar="NAME", help="profile; may be repeated (default: all)")
     parser.add_argument(
         "--model", action="append", metavar="NAME",
-        help="compare models of the shapes with the shapes as they are, in place of profiles; may be given again",
+        help="measure models of the shapes against the exact shapes, in place of profiles; may be repeated",
     )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="write the rows there too")
-    parser.add_argument("--png", type=Path, metavar="FILE", help="draw time against error, a panel for each scene")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="also write the rows to this file")
+    parser.add_argument("--png", type=Path, metavar="FILE", help="draw time against error, one panel per scene")
     parser.set_defaults(command=tradeoff_command)
 
 
 def tradeoff_command(args: argparse.Namespace) -> int:
-    """Measure and print. Raises InputError, ProfileError, SessionError."""
+    """Run the command and return the exit code. Raises InputError, ProfileError, SessionError."""
     from collision_monitor.accuracy.inputs import recorded, simulated
     from collision_monitor.accuracy.tradeoff import tradeoff
     from collision_monitor.settings.profile import Profile
@@ -115,7 +130,7 @@ def _number(value: float) -> str:
 
 
 def _percent(part: float) -> str:
-    return "–" if part != part else f"{math.floor(1e4 * part) / 100:g}"  # 100 only where all are
+    return "–" if part != part else f"{math.floor(1e4 * part) / 100:g}"  # rounded down: 100 only if every bound holds
 
 
 def _print_table(rows: Sequence[Measurement]) -> None:

@@ -1,4 +1,4 @@
-"""`collision-monitor tune`: the cheapest settings that are good enough for your own recording."""
+"""`collision-monitor tune`: find the cheapest settings that meet demands on a recorded session."""
 
 from __future__ import annotations
 
@@ -18,35 +18,51 @@ if TYPE_CHECKING:
     from collision_monitor.accuracy.tune import Trial
 
 EPILOG = """\
-Each profile is run over the recording and every answer compared with exact ones that are computed anew at every step.
-The errors are those of 99 %% of the predictions and of the worst contact, the time is that of 99 %% of the steps.
+Every answer is compared with an exact one, which is recomputed at every step. The demands apply to
+the worst contact, to 99 %% of the predictions and to 99 %% of the steps. A profile that misses a
+collision, or states an interval without the exact time, is never chosen.
 
-exit codes: 0 a profile was found and written, 3 none meets the demands (it is said which fails, and by how much)
+examples:
+  collision-monitor tune run.mcap --max-ttc-error 0.05
+  collision-monitor tune run.mcap --max-distance-error 0.02 --budget-ms 5 -o tuned.yaml --png tune.png
+
+exit codes:
+  0  a profile was found and written
+  1  the session cannot be read, or a file cannot be written
+  3  no profile meets the demands
 """
 
 
 def add_parser(subparsers: Any) -> None:
-    """Register the command."""
+    """Register the command and its options."""
     parser = subparsers.add_parser(
         "tune",
-        help="find the cheapest settings that keep the errors on your recording",
-        description="Search tolerances on a recording: the cheapest that keep the demands, as a parameter file.",
+        help="find the cheapest settings that keep the errors small on a session",
+        description="Find the cheapest tolerances that meet your demands on a recorded session. Prints a row for each\n"
+        "profile that was tried, with the demands that it fails, and writes the chosen profile as a parameter\n"
+        "file.",
         epilog=EPILOG.replace("%%", "%"),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("session", type=Path, metavar="SESSION", help="a .mcap file, or a folder that holds one")
-    parser.add_argument("--max-distance-error", type=positive, metavar="M", help="of contacts, in m")
-    parser.add_argument("--max-ttc-error", type=positive, metavar="S", help="of predicted times to collision, in s")
-    parser.add_argument("--budget-ms", type=positive, metavar="MS", help="of a step, in ms on this machine")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="parameter file (default: SESSION.yaml here)")
-    parser.add_argument("--force", action="store_true", help="overwrite it")
-    parser.add_argument("--png", type=Path, metavar="FILE", help="draw time against error of all that was tried")
+    parser.add_argument("session", type=Path, metavar="SESSION", help=".mcap file, or a folder that holds one session")
+    parser.add_argument(
+        "--max-distance-error", type=positive, metavar="M", help="largest error of a contact's distance (m)"
+    )
+    parser.add_argument(
+        "--max-ttc-error", type=positive, metavar="S", help="largest error of a predicted time to collision (s)"
+    )
+    parser.add_argument("--budget-ms", type=positive, metavar="MS", help="largest time of a step on this machine (ms)")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="parameter file (default: SESSION.yaml in the current folder)"
+    )
+    parser.add_argument("--force", action="store_true", help="overwrite the parameter file")
+    parser.add_argument("--png", type=Path, metavar="FILE", help="draw time against error of each profile")
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
     parser.set_defaults(command=tune_command)
 
 
 def tune_command(args: argparse.Namespace) -> int:
-    """Return the exit code. Raises InputError, SessionError."""
+    """Run the command and return the exit code. Raises InputError, SessionError."""
     from collision_monitor.accuracy.inputs import recorded
     from collision_monitor.accuracy.tune import Demands, candidates, parameter_file, tune
     from collision_monitor.session import Session

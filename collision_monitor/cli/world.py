@@ -1,4 +1,4 @@
-"""`collision-monitor world`: play a scene for the monitor to watch."""
+"""`collision-monitor world`: publish a simulated scene to a monitor."""
 
 from __future__ import annotations
 
@@ -11,29 +11,58 @@ from collision_monitor.errors import InputError
 from collision_monitor.pipeline.topics import NODE
 from collision_monitor.ros.executables import world
 
+DESCRIPTION = """\
+Publish a simulated scene on this ROS domain: the shapes of the objects once, then their states at
+a steady rate. A monitor node observes it. The command prints ROS log messages.
+"""
+EPILOG = """\
+examples:
+  collision-monitor world --list
+  collision-monitor world fleet --objects 200 --noise 0.005
+  collision-monitor world trajectory --path tracks --duration 60
+
+exit codes:
+  0  the scene ended, or was stopped by Ctrl-C or SIGTERM
+  1  the scene does not exist
+  2  wrong usage, or the scene refuses an option
+"""
+
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the command to the `collision-monitor` parser."""
+    """Register the command and its options."""
     parser = subparsers.add_parser(
         "world",
         help="publish a simulated scene",
-        description="Publish a scene's shapes and states, at a steady rate, to a monitor on this ROS domain.",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("scene", nargs="?", metavar="SCENE", help="which scene; --list shows them")
-    parser.add_argument("--list", action="store_true", help="list the scenes and stop")
-    parser.add_argument("--objects", type=whole(1), metavar="N", help="how many move (default: the scene's own number)")
-    parser.add_argument("--rate", type=positive, metavar="HZ", help="messages per second (default: the scene's own)")
-    parser.add_argument("--duration", type=positive, metavar="S", help="stop after so many seconds (default: endless)")
-    parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="of the random numbers (default: 1)")
-    parser.add_argument("--path", type=Path, metavar="FILE", help="recorded tracks, for the scene that plays them")
-    parser.add_argument("--noise", type=positive, metavar="S", help="of the states, in m, rad, m/s and rad/s; declared")
-    parser.add_argument("--monitor", default=NODE, metavar="NAME", help="the monitor node's name")
-    parser.add_argument("--ros-args", nargs=argparse.REMAINDER, default=[], metavar="…", help="passed on to ROS")
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help="name of the scene")
+    parser.add_argument("--list", action="store_true", help="print the names of all scenes and exit")
+    parser.add_argument(
+        "--objects", type=whole(1), metavar="N", help="number of moving objects (default: depends on the scene)"
+    )
+    parser.add_argument(
+        "--rate", type=positive, metavar="HZ", help="messages per second (Hz, default: depends on the scene)"
+    )
+    parser.add_argument("--duration", type=positive, metavar="S", help="stop after this time (s, default: never)")
+    parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="seed of the random numbers (default: 1)")
+    parser.add_argument("--path", type=Path, metavar="FILE", help="recorded tracks for the scene `trajectory`")
+    parser.add_argument(
+        "--noise",
+        type=positive,
+        metavar="S",
+        help="standard deviation of the states, which declare it (m, rad, m/s, rad/s)",
+    )
+    parser.add_argument(
+        "--monitor", default=NODE, metavar="NAME", help="name of the monitor node (default: object_monitor)"
+    )
+    parser.add_argument("--ros-args", nargs=argparse.REMAINDER, default=[], metavar="…", help="arguments for ROS")
     parser.set_defaults(command=play)
 
 
 def play(args: argparse.Namespace) -> int:
-    """Play the scene until its end, SIGINT or SIGTERM. Raises InputError."""
+    """Publish the scene until its end, SIGINT or SIGTERM, and return the exit code. Raises InputError."""
     from collision_monitor.world import describe, scene_names
 
     if args.list:

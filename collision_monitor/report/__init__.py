@@ -1,4 +1,4 @@
-"""A session as one page that people look at: verdict, timeline, predicted against actual, distances, tracks."""
+"""Report of a session as one HTML page: verdict, timeline, predicted against actual, distances, tracks."""
 
 from collision_monitor.report.page import check_outputs, write_report
 

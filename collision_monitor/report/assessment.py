@@ -1,4 +1,7 @@
-"""A session in words: what happened, and why that may not be all. Nothing is called clear that was not seen."""
+"""Assessment of a session in sentences: what happened, and why more may have happened.
+
+A session is called clear only if all of it is known.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +16,15 @@ from collision_monitor.session.history.alerts import AlertOutcome
 from collision_monitor.session.history.history import History
 
 NAMED: Final = 3
-"""Objects, gaps and problems that are named; of more than that the number is said."""
+"""Largest number of objects, gaps or problems that are listed. The rest is only counted."""
 
 
 @dataclass(frozen=True)
 class Assessment:
-    """answer: the first words. findings: sentences about what happened. doubts: why there may be more.
+    """Verdict on a session.
 
-    kind: `collisions`, `clear` or, where nothing is known of and not all is known, `unknown`.
+    kind: `collisions`, `clear`, or `unknown` if there is no known collision but not everything is known. answer: the
+    headline. findings: sentences about what happened. doubts: reasons why more may have happened.
     """
 
     kind: str
@@ -30,20 +34,20 @@ class Assessment:
 
 
 def assess(history: History, facts: Facts) -> Assessment:
-    """The assessment of a session."""
+    """Assess a session."""
     doubts = _doubts(history, facts)
     count = len(facts.collisions)
     if count:
         kind, answer = "collisions", ("At least " if doubts else "") + counted(count, "collision")
     elif doubts:
-        kind, answer = "unknown", "No collision is known of, but not all is known"
+        kind, answer = "unknown", "No known collision, but not everything is known"
     else:
         kind, answer = "clear", "No collisions"
     return Assessment(kind, answer, _findings(facts), doubts)
 
 
 def counted(count: int, what: str) -> str:
-    """A number and its noun."""
+    """Return a number with its noun, in the plural if needed."""
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
@@ -56,55 +60,55 @@ def _findings(facts: Facts) -> list[str]:
     leads = np.array([each.warned for each in facts.collisions if each.warned > 0.0])
     if len(leads):
         lines.append(
-            f"{_were(len(leads))} predicted: {leads.min():.2f} s ahead at the least, {np.median(leads):.2f} s in the "
-            "median"
+            f"{_were(len(leads))} predicted: at least {leads.min():.2f} s ahead, with a median of "
+            f"{np.median(leads):.2f} s"
         )
     if facts.surprises:
-        lines.append(f"{len(facts.surprises)} came without a prediction right before")
+        lines.append(f"{len(facts.surprises)} had no prediction right before the contact")
     there = len(facts.collisions) - len(leads) - len(facts.surprises)
     if there:
-        lines.append(f"{_were(there)} there from the first step on")
+        lines.append(f"{_were(there)} in contact from the first step on")
     if facts.nothing:
         pairs = len({alert.pair for alert in facts.nothing})
         lines.append(
-            f"{counted(len(facts.nothing), 'warning')} of {counted(pairs, 'pair')} came to nothing: the objects moved "
-            "otherwise, or passed within the tolerance"
+            f"{counted(len(facts.nothing), 'warning')} of {counted(pairs, 'pair')} came to nothing: the objects "
+            "changed their motion, or passed each other within the tolerance"
         )
     due = sum(each[-1].certain and each[-1].outcome is AlertOutcome.OPEN for each in facts.alerts.values())
     if due:
         lines.append(f"{counted(due, 'pair')} still predicted to touch when the session ended")
     if not facts.collisions and not facts.alerts:
-        lines.append("none was predicted either")
+        lines.append("no collision was predicted either")
     return lines
 
 
 def _doubts(history: History, facts: Facts) -> list[str]:
     lines = _some(history.problems, "problems with the recording")
     if not len(history.times):
-        return [*lines, "no step was answered; --replay answers the inputs now"]
+        return [*lines, "no step was answered; --replay computes the answers now"]
     if not history.objects:
-        lines.append("no object is described in it")
+        lines.append("the session describes no object")
     seen = set(history.states["id"].tolist())
     unseen = [each.name for i, each in sorted(history.objects.items()) if not each.static and i not in seen]
     if unseen:
         lines.append(f"no state of {_names(unseen)} was ever received")
     if history.restarts:
         often = counted(history.restarts, "time")
-        lines.append(f"the clock was set back ({often}): times go on as if it had stood still")
+        lines.append(f"the clock was set back ({often}): times on this page continue as if it had stood still")
     lines += _some([f"no step from {a:.2f} s to {b:.2f} s" for a, b in facts.gaps], "gaps between the steps")
     if facts.possible:
         lines.append(f"{counted(len(facts.possible), 'further contact')} could not be excluded (UNRESOLVED)")
     stale = len(np.unique(history.prediction_step[history.predictions["stale"] != 0]))
     if stale:
-        lines.append(f"in {counted(stale, 'step')} predictions rested on states that were too old")
+        lines.append(f"in {counted(stale, 'step')} predictions were based on states that were too old")
     return lines + _counted(history)
 
 
 def _counted(history: History) -> list[str]:
-    """What the last status counted."""
+    """Return a sentence for each kind of loss that the last status counts."""
     status = history.status
     if status is None:
-        return ["the session holds no status: what was refused or lost is not known"]
+        return ["the session holds no status message, so refused and lost messages are unknown"]
     lines = []
     refused = {reason.value: int(getattr(status, f"refused_{reason.value}")) for reason in Refusal}
     if any(refused.values()):
@@ -112,7 +116,7 @@ def _counted(history: History) -> list[str]:
         count = counted(sum(refused.values()), "refusal")
         lines.append(f"{count} of messages, states or shapes ({reasons}); the last: {status.last_refusal}")
     if status.messages_lost:
-        lines.append(f"{counted(status.messages_lost, 'message')} of states were lost on the way to the monitor")
+        lines.append(f"{counted(status.messages_lost, 'message')} with states did not reach the monitor")
     if status.recording_dropped:
         lines.append(f"{counted(status.recording_dropped, 'message')} could not be recorded")
     if status.recording_error:

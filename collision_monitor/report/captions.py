@@ -1,4 +1,4 @@
-"""The sentences over the pictures: what each shows, and what it leaves out."""
+"""Captions of the figures: what each figure shows and what it omits."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collision_monitor.session.history.history import History
 
 
 def captions(history: History, facts: Facts) -> dict[str, str]:
-    """The caption of each picture, by the names that `figures` gives."""
+    """Return the caption of each figure, by the names that `figures` uses."""
     return {
         "timeline": _timeline(facts),
         "predicted": _predicted(facts),
@@ -22,39 +22,39 @@ def captions(history: History, facts: Facts) -> dict[str, str]:
 
 def _timeline(facts: Facts) -> str:
     left = len(facts.risky) - PAIRS
-    out = f" The {PAIRS} riskiest pairs; {counted(left, 'more pair')} left out." if left > 0 else ""
-    return f"When pairs touched, and when they were predicted to.{out}"
+    out = f" Only the {PAIRS} riskiest pairs; {counted(left, 'more pair')} left out." if left > 0 else ""
+    return f"When each pair touched, and when it was predicted to touch.{out}"
 
 
 def _predicted(facts: Facts) -> str:
     left = len(facts.answered) - len(drawn_collisions(facts))
     worst = largest_error(facts)
-    held = f"at worst the interval was off by {worst:.2g} s" if worst > 0.0005 else "here every interval was right"
+    held = f"The largest error of an interval was {worst:.2g} s" if worst > 0.0005 else "Here every interval was right"
     return (
-        "For each collision that was predicted: how far off the stated time was, from the first prediction to the "
-        "contact. The band is the stated interval; below the grey it was too early, above too late. "
-        f"A prediction says what happens if both go on as they move: {held}."
-        + (f" The {CURVES} that were furthest off; {left} more left out." if left else "")
+        "Error of the stated time of contact for each predicted collision, from the first prediction to the contact. "
+        "The coloured band is the stated interval. Below the grey band it was too early, above it too late. "
+        f"A prediction assumes that both objects keep their motion. {held}."
+        + (f" Only the {CURVES} collisions with the largest errors; {left} more left out." if left else "")
     )
 
 
 def _distances() -> str:
     return (
-        "Distance of the shapes, computed from the recorded states, and the time to collision that was predicted. "
-        "Gaps: no state was known, or the object was moved."
+        "Distance of the shapes, computed from the recorded states, and the predicted time to collision. "
+        "A curve has a gap where a state is missing or an object jumped."
     )
 
 
 def _events(facts: Facts) -> str:
     left = len(facts.collisions) - EVENTS
-    out = f" Unpredicted and deepest first; {left} more left out." if left > 0 else ""
+    out = f" Only the unpredicted, then the deepest collisions; {left} more left out." if left > 0 else ""
     return (
         f"Tracks from {AROUND:g} s before to {AROUND:g} s after the contact began, in m from the point of contact. "
-        f"Filled: then; dotted: {AROUND / 2:g} s before.{out}"
+        f"Filled outlines: when the contact began; dotted outlines: {AROUND / 2:g} s before.{out}"
     )
 
 
 def _steps(history: History) -> str:
     if history.replayed:
-        return f"How long the steps of this replay took ({len(history.durations)} steps)."
-    return f"How long the monitor took, as its status said ({counted(len(history.durations), 'status message')})."
+        return f"Durations of the {len(history.durations)} steps of this replay."
+    return f"Step durations that the monitor reported ({counted(len(history.durations), 'status message')})."

@@ -1,4 +1,4 @@
-"""What a report says, as numbers: gathered from a session's history, before anything is drawn."""
+"""Numbers of a report, gathered from the history of a session before anything is drawn."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from collision_monitor.session.history.history import CollisionEvent, Floats, Hi
 
 @dataclass(frozen=True, eq=False)
 class Facts:
-    """What happened.
+    """Numbers of a session.
 
-    period: s from one step to the next, the median. gaps: from, to (s) where no step was answered.
-    collisions: those that are certain. surprises: of these, without a prediction right before. possible: contacts that
-    could not be excluded. alerts: by pair. nothing: certain alerts that were withdrawn. risky: all pairs that touched
-    or were predicted to, the riskiest first. answered: the alert of each collision that was predicted.
+    period: median time between steps (s). gaps: from, to (s), without an answered step. collisions: certain contacts.
+    surprises: collisions without a prediction right before. possible: contacts that could not be excluded. alerts: by
+    pair. nothing: certain alerts that ended without a contact. risky: all pairs that touched or were predicted to
+    touch, the riskiest first. answered: the alert of each predicted collision.
     """
 
     period: float
@@ -34,7 +34,7 @@ class Facts:
 
 
 def gather(history: History) -> Facts:
-    """The facts of a history."""
+    """Gather the facts of a history."""
     period = history.period
     found = alerts_of(history)
     alerts: dict[Pair, list[Alert]] = {}
@@ -61,7 +61,7 @@ def _gaps(times: Floats, longest: float) -> list[tuple[float, float]]:
 
 
 def _riskiest(history: History, alerts: dict[Pair, list[Alert]]) -> list[Pair]:
-    """Collisions by depth, then predictions by how soon they were due."""
+    """Return the pairs of collisions, deepest first, then the pairs that were only predicted, soonest first."""
     depth: dict[Pair, float] = {}
     for each in history.collisions:
         depth[each.pair] = min(depth.get(each.pair, np.inf), each.deepest if each.certain else 0.0)

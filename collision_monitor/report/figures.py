@@ -1,4 +1,4 @@
-"""The pictures of a report, drawn with matplotlib from its facts."""
+"""Figures of a report, drawn from its facts with matplotlib."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from collision_monitor.session.history.alerts import stated_error
 from collision_monitor.session.history.history import CollisionEvent, Floats, History, Pair
 
 PAIRS: Final = 16
-"""Rows of the timeline."""
+"""Largest number of rows of the timeline."""
 CLOSEST: Final = 4
-"""Pairs whose distance is drawn."""
+"""Largest number of pairs whose distance is drawn."""
 CURVES: Final = 6
-"""Collisions whose predictions are drawn."""
+"""Largest number of collisions whose predictions are drawn."""
 DOTS: Final = 2000
-"""Predictions of one pair that are drawn, at most."""
+"""Largest number of predictions of one pair that are drawn."""
 FINEST: Final = 1000
-"""Parts of the timeline's length: what is closer together is drawn as one."""
+"""Number of parts of the timeline. Predictions within about one part are drawn as one bar."""
 BINS: Final = 40
 TAIL: Final = 0.995
-"""Of the step times are drawn each for itself; what took longer stands in the last bar."""
+"""Quantile of the step times at which the histogram ends. Its last bar includes all longer times."""
 
 
 def figures(history: History, facts: Facts, size: Size) -> dict[str, Figure]:
-    """All pictures for which there is something to draw, by name, in their order on the page."""
+    """Draw the figures that have content. Return them by name, in their order on the page."""
     draw: dict[str, Callable[[History, Facts, Size], Figure | None]] = {
         "timeline": _timeline,
         "predicted": _predicted,
@@ -47,18 +47,18 @@ def figures(history: History, facts: Facts, size: Size) -> dict[str, Figure]:
 
 
 def pair_name(history: History, pair: Pair, longest: int = 18) -> str:
-    """Both names, shortened to what fits on a picture."""
+    """Return both names of a pair, shortened to fit into a figure."""
     return " – ".join(shortened(history.name_of(object_id), longest) for object_id in pair)
 
 
 def drawn_collisions(facts: Facts) -> list[CollisionEvent]:
-    """Those whose predictions are drawn: the ones that were most wrong, then the ones that were made longest before."""
+    """Return the collisions to draw: those with the largest errors, then those with the longest warning."""
     chosen = sorted(facts.answered, key=lambda c: (-_worst(facts, c), -c.warned, c.begin, c.pair))[:CURVES]
     return sorted(chosen, key=lambda c: (c.begin, c.pair))
 
 
 def largest_error(facts: Facts) -> float:
-    """Of all predictions of collisions, how far the stated interval was off at most, s; 0 without any."""
+    """Return the largest error of the stated intervals of all predicted collisions (s), or 0 without any."""
     return max((_worst(facts, each) for each in facts.answered), default=0.0)
 
 
@@ -67,7 +67,7 @@ def _worst(facts: Facts, collision: CollisionEvent) -> float:
 
 
 def _runs(times: Floats, longest: float, period: float) -> list[tuple[float, float]]:
-    """Begin and length of the stretches of times without a gap of over `longest`."""
+    """Return begin and length of the runs of times without a gap longer than `longest`."""
     breaks = np.flatnonzero(np.diff(times) > longest) + 1
     return [(float(part[0]), float(part[-1] - part[0]) + period) for part in np.split(times, breaks) if len(part)]
 
@@ -102,7 +102,7 @@ def _timeline(history: History, facts: Facts, size: Size) -> Figure | None:
                 low, high = facts.answered[each].first_stated
                 stated = [low, high] if np.isfinite(high) else [low]
                 axes.vlines(stated, row - reach, row + reach, color=INK, linewidth=0.9)
-    if size.narrow:  # the names over the bars: beside them there is no room
+    if size.narrow:  # the names are above the bars, because there is no room beside them
         axes.set_yticks([])
         axes.spines["left"].set_visible(False)
         for row, pair in enumerate(pairs):
@@ -115,7 +115,7 @@ def _timeline(history: History, facts: Facts, size: Size) -> Figure | None:
     axes.set_xlabel("s from the first step")
     handles: list[Patch | Line2D] = [Patch(color=CONTACT, label="in contact"), Patch(color=WARNING, label="predicted")]
     if facts.answered:
-        mark = Line2D([], [], color=INK, marker="|", markersize=10, linestyle="", label="when, as first stated")
+        mark = Line2D([], [], color=INK, marker="|", markersize=10, linestyle="", label="first stated time")
         handles.append(mark)
     if facts.possible or any(not alert.certain for pair in pairs for alert in facts.alerts.get(pair, ())):
         handles.append(Patch(color=POSSIBLE, label="possible"))
@@ -130,7 +130,7 @@ def _legend(figure: Figure, handles: list[Patch | Line2D], columns: int) -> None
 
 
 def _predicted(history: History, facts: Facts, size: Size) -> Figure | None:
-    """How wrong each prediction of a collision was, by how long before it was made."""
+    """Draw the error of each prediction of a collision over the time before the contact."""
     chosen = drawn_collisions(facts)
     if not chosen:
         return None
@@ -152,7 +152,7 @@ def _predicted(history: History, facts: Facts, size: Size) -> Figure | None:
     axes.invert_xaxis()
     axes.set_xlabel("s before the contact was first reported")
     axes.set_ylabel("predicted − actual (ms)")
-    handles.append(Patch(color=POSSIBLE, alpha=0.4, label="within the step in which it began"))
+    handles.append(Patch(color=POSSIBLE, alpha=0.4, label="within the step in which the contact began"))
     _legend(figure, handles, 1 if size.narrow else 2)
     return figure
 

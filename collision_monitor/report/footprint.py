@@ -1,4 +1,4 @@
-"""Objects seen from above: outlines in the x-y plane."""
+"""Outlines of objects in the x-y plane, seen from above."""
 
 from __future__ import annotations
 
@@ -14,17 +14,20 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session.history.history import Floats
 
 VIEWING_DIRECTIONS: Final = 64
-"""From which round shapes are looked at."""
+"""Number of directions in the plane from which round shapes are sampled."""
 
 FAR: Final = 1e4
-"""m: how much is drawn of a half-space, more than any picture shows."""
+"""Size to which a half-space is drawn (m). It is larger than any figure."""
 
 _ANGLE: Final = np.linspace(0.0, 2.0 * np.pi, VIEWING_DIRECTIONS, endpoint=False)
 _NORMAL: Final = np.stack([np.cos(_ANGLE), np.sin(_ANGLE), np.zeros(VIEWING_DIRECTIONS)], axis=1)
 
 
 def footprint(described: ObjectDescription, position: Floats, quaternion: Floats) -> list[Floats]:
-    """The outline (n, 2) in m of each of an object's shapes, convex but for polygons; a ground plane has none."""
+    """Return the outline (n, 2) in m of each shape of an object. A nearly level half-space (a ground plane) has none.
+
+    Outlines are convex, except those of polygons.
+    """
     pose = Pose(position, quaternion)
     outlines = [_outline(shape, pose @ offset) for shape, offset in described.shapes]
     return [outline for outline in outlines if outline is not None]
@@ -52,11 +55,11 @@ def _from_above(points: Floats, pose: Pose) -> Floats:
 def _hull(points: Floats, pose: Pose) -> Floats:
     seen = _from_above(points, pose)
     hull = qhull(seen)
-    return seen if hull is None else np.asarray(seen[hull.vertices], np.float64)  # None: it is seen from its edge
+    return seen if hull is None else np.asarray(seen[hull.vertices], np.float64)  # None: the points lie on a line
 
 
 def _round(shape: Shape, pose: Pose) -> Floats:
-    """Where neighbouring lines of sight meet."""
+    """Intersect the tangents of neighbouring directions."""
     far = reach([(shape, Pose((0.0, 0.0, 0.0), pose.quaternion))], _NORMAL)
     after_normal, after = np.roll(_NORMAL, -1, axis=0), np.roll(far, -1)
     area = _NORMAL[:, 0] * after_normal[:, 1] - _NORMAL[:, 1] * after_normal[:, 0]
@@ -66,7 +69,7 @@ def _round(shape: Shape, pose: Pose) -> Floats:
 
 
 def _half_plane(shape: HalfSpace, pose: Pose) -> Floats | None:
-    """What of a half-space lies in its own height: {x : n.x <= offset}."""
+    """Return the section of the half-space {x : n.x <= offset} at the height of its origin, or None if it is level."""
     normal = pose.rotation @ shape.normal
     level = float(np.linalg.norm(normal[:2]))
     if level < 0.1:

@@ -1,4 +1,4 @@
-"""Collisions from above: the tracks around each, and the footprints where the contact began."""
+"""Figure of collisions from above: tracks around each, and footprints at the begin of the contact."""
 
 from __future__ import annotations
 
@@ -18,24 +18,27 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 EVENTS: Final = 6
-"""Collisions that are drawn."""
+"""Largest number of collisions that are drawn."""
 AROUND: Final = 2.0
-"""s of the tracks that are drawn before and after a collision."""
+"""Time before and after a collision for which the tracks are drawn (s)."""
 ZOOM: Final = 4.0
-"""Half the width of a panel is at most this many times the larger body."""
+"""Largest ratio of half the width of a panel to the size of the larger body."""
 POINTS: Final = 400
-"""Of a track, at most."""
+"""Largest number of points of a track."""
 
 
 def chosen_events(facts: Facts) -> list[CollisionEvent]:
-    """The collisions that are drawn: not predicted ones first, those there from the start last; in order of time."""
+    """Return the collisions to draw, in order of time.
+
+    Collisions without a prediction have priority, those from the first step on come last, and deep ones come first.
+    """
     worst = sorted(facts.collisions, key=lambda c: (isnan(c.warned), c.warned > 0.0, c.deepest, c.begin, c.pair))
     worst = worst[:EVENTS]
     return sorted(worst, key=lambda c: (c.begin, c.pair))
 
 
 def from_above(history: History, facts: Facts, size: Size) -> Figure | None:
-    """One panel for each chosen collision; None where there is none."""
+    """Draw one panel for each chosen collision. Return None if there is none."""
     chosen = chosen_events(facts)
     if not chosen:
         return None
@@ -86,7 +89,7 @@ def _panel(axes: Axes, history: History, facts: Facts, collision: CollisionEvent
 
 
 def _middle(history: History, facts: Facts, collision: CollisionEvent) -> Floats:
-    """The point of contact (2,), or where it is not known, the first object that is."""
+    """Return the point of contact (2,), or the position of the first known object if the point is unknown."""
     rows = history.contacts[history.contact_step == collision.step]
     rows = rows[(rows["id_a"] == collision.pair[0]) & (rows["id_b"] == collision.pair[1])]
     points = rows["point_a"][np.isfinite(rows["point_a"]).all(axis=1)]
@@ -97,7 +100,7 @@ def _middle(history: History, facts: Facts, collision: CollisionEvent) -> Floats
 
 
 def _line(path: Track, begin: float) -> Floats:
-    """Positions (n, 3) around a time, with NaN before a jump."""
+    """Return the positions (n, 3) around a time, with NaN before each jump."""
     near = np.flatnonzero(np.abs(path.time - begin) <= AROUND)
     near = near[:: max(-(-len(near) // POINTS), 1)]
     jumps = np.flatnonzero(path.jump[near])
@@ -105,7 +108,7 @@ def _line(path: Track, begin: float) -> Floats:
 
 
 def _zoom(axes: Axes, tracks: list[Floats], bodies: list[Floats]) -> None:
-    """A square about the contact, with what moves and where it came from, as far as that lets the bodies be seen."""
+    """Limit the panel to a square around the contact that shows the tracks, but keeps the bodies visible (ZOOM)."""
     far = max((float(np.abs(each).max()) for each in (*tracks, *bodies) if len(each)), default=0.0)
     largest = max((float(np.ptp(each, axis=0).max()) for each in bodies), default=far)
     half = 1.1 * min(far, ZOOM * largest) or 1.0

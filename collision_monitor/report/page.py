@@ -1,4 +1,4 @@
-"""One HTML file that needs nothing else: the words and tables of a report around its pictures."""
+"""The HTML page of a report: a single file with its sentences, tables and figures."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from collision_monitor.report.rendering import BROAD, NARROW, as_png, as_svg
 from collision_monitor.session.history.history import CollisionEvent, History
 
 ROWS: Final = 200
-"""Collisions in the table."""
+"""Largest number of collisions in the table."""
 
 SWITCHES: Final = 10
-"""Changes of settings that are told."""
+"""Largest number of changed settings that are listed."""
 
 PICTURES: Final = {
     "timeline": "Timeline",
@@ -30,10 +30,10 @@ PICTURES: Final = {
     "events": "From above",
     "steps": "Step times",
 }
-"""Titles of the pictures, by the names that `figures` and `captions` give, in their order on the page."""
+"""Titles of the figures, by the names that `figures` and `captions` use, in their order on the page."""
 
 NOTHING_ELSE: Final = "default-src 'none'; style-src 'unsafe-inline'"
-"""Content security policy: whatever a name may hold, the page runs no script and asks for nothing."""
+"""Content security policy. The page runs no script and loads nothing, even if a name contains HTML."""
 
 STYLESHEET: Final = """\
 :root { color-scheme: light dark; --ink: #1b1f24; --paper: #fff; --soft: #f3f4f6; --line: #d5d9de;
@@ -76,9 +76,9 @@ def write_report(
     pictures: str | Path | None = None,
     overwrite: bool = False,
 ) -> list[Path]:
-    """Write the report, and with `pictures` its figures as PNG into that folder; returns what was written.
+    """Write the report, and its figures as PNG into the folder `pictures`. Return the paths of the written files.
 
-    Raises SessionError where a file is there already and not to be overwritten, or cannot be written.
+    Raises SessionError if a file exists and `overwrite` is false, or if a file cannot be written.
     """
     check_outputs([Path(path)], overwrite)
     facts = gather(history)
@@ -104,7 +104,7 @@ def write_report(
 
 
 def check_outputs(files: list[Path], overwrite: bool) -> None:
-    """Raises SessionError for the first that is there already and may not be overwritten."""
+    """Raise SessionError if a file is a folder, or exists and may not be overwritten."""
     for file in files:
         if file.is_dir():
             raise SessionError(f"{file}: expected a file to write to, got a folder")
@@ -113,7 +113,7 @@ def check_outputs(files: list[Path], overwrite: bool) -> None:
 
 
 def page(history: History, facts: Facts, pictures: dict[str, str]) -> str:
-    """The whole page; pictures: HTML by the names that `figures` gives."""
+    """Return the whole page. pictures: HTML of the figures, by the names that `figures` uses."""
     said = captions(history, facts)
     drawn = [_section(title, said[name], pictures.get(name)) for name, title in PICTURES.items()]
     sections = [_verdict(history, facts), drawn[0], _collisions(history, facts), *drawn[1:], _provenance(history)]
@@ -132,7 +132,7 @@ def _section(title: str, caption: str, picture: str | None) -> str:
 
 
 def _verdict(history: History, facts: Facts) -> str:
-    """First what a reader has to know, and whether it can be relied on."""
+    """Return the headline of the page, with its findings and doubts."""
     found = assess(history, facts)
     moving = sum(not each.static for each in history.objects.values())
     source = "today's answers to the recorded inputs" if history.replayed else "as recorded"
@@ -142,7 +142,7 @@ def _verdict(history: History, facts: Facts) -> str:
     )
     doubts = ""
     if found.doubts:
-        doubts = f'<p class="doubts">There may be more than is known:</p>\n{_list(found.doubts, "doubts")}\n'
+        doubts = f'<p class="doubts">There may be more collisions, because:</p>\n{_list(found.doubts, "doubts")}\n'
     return (
         f'<div class="verdict {found.kind}"><strong>{found.answer}</strong> {extent}\n'
         f"{_list(found.findings, 'findings')}\n{doubts}</div>"
@@ -150,11 +150,11 @@ def _verdict(history: History, facts: Facts) -> str:
 
 
 def _switched(history: History) -> str:
-    """What became of the profile while it ran."""
+    """Return how the profile changed during the session."""
     names = [str(changed["profile"]) for _, changed in history.settings if "profile" in changed]
     if names:
         return f", then {escape(', then '.join(names[:SWITCHES]))}{' and more' if len(names) > SWITCHES else ''}"
-    return ", with settings that changed" if history.settings else ""
+    return ", with changed settings" if history.settings else ""
 
 
 def _list(sentences: list[str], name: str) -> str:
@@ -198,8 +198,9 @@ def _collisions(history: History, facts: Facts) -> str:
     left = len(facts.collisions) - ROWS
     out = f"<p>The first {ROWS}; {left} more left out.</p>" if left > 0 else ""
     return (
-        "<h2>Collisions</h2>\n<p>Times from the first step. First stated: when they would touch, by the first "
-        'prediction.</p>\n<div class="scroll"><table>\n<tr><th>pair</th>'
+        "<h2>Collisions</h2>\n<p>Times count from the first step. Warned: how long before the contact its predictions "
+        'began. First stated: the time of contact by the first prediction.</p>\n<div class="scroll"><table>\n'
+        "<tr><th>pair</th>"
         f"{heads}</tr>\n" + "\n".join(rows) + f"\n</table></div>{out}"
     )
 

@@ -1,4 +1,4 @@
-"""How pictures look, and how they become SVG and PNG: for light and dark pages, broad and narrow."""
+"""Style of the figures, and their conversion to SVG and PNG for light and dark, broad and narrow pages."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CONTACT, WARNING, POSSIBLE = "#d1493f", "#e0912a", "#8a8a8a"
 PALETTE: Final = ("#3b82c4", "#d1493f", "#2e9e5b", "#9b5fc0", "#e0912a", "#1a9fa8")
 
 INK: Final = "#010101"
-"""Of all text and lines that are no data. In SVG it becomes the page's text colour, which is light on dark pages."""
+"""Colour of text and of lines that are not data. In SVG it becomes the text colour of the page, light or dark."""
 
 STYLE: Final[Any] = {
     "font.size": 10,
@@ -26,16 +26,16 @@ STYLE: Final[Any] = {
     "legend.frameon": False,
     "legend.fontsize": 9,
     "legend.handlelength": 1.2,
-    "svg.fonttype": "none",  # the reader's own fonts know the letters of every name
+    "svg.fonttype": "none",  # text, so that the browser's fonts draw the letters of any script
     "svg.hashsalt": "collision_monitor",
-    "text.parse_math": False,  # a name may hold a dollar sign
+    "text.parse_math": False,  # a name may contain a dollar sign
     **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), INK),
 }
 
 
 @dataclass(frozen=True)
 class Size:
-    """For which page: its name, the width of a picture (inches), and how many small pictures stand side by side."""
+    """Size of a page: its name, the width of a figure (inches), and the number of panels side by side."""
 
     name: str
     width: float
@@ -43,7 +43,7 @@ class Size:
 
     @property
     def narrow(self) -> bool:
-        """A phone."""
+        """Whether the page is as narrow as a phone."""
         return self.columns == 1
 
 
@@ -54,7 +54,7 @@ _WITHOUT_METADATA: Final[Any] = dict.fromkeys(("Date", "Creator", "Format", "Typ
 
 
 def shortened(name: str, longest: int = 18) -> str:
-    """The name on one line; of a long one the beginning and the end, for names often differ there."""
+    """Return the name on one line. A long name keeps its beginning and end, where names often differ."""
     name = "".join(letter if letter.isprintable() else " " for letter in name)
     if len(name) <= longest:
         return name
@@ -62,14 +62,14 @@ def shortened(name: str, longest: int = 18) -> str:
 
 
 def as_svg(figure: Figure, name: str) -> str:
-    """The picture as an SVG element to stand in HTML; the same bytes for the same picture.
+    """Return the figure as an SVG element for HTML. Equal figures give equal bytes.
 
-    name: of the picture, unique on the page, in front of all ids: a reference finds its own picture's parts.
+    name: of the figure, unique on the page. It prefixes all ids, so that references stay within the figure.
     """
     text = _saved(figure, format="svg", metadata=_WITHOUT_METADATA, transparent=True).decode()
     text = text[text.index("<svg") :]
     text = re.sub(r'(\sid="|xlink:href="#|url\(#)', rf"\g<1>{name}-", text)
-    text = re.sub(r'\sxmlns(:xlink)?="[^"]*"', "", text)  # HTML knows what an SVG element is
+    text = re.sub(r'\sxmlns(:xlink)?="[^"]*"', "", text)  # HTML needs no namespace for SVG
     text = re.sub(r"(font: [^'\";]*?)'DejaVu Sans'[^\";]*", r"\1system-ui, sans-serif", text)
     text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.DOTALL)
     text = text.replace("<svg ", f'<svg role="img" aria-label="{name}" ', 1)
@@ -77,13 +77,13 @@ def as_svg(figure: Figure, name: str) -> str:
 
 
 def as_png(figure: Figure) -> bytes:
-    """The picture as PNG on white."""
+    """Return the figure as PNG on a white background."""
     return _saved(figure, format="png", dpi=150, metadata={"Software": None})
 
 
 def _saved(figure: Figure, **options: Any) -> bytes:
     buffer = BytesIO()
     with mpl.rc_context(STYLE), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing from font")  # of a name in other letters
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")  # for names in other scripts
         figure.savefig(buffer, **options)
     return buffer.getvalue()

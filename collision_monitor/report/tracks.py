@@ -1,4 +1,4 @@
-"""Where objects were, and how far apart, from the recorded states."""
+"""Positions and distances of objects, computed from the recorded states."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ from collision_monitor.records import StateFlag
 from collision_monitor.session.history.history import Floats, History, Pair
 
 MOST_PIECE_PAIRS: Final = 64
-"""Most pairs of convex pieces that a distance is taken of; beyond, the objects' convex hulls stand for them."""
+"""Largest number of pairs of convex pieces for a distance. Beyond it, the convex hulls replace the objects."""
 
 MOST_TIMES: Final = 800
-"""Times at which the distance of a pair is drawn, at most."""
+"""Largest number of times at which the distance of a pair is computed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
     """States of one object: time (n,) s, position (n, 3) m, quaternion (n, 4), linear (n, 3) m/s, angular (n, 3) rad/s.
 
-    jump (n,): it was moved there, and not on a way from the state before. A static object has one state, from always.
+    jump (n,): the object jumped to this state and did not move from the state before. A static object has one state,
+    with time -inf.
     """
 
     time: Floats
@@ -37,9 +38,9 @@ class Track:
     jump: NDArray[np.bool_]
 
     def at(self, times: Floats) -> tuple[Floats, Floats, Floats]:
-        """Positions (k, 3), quaternions (k, 4), each carried on from the last state before, and its age (k,) s.
+        """Return positions (k, 3) and quaternions (k, 4), extrapolated from the last state, and its age (k,) s.
 
-        Before the first state the age is NaN.
+        The age is NaN before the first state, and 0 for a static object.
         """
         i = np.searchsorted(self.time, times, side="right") - 1
         with np.errstate(invalid="ignore"):
@@ -50,7 +51,7 @@ class Track:
 
 
 class Tracks:
-    """The tracks of a history's objects, by id."""
+    """Tracks of the objects of a history, by id."""
 
     def __init__(self, history: History) -> None:
         self._history = history
@@ -59,7 +60,7 @@ class Tracks:
         self._found: dict[int, Track | None] = {}
 
     def __getitem__(self, object_id: int) -> Track | None:
-        """None where nothing usable is known."""
+        """Return the track of an object, or None if it has no usable state."""
         if object_id not in self._found:
             self._found[object_id] = self._read(object_id)
         return self._found[object_id]
@@ -84,7 +85,7 @@ class Tracks:
         return Track(time, rows["position"].copy(), rows["quaternion"].copy(), linear, angular, jump)
 
     def distance(self, pair: Pair) -> tuple[Floats, Floats] | None:
-        """Times (n,) and signed distances (n,), NaN where a state is missing; None where nothing is known."""
+        """Return times (n,) and signed distances (n,) in m, NaN without a recent state. None if nothing is known."""
         history, (a, b) = self._history, (self[object_id] for object_id in pair)
         if a is None or b is None or any(i not in history.objects for i in pair) or not len(history.times):
             return None
@@ -99,11 +100,11 @@ class Tracks:
         distance[~((at_a[2] <= oldest) & (at_b[2] <= oldest))] = np.nan
         jumps = np.searchsorted(times, np.concatenate([each.time[each.jump] for each in (a, b)]))
         jumps = np.unique(jumps[(jumps > 0) & (jumps < len(times))])
-        return np.insert(times, jumps, times[jumps]), np.insert(distance, jumps, np.nan)  # no line across a jump
+        return np.insert(times, jumps, times[jumps]), np.insert(distance, jumps, np.nan)  # breaks the line at a jump
 
 
 def _distances(a: Modelled, b: Modelled, at_a: tuple[Floats, Floats], at_b: tuple[Floats, Floats]) -> Floats:
-    """Least signed distances (n,) over the pieces of two objects at these positions and quaternions."""
+    """Smallest signed distances (n,) of the pieces of two objects at these positions and quaternions."""
     count = len(at_a[0])
     R_WA, R_WB = rotation_matrix(at_a[1]), rotation_matrix(at_b[1])
     builder = ShapeTableBuilder()

@@ -1,4 +1,4 @@
-"""The suite of the extremes: its exact answers are right, it passes, and it does not where an answer is wrong."""
+"""Tests of the extremes: the exact answers are correct, all bounds hold, and a wrong answer is detected."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 def test_exact_answers_that_are_known() -> None:
     assert exact.sphere_sphere((0, 0, 0), (3, 4, 0), 1.0, 1.5) == Decimal("2.5")
-    quarter = (0.0, 0.0, 1.0, 1.0)  # of any length
+    quarter = (0.0, 0.0, 1.0, 1.0)  # a quaternion of any length
     assert exact.sphere_box((3, 0, 0), 0.5, (0, 0, 0), quarter, (2, 4, 2)) == Decimal("0.5")
     assert exact.sphere_box((0, 0, 0.75), 0.5, (0, 0, 0), UPRIGHT, (2, 4, 2)) == Decimal("-0.75")
     apart = exact.capsule_capsule((0, 0, 0), UPRIGHT, 0.5, 2.0, (3, 0, 5), UPRIGHT, 0.5, 2.0)
@@ -65,7 +65,7 @@ def test_a_wrong_answer_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_nearly_parallel_capsules_state_how_far_off_they_may_be() -> None:
-    """At 1e-10 rad the cores count as parallel and are compared in their middle: an end is nearer by up to 1e-10."""
+    """At 1e-10 rad the cores count as parallel. The answer uses their middle, and an end is nearer by up to 1e-10."""
     worst = 0.0
     rng = np.random.default_rng(3)
     for _ in range(200):
@@ -82,7 +82,7 @@ def test_nearly_parallel_capsules_state_how_far_off_they_may_be() -> None:
 @pytest.mark.parametrize("gap", [1e-15, 1e-12, 1e-9])
 @pytest.mark.parametrize("scale", [1e-140, 1e-9, 1.0, 1e9])
 def test_the_time_of_a_tiny_gap_is_within_its_interval(gap: float, scale: float) -> None:
-    """The difference of the squares loses the gap's digits: both ends of the interval have to allow for it."""
+    """The difference of the squares loses digits of the gap. Both ends of the interval must include this error."""
     rng = np.random.default_rng(4)
     for _ in range(50):
         r, s = rng.uniform(0.3, 1.0, 2) * scale

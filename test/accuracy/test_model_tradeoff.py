@@ -1,4 +1,4 @@
-"""Models of meshes against the meshes: what is known of them beforehand, and the command."""
+"""Tests of models of meshes against the meshes, on bodies with known distances, and of the command."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from collision_monitor.world.arm import lathe
 from collision_monitor.world.scene import state_array
 
 REEL = lathe([(0, -0.5), (0.4, -0.5), (0.4, -0.4), (0.1, -0.4), (0.1, 0.4), (0.4, 0.4), (0.4, 0.5), (0, 0.5)], 4)
-"""A thin core between two square flanges: its hull is a box of 0.4 sqrt(2) x 0.4 sqrt(2) x 1 m."""
+"""A thin core between two square flanges. Its hull is a box of 0.4 sqrt(2) x 0.4 sqrt(2) x 1 m."""
 BALL = lathe([(0, -0.05), (0.05, 0), (0, 0.05)], 4)
 OBJECTS = [ObjectDescription(1, REEL), ObjectDescription(2, BALL, static=True, pose=Pose((1, 0, 0)))]
 
 
 def approach(steps: int = 5) -> list[Step]:
-    """The reel comes along x until the ball is 5 cm from its core, between the flanges."""
+    """Return steps in which the reel moves along x until the ball is between its flanges, 5 cm from its core."""
     found = []
     for k, x in enumerate(np.linspace(0.4, 0.8, steps)):
         states = state_array(np.array([1], np.uint32))
@@ -38,7 +38,7 @@ def approach(steps: int = 5) -> list[Step]:
 def test_what_is_known_of_a_reel_and_a_ball() -> None:
     exact, sphere, hull = model_tradeoff("reel", OBJECTS, approach(), ["sphere", "convex_hull"])
     assert (exact.model, exact.alarms, exact.distance_error_m) == ("exact", 0, 0.0)
-    # the corners point along x: the flanges reach 0.4 m, the core 0.1 m, and the ball's corner 0.05 m
+    # the corners point along x: the flanges reach to 0.4 m, the core to 0.1 m, and the corner of the ball to 0.05 m
     assert (hull.model, hull.misses, hull.outside_bound) == ("convex_hull", 0, 0)
     assert hull.alarms == hull.false_alarms == 3, "from x = 0.6 m on the ball is between the flanges"
     assert hull.distance_error_m > 0.25

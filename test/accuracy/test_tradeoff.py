@@ -1,4 +1,4 @@
-"""What the trade-off counts, on pairs whose answers are known beforehand, and its command."""
+"""Tests of the numbers of the trade-off, on pairs with known answers, and of its command."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TWO = [ObjectDescription(1, Sphere(0.5)), ObjectDescription(2, Sphere(0.5))]
 
 
 def passing(beside: float, steps: int = 20) -> list[Step]:
-    """Sphere 2 passes sphere 1 at 1 m/s, `beside` metres off its middle."""
+    """Return steps in which sphere 2 passes sphere 1 at 1 m/s, at a distance of `beside` (m) from its centre."""
     found = []
     for k in range(steps):
         states = state_array(np.array([1, 2], np.uint32))
@@ -55,7 +55,7 @@ def test_a_hit_is_seen_by_all_and_its_time_is_known_to_the_tolerance() -> None:
 
 
 def test_what_may_happen_by_what_is_uncertain_is_no_alarm() -> None:
-    """A near miss of states that declare 2 cm: `exact` tells the pair as POSSIBLE, which the truth knows nothing of."""
+    """A near miss of states that declare 2 cm. `exact` reports the pair as POSSIBLE; the exact answers lack it."""
     steps = passing(1.005)
     for _, states in steps:
         states["position_stddev"] = 0.02
@@ -69,7 +69,7 @@ def test_what_may_happen_by_what_is_uncertain_is_no_alarm() -> None:
 
 
 def test_an_interval_beside_the_truth_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The truth of another course of the same objects: every interval is beside it."""
+    """The exact answers belong to slower motions of the same objects, so no interval contains the exact time."""
     right = ReferenceMonitor.step
     monkeypatch.setattr(ReferenceMonitor, "step", lambda self, stamp, states: right(self, stamp, _slower(states)))
     (row,) = profile_tradeoff("hit", TWO, passing(0.0, 5), ["exact"])
@@ -83,7 +83,7 @@ def _slower(states: NDArray[np.void]) -> NDArray[np.void]:
 
 
 def test_the_fleet_as_a_localiser_sees_it_is_what_fast_is_for(capsys: pytest.CaptureFixture[str]) -> None:
-    """The states declare 5 mm: `exact` says how likely each pair meets, anew in each step; `fast` does neither."""
+    """The states declare 5 mm. `exact` recomputes the probability of each pair in each step; `fast` computes none."""
     assert main(["tradeoff", "--scene", "fleet", "--seconds", "0.3", "--json"]) == 0
     fast, _, exact = json.loads(capsys.readouterr().out)["rows"]
     assert fast["scene"] == "fleet" and fast["noise"] == 0.005

@@ -1,4 +1,4 @@
-"""Tuning: the cheapest settings that keep the demands, as a file for the node; and what fails where none does."""
+"""Tests of tuning: the cheapest settings that meet the demands, their parameter file, and the failed demands."""
 
 from __future__ import annotations
 

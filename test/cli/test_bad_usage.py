@@ -1,4 +1,4 @@
-"""What a person may mistype: one line that says what was expected, no traceback, an exit code that tells it apart."""
+"""Tests of wrong usage: one line with the expected input, no traceback, and a distinct exit code."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_numbers_out_of_range_are_wrong_usage(
     with pytest.raises(SystemExit) as stopped:
         make_parser().parse_args(arguments)
     assert stopped.value.code == 2
-    error = capsys.readouterr().err.splitlines()[-1]  # below the usage
+    error = capsys.readouterr().err.splitlines()[-1]  # the line below the usage
     assert "expected a" in error and f"got {arguments[-1]!r}" in error
 
 

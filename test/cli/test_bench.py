@@ -1,4 +1,4 @@
-"""`collision-monitor bench`: its numbers, its formats and its errors."""
+"""Tests of `collision-monitor bench`: its numbers, formats and errors."""
 
 from __future__ import annotations
 

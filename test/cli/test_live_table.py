@@ -1,4 +1,4 @@
-"""The live table and its line, drawn from known messages."""
+"""Tests of the live table and its one-line form, drawn from known messages."""
 
 import numpy as np
 from rich.console import Console

@@ -1,4 +1,4 @@
-"""What every command shares: help, version, one-line errors, exit codes."""
+"""Tests of what all commands share: help, version, one-line errors, exit codes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture
 def command_that(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], int]], None]:
-    """Give the parser one command, `act`, that does this."""
+    """Replace all commands by one command, `act`, that calls the given function."""
 
     def make(act: Callable[[], int]) -> None:
         parser = argparse.ArgumentParser()
@@ -92,7 +92,7 @@ def test_an_interrupt_is_quiet(
 
 
 def test_a_reader_that_goes_away_is_no_error() -> None:
-    """As in `collision-monitor … | head -1`, with more output than a pipe holds."""
+    """The reader closes the pipe, as in `collision-monitor … | head -1`, before all output is written."""
     code = (
         "import argparse, sys; from collision_monitor.cli import main as m\n"
         "p = argparse.ArgumentParser()\n"

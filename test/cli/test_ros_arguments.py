@@ -1,4 +1,4 @@
-"""Options become ROS parameters that ROS reads back as they were given."""
+"""ROS reads options back with the value and type that were given."""
 
 from pathlib import Path
 

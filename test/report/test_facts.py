@@ -1,4 +1,4 @@
-"""The facts of a report: what happened in sessions of which it is known, and what became of each prediction."""
+"""Tests of the facts of a report, on sessions with known events and known outcomes of each prediction."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_a_drive_and_a_warning_that_came_to_nothing(drive: Path) -> None:
     (collision,) = facts.collisions
     assert collision.pair == (1, 2)
     assert 1.5 <= collision.begin <= 1.5 + STEP  # the front of its ball is at 0.7 m, the post's at 2.2 m
-    assert collision.warned == pytest.approx(collision.begin)  # from the first step on
+    assert collision.warned == pytest.approx(collision.begin)  # predicted from the first step on
     assert facts.surprises == facts.possible == facts.gaps == []
     assert [alert.pair for alert in facts.nothing] == [(1, 3)]
     assert facts.nothing[0].time[-1] == pytest.approx(0.5, abs=1.5 * STEP)
@@ -116,15 +116,15 @@ def test_nothing_is_concluded_across_a_gap(tmp_path: Path) -> None:
     history = read_history(Session(record_states(tmp_path / "gaps.mcap", descriptions, seen)))
     facts = gather(history)
     assert np.ravel(facts.gaps) == pytest.approx([0.3, 1.2, 1.78, 2.62], abs=STEP)
-    assert not facts.nothing  # of the ball nothing is known after 0.3 s
+    assert not facts.nothing  # the state of the ball is unknown after 0.3 s
     first = next(each for each in facts.collisions if each.pair == (1, 2))
-    assert first.warned == pytest.approx(0.3, abs=2 * STEP)  # since the gap
-    assert [each.pair for each in facts.collisions].count((1, 2)) == 1  # it is known to have lasted through the second
+    assert first.warned == pytest.approx(0.3, abs=2 * STEP)  # the predictions before the gap do not count
+    assert [each.pair for each in facts.collisions].count((1, 2)) == 1  # it lasts through the second gap
 
 
 def test_the_end_of_a_contact_that_nobody_saw_is_not_known(tmp_path: Path) -> None:
     descriptions, states = drive_states(2.0)
-    later = [(t + 5.0, rows) for t, rows in drive_states(0.5)[1]]  # they are apart again
+    later = [(t + 5.0, rows) for t, rows in drive_states(0.5)[1]]  # the objects are apart again
     history = read_history(Session(record_states(tmp_path / "gap.mcap", descriptions, [*states, *later])))
     (collision,) = (each for each in history.collisions if each.pair == (1, 2))
     assert collision.end is None and collision.last == pytest.approx(1.98)

@@ -1,4 +1,4 @@
-"""The page of a report: it holds the facts, stands alone, is safe, and says first what is missing."""
+"""Tests of the report page: it shows the facts, loads nothing else, is safe, and states first what is missing."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ VOID = ("meta", "br")
 
 
 class Page(HTMLParser):
-    """What is on a page; its tags must be closed in order."""
+    """Tags and text of a page. Asserts that all tags are closed in order."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -58,7 +58,7 @@ def test_the_page_says_what_happened(crossing: Path, tmp_path: Path) -> None:
     page = Page(report(crossing, tmp_path))
     encounters = [each for each in Crossing(None, None).expected if each.begin is not None]
     assert f"{len(encounters)} collisions" in page.text
-    assert f"{len(encounters)} were predicted: 2.00 s ahead at the least" in page.text
+    assert f"{len(encounters)} were predicted: at least 2.00 s ahead" in page.text
     assert "There may be more" not in page.text
     assert ("div", {"class": "verdict collisions"}) in page.tags
     for words in ("head_on_left – head_on_right", "determinism key", "digest at the last", "balanced: horizon 2"):
@@ -70,7 +70,7 @@ def test_the_page_says_what_happened(crossing: Path, tmp_path: Path) -> None:
 def test_the_page_stands_alone_and_names_are_harmless(drive: Path, tmp_path: Path) -> None:
     text = report(drive, tmp_path)
     page = Page(text)
-    assert NASTY in page.text  # as text, twice escaped nowhere
+    assert NASTY in page.text  # as text, and never escaped twice
     assert "<script" not in text
     assert not any(word in text for word in ("http:", "https:", "//", "@import", "javascript:"))
     ids = [attributes["id"] for _, attributes in page.tags if attributes.get("id")]
@@ -89,7 +89,7 @@ def test_nothing_is_called_clear_that_was_not_seen(tmp_path: Path) -> None:
     (tmp_path / "cut.mcap").write_bytes(whole[: whole.rindex(b"\x0f\x04\0\0\0\0\0\0\0") + 5])
     text = report(tmp_path / "cut.mcap", tmp_path, "cut.html")
     assert 'class="verdict unknown"' in text
-    assert "No collision is known of, but not all is known" in text
+    assert "No known collision, but not everything is known" in text
     assert "the recording was cut off" in text
 
 
@@ -102,7 +102,7 @@ def test_a_session_without_answers_or_shapes_says_so(tmp_path: Path) -> None:
     scene = Crossing(None, None)
     record_states(tmp_path / "bare.mcap", [], played(scene, 0.2))
     text = report(tmp_path / "bare.mcap", tmp_path, "bare.html")
-    assert "no object is described in it" in text
+    assert "the session describes no object" in text
     assert "unknown id" in text and 'class="verdict unknown"' in text
 
 
@@ -130,7 +130,7 @@ def test_the_command_writes_pages_and_pictures(drive: Path, tmp_path: Path) -> N
     answer = run(drive, "--replay", "fast", "--png", "png")
     assert answer.returncode == 0, answer.stderr
     assert answer.stdout.splitlines() == ["drive.html", *(f"png/{name}.png" for name in PICTURES)]
-    assert answer.stderr == ""  # no bar where there is no terminal
+    assert answer.stderr == ""  # no progress bar without a terminal
     assert "today's answers to the recorded inputs" in (tmp_path / "drive.html").read_text()
     assert all((tmp_path / f"png/{name}.png").read_bytes().startswith(b"\x89PNG") for name in PICTURES)
 
