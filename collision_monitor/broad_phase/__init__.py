@@ -1,1 +1,1 @@
-"""Which pairs can be near each other: grids, and brute force as their reference."""
+"""Broad phase: pairs whose bounds overlap, by grids and trees, with brute force as the reference."""
