@@ -65,7 +65,7 @@ def inlined(function: F) -> F:
 
 
 def parallel_kernel(function: F) -> F:
-    """Compile a kernel whose `prange` loops run on all threads; each iteration must write to its own elements."""
-    # only explicit loops: numba would also move and merge loops across calls whose side effects it does not see
+    """Compile a kernel that runs its `prange` loops on all threads; each iteration must write to its own elements."""
+    # only explicit loops: numba would also move and merge loops across calls with side effects that it does not see
     others = ("comprehension", "reduction", "inplace_binop", "setitem", "numpy", "stencil", "fusion")
     return _compile(function, {**_OPTIONS, "parallel": dict.fromkeys(others, False)})

@@ -1,1 +1,1 @@
-"""Broad phase: pairs whose bounds overlap, by grids and trees, with brute force as the reference."""
+"""Broad phase: pairs with overlapping bounds, by grids and trees, with brute force as the reference."""

@@ -47,7 +47,7 @@ def overlaps_in_ranges(low: Array, high: Array, box: Indices, first: Indices, co
 
 
 def overlaps(low: Array, high: Array, i: Indices, j: Indices) -> Indices:
-    """Pairs (M, 2) among the pairs i, j whose boxes overlap or touch; axis by axis, as most fail on the first."""
+    """Pairs (M, 2) among i, j with boxes that overlap or touch; tests axis by axis, as most fail on the first."""
     for axis in range(low.shape[1]):
         meet = (low[i, axis] <= high[j, axis]) & (low[j, axis] <= high[i, axis])
         i, j = i[meet], j[meet]

@@ -42,7 +42,7 @@ class BspTree(NamedTuple):
 
 
 def bsp_tree(vertices: ArrayLike, faces: ArrayLike) -> BspTree:
-    """Build the tree of a closed mesh (vertices (n, 3) in m, faces (m, 3)) whose surface does not cross itself.
+    """Build the tree of a closed mesh (vertices (n, 3) in m, faces (m, 3)) without self-intersections.
 
     A scene of disjoint solids is also one mesh. Raises ShapeError.
     """
@@ -125,8 +125,10 @@ def _cut(corners: Array, height: Array, here: Booleans, there: Booleans) -> Arra
 
 
 def locate_in_bsp_tree(points: ArrayLike, tree: BspTree) -> Signs:
-    """Location (...) of points (..., 3) in m. Within the planes' thickness of the surface the answer is BOUNDARY or
-    the location on either side."""
+    """Location (...) of points (..., 3) in m.
+
+    Within the planes' thickness of the surface, it is BOUNDARY or the location on one of the sides.
+    """
     points = coordinates(points, "points", 3)
     p = points.reshape(-1, 3)
     met = np.zeros((2, len(p)), bool)  # outside, inside

@@ -290,7 +290,7 @@ def places(grid: Any, a: int) -> Any:
 
 @inlined
 def keep_overlapping(grid: Any, bounds: Any, p: int, low: int, high: int, found: Any, n: int) -> int:
-    """Append the places low ... high - 1 whose bounds overlap those of place p to found[n:]; returns the new n."""
+    """Append the places low ... high - 1 with bounds that overlap those of place p to found[n:]; return the new n."""
     x, y, z = grid.centre[0, p], grid.centre[1, p], grid.centre[2, p]
     own = Region(x, y, z, bounds.extent[0, p], bounds.extent[1, p], bounds.extent[2, p])
     for q in range(low, max(high, low + 1), LANES):  # also tests an empty range, which is cheaper than a branch
@@ -308,7 +308,7 @@ def keep_overlapping(grid: Any, bounds: Any, p: int, low: int, high: int, found:
 
 @inlined
 def _of_row(grid: Any, inverse: float, y: int, z: int, found: Any, begin: int, n: int) -> int:
-    """Keep those of found[begin:n] whose cell is in the row (y, z), as other rows can hash to the same cells."""
+    """Keep the places in found[begin:n] that are in the row (y, z), as other rows can hash to the same cells."""
     kept = begin
     for m in range(begin, n):
         q = found[m]

@@ -1,7 +1,7 @@
 """Hashed uniform grid with one resolution per size class, updated object by object.
 
-Each box is stored in exactly one cell: the cell of its centre, at the level whose cells are at least half as wide as
-the box. A query visits the cells from which a box of the level could reach, so mixed sizes cost one lookup per occupied
+Each box is stored in exactly one cell: the cell of its centre, at the level with cells at least half as wide as the
+box. A query visits the cells from which a box of the level could reach, so mixed sizes cost one lookup per occupied
 level. Cells are chains in a hash table, so that empty space costs nothing.
 Source: lecture slides "Efficient collision detection: spatial partitioning" (hash tables, multiresolution grids).
 """
@@ -81,7 +81,7 @@ def regridded(box: NDArray[np.void], capacity: int) -> HashedGrid:
 
 @device
 def _level_of(width):
-    """Return the finest level whose cells are at least `width` wide."""
+    """Return the finest level with cells at least `width` wide."""
     if not width < 2.0**62:
         return GRID_LEVELS - 1
     exponent = frexp(width)[1] if width > 0.0 else -LEVEL_OFFSET

@@ -1,6 +1,6 @@
 """Overlap tests of one body against eight others at a time; the results are the bits of a number.
 
-LLVM does not vectorise a loop whose output positions depend on earlier results, so the vectors are written out
+LLVM does not vectorise a loop with output positions that depend on earlier results, so the vectors are written out
 here. The docstrings give the equivalent scalar formulas.
 """
 

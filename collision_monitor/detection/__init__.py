@@ -1,1 +1,1 @@
-"""Detection of all contacts of one frame, for objects whose poses are all new."""
+"""Detection of all contacts of one frame, for objects that all have new poses."""

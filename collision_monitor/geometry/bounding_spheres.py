@@ -71,7 +71,7 @@ def sphere_grown(points: ArrayLike) -> BoundingSphere:
 
 
 def minimal_sphere(points: ArrayLike) -> BoundingSphere:
-    """The smallest sphere, to about 1e-12 of its radius. Expected O(n). (Welzl, Smallest enclosing disks, 1991)"""
+    """Smallest sphere, to about 1e-12 of its radius. Expected O(n). (Welzl, Smallest enclosing disks, 1991)"""
     points = point_set(points, "points")
     outer = np.unique(_outer(points), axis=0)
     base = outer.mean(axis=0)

@@ -59,7 +59,7 @@ class Obb(NamedTuple):
 
     @property
     def corners(self) -> Array:
-        """The eight corners (..., 8, 3) in m."""
+        """Eight corners (..., 8, 3) in m."""
         signs = np.array(list(product((-1.0, 1.0), repeat=3)))
         return np.asarray(
             self.center[..., None, :] + (signs * self.half_extents[..., None, :]) @ np.swapaxes(self.rotation, -1, -2)

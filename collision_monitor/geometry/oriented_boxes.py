@@ -25,7 +25,7 @@ OUTLINE: Final = 128
 
 FACE_NORMALS: Final = 256
 """Largest number of hull faces, the largest first, that a box is aligned with.
-Larger: seconds for round hulls of a thousand faces, whose boxes are all alike. Smaller: the best face may be missed."""
+Larger: seconds for round hulls of a thousand similar faces. Smaller: the best face may be missed."""
 
 DISTINCT: Final = 1e-9
 """Directions closer than this count as equal."""

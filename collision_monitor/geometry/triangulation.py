@@ -37,7 +37,7 @@ def triangulate(points: ArrayLike) -> Indices:
 
 
 def _ear(ring: Array) -> int:
-    """First left turn of a counter-clockwise ring whose triangle, boundary included, contains no other corner."""
+    """First left turn of a counter-clockwise ring with no other corner in its triangle, boundary included."""
     before, after = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0)
     turn = np.asarray(orient2d(before, ring, after))
     # the corner of the ring nearest to an ear inside its triangle is always reflex or straight

@@ -122,7 +122,7 @@ def _grown(hull: Hull, by: float) -> Hull:
 
 
 def _uncovered(polygons: list[Array], hulls: list[Hull], slack: float) -> list[Array]:
-    """Parts of convex polygons (k, 3) that are in none of the hulls, whose planes are moved outward by `slack`."""
+    """Parts of convex polygons (k, 3) that are in none of the hulls after moving their planes outward by `slack`."""
     for hull in hulls:
         normal, offset = _planes(hull)
         low, high = hull.vertices.min(axis=0) - slack, hull.vertices.max(axis=0) + slack

@@ -205,7 +205,7 @@ def _box(size: Array) -> Box:
 
 
 def _corners(pieces: PosedShapes) -> Array:
-    """Points whose hull contains the pieces: vertices of polytopes, corners of boxes around round shapes."""
+    """Points with a hull that contains the pieces: vertices of polytopes, corners of boxes around round shapes."""
     corners = []
     for shape, pose in pieces:
         if isinstance(shape, ConvexHull | Triangle):
