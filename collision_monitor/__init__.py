@@ -1,20 +1,21 @@
-"""What touches now, what will touch next, when, how sure that is and what it costs to know.
+"""Collision monitoring: current contacts, predicted collisions with their times, and the uncertainty of both.
 
     monitor.monitor                Monitor, StepResult, StepStatus        states in, contacts and predictions out
     settings.profile               Profile                                the settings that trade speed for accuracy
-    geometry.shapes, .pose         Sphere, Box, …, Pose, Motion           what objects are made of and where they are
+    geometry.shapes, .pose         Sphere, Box, …, Pose, Motion           shapes of objects, and their poses
     objects.description            ObjectDescription                      an object with its shapes, group and bounds
     objects.convex_decomposition   convex_decomposition, Decomposition    a concave mesh as convex parts, with an error
     query.contact                  contact, Contact                       two shapes: distance, normal, points, bound
-    query.features                 contact_features                       what touches: "vertex 3 of A on face 7 of B"
-    query.overlap                  overlap                                yes or no, by the test that one chooses
-    query.time_of_impact           time_of_impact, Impact                 when two shapes meet, as an interval
+    query.features                 contact_features                       features: "vertex 3 of A on face 7 of B"
+    query.overlap                  overlap                                yes or no, with a choice of tests
+    query.time_of_impact           time_of_impact, Impact                 time of impact of two shapes, as an interval
     query.time_of_impact_batch     time_of_impact_batch, Impacts          the same for many motions of two shapes
     query.feature_impact           vertex_face_impact, edge_edge_impact   the same for features in linear motion
-    records                        Model                                  what can stand for an object
-    errors                         CollisionMonitorError and its kinds    what can be wrong with an input
+    records                        Model                                  the geometric models of an object
+    errors                         CollisionMonitorError and subclasses   errors of the inputs
 
-The names on the right are those of this module: `collision_monitor.contact`. Each is imported at its first use.
+This module exports the names in the second column, such as `collision_monitor.contact`. Each name is imported at its
+first use.
 """
 
 from __future__ import annotations
@@ -112,7 +113,7 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:
-    """Import on first use: `collision-monitor --help` must not wait for the kernels."""
+    """Import the name at its first use, so that `collision-monitor --help` does not wait for the kernels."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
@@ -121,5 +122,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """The names of the API too, which are not there before their first use: for tab completion."""
+    """Include the names of the API that are not imported yet, for tab completion."""
     return sorted({*globals(), *__all__})

@@ -1,4 +1,4 @@
-"""What can be wrong with what a user hands over, as an exception tree and as the reasons the monitor counts."""
+"""Exceptions of this package, and the reasons for which the monitor refuses an input."""
 
 from __future__ import annotations
 
@@ -6,39 +6,39 @@ from enum import Enum
 
 
 class CollisionMonitorError(Exception):
-    """Base of every error that this package raises on purpose; its text is meant for people."""
+    """Base class of all errors that this package raises on purpose, with a text for users."""
 
 
 class InputError(CollisionMonitorError, ValueError):
-    """An argument is not what was expected."""
+    """An argument is invalid."""
 
 
 class ShapeError(InputError):
-    """A shape that cannot exist: negative, empty, flat where a solid is needed, indices out of range."""
+    """A shape is impossible: negative or empty, flat instead of solid, or with indices out of range."""
 
 
 class PoseError(InputError):
-    """A pose or motion with non-finite numbers or a quaternion that is not of unit length."""
+    """A pose or motion has non-finite numbers or a quaternion that is not of unit length."""
 
 
 class UnsupportedError(CollisionMonitorError, NotImplementedError):
-    """A pair, model or method that is not offered; the text lists what is."""
+    """A pair, model or method is not supported; the text lists the supported ones."""
 
 
 class ProfileError(InputError):
-    """A setting with an unknown name or an impossible value; the text lists the choices."""
+    """A setting has an unknown name or an impossible value; the text lists the choices."""
 
 
 class MessageError(CollisionMonitorError):
-    """Bytes that are not the message that was expected."""
+    """The bytes are not the expected message."""
 
 
 class SessionError(CollisionMonitorError):
-    """A recording that cannot be opened, read or written."""
+    """A recording cannot be opened, read or written."""
 
 
 class Refusal(Enum):
-    """Why the monitor refused an input; each is counted in the status under `refused_<value>`."""
+    """Reason for which the monitor refused an input; the status counts each as `refused_<value>`."""
 
     MALFORMED = "malformed"
     FRAME = "frame"

@@ -1,7 +1,7 @@
-"""The arrays that go in and out of the monitor: structured dtypes with exactly the layout of the messages.
+"""Arrays of the monitor's input and output: structured dtypes with exactly the layout of the messages.
 
 An array of these dtypes has the bytes of the message's sequence in little-endian CDR, so it is published and
-recorded without conversion. Units, frames and signs are written in `collision_monitor_msgs/msg/*.msg`.
+recorded without conversion. `collision_monitor_msgs/msg/*.msg` documents units, frames and signs.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ PREDICTION = np.dtype(
 
 
 MOST_POINTS = 4
-"""Rows that one contact may have in a ContactArray: the corners that stand for a patch."""
+"""Largest number of rows of one contact in a ContactArray: the corners that represent a contact patch."""
 
 
 class StateFlag(IntFlag):
@@ -126,7 +126,7 @@ class Method(IntEnum):
 
 
 class Model(IntEnum):
-    """`ObjectDescription.model` and the `model_*` fields of answers."""
+    """`ObjectDescription.model` and the `model_*` fields of contacts and predictions."""
 
     AUTO = 0
     EXACT = 1
@@ -160,6 +160,6 @@ Rows = NDArray[np.void]
 
 
 def joined(parts: Sequence[Rows]) -> Rows:
-    """`np.concatenate` of arrays of one structured type."""
+    """Concatenate arrays of one structured dtype."""
     kind = parts[0].dtype
     return np.concatenate([part.view(f"V{kind.itemsize}") for part in parts]).view(kind)

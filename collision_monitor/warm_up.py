@@ -1,6 +1,6 @@
-"""Compile every kernel ahead, so that neither the first step of a session nor a first call waits for the compiler.
+"""Compile every kernel in advance, so that neither a session's first step nor a first call waits for the compiler.
 
-    python -m collision_monitor.warm_up [monitor | functions]      without a name: both, one after the other
+    python -m collision_monitor.warm_up [monitor | functions]      without an argument: both, one after the other
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from collision_monitor.geometry.shapes import Box, Shape, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.records import STATE
 
-OBJECTS = 70  # more than the arrays have room for at first: growing them is warmed up too
+OBJECTS = 70  # more than the initial capacity of the arrays, so that growing them is compiled too
 
 
 def warm_up_monitor() -> None:
-    """Step a small scene through all that a step can do; the compiled kernels stay in the cache."""
+    """Step a small scene through every part of a step; the compiled kernels stay in the cache."""
     monitor = Monitor()
     monitor.add(OBJECTS, Box((500, 10, 1)), static=True, pose=Pose((0, 0, -0.5)))
     for object_id in range(OBJECTS):
@@ -34,17 +34,17 @@ def warm_up_monitor() -> None:
     for step in range(20):
         monitor.step(step * 100_000_000, np.arange(OBJECTS), poses, twists)
         poses[:, :3] += 0.1 * twists[:, :3]
-        twists[step, :] *= -1.0  # one leaves its motion
+        twists[step, :] *= -1.0  # one object leaves its predicted motion
     monitor.remove(1)
     monitor.step(3_000_000_000, np.arange(2, OBJECTS), poses[2:], twists[2:])
     _step_uncertain(monitor, poses[2:])
-    for step, pairs in enumerate((1, 1, 1_000_000)):  # the last with time for what the others left
+    for step, pairs in enumerate((1, 1, 1_000_000)):  # the last step has time for the pairs that the others deferred
         monitor.profile = monitor.profile.replace(pairs_per_step=pairs, contact_points=4)
         monitor.step(4_000_000_000 + step * 10_000_000, np.arange(2, OBJECTS), poses[2:], twists[2:])
 
 
 def _step_uncertain(monitor: Monitor, poses: NDArray[np.float64]) -> None:
-    """The same with states that declare an uncertainty, with covariances, and with a bound on an acceleration."""
+    """Step with states that declare an uncertainty, with covariances, and with a bound on an acceleration."""
     states = np.zeros(len(poses), STATE)
     states["id"] = np.arange(2, OBJECTS)
     states["position"], states["quaternion"] = poses[:, :3], poses[:, 3:]
@@ -55,8 +55,8 @@ def _step_uncertain(monitor: Monitor, poses: NDArray[np.float64]) -> None:
 
 
 def warm_up_functions() -> None:
-    """Call what can be called without a monitor, once with each kind of argument that has a kernel of its own."""
-    # imported here: a node, which warms up the monitor when it starts, needs none of it
+    """Call the functions that need no monitor, once with each kind of argument that has a kernel of its own."""
+    # imported here because a node, which warms up the monitor at its start, needs none of it
     from collision_monitor.detection.detector import WORTH_THREADS, Detector, default_threads
     from collision_monitor.query.contact import contact
     from collision_monitor.query.feature_impact import vertex_face_impact

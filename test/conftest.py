@@ -1,4 +1,4 @@
-"""What every test shares: reproducible examples, a recorded session and a ROS domain of its own."""
+"""Fixtures and settings of all tests: reproducible examples, a recorded session and an unused ROS domain."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-# The same examples on every run and every machine; HYPOTHESIS_PROFILE=explore looks for new ones.
+# The same examples on every run and every machine; HYPOTHESIS_PROFILE=explore searches for new ones.
 settings.register_profile(
     "same",
     derandomize=True,
@@ -22,14 +22,14 @@ settings.register_profile(
 settings.register_profile("explore", max_examples=2000, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
-_DOMAINS = range(1, 101)  # beyond 101, DDS ports meet the ephemeral ports of Linux
+_DOMAINS = range(1, 101)  # from 102 on, DDS ports are in the range of the ephemeral ports of Linux
 
 
 @pytest.fixture
 def ros_domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """A ROS domain that no other test on this machine uses meanwhile, set for this process and its children.
+    """ROS domain that no other test on this machine uses at the time, set for this process and its children.
 
-    The claim is an abstract socket: it goes with the process, however that ends.
+    An abstract socket claims the domain. The kernel releases it when the process ends in any way.
     """
     first = os.getpid() % len(_DOMAINS)
     for domain in (*_DOMAINS[first:], *_DOMAINS[:first]):
@@ -49,8 +49,8 @@ def ros_domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
 
 @pytest.fixture(scope="session")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A finished session of 50 steps, which no test may change."""
-    from session_scene import record  # imports the kernels, which most tests do without
+    """Path of a finished session of 50 steps, which tests must not change."""
+    from session_scene import record  # imported here, as it imports the kernels, which most tests do not need
 
     path = tmp_path_factory.mktemp("session") / "run.mcap"
     record(path)

@@ -1,4 +1,4 @@
-"""Imports run one way, and everything below the node works where there is no ROS at all."""
+"""Tests that imports point in one direction, and that all modules below the node work without ROS."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ FLOORS: Final = (
     {"cli"},
     {"__init__", "__main__"},
 )
-"""The folders and files of the package, from the ground up: each imports itself and what is on the floors below it."""
+"""Folders and files of the package by floor, from the bottom up; each may import itself and the floors below."""
 
 SIDEWAYS: Final = {
     ("sources.importing", "session"): "what a bag is imported into is a session",
 }
-"""Imports of a module from another folder of its own floor, and why."""
+"""Allowed imports of a module from another folder of the same floor, with the reason."""
 
 WITH_ROS = ("ros", "cli", "__main__")
 
@@ -51,7 +51,7 @@ for name in sys.argv[1:]:
 
 
 def _dotted(path: Path) -> str:
-    """`collision_monitor.geometry.pose`; a folder is named as it is imported, by its own name."""
+    """Dotted name such as `collision_monitor.geometry.pose`; a folder's `__init__` has the folder's name."""
     return ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
 
 
@@ -59,17 +59,17 @@ FILES: Final = {_dotted(path): path for path in sorted(PACKAGE.rglob("*.py"))}
 
 
 def top(module: str) -> str:
-    """The folder or file right below the package that a module belongs to."""
+    """Folder or file directly below the package that contains a module."""
     return module.split(".")[1] if module != NAME else "__init__"
 
 
 def floor(name: str) -> int | None:
-    """The floor of a folder or file right below the package; None: it is on none."""
+    """Floor of a folder or file directly below the package, or None if FLOORS does not list it."""
     return next((height for height, names in enumerate(FLOORS) if name in names), None)
 
 
 def imported(path: Path) -> set[str]:
-    """The modules of this package that a source file imports, also in functions and for type checkers only."""
+    """Modules of this package that a source file imports, also in functions and for type checkers only."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):

@@ -1,4 +1,4 @@
-"""The names of `collision_monitor`: all of them are there, none is imported before it is used."""
+"""Tests of the names of `collision_monitor`: all of them exist, and none is imported before its first use."""
 
 from __future__ import annotations
 

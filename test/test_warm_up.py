@@ -1,4 +1,4 @@
-"""After the warm-up a session waits for no compiler, and a start is quick."""
+"""Tests that a session compiles nothing after the warm-up."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_nothing_is_compiled_after_the_warm_up(session: str) -> None:
 
 @pytest.mark.parametrize("when", ["Monitor(limited)", "Monitor(); monitor.profile = limited"])
 def test_no_step_with_a_budget_is_the_first_to_load_a_kernel(when: str) -> None:
-    """28 ms in a step of 1.6: what the first ones had no time for was loaded by the first that had."""
+    """Without the warm-up, the first step with time left loaded a kernel: 28 ms in a step of 1.6 ms."""
     program = (
         "from collision_monitor.monitor.monitor import Monitor, Profile\n"
         "from collision_monitor.prediction import pair_impacts, sphere_trees\n"

@@ -1,7 +1,7 @@
-"""The one place that decides how kernels are compiled.
+"""Decorators that compile the kernels, with the compiler options of the whole package.
 
-`fastmath` is off everywhere: results must be the same bits with one thread and with two, live and in replay.
-Compiled kernels are cached (`cache.py`), so that a second start compiles nothing.
+`fastmath` is off everywhere, because results must be identical to the bit with one thread and with two, live and in
+replay. Compiled kernels are cached (`cache.py`), so that a second start compiles nothing.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _CACHE_IS_CHOSEN = bool(os.environ.get("NUMBA_CACHE_DIR"))
 
-# Threads that wait for each other soon sleep: where something else needs the cores too, a waiting thread that keeps one
-# holds up the very thread it waits for (40 ms in place of 0.1 ms). Read by GNU OpenMP when its first loop starts.
+# Waiting threads of GNU OpenMP go to sleep early. If other programs need the cores too, a waiting thread that spins
+# occupies the core of the thread it waits for (40 ms instead of 0.1 ms). OpenMP reads this when its first loop starts.
 os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 
 _OPTIONS: dict[str, Any] = {
@@ -38,9 +38,9 @@ def _compile(function: F, options: dict[str, Any]) -> F:
     return compiled
 
 
-# Counting references to array arguments is atomic memory traffic: 300 ns for one pair of spheres, 18 ns without; and
-# 86 ns for the bound of a pair in a loop over many, 34 ns without. So what is compiled here only borrows its arrays: it
-# must not allocate, and must return numbers, never an array.
+# Reference counts of array arguments are atomic memory traffic: one pair of spheres costs 300 ns with them and 18 ns
+# without; the bound of a pair in a loop over many costs 86 ns with them and 34 ns without. Functions compiled with
+# these options therefore only borrow their arrays: they must not allocate, and must return numbers, never an array.
 _BORROWING: dict[str, Any] = {**_OPTIONS, "_nrt": False}
 
 
@@ -50,7 +50,7 @@ def kernel(function: F) -> F:
 
 
 def allocating_kernel(function: F) -> F:
-    """Compile a kernel that makes arrays of its own: what loops over many of anything should be a device function."""
+    """Compile a kernel that creates arrays. Its inner loops should be device functions, which are faster."""
     return _compile(function, _OPTIONS)
 
 
@@ -60,12 +60,12 @@ def device(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """A device function that numba inlines into its callers: where arguments cost more to pass than to use."""
+    """Compile a device function that numba inlines into its callers, for functions that cost less than their call."""
     return _compile(function, {**_BORROWING, "inline": "always"})
 
 
 def parallel_kernel(function: F) -> F:
-    """Compile a kernel whose `prange` loops run on all threads; each iteration must write places of its own."""
-    # only what is written as a loop: numba would also move and merge loops across calls whose side effects it misses
+    """Compile a kernel that runs its `prange` loops on all threads; each iteration must write to its own elements."""
+    # only explicit loops: numba would also move and merge loops across calls with side effects that it does not see
     others = ("comprehension", "reduction", "inplace_binop", "setitem", "numpy", "stencil", "fusion")
     return _compile(function, {**_OPTIONS, "parallel": dict.fromkeys(others, False)})

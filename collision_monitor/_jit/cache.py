@@ -1,8 +1,8 @@
-"""Where compiled kernels are kept: one folder per content of a module and of all it imports.
+"""Cache folders of the compiled kernels: one folder for each content of a module and of all its imports.
 
-numba looks at a kernel's own file only, so a change in a function that was inlined from another file would go unseen.
-Here the folder's name is a digest of the module with everything of this package below it: a changed kernel can
-never be answered by an old one, and what does not depend on it stays compiled.
+numba only checks a kernel's own file, so it would miss a change in a function that was inlined from another file.
+The folder's name is therefore a digest of the module and of everything in this package that it imports. A changed
+kernel is always compiled again, and kernels that do not depend on the change stay compiled.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def _file_digest(module: str) -> bytes:
 
 @functools.cache
 def folder(module: str) -> str:
-    """The cache folder for the kernels of `module`, by its dotted name."""
+    """Return the cache folder of the kernels of `module`, a dotted name."""
     digest = hashlib.blake2b(f"{numba.__version__} {sys.version_info[:2]}".encode(), digest_size=8)
     for name in with_dependencies(module):
         digest.update(name.encode() + _file_digest(name))
@@ -34,7 +34,7 @@ def folder(module: str) -> str:
 
 
 def _root() -> Path:
-    """Inside the environment where that can be written, else in the user's cache folder."""
+    """Return a folder in the virtual environment if it is writable, else one in the user's cache folder."""
     prefix = Path(sys.prefix)
     if sys.prefix != sys.base_prefix and os.access(prefix, os.W_OK):
         return prefix / "var" / "cache" / "collision_monitor"

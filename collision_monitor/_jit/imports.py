@@ -1,4 +1,4 @@
-"""Which modules of this package a module depends on, read from the source files without importing any."""
+"""Dependencies between the modules of this package, read from the source files without an import."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _IMPORT = re.compile(
 
 
 def source_file(module: str) -> Path | None:
-    """The module's file: one of this package, or one that was started or imported, such as a benchmark."""
+    """Return the file of a module of this package or of a loaded module, such as a benchmark; None if there is none."""
     base = _PACKAGE.parent.joinpath(*module.split("."))
     loaded = getattr(sys.modules.get(module), "__file__", None)
     candidates = [base.with_suffix(".py"), base / "__init__.py", *([Path(loaded)] if loaded else [])]
@@ -23,7 +23,7 @@ def source_file(module: str) -> Path | None:
 
 @functools.cache
 def direct_imports(module: str) -> frozenset[str]:
-    """The modules of this package that `module` imports by name, anywhere in its file."""
+    """Return the modules of this package that `module` imports by name, anywhere in its file."""
     path = source_file(module)
     found: set[str] = set()
     for origin, names, plain in _IMPORT.findall(path.read_bytes()) if path else ():
@@ -34,7 +34,7 @@ def direct_imports(module: str) -> frozenset[str]:
 
 
 def with_dependencies(module: str) -> list[str]:
-    """The module and all modules of this package that it imports, also through others, by name."""
+    """Return the module and all modules of this package that it imports, directly or indirectly, sorted by name."""
     found, queue = {module}, [module]
     while queue:
         new = direct_imports(queue.pop()) - found

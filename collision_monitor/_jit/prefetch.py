@@ -1,4 +1,4 @@
-"""Memory that a later iteration reads, asked for while this one computes."""
+"""Prefetch of memory for a later iteration while the current one computes."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from numba.core import types
 from numba.extending import intrinsic
 
 CACHE_LINE: Final = 64
-"""Bytes."""
+"""Size of a cache line (bytes)."""
 
 
 @intrinsic
 def prefetch(context, array, row):
-    """Ask for array[row], for a later iteration; of a row of numbers for its first 64 bytes. Changes no answer.
+    """Prefetch array[row]; if the row is itself an array of numbers, its first 64 bytes. The result does not change.
 
-    Kernels that visit bodies in no order of the memory wait for them longer than they compute.
+    Kernels that visit bodies in random memory order would otherwise wait for memory longer than they compute.
     """
 
     def generate(context, builder, signature, arguments):

@@ -1,1 +1,1 @@
-"""Which pairs can be near each other: grids, and brute force as their reference."""
+"""Broad phase: pairs with overlapping bounds, by grids and trees, with brute force as the reference."""

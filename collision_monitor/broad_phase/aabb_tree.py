@@ -1,4 +1,4 @@
-"""A tree of bounding boxes: halved at the median of its widest axis, down to one or two boxes; built level by level.
+"""AABB tree, built level by level: each node is split at the median of its widest axis, down to one or two boxes.
 
 (Slides "Bounding volume hierarchies"; Ericson, Real-Time Collision Detection, 6.2)
 """
@@ -14,7 +14,10 @@ from collision_monitor.broad_phase.boxes import Array, Indices, box_arrays, in_o
 
 
 class AabbTree(NamedTuple):
-    """Level k has 2^k nodes: lower[k], upper[k] (2^k, 2 or 3). Node m of the last holds order[first[m] …]."""
+    """AABB tree. Level k has 2^k nodes: lower[k], upper[k] (2^k, 2 or 3) in m.
+
+    Node m of the last level holds the boxes order[first[m]] … order[first[m + 1] - 1].
+    """
 
     lower: list[Array]
     upper: list[Array]
@@ -23,7 +26,7 @@ class AabbTree(NamedTuple):
 
 
 def aabb_tree(lower: ArrayLike, upper: ArrayLike) -> AabbTree:
-    """The tree of N >= 1 boxes (N, 2 or 3). Raises InputError."""
+    """Build the tree of N >= 1 boxes (N, 2 or 3) in m. Raises InputError."""
     low, high = box_arrays(lower, upper)
     n, depth = len(low), max(len(low).bit_length() - 1, 0)
     middle = low + 0.5 * (high - low)
@@ -42,7 +45,7 @@ def aabb_tree(lower: ArrayLike, upper: ArrayLike) -> AabbTree:
 
 
 def tree_overlaps(lower: ArrayLike, upper: ArrayLike) -> Indices:
-    """Pairs (M, 2), i < j, sorted, of boxes (N, 2 or 3) that overlap or touch: the tree against itself."""
+    """Pairs (M, 2), i < j, sorted, of boxes (N, 2 or 3) that overlap or touch; tests the tree against itself."""
     low, high = box_arrays(lower, upper)
     if not len(low):
         return np.zeros((0, 2), np.int64)
@@ -50,7 +53,7 @@ def tree_overlaps(lower: ArrayLike, upper: ArrayLike) -> Indices:
     i = j = np.zeros(1, np.int64)
     for node_low, node_high in zip(tree.lower[1:], tree.upper[1:], strict=True):
         same = i == j
-        # both halves with both halves, but those of one node with each other only once
+        # both halves against both halves, but a node's own two halves against each other only once
         i = np.concatenate([2 * i, 2 * i, 2 * i[~same] + 1, 2 * i + 1])
         j = np.concatenate([2 * j, 2 * j + 1, 2 * j[~same], 2 * j + 1])
         i, j = overlaps(node_low, node_high, i, j).T

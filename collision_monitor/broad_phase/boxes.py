@@ -1,4 +1,4 @@
-"""Arrays of axis-aligned boxes: the door of the space partitions, and the comparison of many at a time."""
+"""Arrays of axis-aligned boxes: input check of the space partitions, and overlap tests of many pairs at once."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 CANDIDATES_AT_ONCE: Final = 1 << 20
-"""Candidates that are compared at a time: their table stays in 100 MB."""
+"""Candidates compared in one batch, which limits the temporary arrays to 100 MB."""
 
 
 def box_arrays(lower: ArrayLike, upper: ArrayLike) -> tuple[Array, Array]:
-    """Boxes by their corners (N, 2 or 3) in m. Raises InputError for ones that have no end or are inside out."""
+    """Corners (N, 2 or 3) in m as float64 arrays. Raises InputError if they are not finite or lower > upper."""
     low, high = np.asarray(lower, np.float64), np.asarray(upper, np.float64)
     if low.ndim != 2 or low.shape[1] not in (2, 3) or low.shape != high.shape:
         raise InputError(f"boxes: expected corners of shape (N, 2 or 3), got {low.shape} and {high.shape}")
@@ -27,13 +27,13 @@ def box_arrays(lower: ArrayLike, upper: ArrayLike) -> tuple[Array, Array]:
 
 
 def ranges(first: Indices, count: Indices) -> tuple[Indices, Indices]:
-    """The numbers first[k] … first[k] + count[k] - 1 of all k one after the other, and the k of each."""
+    """Concatenate the ranges first[k] … first[k] + count[k] - 1 over all k; return the numbers and the k of each."""
     owner = np.repeat(np.arange(len(count)), count)
     return np.arange(len(owner)) + np.repeat(first - (np.cumsum(count) - count), count), owner
 
 
 def overlaps_in_ranges(low: Array, high: Array, box: Indices, first: Indices, count: Indices) -> Indices:
-    """Pairs (M, 2) of the boxes `box` (K,) with those numbered first[k] … that they overlap or touch."""
+    """Pairs (M, 2) of box[k] and each box first[k] … first[k] + count[k] - 1 that it overlaps or touches."""
     found = [np.zeros((0, 2), np.int64)]
     done = np.cumsum(count)
     begin = 0
@@ -47,7 +47,7 @@ def overlaps_in_ranges(low: Array, high: Array, box: Indices, first: Indices, co
 
 
 def overlaps(low: Array, high: Array, i: Indices, j: Indices) -> Indices:
-    """Those (M, 2) of the pairs i, j whose boxes overlap or touch; axis by axis, as most fail on the first."""
+    """Pairs (M, 2) among i, j with boxes that overlap or touch; tests axis by axis, as most fail on the first."""
     for axis in range(low.shape[1]):
         meet = (low[i, axis] <= high[j, axis]) & (low[j, axis] <= high[i, axis])
         i, j = i[meet], j[meet]
@@ -55,6 +55,6 @@ def overlaps(low: Array, high: Array, i: Indices, j: Indices) -> Indices:
 
 
 def in_order(pairs: Indices) -> Indices:
-    """Pairs with the smaller number first, sorted."""
+    """Sort the pairs, with the smaller number of each pair first."""
     pairs = np.sort(pairs, axis=1)
     return np.asarray(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))])

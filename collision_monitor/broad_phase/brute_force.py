@@ -1,4 +1,4 @@
-"""The slow obvious broad phase: every pair of boxes is compared. The reference that tests the grids."""
+"""Brute-force broad phase: compares every pair of boxes. The reference in the tests of the grids."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Binary space partition of a static solid: where points are, and where segments enter it.
+"""Binary space partition of a static solid: locates points, and finds where segments enter the solid.
 
-Each node is the plane of a face; a leaf is all inside or all outside. Faces across a plane are cut. (Fuchs, Kedem and
-Naylor, 1980; Thibault and Naylor, 1987; slides "Spatial partitioning: BSP")
+Each node is the plane of a face; a leaf is either inside or outside. A face that crosses a plane is cut. (Fuchs, Kedem
+and Naylor, 1980; Thibault and Naylor, 1987; slides "Spatial partitioning: BSP")
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.polyhedra import closed_mesh
 
 THICKNESS: Final = 1e-9
-"""Of a plane, as part of the solid's size: what is nearer counts as on it. Smaller: cut corners, which are rounded,
-fall on the wrong side of the plane that cut them. Larger: features of that size vanish."""
+"""Thickness of a plane, as part of the solid's size: nearer points count as on it. Smaller: cut corners, which are
+rounded, fall on the wrong side of the plane that cut them. Larger: features of that size vanish."""
 
 CANDIDATES: Final = 8
-"""Faces that are tried for the next plane: the one that cuts fewest, then halves best, is taken."""
+"""Faces tried for the next plane: the face that cuts fewest others wins, then the one with the best balance."""
 
 OUTSIDE: Final = -1
 INSIDE: Final = -2
-"""Leaves, in place of the number of a node."""
+"""Leaves; stored in place of a node's number."""
 
 
 class BspTree(NamedTuple):
-    """Planes normal . x = offset of n nodes, and what is in front (outside) and behind: nodes or leaves.
+    """Planes normal . x = offset (offset in m) of n nodes, with their children in front (outside) and behind.
 
-    Node 0 is first. thickness (m): nearer points are on a plane.
+    A child is a node or a leaf. Node 0 is the root. thickness (m): nearer points count as on a plane.
     """
 
     normal: Array  # (n, 3)
@@ -42,9 +42,9 @@ class BspTree(NamedTuple):
 
 
 def bsp_tree(vertices: ArrayLike, faces: ArrayLike) -> BspTree:
-    """The tree of a closed mesh (vertices (n, 3) in m, faces (m, 3)) whose surface does not cross itself.
+    """Build the tree of a closed mesh (vertices (n, 3) in m, faces (m, 3)) without self-intersections.
 
-    A scene of solids that do not meet is one such mesh. Raises ShapeError.
+    A scene of disjoint solids is also one mesh. Raises ShapeError.
     """
     vertices, faces = closed_mesh(vertices, faces)
     thickness = THICKNESS * float(np.ptp(vertices[np.unique(faces)], axis=0).max())
@@ -54,7 +54,7 @@ def bsp_tree(vertices: ArrayLike, faces: ArrayLike) -> BspTree:
     normals: list[Array] = []
     offsets: list[float] = []
     sides: list[list[int]] = []
-    todo = [(polygons, -1, 0)]  # what is to be divided, and the node and side that it belongs to
+    todo = [(polygons, -1, 0)]  # polygons to divide, their parent node and its side
     while todo:
         polygons, above, side = todo.pop()
         if above >= 0:
@@ -71,7 +71,7 @@ def bsp_tree(vertices: ArrayLike, faces: ArrayLike) -> BspTree:
 
 
 def _plane(corners: Array, thickness: float) -> tuple[Array, float] | None:
-    """Unit normal and offset of a polygon; None for one that is no wider than a plane is thick."""
+    """Unit normal and offset (m) of a polygon; None if the polygon is narrower than a plane's thickness."""
     offset = corners - corners[0]
     normal = np.cross(offset[1:-1], offset[2:]).sum(axis=0)
     length, size = float(np.linalg.norm(normal)), float(np.linalg.norm(offset, axis=1).max())
@@ -92,7 +92,7 @@ def _best_plane(polygons: list[Array], thickness: float) -> tuple[Array, float]:
 
 
 def _divided(polygons: list[Array], normal: Array, offset: float, thickness: float) -> tuple[list[Array], list[Array]]:
-    """What is in front of a plane and behind it; polygons in it are done with, those across it are cut."""
+    """Split polygons into those in front of a plane and those behind it; cut those across it, drop those in it."""
     before, behind = _sides(polygons, normal, offset, thickness)
     front = [polygons[k] for k in np.flatnonzero(before & ~behind)]
     back = [polygons[k] for k in np.flatnonzero(behind & ~before)]
@@ -106,14 +106,14 @@ def _divided(polygons: list[Array], normal: Array, offset: float, thickness: flo
 
 
 def _sides(polygons: list[Array], normal: Array, offset: float, thickness: float) -> tuple[Booleans, Booleans]:
-    """Which polygons have a part in front of a plane, and which behind it."""
+    """Masks of the polygons with a part in front of a plane, and of those with a part behind it."""
     height = np.concatenate(polygons) @ normal - offset
     first = np.cumsum([0] + [len(corners) for corners in polygons[:-1]])
     return np.maximum.reduceat(height, first) > thickness, np.minimum.reduceat(height, first) < -thickness
 
 
 def _cut(corners: Array, height: Array, here: Booleans, there: Booleans) -> Array:
-    """The part of a convex polygon on one side, corners on the plane included."""
+    """Part of a convex polygon on one side of a plane, including the corners on the plane."""
     kept = []
     for k in range(len(corners)):
         after = (k + 1) % len(corners)
@@ -125,7 +125,10 @@ def _cut(corners: Array, height: Array, here: Booleans, there: Booleans) -> Arra
 
 
 def locate_in_bsp_tree(points: ArrayLike, tree: BspTree) -> Signs:
-    """Location (...) of points (..., 3); within the planes' thickness of the surface: BOUNDARY, or one of its sides."""
+    """Location (...) of points (..., 3) in m.
+
+    Within the planes' thickness of the surface, it is BOUNDARY or the location on one of the sides.
+    """
     points = coordinates(points, "points", 3)
     p = points.reshape(-1, 3)
     met = np.zeros((2, len(p)), bool)  # outside, inside
@@ -144,7 +147,7 @@ def locate_in_bsp_tree(points: ArrayLike, tree: BspTree) -> Signs:
 
 
 def first_hit(p: ArrayLike, q: ArrayLike, tree: BspTree) -> Array:
-    """The least t (...) from 0 to 1 at which segments p + t (q - p) (..., 3) are in the solid or on it; NaN if none."""
+    """Least t (...) in 0 … 1 at which segments p + t (q - p) (..., 3) in m are in the solid or on it; NaN if none."""
     p, q = coordinates(p, "p", 3), coordinates(q, "q", 3)
     try:
         p, q = np.broadcast_arrays(p, q)

@@ -1,9 +1,10 @@
-"""Broad phase for bodies that are all new: bodies are counted into cells, sorted by cell, and compared row by row.
+"""Broad phase for bodies that all move: counts the bodies into cells, sorts them by cell, compares row by row.
 
-Bodies of similar size share a class, and each class has its own cells, as wide as its largest body. A body looks for
-partners in its own class and the coarser ones, so every pair is met once, from its smaller body. Cells are a dense
-array where their number is a small multiple of the bodies', else hashed, so that empty space costs nothing. The cells
-of a row along x stand side by side in both, so the three cells that a body reaches in a row are one range of bodies.
+Bodies of similar size share a class, and each class has its own cells, as wide as its largest body. A body searches for
+partners in its own class and the coarser ones, so that each pair is found once, by its smaller body. The cells of a
+class form a dense array if their number is a small multiple of the number of bodies, else a hash table, so that empty
+space costs nothing. In both, the cells of a row along x are adjacent, so the three cells that a body reaches in a row
+hold one contiguous range of bodies.
 Source: lecture slides "Efficient collision detection: spatial partitioning" (uniform, hashed and multiresolution
 grids); counting sort by cell: Green, "Particle simulation using CUDA", 2010.
 """
@@ -25,38 +26,38 @@ from collision_monitor.errors import InputError
 from collision_monitor.tolerances import EPSILON
 
 MAX_CLASSES: Final = 32
-"""Size classes; the last takes all that is smaller than the others."""
+"""Number of size classes; the last class also takes all smaller bodies."""
 
 CROWDING: Final = 8.0
-"""Sizes are put in one class while cells fitted to its largest hold at most so many times the candidates that cells
-fitted to each body would. Larger: small bodies among large ones compare with too many. Smaller: more classes."""
+"""Sizes share a class while cells fitted to the largest hold at most this many times the candidates of cells fitted
+to each body. Larger: small bodies among large ones are compared with too many. Smaller: more classes."""
 
 DENSE: Final = 4
-"""Cells per body up to which a class has an array of cells: filling the array must not cost more than the search."""
+"""Cells per body up to which a class has a dense array, since filling it must not cost more than the search."""
 
 FEWEST_CELLS: Final = 64
-"""Cells that any class may have, however few its bodies."""
+"""Number of cells allowed for any class, however few its bodies are."""
 
 STRIP: Final = 2
-"""log2 of the rows that a strip of cells is wide."""
+"""log2 of the number of rows in a strip of cells."""
 
 FARTHEST_CELL: Final = 2.0**52
-"""Hashed cell coordinates end here, where float64 still counts them one by one; beyond, bodies share cells."""
+"""Hashed cell coordinates are clipped here, where float64 still represents every integer; bodies beyond share cells."""
 
 LARGEST_BODY: Final = 2.0**200
-"""Half extents and positions (m) beyond this are compared with everything: the products of cells stay finite."""
+"""Bodies with a larger half extent or coordinate (m) are compared with all, so that products of cells stay finite."""
 
 AHEAD: Final = 8
-"""Iterations between asking for memory and reading it: 100,000 bodies fit no cache and are in no order of the cells."""
+"""Iterations between prefetch and use: 100,000 bodies fit into no cache and are not in the order of the cells."""
 
 PAD: Final = LANES
-"""Places behind the last sorted body that a vector may read."""
+"""Elements behind the last sorted body that a vector load may read."""
 
 STARTING: Final = MAX_CLASSES + 1
-"""Classes of bodies that start a search: class 0 is the unbounded ones, then from large to small."""
+"""Number of classes of bodies that start a search: class 0 for unbounded bodies, then from large to small."""
 
 CLASSES: Final = 2 * STARTING
-"""With the classes of those that do not, in the same order."""
+"""Number of all classes: those of bodies that start a search, then those of bodies that do not, in the same order."""
 
 _OCTAVES: Final = 512
 _HASHED, _DENSE, _WHOLE = 0, 1, 2
@@ -66,13 +67,13 @@ _INVERSE, _REACH, _LARGEST = range(3)
 
 
 class Grid(NamedTuple):
-    """Scratch memory for N bodies. Classes: the bodies that start a search first, the unbounded first among them."""
+    """Scratch memory for N bodies. Classes of bodies that start a search come first; class 0 is the unbounded ones."""
 
     klass: Any  # (N,) uint8
-    bucket: Any  # (N,) int32: the body's cell, over all classes
-    start: Any  # (T + 2,) int32: where each cell's bodies start in `order`
-    order: Any  # (N,) int32: the bodies by cell
-    layout: Any  # (_ABSENT + 1, 8) int64: class by class: first place, count, first cell, mode, cells along x, y, z, …
+    bucket: Any  # (N,) int32: the body's cell, numbered over all classes
+    start: Any  # (T + 2,) int32: first place of each cell in `order`
+    order: Any  # (N,) int32: the bodies sorted by cell
+    layout: Any  # (_ABSENT + 1, 8) int64, per class: first place, count, first cell, mode, cells along x, y, z, strip
     scale: Any  # (_ABSENT + 1, 3) float64: 1 / cell width (1/m), largest half extent (m) with round-off, and without
     origin: Any  # (3,) float64: lower corner of the dense cells (m)
     centre: Any  # (3, N + PAD) float64, sorted by cell
@@ -86,7 +87,7 @@ class Bounds(NamedTuple):
 
 
 def make_grid(capacity: int) -> Grid:
-    """Scratch memory for up to `capacity` bodies."""
+    """Allocate scratch memory for up to `capacity` bodies."""
     cells = DENSE * capacity + (_ABSENT + 1) * FEWEST_CELLS
     return Grid(
         klass=np.zeros(capacity, np.uint8),
@@ -102,10 +103,10 @@ def make_grid(capacity: int) -> Grid:
 
 @device
 def classify(size: Any, starts: Any, octave: Any, cubes: Any, grid: Any) -> None:
-    """Put bodies with half extent `size` (N,) m into classes; NaN: absent, beyond LARGEST_BODY: unbounded.
+    """Assign bodies with half extent `size` (N,) m to classes; NaN: absent, beyond LARGEST_BODY: unbounded.
 
-    octave (_OCTAVES, 2): scratch for counts and classes; cubes (_OCTAVES, 2): of sums and of the greatest of the cubes
-    of the sizes, relative to the octave's.
+    octave (_OCTAVES, 2): scratch for counts and classes; cubes (_OCTAVES, 2): scratch for the sum and the maximum of
+    the cubed sizes in an octave, relative to the octave's size.
     """
     octave[:] = 0
     cubes[:] = 0.0
@@ -157,7 +158,7 @@ def _dense(x: float, origin: float, inverse: float) -> Any:
 
 @inlined
 def _row(y: Any, z: Any, nz: Any, strip: Any) -> Any:
-    """Where the row of cells (y, z) stands among the rows."""
+    """Index of the row of cells (y, z)."""
     return (((y >> strip) * nz + z) << strip) + (y & ((1 << strip) - 1))
 
 
@@ -168,7 +169,7 @@ def _hashed(x: float, inverse: float) -> Any:
 
 @device
 def measure_classes(size: Any, grid: Any) -> None:
-    """Count the bodies of each class and find its largest half extent; after `classify`."""
+    """Count the bodies of each class and find its largest half extent; call after `classify`."""
     grid.layout[:] = 0
     grid.scale[:] = 0.0
     for i in range(size.size):
@@ -179,13 +180,13 @@ def measure_classes(size: Any, grid: Any) -> None:
 
 @device
 def plan_cells(lx: float, ly: float, lz: float, hx: float, hy: float, hz: float, grid: Any) -> Any:
-    """Choose the cells of each class, for centres between the corners l and h (m); after `measure_classes`.
+    """Choose the cells of each class for centres between the corners l and h (m); call after `measure_classes`.
 
-    Returns the number of cells over all classes; the last one holds the bodies that are absent.
+    Returns the number of cells over all classes; the last cell holds the absent bodies.
     """
     layout, scale = grid.layout, grid.scale
     grid.origin[0], grid.origin[1], grid.origin[2] = lx, ly, lz
-    # round-off of a difference of two coordinates, and of the multiplication by 1 / cell width
+    # round-off of a difference of two coordinates and of the product with 1 / cell width
     slack = 32.0 * EPSILON * max(abs(lx), abs(ly), abs(lz), abs(hx), abs(hy), abs(hz))
     first = cells = np.int64(0)
     for k in range(_ABSENT + 1):
@@ -207,7 +208,7 @@ def plan_cells(lx: float, ly: float, lz: float, hx: float, hy: float, hz: float,
         nx = np.floor((hx - lx) * inverse) + 1.0
         ny = np.floor((hy - ly) * inverse) + 1.0
         nz = np.floor((hz - lz) * inverse) + 1.0
-        # rows in strips, as in a bank of pigeonholes: a row's neighbours are in the nearest cache also in large scenes
+        # rows in strips, so that neighbouring rows are close in memory and stay in the cache in large scenes too
         strip = STRIP if ny >= 4.0 * 2.0**STRIP else 0
         rows = np.ceil(ny * 0.5**strip) * 2.0**strip * nz
         if nx * rows <= max(DENSE * count, FEWEST_CELLS):
@@ -229,7 +230,7 @@ def plan_cells(lx: float, ly: float, lz: float, hx: float, hy: float, hz: float,
 
 @device
 def find_buckets(centre: Any, grid: Any, begin: int, end: int) -> None:
-    """The cell of the bodies begin ... end - 1."""
+    """Compute the cell of the bodies begin ... end - 1."""
     ox, oy, oz = grid.origin[0], grid.origin[1], grid.origin[2]
     for i in range(begin, end):
         k = grid.klass[i]
@@ -249,7 +250,7 @@ def find_buckets(centre: Any, grid: Any, begin: int, end: int) -> None:
 
 @device
 def sort_by_cell(n: int, cells: int, grid: Any) -> None:
-    """Counting sort: grid.order, and grid.start so that cell c holds the places start[c] ... start[c + 1] - 1."""
+    """Counting sort: fills grid.order, and grid.start so that cell c holds the places start[c] ... start[c + 1] - 1."""
     start, bucket, order = grid.start, grid.bucket, grid.order
     start[: cells + 2] = 0
     for i in range(n):
@@ -266,7 +267,7 @@ def sort_by_cell(n: int, cells: int, grid: Any) -> None:
 
 @device
 def gather_centres(centre: Any, grid: Any, begin: int, end: int) -> None:
-    """Centres of the places begin ... end - 1, in the order of the cells."""
+    """Copy the centres of the places begin ... end - 1 into the order of the cells."""
     for p in range(begin, end):
         prefetch(centre, np.intp(grid.order[min(p + AHEAD, end - 1)]))
         i = grid.order[p]
@@ -277,22 +278,22 @@ def gather_centres(centre: Any, grid: Any, begin: int, end: int) -> None:
 
 @inlined
 def searches(grid: Any, a: int, b: int) -> bool:
-    """Whether bodies of class a look for partners in class b: the coarser ones, and all that rest."""
+    """Return whether bodies of class a search class b: their own, coarser ones, and classes that start no search."""
     return (b <= a or b >= STARTING) and grid.layout[a, _COUNT] > 0 and grid.layout[b, _COUNT] > 0
 
 
 @inlined
 def places(grid: Any, a: int) -> Any:
-    """First place of class a, and the one behind its last."""
+    """First place of class a and the place behind its last."""
     return grid.layout[a, _FIRST], grid.layout[a, _FIRST] + grid.layout[a, _COUNT]
 
 
 @inlined
 def keep_overlapping(grid: Any, bounds: Any, p: int, low: int, high: int, found: Any, n: int) -> int:
-    """Append the places low ... high - 1 whose bounds overlap those of place p to found[n:]; returns the new n."""
+    """Append the places low ... high - 1 with bounds that overlap those of place p to found[n:]; return the new n."""
     x, y, z = grid.centre[0, p], grid.centre[1, p], grid.centre[2, p]
     own = Region(x, y, z, bounds.extent[0, p], bounds.extent[1, p], bounds.extent[2, p])
-    for q in range(low, max(high, low + 1), LANES):  # an empty range too is looked at: cheaper than to ask
+    for q in range(low, max(high, low + 1), LANES):  # also tests an empty range, which is cheaper than a branch
         if bounds.balls:
             bits = spheres_overlap(grid.centre, bounds.extent, q, own)
         else:
@@ -307,7 +308,7 @@ def keep_overlapping(grid: Any, bounds: Any, p: int, low: int, high: int, found:
 
 @inlined
 def _of_row(grid: Any, inverse: float, y: int, z: int, found: Any, begin: int, n: int) -> int:
-    """Keep those of found[begin:n] whose cell is in the row (y, z); other rows can hash to the same cells."""
+    """Keep the places in found[begin:n] that are in the row (y, z), as other rows can hash to the same cells."""
     kept = begin
     for m in range(begin, n):
         q = found[m]
@@ -324,9 +325,9 @@ def _clamped(x: float, origin: float, inverse: float, last: int) -> Any:
 
 @inlined
 def partners(grid: Any, bounds: Any, a: int, b: int, p: int, found: Any, n: int) -> int:
-    """Append to found[n:] the places of class b that overlap place p of class a, each pair of one class once.
+    """Append to found[n:] the places of class b that overlap place p of class a; if a == b, each pair only once.
 
-    `found` must have room for one more than all bodies of the class.
+    `found` must have room for all bodies of the class and one more.
     """
     first, count = grid.layout[b, _FIRST], grid.layout[b, _COUNT]
     mode = grid.layout[b, _MODE]
@@ -346,7 +347,7 @@ def partners(grid: Any, bounds: Any, a: int, b: int, p: int, found: Any, n: int)
         z0 = _clamped(cz - rz, oz, inverse, nz - 1)
         z1 = _clamped(cz + rz, oz, inverse, nz - 1)
         if a == b:
-            # the rows before look this way; of those around, all are taken: a loop that ends by chance costs more
+            # earlier rows search towards this one; the loop visits all rows ahead, as a data-dependent end costs more
             z0 = _dense(cz, oz, inverse)
             own = _dense(cy, oy, inverse)
             y0, y1, z1 = max(own - 1, 0), min(own + 1, ny - 1), min(z0 + 1, nz - 1)
@@ -377,7 +378,7 @@ def partners(grid: Any, bounds: Any, a: int, b: int, p: int, found: Any, n: int)
             x = x0 + _hash(y, z)
             end = x + (x1 - x0) + 1
             while x < end:
-                # the run of cells goes on at the first one where the table ends
+                # the run of cells wraps around at the end of the table
                 cell = x & nx
                 run = min(end - x, nx + 1 - cell)
                 low = grid.start[base + cell]
@@ -391,7 +392,7 @@ def partners(grid: Any, bounds: Any, a: int, b: int, p: int, found: Any, n: int)
 
 @device
 def sort_pairs(pairs: Any, count: int, other: Any, begins: Any) -> None:
-    """Sort pairs[:count] of numbers below begins.size - 1 by first, then second: two stable counting sorts."""
+    """Sort pairs[:count] of numbers below begins.size - 1 by first, then second, with two stable counting sorts."""
     for column in (1, 0):
         source, target = (pairs, other) if column == 1 else (other, pairs)
         begins[:] = 0
@@ -408,14 +409,14 @@ def sort_pairs(pairs: Any, count: int, other: Any, begins: Any) -> None:
 
 @allocating_kernel
 def classify_bodies(size: Any, starts: Any, grid: Any) -> None:
-    """Put bodies with half extents `size` (N,) into classes once, for many frames."""
+    """Assign bodies with half extents `size` (N,) m to classes, once for many frames."""
     classify(size, starts, np.empty((_OCTAVES, 2), np.int64), np.empty((_OCTAVES, 2)), grid)
     measure_classes(size, grid)
 
 
 @allocating_kernel
 def _box_pairs(centre: Any, half: Any, starts: Any, grid: Any, pairs: Any) -> int:
-    """Pairs into pairs (P, 2), sorted unless there are more than P; returns how many there are."""
+    """Write pairs into pairs (P, 2), sorted unless there are more than P; return their number."""
     n = centre.shape[0]
     size = np.empty(n)
     lx = ly = lz = np.inf
@@ -466,7 +467,7 @@ def box_pairs(centre: ArrayLike, half: ArrayLike, starts: ArrayLike | None = Non
     """Pairs (M, 2), i < j, sorted, of axis-aligned boxes that overlap or touch: |centre difference| <= sum of halves.
 
     centre, half extents: (N, 3) m; half extents may be infinite, and a box with a NaN or a negative half extent meets
-    nothing. starts (N,) bool: pairs in which neither box starts are left out, and not visited. Raises InputError.
+    nothing. starts (N,) bool: pairs of two boxes without the flag are omitted and not visited. Raises InputError.
     """
     centre = np.ascontiguousarray(centre, dtype=np.float64)
     half = np.ascontiguousarray(half, dtype=np.float64)
@@ -477,7 +478,7 @@ def box_pairs(centre: ArrayLike, half: ArrayLike, starts: ArrayLike | None = Non
     if starting.shape != (n,):
         raise InputError(f"starts: expected {n} flags, one for each box, got an array of shape {starting.shape}")
     grid = make_grid(n)
-    pairs = np.empty((16 * n + 16, 2), np.int32)  # more than most scenes have; what is not written costs nothing
+    pairs = np.empty((16 * n + 16, 2), np.int32)  # more than most scenes have; unwritten memory costs nothing
     count = _box_pairs(centre, half, starting, grid, pairs)
     if count > len(pairs):
         pairs = np.empty((count, 2), np.int32)

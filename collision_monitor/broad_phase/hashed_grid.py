@@ -1,8 +1,8 @@
 """Hashed uniform grid with one resolution per size class, updated object by object.
 
-Each box lies in exactly one cell: the cell of its centre, at the level whose cells are at least half as wide as it.
-A query looks at the cells that a box of the level could reach from, so mixed sizes cost one look per occupied level.
-Cells are chains in a hash table: space between far objects costs nothing.
+Each box is stored in exactly one cell: the cell of its centre, at the level with cells at least half as wide as the
+box. A query visits the cells from which a box of the level could reach, so mixed sizes cost one lookup per occupied
+level. Cells are chains in a hash table, so that empty space costs nothing.
 Source: lecture slides "Efficient collision detection: spatial partitioning" (hash tables, multiresolution grids).
 """
 
@@ -18,13 +18,13 @@ from collision_monitor._jit import allocating_kernel, device, inlined, kernel
 from collision_monitor.broad_phase.region import Region, regions_overlap
 
 GRID_LEVELS: Final = 128
-"""Sizes of cells."""
+"""Number of cell sizes."""
 
 LEVEL_OFFSET: Final = 64
-"""Level of cells 1 m wide; levels run from 2^-64 m to 2^63 m, sizes beyond are put in the outermost."""
+"""Level of cells 1 m wide; levels run from 2^-64 m to 2^63 m, and other sizes use the outermost levels."""
 
 CELL_LIMIT: Final = 2.0**62
-"""Cell coordinates are clipped here, so that no position overflows an int64; clipped boxes share cells."""
+"""Cell coordinates are clipped to this, so that no position overflows an int64; clipped boxes share cells."""
 
 GRID_BOX = np.dtype(
     [
@@ -38,18 +38,18 @@ GRID_BOX = np.dtype(
         ("cell_y", np.int64),
         ("cell_z", np.int64),
         ("level", np.int32),  # -1: the box is not in the grid
-        ("next", np.int32),  # in the bucket; -1 ends a chain
-        ("previous", np.int32),  # or -2 - bucket for the first
-        ("level_next", np.int32),  # all boxes of a level are chained too
-        ("level_previous", np.int32),  # -1 for the first
+        ("next", np.int32),  # in the bucket; -1: end of the chain
+        ("previous", np.int32),  # in the bucket; -2 - bucket: first of the chain
+        ("level_next", np.int32),  # chain of all boxes of a level
+        ("level_previous", np.int32),  # -1: first of the chain
     ],
     align=True,
 )
-"""One box, all that a look at it reads side by side."""
+"""One box; all that a query reads of it is adjacent in memory."""
 
 
 class HashedGrid(NamedTuple):
-    """Capacity N boxes, B buckets (a power of two)."""
+    """Grid with a capacity of N boxes and B buckets (a power of two)."""
 
     box: Any  # (N,) GRID_BOX
     head: Any  # (B,) int32: first box of the bucket, -1: none
@@ -58,7 +58,7 @@ class HashedGrid(NamedTuple):
 
 
 def make_hashed_grid(capacity: int) -> HashedGrid:
-    """An empty grid for box numbers 0 … capacity - 1."""
+    """Create an empty grid for box numbers 0 … capacity - 1."""
     buckets = 1 << max(4, (2 * capacity - 1).bit_length())
     box = np.zeros(capacity, GRID_BOX)
     box["level"] = -1
@@ -71,7 +71,7 @@ def make_hashed_grid(capacity: int) -> HashedGrid:
 
 
 def regridded(box: NDArray[np.void], capacity: int) -> HashedGrid:
-    """A grid of this capacity that holds those of the boxes (N,) GRID_BOX that were in a grid."""
+    """Create a grid of this capacity with all boxes (N,) GRID_BOX that were in a grid."""
     grid = make_hashed_grid(capacity)
     centre, half = np.empty((2, len(box), 3))
     read_boxes(box, centre, half)
@@ -81,7 +81,7 @@ def regridded(box: NDArray[np.void], capacity: int) -> HashedGrid:
 
 @device
 def _level_of(width):
-    """The finest level whose cells are at least `width` wide."""
+    """Return the finest level with cells at least `width` wide."""
     if not width < 2.0**62:
         return GRID_LEVELS - 1
     exponent = frexp(width)[1] if width > 0.0 else -LEVEL_OFFSET
@@ -103,7 +103,7 @@ def _bucket(level, x, y, z, mask):
 
 @device
 def remove_box(grid, i):
-    """Take box i out; nothing happens where it is not in."""
+    """Remove box i from the grid; do nothing if it is not in the grid."""
     box = grid.box[i]
     if box.level < 0:
         return
@@ -125,7 +125,7 @@ def remove_box(grid, i):
 
 @device
 def put_box(grid, i, region):
-    """Put box i with the bounds `region` in, or move it there."""
+    """Insert box i with the bounds `region`, or move it there."""
     remove_box(grid, i)
     box = grid.box[i]
     level = _level_of(max(region.hx, region.hy, region.hz))
@@ -151,9 +151,9 @@ def put_box(grid, i, region):
 
 @device
 def query_box(grid, box, i, found):
-    """The boxes but number i that overlap `box` (a Region or a GRID_BOX), into found[0:n], in no particular order.
+    """Write all boxes except number i that overlap `box` (a Region or a GRID_BOX) to found[0:n], unordered.
 
-    Returns n. n can be larger than found.size: then the rest was counted but not written.
+    Returns n. If n is larger than found.size, the rest was counted but not written.
     """
     n = 0
     for level in range(GRID_LEVELS):
@@ -161,7 +161,7 @@ def query_box(grid, box, i, found):
         if count == 0:
             continue
         size = 2.0 ** (level - LEVEL_OFFSET)
-        # a box of this level reaches at most a cell from its centre; the outermost level holds any size
+        # a box of this level reaches at most one cell from its centre; the outermost level holds boxes of any size
         reach = size if level < GRID_LEVELS - 1 else np.inf
         x0, x1 = np.floor((box.x - box.hx - reach) / size), np.floor((box.x + box.hx + reach) / size)
         y0, y1 = np.floor((box.y - box.hy - reach) / size), np.floor((box.y + box.hy + reach) / size)
@@ -200,7 +200,7 @@ def query_box(grid, box, i, found):
 
 @kernel
 def put_boxes(grid, which, centre, half):
-    """Put boxes `which` (M,) at centre, half (N, 3), indexed by box number."""
+    """Insert the boxes `which` (M,) with centre, half (N, 3) in m, indexed by box number."""
     for k in range(which.size):
         i = which[k]
         x, y, z = centre[i, 0], centre[i, 1], centre[i, 2]
@@ -209,9 +209,9 @@ def put_boxes(grid, which, centre, half):
 
 @kernel
 def read_boxes(box, centre, half):
-    """The first N of the boxes (GRID_BOX) into centre, half (N, 3).
+    """Copy the first N boxes (GRID_BOX) into centre, half (N, 3) in m.
 
-    A box that is not in the grid gets a NaN half extent, which meets nothing.
+    A box that is not in the grid gets a NaN half extent, so that it meets nothing.
     """
     for i in range(centre.shape[0]):
         centre[i, 0], centre[i, 1], centre[i, 2] = box[i].x, box[i].y, box[i].z
@@ -222,16 +222,16 @@ def read_boxes(box, centre, half):
 
 @kernel
 def remove_boxes(grid, which):
-    """Take boxes `which` (M,) out."""
+    """Remove the boxes `which` (M,)."""
     for k in range(which.size):
         remove_box(grid, which[k])
 
 
 @allocating_kernel
 def query_boxes(grid, which, pairs):
-    """All (i, j) with i in `which` (M,) and j overlapping it, into pairs (P, 2); returns how many there are.
+    """Write all (i, j) with i in `which` (M,) and j overlapping i to pairs (P, 2); return their number.
 
-    More than P: call again with a larger array.
+    If the number exceeds P, call again with a larger array.
     """
     found = np.empty(grid.box.size, np.int32)
     n = 0

@@ -1,7 +1,7 @@
-"""Eight bodies at a time against one: which bounds overlap, as the bits of a number.
+"""Overlap tests of one body against eight others at a time; the results are the bits of a number.
 
-LLVM does not vectorise a loop whose results go to places that depend on earlier results, so vectors are written out
-here. The comparisons are those of the scalar formulas in the docstrings.
+LLVM does not vectorise a loop with output positions that depend on earlier results, so the vectors are written out
+here. The docstrings give the equivalent scalar formulas.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _PLACE = ir.IntType(64)
 
 
 def _rows(context: Any, builder: Any, array_type: Any, array: Any, place: Any) -> list[Any]:
-    """Lanes from `place` on of the three rows of a C-contiguous (3, N) array, loaded when called."""
+    """Loaders of the lanes from `place` on, for the three rows of a C-contiguous (3, N) array."""
     struct = context.make_array(array_type)(context, builder, array)
     length = cgutils.unpack_tuple(builder, struct.shape)[1]
 
@@ -41,9 +41,9 @@ def _axis(builder: Any, rows: list[Any], row: int, value: Any) -> Any:
 
 @intrinsic
 def spheres_overlap(typing_context, centre, extent, q, ball):
-    """Bit k: |centre[:, q + k] - (x, y, z)|^2 <= (hx + extent[0, q + k])^2 for the Region `ball`, hx its radius.
+    """Bit k: |centre[:, q + k] - (x, y, z)|^2 <= (hx + extent[0, q + k])^2, with hx the radius of the Region `ball`.
 
-    Reads LANES places from q on.
+    Reads LANES elements from q on.
     """
     signature = types.int64(centre, extent, types.int64, ball)
 
@@ -66,7 +66,7 @@ def spheres_overlap(typing_context, centre, extent, q, ball):
 def boxes_overlap(typing_context, centre, extent, q, box):
     """Bit k: |centre[i, q + k] - (x, y, z)[i]| <= (hx, hy, hz)[i] + extent[i, q + k] on all axes i of the Region `box`.
 
-    Reads LANES places from q on.
+    Reads LANES elements from q on.
     """
     signature = types.int64(centre, extent, types.int64, box)
 
@@ -90,7 +90,7 @@ def boxes_overlap(typing_context, centre, extent, q, box):
 
 @intrinsic
 def lowest_bit(typing_context, bits):
-    """Number of the lowest bit that is set; bits must not be 0."""
+    """Index of the lowest bit that is set; bits must not be 0."""
     signature = types.int64(types.int64)
 
     def codegen(context, builder, signature, arguments):

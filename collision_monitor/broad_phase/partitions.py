@@ -1,7 +1,7 @@
-"""The space partitions behind one interface: corners of boxes in, the pairs that overlap out.
+"""The space partitions behind one interface: corners of boxes in, overlapping pairs out.
 
-The monitor's are the grids; the others are for comparison and for work without a monitor.
-benchmarks/space_partitions.py says when each wins.
+The monitor uses the grids; the others serve comparison and use without a monitor.
+benchmarks/space_partitions.py measures them against each other.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ Partition = Callable[[Array, Array], Indices]
 
 
 def grid_overlaps(lower: Array, upper: Array) -> Indices:
-    """By the grid that sorts all boxes anew, with one resolution for each class of sizes."""
+    """Pairs by the grid that sorts all boxes anew, with one resolution for each size class. Raises InputError."""
     low, high = box_arrays(lower, upper)
     centre, half = _rounded_out(low, high)
     return overlaps(low, high, *box_pairs(centre, half).astype(np.int64).T)
 
 
 def hashed_grid_overlaps(lower: Array, upper: Array) -> Indices:
-    """By the grid that boxes are put into one by one, with one resolution for each power of two."""
+    """Pairs by the grid updated box by box, with one resolution for each power of two. Raises InputError."""
     low, high = box_arrays(lower, upper)
     n = len(low)
     grid, every = make_hashed_grid(n), np.arange(n, dtype=np.int32)
@@ -46,7 +46,7 @@ def hashed_grid_overlaps(lower: Array, upper: Array) -> Indices:
 
 
 def _rounded_out(low: Array, high: Array) -> tuple[Array, Array]:
-    """Centres and half extents of boxes that hold these."""
+    """Centres and half extents (m) of boxes that contain these boxes in spite of round-off."""
     centre = low + 0.5 * (high - low)
     half = np.maximum(high - centre, centre - low)
     return centre, np.nextafter(half + 1e-15 * np.abs(centre), np.inf)

@@ -1,4 +1,4 @@
-"""An axis-aligned box as kernels take it: one argument of six numbers."""
+"""Axis-aligned box as an argument of kernels: one tuple of six numbers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collision_monitor._jit import inlined
 
 
 class Region(NamedTuple):
-    """A box by its centre and half extents (m)."""
+    """Axis-aligned box by its centre and half extents (m)."""
 
     x: float
     y: float
@@ -20,5 +20,5 @@ class Region(NamedTuple):
 
 @inlined
 def regions_overlap(a: Any, b: Any) -> Any:
-    """Whether two boxes, Regions or records with the same fields, overlap or touch."""
+    """Return whether two boxes, Regions or records with the same fields, overlap or touch."""
     return abs(a.x - b.x) <= a.hx + b.hx and abs(a.y - b.y) <= a.hy + b.hy and abs(a.z - b.z) <= a.hz + b.hz

@@ -1,4 +1,4 @@
-"""Sweep and prune: boxes sorted along one axis, each compared with those that begin before it ends.
+"""Sweep and prune: boxes are sorted along one axis, and each is compared with those that begin before it ends.
 
 (Baraff, 1992; Cohen, Lin, Manocha and Ponamgi, I-COLLIDE, 1995)
 """
@@ -12,7 +12,10 @@ from collision_monitor.broad_phase.boxes import Indices, box_arrays, in_order, o
 
 
 def sweep_and_prune(lower: ArrayLike, upper: ArrayLike) -> Indices:
-    """Pairs (M, 2), i < j, sorted, of boxes (N, 2 or 3) that overlap or touch; swept along the axis they spread on."""
+    """Pairs (M, 2), i < j, sorted, of boxes (N, 2 or 3) that overlap or touch; sweeps the axis of largest spread.
+
+    Raises InputError.
+    """
     low, high = box_arrays(lower, upper)
     axis = int(np.std(low + high, axis=0).argmax()) if len(low) else 0
     order = np.argsort(low[:, axis], kind="stable")

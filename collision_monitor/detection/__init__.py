@@ -1,1 +1,1 @@
-"""All contacts of one frame: every pose in, every contact out."""
+"""Detection of all contacts of one frame, for objects that all have new poses."""

@@ -1,8 +1,8 @@
-"""Full detection: all poses in, all contacts out, frame by frame.
+"""Full detection: computes all contacts of a frame from all poses.
 
     Detector(shapes).detect(positions, quaternions) -> DetectedContacts
 
-For objects whose every pose is new in each frame. Monitor is what remembers and predicts.
+For scenes in which every pose is new in each frame. Monitor, in contrast, keeps state and predicts.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 Array = NDArray[np.float64]
 
 WORTH_THREADS: Final = 3000
-"""Objects below which a frame is done before a second thread has woken up."""
+"""Number of objects from which a second thread pays; a smaller frame is finished before that thread has woken up."""
 
 
 def default_threads() -> int:
-    """Two, or one where there is one core."""
+    """Return 2, or 1 on a machine with a single core."""
     return min(2, int(numba.config.NUMBA_NUM_THREADS))
 
 
@@ -39,7 +39,7 @@ class DetectedContacts:
     """M contacts, sorted by pair. `table` holds a row for each; the fields are views of it."""
 
     pairs: NDArray[np.int32]
-    """(M, 2): numbers of the two shapes, the smaller first; A and B below."""
+    """(M, 2): indices of the two shapes A and B, the smaller first."""
     table: Array
     """(M, 14): signed distance, error bound, normal, point, point on A, point on B (see kernels.DETECTED)."""
 
@@ -81,10 +81,10 @@ class DetectedContacts:
 
 
 class Detector:
-    """Finds every pair of shapes that is at most `margin` (m) apart.
+    """Finds every pair of shapes with a distance of at most `margin` (m).
 
-    shapes: one for each object. static: (N,) flags; pairs of two static objects are not looked at.
-    threads: how many a frame may use; the answer's bytes do not depend on it.
+    shapes: one for each object. static: (N,) flags; pairs of two static objects are ignored.
+    threads: largest number of threads for a frame; the result is the same to the bit for any number.
     Raises ShapeError, UnsupportedError (a shape without narrow phase) or InputError.
     """
 
@@ -110,10 +110,10 @@ class Detector:
         kinds = set(self._table.kind[:n].tolist())
         self._path = {(SPHERE,): kernels.SPHERES, (BOX,): kernels.BOXES}.get(tuple(kinds), kernels.ANY)
         if self._path == kernels.BOXES and margin > 0.0:
-            self._path = kernels.ANY  # boxes that are apart need more than SAT
+            self._path = kernels.ANY  # SAT alone gives no distance of boxes that are apart
         self._margin = float(margin)
         self._threads = threads if n >= WORTH_THREADS else 1
-        # half of the margin on each; rounded up, so that no pair at the margin is lost
+        # half of the margin for each body; rounded up, so that no pair at the margin is lost
         radius = (self._table.radius[:n] + 0.5 * margin) * (1.0 + 1e-15)
         body = np.column_stack([self._table.size[:n, :3], radius])
         if self._path == kernels.SPHERES:
@@ -131,7 +131,7 @@ class Detector:
     def detect(self, positions: ArrayLike, quaternions: ArrayLike) -> DetectedContacts:
         """Contacts at these positions (N, 3) m and unit quaternions (N, 4) x, y, z, w.
 
-        Raises InputError for arrays of another shape, PoseError for numbers that are no pose.
+        Raises InputError for arrays of another shape, PoseError for values that are not finite or not of unit length.
         """
         positions = np.ascontiguousarray(positions, dtype=np.float64)
         quaternions = np.ascontiguousarray(quaternions, dtype=np.float64)
@@ -154,7 +154,7 @@ class Detector:
                 return DetectedContacts(pairs[:count], table[:count])
             if count >= kernels.BAD_QUATERNION:
                 raise PoseError(_what_is_wrong(positions, quaternions))
-            # more contacts than ever before: with room for them, the frame is done again
+            # more contacts than in any frame before: allocate more memory and repeat the frame
             needed = kernels.BAD_QUATERNION - 1 - count
             self._room = needed + needed // 4
             self._hits = kernels.make_hits(self._threads, self._room)
@@ -162,7 +162,7 @@ class Detector:
 
 
 def _what_is_wrong(positions: Array, quaternions: Array) -> str:
-    """The first row that is no pose, in words."""
+    """Describe the first row that is not a valid pose."""
     far = ~(np.abs(positions) <= LARGEST_INPUT).all(axis=1)
     if far.any():
         i = int(np.argmax(far))

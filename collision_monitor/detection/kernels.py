@@ -1,8 +1,8 @@
-"""One frame of full detection: every pose is new, every pair that touches is found, nothing is carried over.
+"""Kernels for one frame of full detection: every pose is new, and nothing is carried over from the frame before.
 
-The frame is cut into blocks of bodies, and each stage runs block by block: bounds, cells, sort by cell, and on one
-thread or on several gather, search with the narrow phase, and after the sort of the hits output.
-Each pair is computed from its two poses alone and the hits are sorted: the answer's bytes do not depend on the blocks.
+The bodies are divided into blocks, and each stage runs block by block: bounds, cells, sort by cell, gather, search with
+the narrow phase, sort of the hits, output. Gather, search and output can run on several threads.
+Each pair is computed from its two poses alone and the hits are sorted, so the result does not depend on the blocks.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ from collision_monitor.narrow_phase.work_memory import WORK_SIZE
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 
 SPHERES, BOXES, ANY = 0, 1, 2
-"""Which narrow phase: only spheres, only boxes without margin, or the table of pair tests."""
+"""Kinds of narrow phase: only spheres, only boxes without margin, or the table of pair tests."""
 
 CHUNK: Final = 256
-"""Candidates that are collected before the narrow phase runs over them: both loops stay in the caches."""
+"""Candidates collected before the narrow phase tests them, so that both loops stay in the caches."""
 
 DETECTED: Final = np.dtype(
     [
@@ -75,19 +75,19 @@ DETECTED_SIZE: Final = DETECTED.itemsize // 8
 
 
 class Frame(NamedTuple):
-    """Memory of one detector for N bodies in B blocks; sorted: by cell, in the order of the grid's places."""
+    """Memory of one detector for N bodies in B blocks; "sorted" means by cell, in the order of the grid's places."""
 
-    body: Any  # (N, 4) float64: half extents of boxes or the radius of spheres; bounding radius with half the margin
-    bounds: Any  # (B, 6) float64: lower and upper corner of each block's positions
-    extent: Any  # (3, N + PAD) float64: sorted bounding radii in row 0
-    size: Any  # (N, 3) float64: sorted, half extents of boxes or the radius of spheres
+    body: Any  # (N, 4) float64: half extents of a box or radius of a sphere; bounding radius plus half the margin (m)
+    bounds: Any  # (B, 6) float64: lower and upper corner of each block's positions (m)
+    extent: Any  # (3, N + PAD) float64: sorted bounding radii in row 0 (m)
+    size: Any  # (N, 3) float64: sorted; half extents of a box or radius of a sphere (m)
     rotation: Any  # (N, 3, 3) float64, sorted
-    found: Any  # (B, N + CHUNK + PAD) int32: places of candidates
-    owner: Any  # (B, N + CHUNK + PAD) int32: and of the bodies that they are candidates of
+    found: Any  # (B, N + CHUNK + PAD) int32: places of the candidates
+    owner: Any  # (B, N + CHUNK + PAD) int32: places of the bodies that found them
     work: Any  # (B, WORK_SIZE) float64
-    begins: Any  # (N + 1,) int32: scratch of the final sort
-    hits: Any  # (B,) int64: contacts of each block
-    good: Any  # (B,) bool: whether all the input of the block was
+    begins: Any  # (N + 1,) int32: scratch memory of the final sort
+    hits: Any  # (B,) int64: number of contacts of each block
+    good: Any  # (B,) bool: whether the block's input is valid
 
 
 class CandidateTest(NamedTuple):
@@ -99,15 +99,15 @@ class CandidateTest(NamedTuple):
 
 
 class Hits(NamedTuple):
-    """Contacts of a frame before they are sorted; grown when a frame has more."""
+    """Contacts of a frame before they are sorted; enlarged when a frame has more."""
 
-    pair: Any  # (B, H + 1, 2) int32; the last place takes what does not fit
+    pair: Any  # (B, H + 1, 2) int32; the last element receives the contacts that do not fit
     contact: Any  # (B, H + 1, CONTACT_SIZE) float64
     order: Any  # (2, B * H) int32
 
 
 def make_frame(body: Any, blocks: int) -> Frame:
-    """Memory for bodies (N, 4)."""
+    """Allocate the memory for bodies (N, 4)."""
     n = len(body)
     return Frame(
         body=body,
@@ -125,7 +125,7 @@ def make_frame(body: Any, blocks: int) -> Frame:
 
 
 def make_hits(blocks: int, capacity: int) -> Hits:
-    """Room for `capacity` contacts in each block."""
+    """Allocate memory for `capacity` contacts in each block."""
     return Hits(
         pair=np.zeros((blocks, capacity + 1, 2), np.int32),
         contact=np.zeros((blocks, capacity + 1, CONTACT_SIZE)),
@@ -133,20 +133,20 @@ def make_hits(blocks: int, capacity: int) -> Hits:
     )
 
 
-# A stage does its block b of n things and keeps what it found in frame[b]: an assignment to an element of a tuple's
-# array is lost when it stands in the parallel loop itself.
+# A stage processes block b of n items and stores its result in frame[b]. It does so in a function of its own, because
+# numba loses an assignment to an element of a tuple's array inside the parallel loop itself.
 
 
 @inlined
 def _block(b: Any, frame: Any, n: int) -> Any:
-    """Begin and end of block b of n things."""
+    """Begin and end of block b of n items."""
     blocks = frame.bounds.shape[0]
     return b * n // blocks, (b + 1) * n // blocks
 
 
 @device
 def _bounds(positions: Any, frame: Any, b: Any) -> None:
-    """Corners of the positions, and whether all are finite and within LARGEST_INPUT."""
+    """Compute the corners of the positions, and check that all are finite and within LARGEST_INPUT."""
     begin, end = _block(b, frame, positions.shape[0])
     lx = ly = lz = np.inf
     hx = hy = hz = -np.inf
@@ -163,7 +163,7 @@ def _bounds(positions: Any, frame: Any, b: Any) -> None:
 
 @device
 def _cells(grid: Any, frame: Any) -> Any:
-    """Plan the cells within the bounds of all blocks."""
+    """Plan the cells within the bounds of all blocks; return their number."""
     lx, ly, lz = frame.bounds[0, 0], frame.bounds[0, 1], frame.bounds[0, 2]
     hx, hy, hz = frame.bounds[0, 3], frame.bounds[0, 4], frame.bounds[0, 5]
     for b in range(1, frame.bounds.shape[0]):
@@ -180,7 +180,7 @@ def _buckets(positions: Any, grid: Any, frame: Any, b: Any) -> None:
 
 @device
 def _gather(path: int, positions: Any, quaternions: Any, grid: Any, frame: Any, b: Any) -> None:
-    """What the search reads, in the order of the cells, and whether all quaternions are of unit length."""
+    """Copy the search's input into the order of the cells, and check that all quaternions are of unit length."""
     begin, end = _block(b, frame, positions.shape[0])
     gather_centres(positions, grid, begin, end)
     good = True
@@ -221,9 +221,9 @@ def _boxes(a: Any, b: Any, pose: Any, out: Any, work: Any) -> bool:
 
 @inlined
 def _ask_for(table: Any, path: int, order: Any, size: Any, rotation: Any, q: Any) -> None:
-    """What a test of place q will read of it: in no order of the memory, unlike what it is a candidate of."""
+    """Prefetch what a test of place q reads, as the candidates are in random memory order."""
     prefetch(rotation, q)
-    prefetch(rotation, q + 1)  # the rest of it: a matrix is longer than a line
+    prefetch(rotation, q + 1)  # the rest of the matrix, which is longer than a cache line
     if path == BOXES:
         prefetch(size, q)
     else:
@@ -233,7 +233,7 @@ def _ask_for(table: Any, path: int, order: Any, size: Any, rotation: Any, q: Any
 
 @device
 def _narrow(test: Any, grid: Any, frame: Any, hits: Any, b: Any, candidates: int, count: int) -> int:
-    """CandidateTest the first `candidates` of block b; append contacts from place `count` on, return the new number."""
+    """Test the first `candidates` of block b; append contacts from place `count` on, return the new number."""
     table, path, limit = test.table, test.path, test.limit
     found, owner, work = frame.found[b], frame.owner[b], frame.work[b]
     pair, contact = hits.pair[b], hits.contact[b]
@@ -265,7 +265,7 @@ def _narrow(test: Any, grid: Any, frame: Any, hits: Any, b: Any, candidates: int
 
 @device
 def _search(table: Any, path: int, limit: float, grid: Any, frame: Any, hits: Any, b: Any) -> None:
-    """Contacts of a block of places with all that they look for, and how many there are."""
+    """Find the contacts of a block of places with all their partners; store their number in frame.hits[b]."""
     begin, end = _block(b, frame, grid.order.size)
     found, owner = frame.found[b], frame.owner[b]
     test = CandidateTest(table, path, limit)
@@ -291,7 +291,7 @@ def _search(table: Any, path: int, limit: float, grid: Any, frame: Any, hits: An
 
 @device
 def _sort_hits(frame: Any, hits: Any) -> int:
-    """Places of the hits in `pair`, by first and second body, into order[0]: two stable counting sorts."""
+    """Sort the indices of the hits by first and second body into order[0], with two stable counting sorts."""
     begins, order, pair = frame.begins, hits.order, hits.pair
     stride = pair.shape[1]
     total = 0
@@ -318,14 +318,14 @@ def _sort_hits(frame: Any, hits: Any) -> int:
 
 @device
 def _write(positions: Any, frame: Any, hits: Any, total: int, pairs: Any, contacts: Any, part: Any) -> None:
-    """A block of the sorted hits into the arrays of the answer, witness points in the world."""
+    """Write a block of the sorted hits to the output arrays, with witness points in the world frame."""
     begin, end = _block(part, frame, total)
     stride = hits.pair.shape[1]
     for k in range(begin, end):
         ahead = hits.order[0, min(k + AHEAD, end - 1)]
         contact = hits.contact[ahead // stride]
         prefetch(contact, np.intp(ahead % stride))
-        prefetch(contact, np.intp(ahead % stride + 1))  # and with that the end of the one before
+        prefetch(contact, np.intp(ahead % stride + 1))  # also covers the end of the row `ahead`
         at = hits.order[0, k]
         b, h = at // stride, at % stride
         i = hits.pair[b, h, 0]
@@ -354,7 +354,7 @@ BAD_QUATERNION: Final = -2
 
 @device
 def _finish(frame: Any, hits: Any, pairs: Any) -> int:
-    """The sorted number of hits, or minus what a block needs room for less 3, where there are too many."""
+    """Sort the hits and return their number; if they do not fit, return -3 - the capacity that is needed."""
     most = total = 0
     for b in range(frame.hits.size):
         most = max(most, frame.hits[b])
@@ -366,10 +366,10 @@ def _finish(frame: Any, hits: Any, pairs: Any) -> int:
 
 @kernel
 def detect(path: int, limit: float, positions: Any, quaternions: Any, pairs: Any, contacts: Any, *memory: Any) -> int:
-    """Detect on one thread; returns the number of contacts, or what is wrong (see BAD_POSITION and `_finish`).
+    """Detect on one thread; return the number of contacts or a negative code (BAD_POSITION, BAD_QUATERNION, `_finish`).
 
-    memory: the arrays of the shape table, the grid, the frame and the hits. Arrays that are handed over one by one
-    cost 20 ns each, those in a named tuple 200 ns.
+    memory: the arrays of the shape table, the grid, the frame and the hits. A separate array argument costs 20 ns, an
+    array in a named tuple 200 ns.
     """
     table, grid = ShapeTable(*memory[:_GRID]), Grid(*memory[_GRID:_FRAME])
     frame, hits = Frame(*memory[_FRAME:_HITS]), Hits(*memory[_HITS:_END])
@@ -398,9 +398,9 @@ def detect(path: int, limit: float, positions: Any, quaternions: Any, pairs: Any
 def detect_parallel(
     path: int, limit: float, positions: Any, quaternions: Any, pairs: Any, contacts: Any, *memory: Any
 ) -> int:
-    """The same, with the stages that are worth waking a thread for on as many threads as there are blocks.
+    """Detect as `detect` does, with one thread per block for the stages that are worth a second thread.
 
-    A parallel loop's b is cast to what it is in `detect`, so that both share their compiled stages.
+    The parallel loop's b is cast to its type in `detect`, so that both share their compiled stages.
     """
     table, grid = ShapeTable(*memory[:_GRID]), Grid(*memory[_GRID:_FRAME])
     frame, hits = Frame(*memory[_FRAME:_HITS]), Hits(*memory[_HITS:_END])

@@ -1,8 +1,8 @@
-"""Four bounding spheres of a set of points, from the quickest to the smallest.
+"""Four bounding spheres of a set of points, from the fastest to the smallest.
 
-(Slides "Bounding sphere": the centre is half-way between the maximally separated pair, or the centroid; then point by
-point the sphere is altered to fit.)
-All of them work on points (n, 2 or 3) and end with the distance of the farthest point, rounded up.
+(Slides "Bounding sphere": the centre is half-way between the maximally separated pair, or the centroid; then the sphere
+is adjusted point by point.)
+All take points (n, 2 or 3) in m. The radius is the distance of the farthest point from the centre, rounded up.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from collision_monitor.geometry.qhull import qhull
 from collision_monitor.tolerances import EPSILON
 
 GROWTH_THRESHOLD: Final = 1e-12
-"""A point farther out than this part of the radius makes the minimal sphere grow.
-Smaller: where five or more points are on the sphere, round-off takes them in turns. Larger: the sphere is larger than
-the smallest by as much."""
+"""Excess distance of a point, as a part of the radius, above which the minimal sphere grows.
+Smaller: with five or more points on the sphere, round-off selects them in turns. Larger: the sphere is larger than the
+smallest one by this part."""
 
 
 def sphere_from_centroid(points: ArrayLike) -> BoundingSphere:
-    """Centre at the mean of the points. O(n); up to twice the smallest radius where points crowd at one end."""
+    """Sphere around the mean of the points. O(n); up to twice the smallest radius if the points crowd at one end."""
     points = point_set(points, "points")
     return _around(points, points[0] + (points - points[0]).mean(axis=0))
 
 
 def sphere_from_widest_pair(points: ArrayLike) -> BoundingSphere:
-    """Centre half-way between the two points farthest apart. O(h²) for h points on the hull."""
+    """Sphere around the midpoint of the two points farthest apart. O(h²) for h points on the hull."""
     from scipy.spatial.distance import cdist
 
     points = point_set(points, "points")
     outer = _outer(points)
     offset = outer - outer[0]
-    # row by row: the whole table of distances would not fit into memory for large sets
+    # row by row, as the whole table of distances would not fit into memory for large sets
     widest, pair = -1.0, (0, 0)
     for first in range(0, len(outer), 256):
         apart = cdist(offset[first : first + 256], offset)
@@ -47,9 +47,9 @@ def sphere_from_widest_pair(points: ArrayLike) -> BoundingSphere:
 
 
 def sphere_grown(points: ArrayLike) -> BoundingSphere:
-    """Grown point by point from a wide pair: a point outside moves and grows the sphere just so far as to reach it.
+    """Sphere grown from a wide pair: each point outside moves and enlarges the sphere just enough to reach it.
 
-    The pair is the point farthest from the first one, and the one farthest from that.
+    The pair is the point farthest from the first point, and the point farthest from that one.
     O(n); about 5 % larger than the smallest. Depends on the points' order. (Ritter, An efficient bounding sphere, 1990)
     """
     points = point_set(points, "points")
@@ -71,19 +71,19 @@ def sphere_grown(points: ArrayLike) -> BoundingSphere:
 
 
 def minimal_sphere(points: ArrayLike) -> BoundingSphere:
-    """The smallest sphere, to about 1e-12 of its radius. Expected O(n). (Welzl, Smallest enclosing disks, 1991)"""
+    """Smallest sphere, to about 1e-12 of its radius. Expected O(n). (Welzl, Smallest enclosing disks, 1991)"""
     points = point_set(points, "points")
     outer = np.unique(_outer(points), axis=0)
     base = outer.mean(axis=0)
     size = float(np.abs(outer - base).max()) or 1.0
-    # a random order makes the expected time linear; a fixed seed makes the answer reproducible
+    # a random order makes the expected time linear; a fixed seed makes the result reproducible
     shuffled = np.random.default_rng(0).permutation((outer - base) / size)
     center, _ = _smallest(shuffled, np.zeros((0, points.shape[1])))
     return _around(points, base + size * center)
 
 
 def _smallest(points: Array, touching: Array) -> tuple[Array, float]:
-    """Centre and radius of the smallest sphere around points that has the points of `touching` on its surface."""
+    """Centre and radius of the smallest sphere around `points` with all points of `touching` on its surface."""
     center, radius = _through(touching) if len(touching) else (points[0], 0.0)
     if len(touching) == points.shape[1] + 1:
         return center, radius
@@ -94,7 +94,7 @@ def _smallest(points: Array, touching: Array) -> tuple[Array, float]:
         if not len(outside):
             break
         k += int(outside[0])
-        # a point outside the smallest sphere of those before it is on the surface of the next one
+        # a point outside the smallest sphere of the points before it is on the surface of the next sphere
         center, radius = _smallest(points[:k], np.vstack([touching, points[k]]))
         k += 1
     return center, radius
@@ -109,7 +109,7 @@ def _through(touching: Array) -> tuple[Array, float]:
 
 
 def _outer(points: Array) -> Array:
-    """The hull's corners, on which the widest pair and the smallest sphere depend; all points where they are flat."""
+    """Hull corners, which determine the widest pair and the smallest sphere; all points if they are flat or few."""
     if len(points) <= 64:
         return points
     hull = qhull(points)

@@ -1,7 +1,7 @@
-"""Tests between bounding volumes: true where they overlap or touch.
+"""Tests between bounding volumes: true if they overlap or touch.
 
-All are vectorised over the leading dimensions of the volumes' fields. They are conservative: where round-off could hide
-a touch they say true, as a bounding test must, since nothing looks at a pair again that it rejects.
+All are vectorised over the leading dimensions of the volumes' fields. They are conservative: if round-off could hide a
+touch, they return true, because a rejected pair is never examined again.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from collision_monitor.geometry.triangulation import triangulate
 from collision_monitor.tolerances import EPSILON, PARALLEL_SIN2, SAT_ROUND_OFF
 
 PLANAR: Final = 1e-9
-"""A polygon's corners may leave its plane by this part of its size. Larger: the test answers for another polygon.
-Smaller: polygons that were turned in float32 are refused."""
+"""Largest distance of a polygon's corner from its plane, as part of its size. Larger: the result may be that of another
+polygon. Smaller: polygons that were rotated in float32 are refused."""
 
 
 def sphere_sphere(a: BoundingSphere, b: BoundingSphere) -> Booleans:
-    """Whether spheres overlap: distance of the centres <= sum of the radii, squared to save the root.
+    """Whether spheres overlap: distance of the centres <= sum of the radii, squared to avoid the root.
 
     (Slides "Collisions Detection Between Spheres", "Sphere vs. Sphere")
     """
@@ -44,31 +44,31 @@ def aabb_aabb(a: Aabb, b: Aabb) -> Booleans:
 
 
 def closest_point_in_aabb(p: ArrayLike, box: Aabb) -> Array:
-    """The points of boxes closest to p (..., 2 or 3): each coordinate clamped. (Slide "Sphere vs. AABB – clamping")"""
+    """Points of boxes closest to p (..., 2 or 3) in m: each coordinate clamped. (Slide "Sphere vs. AABB – clamping")"""
     return np.clip(coordinates(p, "p"), box.lower, box.upper)
 
 
 def sphere_aabb(sphere: BoundingSphere, box: Aabb) -> tuple[Booleans, Array]:
-    """Whether a sphere overlaps a box, and the box's point closest to it. (Slides "Sphere vs. AABB – closest point")"""
+    """Whether a sphere overlaps a box, and the box's closest point to it. (Slides "Sphere vs. AABB – closest point")"""
     closest = closest_point_in_aabb(sphere.center, box)
     return _within(closest - sphere.center, sphere.radius), closest
 
 
 def sphere_obb(sphere: BoundingSphere, box: Obb) -> tuple[Booleans, Array]:
-    """Whether a sphere overlaps an oriented box, and the box's closest point: clamped in its frame. (Ericson, 5.2.6)"""
+    """Whether a sphere overlaps an oriented box, and the box's closest point, clamped in its frame. (Ericson, 5.2.6)"""
     p_B = _turn(np.swapaxes(box.rotation, -1, -2), sphere.center - box.center)
     closest_B = np.clip(p_B, -box.half_extents, box.half_extents)
-    # the turn is off by a few roundings of the distance between the centres
+    # the rotation is wrong by a few round-offs of the distance between the centres
     slack = 8 * EPSILON * np.abs(p_B).max(axis=-1)
     overlap = _within(closest_B - p_B, sphere.radius + slack)
     return overlap, np.asarray(box.center + _turn(box.rotation, closest_B))
 
 
 def obb_obb(a: Obb, b: Obb) -> Booleans:
-    """Whether oriented boxes overlap, by SAT: no face normal and no cross product of edges parts them.
+    """Whether oriented boxes overlap, by SAT: no face normal and no cross product of edges separates them.
 
-    (Slides "Oriented bounding box", "Separating Axis Theorem (SAT)"; Gottschalk, Lin, Manocha, 1996. With depth and
-    contact points: narrow_phase/box_box.py)
+    (Slides "Oriented bounding box", "Separating Axis Theorem (SAT)"; Gottschalk, Lin, Manocha, 1996.
+    narrow_phase/box_box.py also computes the depth and contact points.)
     """
     R_AB = np.swapaxes(a.rotation, -1, -2) @ b.rotation
     offset = _turn(np.swapaxes(a.rotation, -1, -2), np.asarray(b.center - a.center))
@@ -83,9 +83,9 @@ def obb_obb(a: Obb, b: Obb) -> Booleans:
 
 
 def kdop_kdop(a: Kdop, b: Kdop) -> Booleans:
-    """Whether k-DOPs overlap in every slab. True does not mean that they meet: only a separating slab is proof.
+    """Whether k-DOPs overlap in every slab. True does not prove that they meet; false proves that they do not.
 
-    Raises InputError where they have different directions.
+    Raises InputError if their directions differ.
     """
     if not np.array_equal(a.directions, b.directions):
         got = f"{len(a.directions)} and {len(b.directions)} that differ"
@@ -94,15 +94,16 @@ def kdop_kdop(a: Kdop, b: Kdop) -> Booleans:
 
 
 def obb_polygon(box: Obb, polygon: ArrayLike) -> bool:
-    """Whether an oriented box meets a flat polygon (n, 3) in space, by SAT; a concave one is split into triangles.
+    """Whether an oriented box meets a flat polygon (n, 3) in space, by SAT; a concave polygon is split into triangles.
 
-    (Slide "Oriented bounding boxes and arbitrary polygons: Separating axis theorem".) The axes are the box's three, the
-    polygon's normal and their edges' cross products. Raises ShapeError where the corners are not in one plane.
+    (Slide "Oriented bounding boxes and arbitrary polygons: Separating axis theorem".) The axes are the box's three
+    axes, the polygon's normal and the cross products of their edges. Raises ShapeError if the corners are not in one
+    plane.
     """
     corner = point_set(polygon, "polygon", 3, least=3)
     p_B = _turn(box.rotation.T, corner - box.center)
     offset = p_B - p_B[0]
-    normal = 0.5 * np.cross(offset, np.roll(offset, -1, axis=0)).sum(axis=0)  # Newell: also right for concave ones
+    normal = 0.5 * np.cross(offset, np.roll(offset, -1, axis=0)).sum(axis=0)  # Newell: also correct for concave ones
     size = float(np.abs(offset).max())
     area = float(np.linalg.norm(normal))
     if not area > PLANAR * size**2:

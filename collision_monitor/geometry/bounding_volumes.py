@@ -1,8 +1,8 @@
-"""Bounding volumes of a set of points: what they are, and the axis-aligned box, the slabs and the convex hull.
+"""Bounding volumes of a set of points: their types, and the construction of AABB, k-DOP and convex hull.
 
-Each holds every point it was made from, in floating point too: sizes are rounded outward. (The hull to Qhull's 1e-14.)
-Their fields may have leading dimensions, so that one of them is an array of volumes.
-(Slides "Bounding objects", "Bounding volume construction". The others: bounding_spheres.py, oriented_boxes.py)
+Each volume contains every point of its set, also in floating point, as sizes are rounded outward. (The hull is accurate
+to Qhull's 1e-14.) The fields may have leading dimensions, so that one tuple is an array of volumes.
+(Slides "Bounding objects", "Bounding volume construction". Others: bounding_spheres.py, oriented_boxes.py)
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Aabb(NamedTuple):
 
     @property
     def volume(self) -> Array:
-        """m³, or m² in the plane."""
+        """Volume in m³, or area in m² in the plane."""
         return np.asarray((self.upper - self.lower).prod(axis=-1))
 
 
@@ -41,7 +41,7 @@ class BoundingSphere(NamedTuple):
 
     @property
     def volume(self) -> Array:
-        """m³, or m² in the plane."""
+        """Volume in m³, or area in m² in the plane."""
         return np.asarray(4 / 3 * pi * self.radius**3 if self.center.shape[-1] == 3 else pi * self.radius**2)
 
 
@@ -54,12 +54,12 @@ class Obb(NamedTuple):
 
     @property
     def volume(self) -> Array:
-        """m³."""
+        """Volume in m³."""
         return np.asarray((2 * self.half_extents).prod(axis=-1))
 
     @property
     def corners(self) -> Array:
-        """The eight corners (..., 8, 3) in m."""
+        """Eight corners (..., 8, 3) in m."""
         signs = np.array(list(product((-1.0, 1.0), repeat=3)))
         return np.asarray(
             self.center[..., None, :] + (signs * self.half_extents[..., None, :]) @ np.swapaxes(self.rotation, -1, -2)
@@ -67,7 +67,7 @@ class Obb(NamedTuple):
 
 
 class Kdop(NamedTuple):
-    """k-DOP: between planes lower <= direction . x <= upper; unit directions (k/2, 3), bounds (..., k/2) in m."""
+    """k-DOP: lower <= direction . x <= upper; unit directions (k/2, 3), bounds (..., k/2) in m."""
 
     directions: Array
     lower: Array
@@ -82,7 +82,7 @@ class Hull(NamedTuple):
 
     @property
     def volume(self) -> float:
-        """m³."""
+        """Volume in m³."""
         a, b, c = (self.vertices - self.vertices.mean(axis=0))[self.faces.T]
         return float((a * np.cross(b, c)).sum() / 6)
 
@@ -98,11 +98,11 @@ _CORNERS: Final = [(1, 1, 1), (1, 1, -1), (1, -1, 1), (1, -1, -1)]
 _EDGES: Final = [(1, 1, 0), (1, -1, 0), (1, 0, 1), (1, 0, -1), (0, 1, 1), (0, 1, -1)]
 
 KDOP_DIRECTIONS: Final = {6: _FACES, 14: _FACES + _CORNERS, 18: _FACES + _EDGES, 26: _FACES + _CORNERS + _EDGES}
-"""The usual direction sets by k: the normals of a cube's faces, corners cut off, edges cut off, both."""
+"""The usual sets of directions by k: normals of a cube's faces, with corners cut off, edges cut off, or both."""
 
 
 def kdop(points: ArrayLike, directions: ArrayLike | int = 14) -> Kdop:
-    """Slabs around points (n, 3): k of KDOP_DIRECTIONS, or directions (k/2, 3) of one's own, of any length but zero.
+    """k-DOP around points (n, 3): k from KDOP_DIRECTIONS, or own directions (k/2, 3) of any length but zero.
 
     (Slide "Bounding Slabs": "arbitrary (user-specified) collection of bounding plane-pairs"; Klosowski et al., 1998)
     Raises InputError.
@@ -118,21 +118,21 @@ def kdop(points: ArrayLike, directions: ArrayLike | int = 14) -> Kdop:
         raise InputError("k-DOP directions: expected vectors with a direction, got a zero vector")
     normals = normals / length
     dots = normals @ points.T
-    # a dot product is off by its round-off, except along a coordinate axis
+    # a dot product has round-off, except along a coordinate axis
     slack = np.where((normals != 0.0).sum(axis=1) > 1, 4 * EPSILON * np.abs(points).max(), 0.0)
     return Kdop(normals, dots.min(axis=1) - slack, dots.max(axis=1) + slack)
 
 
 def inside_kdop(points: ArrayLike, volume: Kdop) -> Array:
-    """Whether points (..., 3) are between each pair of planes. (Slide "Bounding Slabs")"""
+    """Whether points (..., 3) in m are between all pairs of planes. (Slide "Bounding Slabs")"""
     dots = coordinates(points, "points", 3) @ volume.directions.T
     return np.asarray(((volume.lower <= dots) & (dots <= volume.upper)).all(axis=-1))
 
 
 def convex_hull(points: ArrayLike) -> Hull:
-    """Convex hull of points (n, 3), by Qhull. (Slides "Convex Hull": gift wrapping, slower for the same hull)
+    """Convex hull of points (n, 3) in m, by Qhull. (Slides "Convex Hull": gift wrapping, slower for the same hull)
 
-    Raises ShapeError for points in one plane, which have no volume.
+    Raises ShapeError for points in one plane, which span no volume.
     """
     points = point_set(points, "points", 3, least=4)
     center = 0.5 * points.min(axis=0) + 0.5 * points.max(axis=0)
@@ -142,7 +142,7 @@ def convex_hull(points: ArrayLike) -> Hull:
         raise ShapeError("convex hull: expected points that span a solid, got points in one plane")
     used, faces = np.unique(hull.simplices, return_inverse=True)
     vertices, faces = points[used], faces.reshape(-1, 3)
-    # Qhull gives the triangles any way round
+    # Qhull's triangles have no consistent orientation
     inner = center + size * hull.points[hull.vertices].mean(axis=0)
     outward = np.asarray(orient3d(vertices[faces[:, 0]], vertices[faces[:, 1]], vertices[faces[:, 2]], inner)) < 0.0
     faces = np.where(outward[:, None], faces, faces[:, ::-1])

@@ -1,4 +1,4 @@
-"""The ordered cascade for two polyhedra: bounding volumes, then vertices, then edges against faces.
+"""Cascade of tests for two polyhedra: bounding volumes, then vertices, then edges against faces.
 
 (Slide "Order tests according to computational complexity and power of detection")
 """
@@ -19,7 +19,7 @@ from collision_monitor.geometry.polyhedra import closed_mesh, edge_face, locate_
 
 
 class CascadeStage(Enum):
-    """The stage that settled it."""
+    """CascadeStage of the cascade that decided the result."""
 
     BOUNDING_VOLUMES = "bounding volumes"
     VERTICES = "vertices"
@@ -27,10 +27,10 @@ class CascadeStage(Enum):
 
 
 class CascadeResult(NamedTuple):
-    """collides: touching counts. stage: where it was settled.
+    """collides: touching counts. stage: the stage that decided the result.
 
-    vertices_a, vertices_b (k,): those of A in B and of B in A. edges_a, edges_b (k, 3): of each crossing the edge's two
-    vertices and the other one's face. Only the stage that settled it fills its own.
+    vertices_a, vertices_b (k,): vertices of A in B and of B in A. edges_a, edges_b (k, 3): for each crossing, the two
+    vertices of the edge and the index of the other mesh's face. Only the deciding stage fills its fields.
     """
 
     collides: bool
@@ -46,8 +46,8 @@ def polyhedra_intersect(
 ) -> CascadeResult:
     """Whether two closed meshes, convex or not, in one frame (vertices (n, 3), faces (m, 3)), have a point in common.
 
-    Each stage ends the test if it settles it: boxes apart, a vertex of one inside the other, an edge through a face.
-    The last one also finds crossed bars, which have no vertex in each other. Exact. Raises ShapeError.
+    A stage ends the cascade if it decides: separate boxes, a vertex of one inside the other, an edge through a face.
+    The last stage also finds crossed bars, which have no vertex inside each other. Exact. Raises ShapeError.
     """
     points_a, corners_a = closed_mesh(vertices_a, faces_a, "mesh A")
     points_b, corners_b = closed_mesh(vertices_b, faces_b, "mesh B")
@@ -75,7 +75,7 @@ def _crossings(points: Array, edges: Indices, vertices: Array, faces: Indices) -
     low, high = np.minimum(p, q), np.maximum(p, q)
     face_low, face_high = vertices[faces].min(axis=1), vertices[faces].max(axis=1)
     found = [np.zeros((0, 3), np.int64)]
-    for first in range(0, len(edges), 1024):  # so that the table of edges against faces stays small
+    for first in range(0, len(edges), 1024):  # batches, so that the table of edges against faces stays small
         some = slice(first, first + 1024)
         i, j = np.nonzero(((low[some, None] <= face_high) & (face_low <= high[some, None])).all(axis=-1))
         if len(i):

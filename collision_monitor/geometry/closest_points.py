@@ -1,6 +1,6 @@
 """Closest points of two lines, rays or segments in space, as the least-squares problem of the slides.
 
-Both are given by a point and a direction, p + alpha u and q + beta v, as on the slides "Intersecting lines in 3d".
+Each is given by a point and a direction, p + alpha u and q + beta v, as on the slides "Intersecting lines in 3d".
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from collision_monitor.tolerances import SEGMENT_PARALLEL_SIN2
 
 
 class ClosestPoints(NamedTuple):
-    """Parameters alpha, beta (...), the points (..., 3), their distance (...), the estimated intersection (..., 3).
+    """Parameters alpha, beta (...), points (..., 3), distance (...), estimated intersection (..., 3); lengths in m.
 
-    The intersection is the point half-way between the two.
+    The intersection is the midpoint of the two points.
     """
 
     alpha: Array
@@ -40,10 +40,10 @@ def closest_points(
 ) -> ClosestPoints:
     """Minimise |p + alpha u - (q + beta v)| over the extents (line: all, ray: >= 0, segment: 0 … 1); all (..., 3).
 
-    The slides only check that the unbounded solution is in range. Where it is not, alpha is clamped, beta is the best
-    for it, clamped too, and alpha the best for that: the minimum of this convex problem (Ericson, 5.1.8–5.1.9).
-    Parallel ones answer with the middle of where they run beside each other, or where that is infinite, with its end or
-    the solution of least norm. A zero direction is a point.
+    The slides only check that the unbounded solution is in range. If it is not, alpha is clamped, beta is the best
+    value for it, clamped too, and alpha the best value for that beta: the minimum of this convex problem (Ericson,
+    5.1.8–5.1.9). For parallel lines, the result is the middle of the stretch where they run side by side; if that is
+    infinite, its end or, without an end, the solution of least norm. A zero direction represents a point.
     """
     vectors = (coordinates(p, "p", 3), coordinates(u, "u", 3), coordinates(q, "q", 3), coordinates(v, "v", 3))
     try:
@@ -54,7 +54,7 @@ def closest_points(
     w = q - p
 
     def on_b(alpha: Array) -> Array:
-        """The beta nearest to the point at alpha."""
+        """Beta of the point nearest to the point at alpha."""
         return np.clip(_ratio(_dot(v, alpha[..., None] * u - w), _dot(v, v)), low_b, high_b)
 
     def on_a(beta: Array) -> Array:
@@ -65,7 +65,7 @@ def closest_points(
     alpha = np.where(parallel, _beside(u, v, w, first, second), _on_lines(u, v, w))
     alpha = np.clip(alpha, low_a, high_a)
     beta = on_b(alpha)
-    alpha = on_a(beta)  # moves only where beta was clamped
+    alpha = on_a(beta)  # changes only if beta was clamped
     offset = alpha[..., None] * u - (w + beta[..., None] * v)
     point_a, point_b = p + alpha[..., None] * u, q + beta[..., None] * v
     return ClosestPoints(
@@ -78,18 +78,18 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _ratio(top: Array, bottom: Array) -> Array:
-    """top / bottom, 0 where bottom is 0: a zero direction."""
+    """top / bottom, or 0 if bottom is 0 because of a zero direction."""
     return np.where(bottom > 0.0, top / np.where(bottom > 0.0, bottom, 1.0), 0.0)
 
 
 def _on_lines(u: Array, v: Array, w: Array) -> Array:
-    """alpha of the closest points of two lines that are not parallel; anything for others."""
+    """alpha of the closest points of two lines; meaningless for parallel ones."""
     n = np.cross(u, v)  # |n|² is the determinant of the normal equations, u.u v.v - (u.v)², which would cancel
     return _ratio(_dot(np.cross(w, v), n), _dot(n, n))
 
 
 def _beside(u: Array, v: Array, w: Array, first: LineKind, second: LineKind) -> Array:
-    """alpha in the middle of where A runs beside B, both parallel; out of A's extent where they do not."""
+    """alpha in the middle of the stretch where parallel A, B run side by side; out of A's extent if there is none."""
     start, per_beta = _ratio(_dot(u, w), _dot(u, u)), _ratio(_dot(u, v), _dot(u, u))
     with np.errstate(invalid="ignore"):
         ends = [np.where(per_beta == 0.0, 0.0, per_beta * beta) for beta in second.value]

@@ -1,4 +1,4 @@
-"""A compound: one object of several shapes, each with its pose in the object's frame."""
+"""Compounds: objects of several shapes, each with its pose in the object's frame."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collision_monitor.geometry.shapes import Shape
 
 
 def shape_pairs(value: Any, what: str) -> tuple[tuple[Shape, Pose], ...]:
-    """An object's shapes, given as one or as (shape, pose in the object's frame). Raises ShapeError, naming `what`."""
+    """Normalise a shape or a list of (shape, pose in the object's frame). Raises ShapeError with `what` as the name."""
     if isinstance(value, Shape):
         return ((value, Pose()),)
     if not isinstance(value, Iterable):

@@ -1,4 +1,4 @@
-"""Which features of two polyhedra touch: the six pairs of the lecture, for "vertex 3 of A on face 7 of B".
+"""Features of two polyhedra that touch: the lecture's six pairs of types, for "vertex 3 of A on face 7 of B".
 
 (Slide "Collision detection for rigid bodies": Vertex - Face, Vertex - Edge, Vertex - Vertex, Edge - Edge, Edge - Face,
 Face - Face)
@@ -19,7 +19,7 @@ from collision_monitor.tolerances import FEATURE_TIE
 
 
 class FeatureType(IntEnum):
-    """What of a polyhedron touches; the numbers of Contact.msg."""
+    """Type of a polyhedron's feature; the values of Contact.msg."""
 
     VERTEX = 1
     EDGE = 2
@@ -27,7 +27,7 @@ class FeatureType(IntEnum):
 
 
 class FeaturePair(Enum):
-    """The six pairs, without regard to which body has which."""
+    """The six pairs of feature types, regardless of the order of the bodies."""
 
     VV = "vertex-vertex"
     VE = "vertex-edge"
@@ -38,7 +38,7 @@ class FeaturePair(Enum):
 
 
 class Feature(NamedTuple):
-    """type; vertices: index of the vertex, the edge's two, or the face's three; face: index of the face, else -1."""
+    """type; vertices: index of the vertex, the edge's two or the face's three; face: index of the face, or -1."""
 
     type: FeatureType
     vertices: tuple[int, ...]
@@ -50,14 +50,14 @@ class Feature(NamedTuple):
 
 
 class FeatureContact(NamedTuple):
-    """The features of A and of B that touch."""
+    """The touching features of A and B."""
 
     a: Feature
     b: Feature
 
     @property
     def pair(self) -> FeaturePair:
-        """Which of the six pairs it is."""
+        """The pair of feature types."""
         return FeaturePair["".join(t.name[0] for t in sorted((self.a.type, self.b.type)))]
 
     def __str__(self) -> str:
@@ -73,7 +73,7 @@ def classify_contact(
     faces_b: ArrayLike,
     normal: ArrayLike,
 ) -> FeatureContact:
-    """The features at the witness points (3,) of two meshes in one frame, for a contact normal (3,) from A to B."""
+    """Features at the witness points (3,) of two meshes in one frame, for a contact normal (3,) from A to B."""
     normal = coordinates(normal, "normal", 3)
     return FeatureContact(
         feature_at(point_a, normal, vertices_a, faces_a), feature_at(point_b, -normal, vertices_b, faces_b)
@@ -83,11 +83,12 @@ def classify_contact(
 def feature_at(
     point: ArrayLike, normal: ArrayLike, vertices: ArrayLike, faces: ArrayLike, tolerance: float = FEATURE_TIE
 ) -> Feature:
-    """The largest feature of a mesh that touches as a whole at a surface point (3,), for a contact normal (3,).
+    """Largest feature of a mesh that touches as a whole at a surface point (3,), for a contact normal (3,).
 
-    A face at the point touches as a whole where it faces along the normal, an edge where it lies across it. If none
-    does, it is the vertex at the point; and where there is none either, what the point is on. The lowest index wins.
-    `tolerance`: part of the mesh's size. Raises InputError where the point is off the surface.
+    A face at the point touches as a whole if it is perpendicular to the normal and faces along it, an edge if it is
+    perpendicular to the normal. Otherwise the result is the vertex at the point, else the edge or the face that
+    contains the point. The lowest index wins. `tolerance`: part of the mesh's size. Raises InputError if the point is
+    off the surface.
     """
     vertices, faces = triangles(vertices, faces)
     point, normal = coordinates(point, "point", 3), coordinates(normal, "normal", 3)
@@ -124,7 +125,7 @@ def _face(faces: Indices, index: int) -> Feature:
 
 
 def _distance_to_triangles(point: Array, a: Array, b: Array, c: Array) -> Array:
-    """Distances (m,) of a point (3,) to triangles (m, 3): to the plane where the foot is inside, else to the sides."""
+    """Distances (m,) of a point (3,) to triangles (m, 3): to the plane if the foot is inside, else to the sides."""
     sides = ((a, b), (b, c), (c, a))
     to_sides = np.min([distance(point, closest_point_on_segment(point, p, q)[0]) for p, q in sides], axis=0)
     normal = np.cross(b - a, c - a)

@@ -1,4 +1,4 @@
-"""What a shape is tested as: convex pieces. A convex shape is one piece, a concave one is their union."""
+"""Convex pieces of a shape, which the pair tests work on: one for a convex shape, several for a concave one."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from collision_monitor.tolerances import HULL_DROP
 
 @lru_cache(maxsize=64)
 def convex_pieces(shape: Shape) -> tuple[tuple[Shape, Pose], ...]:
-    """The convex pieces of a shape, each with its pose in the shape's frame.
+    """Return the convex pieces of a shape, each with its pose in the shape's frame.
 
-    A concave polygon gives convex parts, a mesh that is closed and convex its hull, any other mesh its triangles: its
-    surface, so that the inside of a closed one is a question of its own (`is_closed`). A shape never changes,
-    so that its pieces are remembered. Raises ShapeError.
+    A concave polygon gives convex parts, a closed convex mesh its hull, any other mesh its triangles. Triangles are
+    only the surface, so the inside of a closed mesh needs a separate test (`is_closed`). Shapes are immutable, so the
+    result is cached. Raises ShapeError.
     """
     match shape:
         case Polygon() if not is_convex(shape.points):
@@ -31,14 +31,14 @@ def convex_pieces(shape: Shape) -> tuple[tuple[Shape, Pose], ...]:
             return ((ConvexHull(shape.vertices[np.unique(shape.faces)]), Pose()),)
         case Mesh():
             corners: NDArray[np.float64] = shape.vertices[shape.faces]
-            # about its own centre a triangle has a small bounding sphere and keeps its digits
+            # a triangle about its own centre has a small bounding sphere and loses no digits
             centres = corners.mean(axis=1)
             return tuple((Triangle(c - m), Pose(m)) for c, m in zip(corners, centres, strict=True))
     return ((shape, Pose()),)
 
 
 def is_convex_mesh(mesh: Mesh) -> bool:
-    """Whether a mesh bounds a solid with no vertex outside the plane of any face, to round-off."""
+    """Whether a mesh bounds a solid and no vertex is outside the plane of any face, up to round-off."""
     if not is_closed(mesh.faces):
         return False
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
@@ -51,7 +51,7 @@ def is_convex_mesh(mesh: Mesh) -> bool:
     used = mesh.vertices[np.unique(mesh.faces)]
     offset = np.einsum("ij,ij->i", a, normal)
     flat = HULL_DROP * 16 * size
-    # inward or outward, but all the same way, and not a sheet that is folded onto itself
+    # all faces must point outward, or all inward, and the mesh must not be a sheet folded onto itself
     outward = inward = True
     for some in np.array_split(np.arange(len(normal)), len(normal) * len(used) // HEIGHTS_AT_ONCE + 1):
         height = used @ normal[some].T - offset[some]

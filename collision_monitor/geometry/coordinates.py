@@ -1,4 +1,4 @@
-"""The door of the pure geometry: finite arrays of points of the expected shape, or an error that says what was."""
+"""Input check of the geometry functions: finite arrays of the expected shape, or an error that names the array."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Signs = NDArray[np.int8]
 
 
 def coordinates(value: ArrayLike, what: str, *widths: int) -> Array:
-    """Points or vectors (..., width), width one of `widths` (2 or 3 unless told), at least one. Raises InputError."""
+    """Points or vectors (..., width), at least one, with a width of `widths` (default 2 or 3). Raises InputError."""
     widths = widths or (2, 3)
     try:
         array = np.asarray(value, dtype=np.float64)
@@ -29,7 +29,7 @@ def coordinates(value: ArrayLike, what: str, *widths: int) -> Array:
 
 
 def numbers(value: ArrayLike, what: str, least: float = -np.inf) -> Array:
-    """Finite numbers (...) of at least `least`. Raises InputError."""
+    """Finite numbers (...) >= `least`. Raises InputError."""
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):

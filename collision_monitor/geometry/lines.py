@@ -1,6 +1,6 @@
-"""Lines, rays and segments in the plane: their forms, on which side a point is, and where two of them meet.
+"""Lines, rays and segments in the plane: equations, side tests and intersections.
 
-A line is given by two points a, b (..., 2): the parametric form a + t (b - a). (Slides "Types of equations",
+A line is given by two points a, b (..., 2) in parametric form a + t (b - a). (Slides "Types of equations",
 "Parametric line equation", "Line intersection – two equations")
 """
 
@@ -19,7 +19,7 @@ from collision_monitor.geometry.orientation import cross, orient2d
 
 
 class LineKind(Enum):
-    """How far a + t (b - a) reaches: the least and the greatest t."""
+    """Extent of a + t (b - a): the least and the greatest t."""
 
     LINE = (-inf, inf)
     RAY = (0.0, inf)
@@ -27,7 +27,7 @@ class LineKind(Enum):
 
 
 class Relation(IntEnum):
-    """What two of them have in common."""
+    """Intersection of two lines, rays or segments: nothing, a point or a stretch."""
 
     NONE = 0
     POINT = 1
@@ -35,7 +35,7 @@ class Relation(IntEnum):
 
 
 class Intersection(NamedTuple):
-    """relation (...) of Relation; where it is POINT the parameters t_a, t_b (...) and the point (..., 2), else NaN."""
+    """relation (...): a Relation; if it is POINT, also parameters t_a, t_b (...) and the point (..., 2), else NaN."""
 
     relation: Signs
     t_a: Array
@@ -67,7 +67,7 @@ def explicit_line(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
 
 
 def side(p: ArrayLike, a: ArrayLike, b: ArrayLike) -> Signs:
-    """1 where p (..., 2) is left of the line a to b, -1 right, 0 on it, exactly (slide "Point in convex polygon")."""
+    """1 if p (..., 2) is left of the line a to b, -1 right, 0 on it, exactly (slide "Point in convex polygon")."""
     return np.sign(orient2d(a, b, p)).astype(np.int8)
 
 
@@ -79,7 +79,7 @@ def intersect(
     first: LineKind = LineKind.SEGMENT,
     second: LineKind = LineKind.SEGMENT,
 ) -> Intersection:
-    """Where a, b and c, d (..., 2) meet, each as a line, a ray from its first point or a segment; ends included.
+    """Intersection of a, b and c, d (..., 2), each a line, a ray from its first point or a segment; ends included.
 
     The relation is exact. A segment may have no length; a line or ray must have a direction. Raises InputError.
     (Slide "Line intersection – two equations": the vector equation's t_a and t_b, here by Cramer's rule)
@@ -109,7 +109,7 @@ def intersect(
     t_a = _parameter(at_a / divisor, at_a, at_b, first)
     t_b = _parameter(-at_c / divisor, at_c, at_d, second)
     point = _along(a, b, t_a)
-    # a corner that lies on the other one is the point, to the last bit
+    # an end that lies on the other line is the intersection, to the last bit
     point = np.where((at_d == 0.0)[..., None], d, np.where((at_c == 0.0)[..., None], c, point))
     point = np.where((at_b == 0.0)[..., None], b, np.where((at_a == 0.0)[..., None], a, point))
     relation = np.where(meets, Relation.POINT, Relation.NONE).astype(np.int8)
@@ -153,7 +153,7 @@ def _along(a: Array, b: Array, t: Array) -> Array:
 
 
 def _position(p: Array, a: Array, b: Array) -> Array:
-    """Parameters t of points p that lie on a, b; 0 where a is b."""
+    """Parameters t of points p that lie on a, b; 0 if a equals b."""
     u, w = b - a, p - a
     axis = np.abs(u).argmax(axis=-1)[..., None]
     u, w = np.take_along_axis(u, axis, -1)[..., 0], np.take_along_axis(w, axis, -1)[..., 0]
@@ -161,7 +161,7 @@ def _position(p: Array, a: Array, b: Array) -> Array:
 
 
 def _ends(a: Array, b: Array, extent: LineKind) -> tuple[Array, Array]:
-    """Least and greatest coordinates (..., 2) that it reaches."""
+    """Least and greatest coordinates (..., 2) of a line, ray or segment."""
     low, high = np.minimum(a, b), np.maximum(a, b)
     if extent is not LineKind.SEGMENT:
         high = np.where(b > a, inf, high)

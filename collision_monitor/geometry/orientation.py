@@ -1,7 +1,7 @@
-"""Determinants whose sign is exact: the floor that every inside, side and crossing test stands on.
+"""Determinants with an exact sign, the basis of all inside, side and crossing tests.
 
-A filter accepts the floating-point value where its relative error is certainly below 1e-13; where it could be larger,
-the value is computed again in integers. So zero means exactly zero: on the line, in the plane.
+A filter accepts the floating-point value if its relative error is certainly below 1e-13; otherwise the value is
+computed again in integers. Zero therefore means exactly zero: on the line, in the plane.
 (Slides "Point in convex polygon", the sided test, and "point-arbitrary plane";
 Shewchuk, Adaptive precision floating-point arithmetic and fast robust geometric predicates, 1997.)
 """
@@ -19,7 +19,7 @@ from collision_monitor.geometry.coordinates import Array
 
 CANCELLATION: Final = 2.0**-7
 """A determinant below this part of the sum of its terms' sizes is computed again in integers.
-Its round-off is at most 16 * 2^-53 of that sum (Shewchuk, 1997), so what passes is right to 2.3e-13.
+Its round-off is at most 16 * 2^-53 of that sum (Shewchuk, 1997), so accepted values are accurate to 2.3e-13.
 Larger: exact arithmetic, 10 µs each, is used where it changes nothing. Smaller: crossing points lose digits."""
 
 UNDERFLOW: Final = 1e-290
@@ -27,7 +27,7 @@ UNDERFLOW: Final = 1e-290
 
 
 def cross(a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> Array:
-    """(b - a) x (d - c) in m² of points (..., 2): positive where d - c turns left from b - a, 0 if parallel."""
+    """(b - a) x (d - c) in m² of points (..., 2): positive if d - c turns left from b - a, 0 if parallel."""
     a, b, c, d = _together(2, a, b, c, d)
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
         u, v = b - a, d - c
@@ -35,17 +35,17 @@ def cross(a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> Array:
         value = left - right
         size = np.abs(left) + np.abs(right)
         certain = (np.abs(value) > CANCELLATION * size) & (size > UNDERFLOW)
-    certain |= ((u == 0.0) | (v[..., ::-1] == 0.0)).all(axis=-1)  # both products are zero, not only too small
+    certain |= ((u == 0.0) | (v[..., ::-1] == 0.0)).all(axis=-1)  # both products are exactly zero, not underflowed
     return _corrected(value, certain, _cross_exactly, a, b, c, d)
 
 
 def orient2d(a: ArrayLike, b: ArrayLike, p: ArrayLike) -> Array:
-    """Twice the signed area (m²) of triangles a, b, p (..., 2): positive where p is left of the line from a to b."""
+    """Twice the signed area (m²) of triangles a, b, p (..., 2): positive if p is left of the line from a to b."""
     return cross(a, b, a, p)
 
 
 def orient3d(a: ArrayLike, b: ArrayLike, c: ArrayLike, p: ArrayLike) -> Array:
-    """Six times the signed volume (m³) of a, b, c, p (..., 3): positive where p sees a, b, c run counter-clockwise."""
+    """Six times the signed volume (m³) of a, b, c, p (..., 3): positive if a, b, c appear counter-clockwise from p."""
     a, b, c, p = _together(3, a, b, c, p)
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
         u, v, w = b - a, c - a, p - a
@@ -55,7 +55,7 @@ def orient3d(a: ArrayLike, b: ArrayLike, c: ArrayLike, p: ArrayLike) -> Array:
             value += (left - right) * w[..., k]
             size += (np.abs(left) + np.abs(right)) * np.abs(w[..., k])
         certain = (np.abs(value) > CANCELLATION * size) & (size > UNDERFLOW)
-    # coordinates that are all equal make a determinant with a column of zeros
+    # a coordinate that is equal in all points makes a determinant with a column of zeros
     certain |= ((u == 0.0) & (v == 0.0) & (w == 0.0)).any(axis=-1)
     return _corrected(value, certain, _volume_exactly, a, b, c, p)
 
@@ -105,7 +105,7 @@ def _volume_exactly(a: Any, b: Any, c: Any, p: Any) -> Any:
 
 
 def _to_float(value: int, exponent: int) -> float:
-    """value * 2^exponent; what would underflow or overflow keeps its sign."""
+    """value * 2^exponent; on underflow or overflow, the smallest or largest number with the same sign."""
     if value == 0:
         return 0.0
     excess = max(value.bit_length() - 64, 0)

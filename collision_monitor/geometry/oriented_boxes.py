@@ -1,4 +1,4 @@
-"""Oriented bounding boxes of a set of points: along the principal axes, and of minimum volume.
+"""Oriented bounding boxes of a set of points: along the principal axes, and with minimum volume.
 
 (Slides "OBB – oriented bounding boxes", "Oriented bounding box")
 """
@@ -17,22 +17,22 @@ from collision_monitor.geometry.qhull import qhull
 from collision_monitor.tolerances import EPSILON
 
 EDGE_DIRECTIONS: Final = 32
-"""Up to this many different edge directions of the hull, the normals across each two of them are tried too (496).
+"""Up to this many edge directions of the hull, the normals perpendicular to each two of them are tried too (496).
 Larger: seconds for hulls of hundreds of corners, to gain a percent. Smaller: a tetrahedron's box is twice too large."""
 
 OUTLINE: Final = 128
-"""From this many edges on it is quicker to find the outline first than to turn the box to every edge."""
+"""Number of edges from which it is faster to find the outline first than to turn the box to every edge."""
 
 FACE_NORMALS: Final = 256
-"""At most this many of the hull's faces, the largest first, get a box laid on them.
-Larger: seconds for round hulls of a thousand faces, whose boxes are all alike. Smaller: the best face may be missed."""
+"""Largest number of hull faces, the largest first, that a box is aligned with.
+Larger: seconds for round hulls of a thousand similar faces. Smaller: the best face may be missed."""
 
 DISTINCT: Final = 1e-9
-"""Directions closer than this are one."""
+"""Directions closer than this count as equal."""
 
 
 def obb_pca(points: ArrayLike) -> Obb:
-    """Box along the eigenvectors of the points' covariance (n, 3). O(n); loose where the points crowd or form a cube.
+    """Box along the eigenvectors of the points' (n, 3) covariance. O(n); loose if the points crowd or form a cube.
 
     (Gottschalk, Lin and Manocha, OBBTree, 1996)
     """
@@ -43,13 +43,14 @@ def obb_pca(points: ArrayLike) -> Obb:
 
 
 def obb_minimum_volume(points: ArrayLike) -> Obb:
-    """The smallest box found by rotating boxes that lie flush with the hull of points (n, 3).
+    """Smallest box among those with a side flush with the hull of points (n, 3) in m.
 
-    A face of the box is laid on each face of the hull (the 256 largest), and on each plane along two hull edges where
-    there are few. The box is then turned about that face's normal until a side lies along an edge, which is the best
-    turn (rotating calipers). Last, this is repeated about the winner's own axes until nothing is gained. The true
-    minimum has two faces flush with edges (O'Rourke, 1985), which this finds in most cases but does not prove; it is
-    never larger than the box by PCA or the axis-aligned one. Points in one plane get the best turn about its normal.
+    A side of the box is aligned with each face of the hull (the 256 largest), and with each plane along two hull edges
+    if there are few. The box is then turned about that side's normal until another side lies along an edge, which is
+    the best turn (rotating calipers). Finally, this is repeated about the best box's own axes until the volume stops
+    decreasing. The true minimum has two faces flush with edges (O'Rourke, 1985); this search finds it in most cases but
+    does not prove it. The result is never larger than the PCA box or the axis-aligned one. Points in one plane get the
+    best turn about its normal.
     """
     points = point_set(points, "points", 3)
     try:
@@ -76,8 +77,8 @@ def obb_minimum_volume(points: ArrayLike) -> Obb:
 
 
 def _flat(points: Array) -> Obb:
-    """The box of points in one plane, turned about its normal; of points on one line, along it."""
-    axes = obb_pca(points).rotation  # the eigenvalues ascend: the first axis is the normal
+    """Box of points in one plane, turned about the plane's normal; for points on one line, along the line."""
+    axes = obb_pca(points).rotation  # the eigenvalues ascend, so the first axis is the normal
     offset = points - points.mean(axis=0)
     hull = qhull(offset @ axes[:, 1:])
     if hull is None:
@@ -105,7 +106,7 @@ def _turned(vertices: Array, edges: Array, normal: Array) -> tuple[float, Array]
 
 
 def _outline(vertices: Array, edges: Array, normal: Array) -> tuple[Array, Array]:
-    """The corners and edges that are on the outline when seen along `normal`; all where that is a line."""
+    """Corners and edges on the outline as seen along `normal`; all of them if the outline is a line."""
     u = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
     hull = qhull(vertices @ np.column_stack([u, np.cross(normal, u)]))
     if hull is None:
@@ -119,7 +120,7 @@ def _measured(vertices: Array, axes: Array) -> tuple[float, Array]:
 
 
 def _distinct(directions: Array) -> Array:
-    """Unit directions (m, 3), each once whichever its sign or length; those of no length are dropped."""
+    """Unit directions (m, 3) without duplicates, regardless of sign and length; drops directions of zero length."""
     length = np.linalg.norm(directions, axis=1)
     directions = directions[length > DISTINCT * length.max()] / length[length > DISTINCT * length.max(), None]
     largest = np.take_along_axis(directions, np.abs(directions).argmax(axis=1)[:, None], axis=1)
@@ -129,7 +130,7 @@ def _distinct(directions: Array) -> Array:
 
 
 def _along(points: Array, axes: Array) -> Obb:
-    """The box of points along orthonormal axes (3, 3, in columns), right-handed, its half extents rounded up."""
+    """Box of points along orthonormal axes (3, 3, in columns), made right-handed, with half extents rounded up."""
     axes = axes * np.array([1.0, 1.0, np.copysign(1.0, np.linalg.det(axes))])
     base = 0.5 * points.min(axis=0) + 0.5 * points.max(axis=0)
     dots = (points - base) @ axes

@@ -1,7 +1,7 @@
-"""Two particles on straight paths: do the paths meet, and are both there at the same time?
+"""Collision of two particles on straight paths: both must be near the paths' closest points at the same time.
 
-(Slides "Particle-Particle Collision in 2D" and "in 3D".) This is the test of the lecture, for points; the product's own
-prediction, for shapes and with certified times, is in `prediction/`.
+(Slides "Particle-Particle Collision in 2D" and "in 3D".) This is the lecture's test for points; the prediction of
+shapes with certified times is in `prediction/`.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ def particle_particle(
     distance_threshold: float,
     time_threshold: float,
 ) -> ParticleEncounter:
-    """Whether particles at p (m), velocities v (m/s), all (..., 2 or 3), are at one time where their paths are near.
+    """Whether particles at p (m) with velocities v (m/s), all (..., 2 or 3), are near each other at the same time.
 
     min over alpha, beta >= 0 of |p_A + alpha v_A - (p_B + beta v_B)| <= distance_threshold and
-    |alpha - beta| <= time_threshold. Where the paths are parallel there are many such alpha, beta, and the time of
-    closest approach is taken for both if it is one of them: else two particles head-on would pass through each other.
+    |alpha - beta| <= time_threshold. For parallel paths, many alpha and beta are minimal. The time of closest approach
+    is used for both if it is minimal; otherwise two particles head-on would pass through each other.
     """
     position_a, velocity_a = _in_space(p_a, "p_a"), _in_space(v_a, "v_a")
     position_b, velocity_b = _in_space(p_b, "p_b"), _in_space(v_b, "v_b")
@@ -54,7 +54,7 @@ def particle_particle(
 def closest_approach(p_a: ArrayLike, v_a: ArrayLike, p_b: ArrayLike, v_b: ArrayLike) -> tuple[Array, Array]:
     """Time t >= 0 (s) at which two particles are closest, and their distance (m) then; p, v as in particle_particle.
 
-    What the lecture's test approximates: one time for both, so that no time threshold is needed.
+    The lecture's test approximates this. One time for both particles needs no time threshold.
     """
     offset = coordinates(p_b, "p_b") - coordinates(p_a, "p_a")
     velocity = coordinates(v_b, "v_b") - coordinates(v_a, "v_a")

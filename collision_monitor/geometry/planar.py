@@ -1,4 +1,4 @@
-"""Scenes in the x-y plane: what sticks out of it is dropped before anything is computed."""
+"""Scenes in the x-y plane: components out of the plane are dropped before any computation."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Circle, Polygon, Shape
 
 PLANAR_VECTORS = {"position": slice(2, 3), "linear": slice(2, 3), "angular": slice(0, 2)}
-"""Fields of records.STATE and which of their components are none of the plane's business."""
+"""Fields of records.STATE, and their components that the plane ignores."""
 
 
 def flat_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The turns about z (n, 4) next to orientations (n, 4); all 0, which is no orientation, where z points down."""
+    """Nearest rotations about z (n, 4) of orientations (n, 4); all 0, which is no orientation, if z points down."""
     x, y, z, w = quaternions.T
     squared = z * z + w * w
     upright = squared > x * x + y * y
@@ -25,7 +25,7 @@ def flat_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def flat_states(states: NDArray[np.void]) -> NDArray[np.void]:
-    """records.STATE (n,) without height, tilt and the motion out of the plane."""
+    """Copy of records.STATE (n,) without height, tilt and the motion out of the plane."""
     flat = states.copy()
     for field, dropped in PLANAR_VECTORS.items():
         flat[field][:, dropped] = 0.0
@@ -34,7 +34,7 @@ def flat_states(states: NDArray[np.void]) -> NDArray[np.void]:
 
 
 def flat_pose(pose: Pose) -> Pose:
-    """The pose without height and tilt. Raises PoseError where z points down."""
+    """The pose without height and tilt. Raises PoseError if z points down."""
     quaternion = flat_quaternions(pose.quaternion[None])[0]
     if not quaternion.any():
         raise PoseError(f"expected z to point up for a shape of the plane, got quaternion {pose.quaternion.tolist()}")
@@ -42,5 +42,5 @@ def flat_pose(pose: Pose) -> Pose:
 
 
 def is_planar(shape: Shape) -> bool:
-    """Whether a shape is one of the x-y plane."""
+    """Whether a shape lies in the x-y plane."""
     return isinstance(shape, Circle | Polygon)

@@ -12,7 +12,7 @@ from collision_monitor.geometry.orientation import orient2d
 
 
 class Location(IntEnum):
-    """Where a point is."""
+    """Location of a point relative to a polygon or a polyhedron."""
 
     OUTSIDE = -1
     BOUNDARY = 0
@@ -22,16 +22,16 @@ class Location(IntEnum):
 def locate(points: ArrayLike, polygon: ArrayLike) -> Signs:
     """Location (...) of points (..., 2) in a simple polygon (n, 2), by the parity of a ray towards +x.
 
-    (Slides "Point in polygon – ray test", "Ray test special cases".) The special cases, without an epsilon:
-    an edge counts for its lower end and not for its upper one, so a ray through a corner counts once where the boundary
-    passes through and twice or never where it only touches; an edge along the ray has no lower end and never counts;
-    a point on the boundary is found before, by its exact cross product.
+    (Slides "Point in polygon – ray test", "Ray test special cases".) The special cases need no epsilon:
+    an edge includes its lower end and excludes its upper one, so a ray through a corner counts once if the boundary
+    passes through and twice or never if it only touches; an edge along the ray has no lower end and never counts;
+    a point on the boundary is found beforehand by its exact cross product.
     """
     p = coordinates(points, "points", 2)[..., None, :]
     a = point_set(polygon, "polygon", 2, least=3)
     b = np.roll(a, -1, axis=0)
     x, y = p[..., 0], p[..., 1]
-    # an edge matters where the ray's line reaches it and it is not wholly to the left
+    # an edge matters if the ray's line reaches it and it is not entirely to the left
     level = (np.minimum(a[:, 1], b[:, 1]) <= y) & (y <= np.maximum(a[:, 1], b[:, 1]))
     matters = level & (x <= np.maximum(a[:, 0], b[:, 0]))
     at = np.nonzero(matters)
@@ -48,7 +48,7 @@ def locate(points: ArrayLike, polygon: ArrayLike) -> Signs:
 
 
 def locate_in_convex(points: ArrayLike, polygon: ArrayLike) -> Signs:
-    """Location (...) of points (..., 2) in a convex polygon (n, 2), either way round: on one side of all edges.
+    """Location (...) of points (..., 2) in a convex polygon (n, 2) of either orientation: on one side of all edges.
 
     (Slide "Point in convex polygon", the sided test)
     """

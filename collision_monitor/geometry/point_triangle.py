@@ -1,4 +1,4 @@
-"""The point of a triangle that is closest to a point."""
+"""Closest point of a triangle to a point."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from collision_monitor.geometry.points import closest_point_on_segment
 
 
 def closest_point_on_triangle(p: ArrayLike, a: ArrayLike, b: ArrayLike, c: ArrayLike) -> tuple[Array, Array]:
-    """The points of triangles a, b, c (..., 3) closest to p (..., 3), and their distances (...) (m).
+    """Points of triangles a, b, c (..., 3) closest to p (..., 3), and their distances (...), in m.
 
-    The foot on the plane where it is inside of all sides, else the nearest point of the sides: so a triangle without
-    area is its sides. (Ericson, Real-Time Collision Detection, 5.1.5)
+    The result is the foot on the plane if it is inside all sides, else the nearest point of the sides. A triangle
+    without area therefore consists of its sides. (Ericson, Real-Time Collision Detection, 5.1.5)
     """
     p, a, b, c = np.broadcast_arrays(
         coordinates(p, "p", 3), coordinates(a, "a", 3), coordinates(b, "b", 3), coordinates(c, "c", 3)

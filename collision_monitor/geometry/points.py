@@ -1,4 +1,4 @@
-"""Points against points, segments, the ground and planes."""
+"""Tests of points against points, segments, the ground and planes."""
 
 from __future__ import annotations
 
@@ -21,19 +21,20 @@ def distance(p: ArrayLike, q: ArrayLike) -> Array:
 def points_coincide(p: ArrayLike, q: ArrayLike, threshold: float = 0.0) -> Booleans:
     """Whether points (..., 2 or 3) are within `threshold` (m) of each other. (Slide "Generic collision detection test")
 
-    By distance: the slide's comparison per coordinate, without absolute value, also holds for points far apart.
+    Uses the distance, because the slide's comparison per coordinate lacks the absolute value and accepts distant
+    points.
     """
     return np.asarray(distance(p, q) <= numbers(threshold, "threshold", 0.0))
 
 
 def closest_point_on_segment(p: ArrayLike, a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
-    """The points of segments a, b (..., 2 or 3) closest to p, and their parameters t (...) from 0 at a to 1 at b."""
+    """Points of segments a, b (..., 2 or 3) closest to p, and their parameters t (...) from 0 at a to 1 at b."""
     p, a, b = coordinates(p, "p"), coordinates(a, "a"), coordinates(b, "b")
     along = b - a
     length2 = (along * along).sum(axis=-1)
     t = ((p - a) * along).sum(axis=-1) / np.where(length2 > 0.0, length2, 1.0)
     t = np.clip(np.where(length2 > 0.0, t, 0.0), 0.0, 1.0)
-    # from the nearer end: a whole segment length would be rounded into points close to b
+    # from the nearer end, as the round-off of a whole segment length would spoil points close to b
     near_b = (t > 0.5)[..., None]
     point = np.where(near_b, b - (1.0 - t)[..., None] * along, a + t[..., None] * along)
     return point, t
@@ -42,9 +43,9 @@ def closest_point_on_segment(p: ArrayLike, a: ArrayLike, b: ArrayLike) -> tuple[
 def point_on_segment(p: ArrayLike, a: ArrayLike, b: ArrayLike, tolerance: float = 0.0) -> Booleans:
     """Whether p lies on the segments a, b (..., 2 or 3), ends included. (Slide "Point on a line segment")
 
-    The slide's t_x = t_y divides by zero on axis-parallel segments and fails by round-off. Here t_x = t_y is an exact
-    cross product that is zero, for each pair of coordinates, and 0 <= t <= 1 is p within the segment's box.
-    With a tolerance (m): p within that distance of the segment.
+    The slide's t_x = t_y divides by zero on axis-parallel segments and fails by round-off. Here t_x = t_y is tested as
+    an exact zero cross product for each pair of coordinates, and 0 <= t <= 1 as p within the segment's box.
+    With a tolerance (m), the test is whether p is within that distance of the segment.
     """
     p, a, b = coordinates(p, "p"), coordinates(a, "a"), coordinates(b, "b")
     if numbers(tolerance, "tolerance", 0.0) > 0.0:
@@ -56,14 +57,14 @@ def point_on_segment(p: ArrayLike, a: ArrayLike, b: ArrayLike, tolerance: float 
 
 
 def height_above_ground(p: ArrayLike, ground: ArrayLike = 0.0) -> Array:
-    """Heights (m) of points (..., 3) above z = ground; a collision where <= 0. (Slide "point-ground plane")"""
+    """Heights (m) of points (..., 3) above z = ground; a collision if <= 0. (Slide "point-ground plane")"""
     return np.asarray(coordinates(p, "p", 3)[..., 2] - numbers(ground, "ground"))
 
 
 class Plane(NamedTuple):
-    """Planes by a unit normal (..., 3) and a point on them (..., 3).
+    """Planes by a unit normal (..., 3) and a point on them (..., 3) in m.
 
-    A point rather than the slides' d: differences of positions keep their digits far from the origin.
+    They store a point instead of the slides' d, because differences of positions keep their digits far from the origin.
     """
 
     normal: Array
@@ -71,7 +72,7 @@ class Plane(NamedTuple):
 
     @property
     def d(self) -> Array:
-        """The d (m) of a x + b y + c z + d = 0, with (a, b, c) the normal."""
+        """The d (m) of a x + b y + c z + d = 0, where (a, b, c) is the normal."""
         return np.asarray(-(self.normal * self.point).sum(axis=-1))
 
 
@@ -86,10 +87,10 @@ def plane(normal: ArrayLike, point: ArrayLike) -> Plane:
 
 
 def plane_from_points(p1: ArrayLike, p2: ArrayLike, p3: ArrayLike) -> Plane:
-    """Planes through three points (..., 3); p1, p2, p3 run counter-clockwise seen from the side the normal points to.
+    """Planes through three points (..., 3); p1, p2, p3 are counter-clockwise seen from the side of the normal.
 
     (Slide "Vertex - Face collision"; its n = s x r points to the other side, away from the outside of a face.)
-    Raises ShapeError where the points lie on one line.
+    Raises ShapeError if the points lie on one line.
     """
     p1, p2, p3 = coordinates(p1, "p1", 3), coordinates(p2, "p2", 3), coordinates(p3, "p3", 3)
     r, s = p1 - p3, p2 - p3
@@ -103,7 +104,7 @@ def plane_from_points(p1: ArrayLike, p2: ArrayLike, p3: ArrayLike) -> Plane:
 
 
 def signed_distance(p: ArrayLike, to: Plane) -> Array:
-    """Signed distances (m) of points (..., 3) to planes, positive on the normal's side; a collision where it is <= 0.
+    """Signed distances (m) of points (..., 3) to planes, positive on the normal's side; a collision if <= 0.
 
     (Slides "Vertex - Face collision", "point-arbitrary plane")
     """
@@ -111,10 +112,10 @@ def signed_distance(p: ArrayLike, to: Plane) -> Array:
 
 
 def crossing_time(start: ArrayLike, end: ArrayLike, through: Plane) -> Array:
-    """Fractional times t (...) in 0 … 1 at which points moving from start to end (..., 3) first meet planes, else NaN.
+    """Fraction t (...) in 0 … 1 at which points moving from start to end (..., 3) first meet planes, else NaN.
 
-    0 where the point starts on the plane. (Slide "Collision detection: time of impact": E(p) = 0 on the segment from
-    P(t_i) to P(t_i+1). E is linear along it, so the crossing is found directly instead of by sampling.)
+    The result is 0 if the point starts on the plane. (Slide "Collision detection: time of impact": E(p) = 0 on the
+    segment from P(t_i) to P(t_i+1). E is linear along it, so the crossing is computed directly instead of by sampling.)
     """
     before, after = signed_distance(start, through), signed_distance(end, through)
     crosses = (np.sign(before) * np.sign(after) <= 0.0) & ((before != 0.0) | (after != 0.0))

@@ -1,4 +1,4 @@
-"""Polygon against polygon: by a contained vertex and by crossing edges for any, by separating axes for convex ones."""
+"""Overlap of two polygons: contained vertices and crossing edges for any polygons, SAT for convex ones."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from collision_monitor.geometry.polygons import corners, is_convex, is_counter_c
 
 
 class Evidence(Enum):
-    """What settled a test of two polygons."""
+    """Evidence that decided a test of two polygons."""
 
     SEPARATE = "neither"
     VERTEX_OF_A = "a vertex of A in B"
@@ -44,10 +44,10 @@ def crossing_edge_pairs(a: ArrayLike, b: ArrayLike) -> Indices:
 
 
 def polygons_intersect(a: ArrayLike, b: ArrayLike) -> Evidence:
-    """Whether two simple polygons (n, 2), convex or not, have a point in common, and by what; touching counts. Exact.
+    """Evidence that two simple polygons (n, 2), convex or not, have a point in common; touching counts. Exact.
 
-    (Slides "Polygon Intersection": contained vertex, intersecting edges; neither alone finds every case: a cross of two
-    bars has no contained vertex, a polygon within another no crossing edges)
+    (Slides "Polygon Intersection": contained vertex, intersecting edges. Neither alone finds every case: a cross of two
+    bars has no contained vertex, and a polygon within another has no crossing edges.)
     """
     if len(contained_vertices(a, b)):
         return Evidence.VERTEX_OF_A
@@ -57,12 +57,12 @@ def polygons_intersect(a: ArrayLike, b: ArrayLike) -> Evidence:
 
 
 class SatResult(NamedTuple):
-    """The answer of the separating axis test.
+    """Result of the separating axis test.
 
-    overlaps: touching counts. axis (2,): unit, from A to B; where they overlap, that of the minimum translation.
-    distance (m): negative where they overlap: moving B by -distance * axis makes them touch; else the gap along
-    the axis, which is at most their distance. edge: index of the axis' edge, those of B counted after those of A; a
-    hint for the next call. tested: how many axes were looked at.
+    overlaps: touching counts. axis (2,): unit, from A to B; if they overlap, the axis of the minimum translation.
+    distance (m): if they overlap, negative, and moving B by -distance * axis makes them touch; else the gap along
+    the axis, which is at most their distance. edge: index of the axis' edge, B's edges counted after those of A; a
+    hint for the next call. tested: number of axes tested.
     """
 
     overlaps: bool
@@ -79,14 +79,15 @@ def project(points: ArrayLike, axis: ArrayLike) -> tuple[Array, Array]:
 
 
 def sat_2d(a: ArrayLike, b: ArrayLike, hint: int = 0) -> SatResult:
-    """Separating axis test of convex polygons (n, 2), either way round, with early exit at the first separating axis.
+    """Separating axis test of convex polygons (n, 2) of either orientation; ends at the first separating axis.
 
     (Slides "Separating Axis Theorem (SAT) - in 2D".) The axes are the outward edge normals. A polygon's own projection
-    ends at its edge, so that the gap is that of the other one's nearest corner; whether there is one is decided by
-    cross products, exactly. `hint`: the edge to try first, e.g. of the last call. Raises ShapeError for concave ones.
+    ends at its edge, so the gap is that of the other polygon's nearest corner; whether there is a gap is decided by
+    cross products, exactly. `hint`: the edge to try first, such as that of the last call. Raises ShapeError for concave
+    polygons.
     """
     first, second = _counter_clockwise(a), _counter_clockwise(b)
-    # both relative to one corner: far from the origin the dot products would cancel
+    # relative to a corner, because far from the origin the dot products would cancel
     best, best_edge, axis = -np.inf, -1, np.zeros(2)
     count = len(first) + len(second)
     for tested, edge in enumerate([hint % count, *(k for k in range(count) if k != hint % count)], start=1):

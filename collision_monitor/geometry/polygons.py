@@ -1,6 +1,6 @@
-"""Simple polygons in the plane: orientation, convexity by three tests, and whether a polygon is simple at all.
+"""Simple polygons in the plane: orientation, three tests for convexity, and a test for simplicity.
 
-A polygon is its corners (n, 2) in order around the boundary, either way round. A corner that is repeated counts once.
+A polygon is its corners (n, 2) in order around the boundary, in either orientation. A repeated corner counts once.
 (Slides "Convex Polygon", "Test for Convex Polygons", "Convex and concave – line test", "interior angles")
 """
 
@@ -19,7 +19,7 @@ from collision_monitor.tolerances import EPSILON
 
 
 def corners(points: ArrayLike) -> Indices:
-    """Indices of the corners of a polygon (n, 2) that do not repeat the one before. Raises ShapeError below 3."""
+    """Indices of the corners of a polygon (n, 2) that differ from the one before. Raises ShapeError if fewer than 3."""
     polygon = point_set(points, "polygon", 2, least=3)
     kept = np.flatnonzero((polygon != np.roll(polygon, 1, axis=0)).any(axis=1))
     if len(kept) < 3:
@@ -28,7 +28,7 @@ def corners(points: ArrayLike) -> Indices:
 
 
 def signed_area(points: ArrayLike) -> float:
-    """Area (m²), positive where the corners run counter-clockwise. (Shoelace formula)"""
+    """Area (m²), positive if the corners are counter-clockwise. (Shoelace formula)"""
     polygon = point_set(points, "polygon", 2, least=3)
     offset = polygon - polygon[0]  # far from the origin the products would cancel
     following = np.roll(offset, -1, axis=0)
@@ -36,7 +36,7 @@ def signed_area(points: ArrayLike) -> float:
 
 
 def is_counter_clockwise(points: ArrayLike) -> bool:
-    """Which way the corners of a simple polygon (n, 2) run, exactly: the turn at its lowest leftmost one tells."""
+    """Whether the corners of a simple polygon (n, 2) are counter-clockwise, exactly, by its lowest leftmost corner."""
     polygon = point_set(points, "polygon", 2, least=3)
     polygon = polygon[corners(polygon)]
     return bool(turns(polygon)[np.lexsort((polygon[:, 1], polygon[:, 0]))[0]] > 0.0)
@@ -50,17 +50,17 @@ def turns(points: ArrayLike) -> Array:
 
 
 def is_convex(points: ArrayLike) -> bool:
-    """Whether a polygon is convex: all cross products have one sign, and the boundary goes round once.
+    """Whether a polygon is convex: all cross products have one sign, and the boundary winds around once.
 
     (Slide "Test for Convex Polygons"; by the signs alone a pentagram would pass.) Straight corners are allowed.
-    Raises ShapeError where all corners are on one line.
+    Raises ShapeError if all corners are on one line.
     """
     polygon = point_set(points, "polygon", 2, least=3)
     polygon = polygon[corners(polygon)]
     sign = np.sign(turns(polygon))
     if not sign.any():
         raise ShapeError("polygon: expected an area, got corners on one line")
-    # going round once, the edges' direction changes from leftward to rightward and back just once
+    # on a single winding, the edges' direction changes from leftward to rightward and back exactly once
     edges = np.roll(polygon, -1, axis=0) - polygon
     rightward = (edges[:, 0] > 0.0) | ((edges[:, 0] == 0.0) & (edges[:, 1] > 0.0))
     changes = int((rightward != np.roll(rightward, 1)).sum())
@@ -70,7 +70,7 @@ def is_convex(points: ArrayLike) -> bool:
 def interior_angles(points: ArrayLike) -> Array:
     """Interior angles (n,) in rad, 0 … 2 pi, of a simple polygon; convex if none is above pi. Their sum is (n - 2) pi.
 
-    (Slide "Convex and concave – interior angles"). Raises ShapeError where a corner is repeated.
+    (Slide "Convex and concave – interior angles"). Raises ShapeError if a corner is repeated.
     """
     polygon = point_set(points, "polygon", 2, least=3)
     if len(corners(polygon)) < len(polygon):
@@ -84,9 +84,9 @@ def interior_angles(points: ArrayLike) -> Array:
 def passes_line_test(points: ArrayLike) -> bool:
     """Whether each segment between two points of a simple polygon stays in it. (Slide "Convex and concave – line test")
 
-    It is enough to try the middle between each two corners: a concave polygon has an edge of its hull that is none of
-    its own, and that edge's middle is outside. The middle is rounded, so a dent shallower than 1e-15 of the size
-    passes; the exact test is `is_convex`.
+    It is sufficient to test the midpoint of each two corners: the hull of a concave polygon has an edge that is not an
+    edge of the polygon, and the middle of that edge is outside. The midpoint is rounded, so a dent shallower than 1e-15
+    of the size passes; the exact test is `is_convex`.
     """
     polygon = point_set(points, "polygon", 2, least=3)
     polygon = polygon[corners(polygon)]
@@ -101,9 +101,9 @@ def passes_line_test(points: ArrayLike) -> bool:
 
 
 def crossing_edges(points: ArrayLike) -> tuple[int, int] | None:
-    """The first two edges (by the index of their first corner) that keep a polygon from being simple; None where it is.
+    """The first two edges (by the index of their first corner) that make a polygon non-simple; None if it is simple.
 
-    Edges may share nothing but the corner between neighbours, exactly.
+    Neighbouring edges may share only their common corner, other edges nothing. Exact.
     """
     polygon = point_set(points, "polygon", 2, least=3)
     index = corners(polygon)

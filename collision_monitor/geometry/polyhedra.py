@@ -1,4 +1,4 @@
-"""Polyhedra as closed triangle meshes: is a point inside, does an edge cross a face. All decisions are exact.
+"""Polyhedra as closed triangle meshes: point location, and edges against faces. All decisions are exact.
 
 A mesh is vertices (n, 3) in m and faces (m, 3) of vertex indices, counter-clockwise from outside.
 (Slides "Collision detection: polyhedra")
@@ -18,24 +18,24 @@ from collision_monitor.geometry.orientation import orient2d, orient3d
 from collision_monitor.geometry.point_in_polygon import Location
 
 POINTS_AT_ONCE: Final = 256
-"""Points that are located together in a mesh. Larger: more faces are near some of them. Smaller: more turns."""
+"""Points located together in a mesh. Larger: more faces are near some of them. Smaller: more iterations."""
 
 
 def mesh_edges(faces: ArrayLike) -> Indices:
-    """The edges (k, 2) of a mesh's faces (m, 3), each once, smaller vertex index first, sorted."""
+    """Edges (k, 2) of a mesh's faces (m, 3) without duplicates, smaller vertex index first, sorted."""
     faces = np.asarray(faces, dtype=np.int64)
     return np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
 
 
 def is_closed(faces: ArrayLike) -> bool:
-    """Whether faces (m, 3) enclose a volume without a gap: each edge belongs to an even number of them."""
+    """Whether faces (m, 3) enclose a volume without a gap: each edge belongs to an even number of faces."""
     faces = np.asarray(faces, dtype=np.int64)
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     return bool((np.unique(edges, axis=0, return_counts=True)[1] % 2 == 0).all())
 
 
 def closed_mesh(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> tuple[Array, Indices]:
-    """A closed triangle mesh: vertices (n, 3), faces (m, 3) of vertex indices, m >= 1. Raises ShapeError."""
+    """Check a closed triangle mesh: vertices (n, 3), faces (m, 3) of vertex indices, m >= 1. Raises ShapeError."""
     vertices, faces = triangles(vertices, faces, what)
     if not is_closed(faces):
         raise ShapeError(f"{what}: expected a closed surface, got edges that belong to an odd number of faces")
@@ -45,7 +45,7 @@ def closed_mesh(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> tu
 def locate_in_convex_polyhedron(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> Signs:
     """Location (...) of points (..., 3) in a convex polyhedron: on the inner side of the planes of all faces.
 
-    (Slide "A vertex is inside a convex polyhedron if it's on the 'inside' side of all faces".) Flat ones are skipped.
+    (Slide "A vertex is inside a convex polyhedron if it's on the 'inside' side of all faces".) Flat faces are skipped.
     """
     p = coordinates(points, "points", 3)[..., None, :]
     vertices, faces = triangles(vertices, faces)
@@ -57,8 +57,8 @@ def locate_in_polyhedron(points: ArrayLike, vertices: ArrayLike, faces: ArrayLik
     """Location (...) of points (..., 3) in any closed polyhedron, by the parity of a ray towards +z.
 
     (Slide "A vertex is inside a concave polyhedron if a semi-infinite ray from the vertex intersects an odd number of
-    faces".) A ray through an edge or a vertex, or along a face, is no special case: the ray is thought to be moved by
-    (e, e²) in x and y for an infinitely small e, which leaves none. A point on a face is found before, exactly.
+    faces".) A ray through an edge or a vertex, or along a face, is no special case: the ray is shifted symbolically by
+    (e, e²) in x and y for an infinitely small e. A point on a face is found beforehand, exactly.
     Raises ShapeError for a mesh that is not closed.
     """
     points = coordinates(points, "points", 3)
@@ -68,7 +68,7 @@ def locate_in_polyhedron(points: ArrayLike, vertices: ArrayLike, faces: ArrayLik
     p = points.reshape(-1, 3)
     on_face, odd = np.zeros(len(p), bool), np.zeros(len(p), bool)
     order = np.argsort(p[:, 0])
-    for first in range(0, len(p), POINTS_AT_ONCE):  # few points side by side: few faces are in question for each
+    for first in range(0, len(p), POINTS_AT_ONCE):  # points in order of x, so that few faces are near each batch
         some = order[first : first + POINTS_AT_ONCE]
         near = np.flatnonzero((low[:, 0] <= p[some[-1], 0]) & (p[some[0], 0] <= high[:, 0]))
         beside = (low[near, :2] <= p[some, None, :2]) & (p[some, None, :2] <= high[near, :2])
@@ -82,14 +82,14 @@ def locate_in_polyhedron(points: ArrayLike, vertices: ArrayLike, faces: ArrayLik
         touching[in_plane] = _in_flat_triangle(q[in_plane], *(corner[in_plane] for corner in corners))
         turn = _perturbed_turn(q, *corners)
         on_face[some] = np.bincount(i, touching, len(p[some])) > 0
-        # the ray meets the face where its point is behind the face that looks up, or before the one that looks down
+        # the ray meets the face if its point is behind a face that looks up, or in front of one that looks down
         odd[some] = np.bincount(i, turn * height < 0.0, len(p[some])) % 2 == 1
     location = np.where(on_face, Location.BOUNDARY, np.where(odd, Location.INSIDE, Location.OUTSIDE))
     return location.reshape(points.shape[:-1]).astype(np.int8)
 
 
 class EdgeFace(NamedTuple):
-    """meets (...): the edge and the face have a point in common; its t (...) and the point (..., 3), else NaN."""
+    """meets (...): the edge and the face have a point in common; t (...) and the point (..., 3) of it, else NaN."""
 
     meets: Booleans
     t: Array
@@ -97,11 +97,11 @@ class EdgeFace(NamedTuple):
 
 
 def edge_face(p: ArrayLike, q: ArrayLike, a: ArrayLike, b: ArrayLike, c: ArrayLike) -> EdgeFace:
-    """Where edges p, q meet triangles a, b, c (..., 3 each), ends and boundary included; whether they do is exact.
+    """Intersections of edges p, q with triangles a, b, c (..., 3 each), ends and boundary included; `meets` is exact.
 
     (Slide "Edge intersection face test": the edge's ends are on opposite sides of the face's plane, and the point where
     the edge meets the plane is inside the face.) For an edge in the face's plane, t is that of an end inside, or NaN.
-    A triangle without area meets nothing: in a closed mesh its neighbours answer for it.
+    A triangle without area meets nothing, because in a closed mesh its neighbours cover it.
     """
     points = [coordinates(x, name, 3) for x, name in ((p, "p"), (q, "q"), (a, "a"), (b, "b"), (c, "c"))]
     try:
@@ -113,7 +113,7 @@ def edge_face(p: ArrayLike, q: ArrayLike, a: ArrayLike, b: ArrayLike, c: ArrayLi
     before, after = np.asarray(orient3d(a, b, c, p)), np.asarray(orient3d(a, b, c, q))
     in_plane = (before == 0.0) & (after == 0.0)
     meets = (np.sign(before) * np.sign(after) <= 0.0) & ~in_plane
-    # the line through p and q passes all three sides of the triangle on one hand
+    # all three sides of the triangle must be on one hand of the line through p and q
     turns = np.zeros((3, len(p)))
     k = np.flatnonzero(meets)
     for side, (start, end) in enumerate(((a, b), (b, c), (c, a))):
@@ -129,7 +129,7 @@ def edge_face(p: ArrayLike, q: ArrayLike, a: ArrayLike, b: ArrayLike, c: ArrayLi
 
 
 def flat_triangles(a: Array, b: Array, c: Array) -> Booleans:
-    """Whether triangles (..., 3) have no area, exactly: their shadows on all three coordinate planes have none."""
+    """Whether triangles (..., 3) have no area, exactly: no projection onto a coordinate plane has an area."""
     return np.asarray(np.all([orient2d(a[..., k], b[..., k], c[..., k]) == 0.0 for k in _PLANES], axis=0))
 
 
@@ -137,7 +137,7 @@ _PLANES = ([0, 1], [1, 2], [2, 0])
 
 
 def _perturbed_turn(p: Array, a: Array, b: Array, c: Array) -> Array:
-    """1 where the triangle faces up and, seen from above, holds p moved by (e, e²); -1 where it faces down; else 0."""
+    """Orientation of the triangle seen from above (1 up, -1 down) if it contains p shifted by (e, e²), else 0."""
     signs = []
     for start, end in ((a, b), (b, c), (c, a)):
         sign = np.sign(orient2d(start[:, :2], end[:, :2], p[:, :2]))
@@ -150,7 +150,7 @@ def _perturbed_turn(p: Array, a: Array, b: Array, c: Array) -> Array:
 
 
 def _in_flat_triangle(p: Array, a: Array, b: Array, c: Array) -> Booleans:
-    """Whether p (m, 3), known to be in the plane of a, b, c (m, 3), is in the triangle: so are all its shadows."""
+    """Whether p (m, 3) in the plane of a, b, c (m, 3) is in the triangle: all projections of p are in those of it."""
     low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     inside = ((low <= p) & (p <= high)).all(axis=1)
     for k in _PLANES:
@@ -163,7 +163,8 @@ def _coplanar(p: Array, q: Array, a: Array, b: Array, c: Array) -> tuple[Boolean
     """Whether edges p, q (m, 3) in the plane of triangles with an area meet them, and t of an end inside or NaN."""
     p_inside, q_inside = _in_flat_triangle(p, a, b, c), _in_flat_triangle(q, a, b, c)
     t = np.where(p_inside, 0.0, np.where(q_inside, 1.0, np.nan))
-    # two coplanar segments meet where their shadows do, on a coordinate plane that the triangle is not upright on
+    # two coplanar segments meet if their projections do, on a coordinate plane that is not perpendicular to the
+    # triangle
     shadows = np.array([orient2d(a[:, k], b[:, k], c[:, k]) != 0.0 for k in _PLANES])
     planes = np.array(_PLANES)[shadows.argmax(axis=0)]
     p, q, a, b, c = (np.take_along_axis(x, planes, axis=1) for x in (p, q, a, b, c))

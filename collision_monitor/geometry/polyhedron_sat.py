@@ -1,7 +1,7 @@
-"""The separating axis test of two convex polyhedra, with the axis of the last call tried first.
+"""Separating axis test of two convex polyhedra, which tries the axis of the last call first.
 
-The product's own boxes go through narrow_phase/box_box.py, the same test compiled; its hulls through GJK and EPA, which
-do not look at every pair of edges.
+The monitor tests boxes with narrow_phase/box_box.py, the same test compiled, and hulls with GJK and EPA, which do not
+examine every pair of edges.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from collision_monitor.tolerances import FACE_PREFERENCE, PARALLEL_SIN2
 
 
 class PolyhedronSat(NamedTuple):
-    """The answer of the separating axis test.
+    """Result of the separating axis test.
 
-    overlaps: touching counts. axis (3,): unit, from A to B; where they overlap, that of the minimum translation.
-    distance (m): negative where they overlap: moving B by -distance * axis makes them touch; else the gap along the
-    axis, which is at most their distance. number: of the axis, a hint for the next call: faces of A, faces of B, then
-    edges of A times edges of B. tested: how many axes were looked at.
+    overlaps: touching counts. axis (3,): unit, from A to B; if they overlap, the axis of the minimum translation.
+    distance (m): if they overlap, negative, and moving B by -distance * axis makes them touch; else the gap along the
+    axis, which is at most their distance. number: index of the axis, a hint for the next call: faces of A, faces of B,
+    then edges of A times edges of B. tested: number of axes tested.
     """
 
     overlaps: bool
@@ -33,13 +33,14 @@ class PolyhedronSat(NamedTuple):
 
 
 def sat_3d(a: Hull, b: Hull, hint: int = 0) -> PolyhedronSat:
-    """Separating axis test of two convex hulls in one frame, with early exit at the first separating axis.
+    """Separating axis test of two convex hulls in one frame; ends at the first stage with a separating axis.
 
     (Slides "Separating Axis Theorem (SAT)"; Gottschalk, Lin, Manocha, OBBTree, 1996) The axes are the outward normals
-    of the faces and the cross products of the edges, of which nearly parallel ones are dropped: the faces cover those.
-    `hint`: the axis that is tried first, e.g. of the last call: what was apart is mostly apart along the same axis.
+    of the faces and the cross products of the edges. Cross products of nearly parallel edges are dropped, as the faces
+    cover them. `hint`: the axis to try first, such as that of the last call, because separated hulls mostly stay
+    separated along the same axis.
     """
-    origin = a.vertices[0]  # far from it the dot products would cancel
+    origin = a.vertices[0]  # far from the origin the dot products would cancel
     first, second = a.vertices - origin, b.vertices - origin
     size = float(max(np.ptp(first, axis=0).max(), np.ptp(second, axis=0).max()))
     counts = np.array([len(a.faces), len(b.faces), len(mesh_edges(a.faces)) * len(mesh_edges(b.faces))])
@@ -58,7 +59,7 @@ def sat_3d(a: Hull, b: Hull, hint: int = 0) -> PolyhedronSat:
 
 
 def _gaps(a: Hull, b: Hull, first: Array, second: Array, which: Indices, counts: Indices) -> tuple[Array, Array]:
-    """Unit axes (n, 3) from A to B of some indices, and the gaps (n,) along them; -inf for no axis."""
+    """Unit axes (n, 3) from A to B for the indices `which`, and the gaps (n,) along them; -inf for a dropped axis."""
     faces_a, faces_b = int(counts[0]), int(counts[0] + counts[1])
     edges_a, edges_b = (_edges(hull.faces, points) for hull, points in ((a, first), (b, second)))
     axes = np.zeros((len(which), 3))
@@ -83,7 +84,7 @@ def _edges(faces: Indices, points: Array) -> Array:
 
 
 def _normals(corners: Array) -> Array:
-    """Outward unit normals (n, 3) of triangles (n, 3, 3); zero where one has no area."""
+    """Outward unit normals (n, 3) of triangles (n, 3, 3); zero for a triangle without area."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     return np.asarray(normal / np.where(length > 0.0, length, 1.0))

@@ -1,4 +1,4 @@
-"""Poses and motions, and the quaternion functions that the rest is built on.
+"""Poses, motions and quaternion functions.
 
 Quaternions are (x, y, z, w), as in ROS. A rotation matrix R_WA takes vectors of frame A to frame W.
 """
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 def vector(value: ArrayLike, name: str, length: int = 3) -> Array:
-    """A finite float64 vector of `length` numbers, read-only. Raises PoseError."""
+    """Check a vector of `length` finite numbers; return it as float64, read-only. Raises PoseError."""
     try:
         result = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
@@ -33,7 +33,7 @@ def vector(value: ArrayLike, name: str, length: int = 3) -> Array:
 
 
 def unit_quaternion(value: ArrayLike) -> Array:
-    """The quaternion (x, y, z, w), normalised where it is within 1e-3 of unit length. Raises PoseError beyond."""
+    """Normalise a quaternion (x, y, z, w) within 1e-3 of unit length. Raises PoseError beyond."""
     q = vector(value, "quaternion", 4)
     norm = float(np.linalg.norm(q))
     if abs(norm - 1.0) > UNIT_QUATERNION:
@@ -80,7 +80,7 @@ def rotation_matrix(quaternion: ArrayLike) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Where a body is: position (m) and orientation (unit quaternion x, y, z, w). Raises PoseError."""
+    """Pose of a body: position (m) and orientation (unit quaternion x, y, z, w). Raises PoseError."""
 
     position: Any = (0.0, 0.0, 0.0)
     quaternion: Any = (0.0, 0.0, 0.0, 1.0)
@@ -91,7 +91,7 @@ class Pose:
 
     @cached_property
     def rotation(self) -> Array:
-        """R_WA (3, 3), read-only: takes the body's vectors to the world."""
+        """R_WA (3, 3), read-only; takes the body's vectors to the world frame."""
         matrix = rotation_matrix(self.quaternion)
         matrix.setflags(write=False)
         return matrix
@@ -103,9 +103,9 @@ class Pose:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A pose, its twist and its acceleration, in the world frame; raises PoseError.
+    """A pose, its twist and its linear acceleration, in the world frame. Raises PoseError.
 
-    linear (m/s) and acceleration (m/s^2) are of the body's origin, angular in rad/s.
+    linear (m/s) and acceleration (m/s^2) refer to the body's origin; angular is in rad/s.
     """
 
     pose: Pose

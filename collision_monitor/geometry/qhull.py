@@ -1,4 +1,4 @@
-"""Convex hulls by Qhull. SciPy is imported at the first call: it would take a sixth of every start without one."""
+"""Convex hulls by Qhull. SciPy is imported at the first call, as its import takes a sixth of the start-up time."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from collision_monitor.tolerances import HULL_DROP
 Array = NDArray[np.float64]
 
 HEIGHTS_AT_ONCE: Final = 1 << 20
-"""Heights of points over planes that are computed together: 8 MB."""
+"""Heights of points above planes computed in one batch: 8 MB."""
 
 
 def qhull(points: Array) -> Any | None:
-    """The hull of points (n, d) as scipy.spatial.ConvexHull, or None where they are flat: Qhull gives up on those."""
+    """Hull of points (n, d) as scipy.spatial.ConvexHull, or None if Qhull fails because they are flat."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -27,7 +27,7 @@ def qhull(points: Array) -> Any | None:
 
 
 def hull_vertices(points: Array) -> NDArray[np.int32]:
-    """Indices of the points (n, 3) that span their convex hull, ascending; all distinct points where qhull gives up."""
+    """Indices of the points (n, 3) that span their convex hull, ascending; all distinct points if Qhull fails."""
     _, first = np.unique(points, axis=0, return_index=True)
     first = np.sort(first)
     centred = points[first] - points[first].mean(axis=0)
@@ -35,7 +35,7 @@ def hull_vertices(points: Array) -> NDArray[np.int32]:
     hull = qhull(centred / scale)
     if hull is None:
         return first.astype(np.int32)
-    # qhull merges what is nearly coplanar; a vertex that it dropped although it sticks out stays in
+    # Qhull merges nearly coplanar points; keep a vertex that it dropped although it is outside the hull
     keep = np.zeros(len(first), bool)
     keep[hull.vertices] = True
     normal, offset = hull.equations[:, :3], hull.equations[:, 3]

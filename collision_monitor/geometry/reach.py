@@ -1,4 +1,4 @@
-"""How far shapes reach in a direction: their support function, in NumPy, for any of them."""
+"""Support function of any shape, in NumPy: how far it extends in a direction."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ Array = NDArray[np.float64]
 
 
 def reach(pieces: Sequence[tuple[Shape, Pose]], directions: ArrayLike) -> Array:
-    """Greatest d . x (...) in m over all pieces, for unit directions d (..., 3); inf where there is no end."""
+    """Greatest d . x (...) in m over all pieces, for unit directions d (..., 3); inf if unbounded."""
     d = np.asarray(directions, dtype=np.float64)
     each = [d @ pose.position + _reach(shape, d @ pose.rotation) for shape, pose in pieces]
     return np.asarray(np.max(each, axis=0))
 
 
 def _reach(shape: Shape, d: Array) -> Array:
-    """The same for one shape in its own frame."""
+    """Support function of one shape in its own frame."""
     along, rim = np.abs(d[..., 2]), np.hypot(d[..., 0], d[..., 1])
     match shape:
         case Sphere():

@@ -1,4 +1,4 @@
-"""All shapes as one structure of arrays: what the kernels read instead of shape objects.
+"""All shapes as one structure of arrays, which the kernels read instead of shape objects.
 
 The dtypes and the memory order never depend on the content, so that adding a shape compiles nothing.
 """
@@ -38,26 +38,27 @@ SUPPORTED_SHAPES: Final = (
 )
 
 _TRIANGLE: Final = np.arange(3, dtype=np.int32)
-"""Its corners, as `hull_vertices` of a hull."""
+"""The corners of a triangle, in the form of `hull_vertices`."""
 
 
 class ShapeTable(NamedTuple):
-    """K slots of shapes and the hull vertices (m). A slot with kind 0 is free. Kernels take this as one argument.
+    """K slots of shapes, and the hull vertices (m). A slot with kind 0 is free. Kernels take this as one argument.
 
     size holds, by kind: sphere r | box half extents x, y, z | capsule r, half core length | cylinder r, half height |
     cone r, half height | half-space normal x, y, z, offset | hull nothing | circle r | polygon number of corners.
-    Hull vertices come in blocks of LANES, the last one repeated, so that the support scan has no tail.
+    Hull vertices come in blocks padded to a multiple of LANES with the last vertex, so that the support scan has no
+    tail.
     """
 
     kind: Any  # (K,) uint8, records.ShapeType
     size: Any  # (K, 4) float64
-    margin: Any  # (K,) float64: the shape is grown by a sphere of this radius
-    radius: Any  # (K,) float64: of the sphere about the shape's origin that holds it, margin included
+    margin: Any  # (K,) float64: radius of the sphere by which the shape is enlarged (m)
+    radius: Any  # (K,) float64: radius of the bounding sphere about the shape's origin, including the margin (m)
     vertex_start: Any  # (K,) int32
-    vertex_count: Any  # (K,) int32, a multiple of LANES; 0 where not a hull
+    vertex_count: Any  # (K,) int32, a multiple of LANES; 0 if the shape has no vertices
     vertices: Any  # (3, V) float64: all x, all y, all z
-    vertex_index: Any  # (V,) int32: the vertex's place in the points that the user gave
-    local_position: Any  # (K, 3) float64, of the shape in its object's frame
+    vertex_index: Any  # (V,) int32: the vertex's index in the user's points
+    local_position: Any  # (K, 3) float64: position of the shape in its object's frame (m)
     local_rotation: Any  # (K, 3, 3) float64
 
 
@@ -84,13 +85,13 @@ def _resized(table: ShapeTable, slots: int, vertices: int) -> ShapeTable:
 
 
 def take(table: ShapeTable, slots: NDArray[np.int_]) -> ShapeTable:
-    """A table of these slots in this order, each as often as it is named; the vertices are shared."""
+    """Return a table of these slots in this order; a slot may occur several times. The vertices are shared."""
     rows = {name: getattr(table, name)[slots] for name in table._fields if name not in ("vertices", "vertex_index")}
     return table._replace(**rows)
 
 
 def join(tables: Sequence[ShapeTable]) -> ShapeTable:
-    """One table of the slots of several, in order."""
+    """Concatenate several tables into one, in order."""
     columns = {name: [getattr(table, name) for table in tables] for name in ShapeTable._fields}
     start = np.cumsum([0] + [len(index) for index in columns["vertex_index"][:-1]])
     columns["vertex_start"] = [each + np.int32(at) for each, at in zip(columns["vertex_start"], start, strict=True)]
@@ -98,7 +99,7 @@ def join(tables: Sequence[ShapeTable]) -> ShapeTable:
 
 
 def triangle_table(corners: Array) -> ShapeTable:
-    """A table of triangles (n, 3, 3) about their own origins: as `append` of each, for a mesh of many."""
+    """Table of triangles (n, 3, 3) about their own origins. Equals `append` of each, but fast for a large mesh."""
     n = len(corners)
     table = _empty(n, LANES * n)
     radius = np.linalg.norm(corners, axis=2).max(axis=1)
@@ -115,7 +116,7 @@ def triangle_table(corners: Array) -> ShapeTable:
 
 
 def convex_ring(points: Array) -> NDArray[np.int32]:
-    """Indices of the corners (n,) of a polygon (m, 2), counter-clockwise. Raises ShapeError where it is not convex."""
+    """Corner indices (n,) of a polygon (m, 2), counter-clockwise. Raises ShapeError if it is not convex."""
     if not is_convex(points):
         raise ShapeError("Polygon points: expected a convex polygon, got a concave one; see triangulation.convex_parts")
     ring = corners(points)
@@ -123,7 +124,7 @@ def convex_ring(points: Array) -> NDArray[np.int32]:
 
 
 class ShapeTableBuilder:
-    """Grows a ShapeTable; `table` is the current one and must be fetched again after `append`."""
+    """Builds a ShapeTable. `table` is the current table and must be read again after `append`."""
 
     def __init__(self, slots: int = 64, vertices: int = 512) -> None:
         self.table = _empty(max(slots, 1), max(vertices, LANES))
@@ -131,12 +132,12 @@ class ShapeTableBuilder:
         self._vertices = 0
         self._free_slots: list[int] = []
         self._free_blocks: dict[int, list[int]] = {}
-        self._blocks: dict[bytes, tuple[int, int]] = {}  # the points' bytes -> start, count
-        self._users: dict[int, tuple[bytes, int]] = {}  # start -> its key, how many slots share the block
+        self._blocks: dict[bytes, tuple[int, int]] = {}  # bytes of the points -> start, count
+        self._users: dict[int, tuple[bytes, int]] = {}  # start -> key of the block, number of slots that share it
 
     @classmethod
     def restored(cls, table: ShapeTable, free_slots: list[int], free_blocks: dict[int, list[int]]) -> ShapeTableBuilder:
-        """Goes on from what `used` gave and what was free then: of slots, and of blocks by their length."""
+        """Restore a builder from its `used` table and its `free` slots and blocks."""
         slots, vertices = len(table.kind), len(table.vertex_index)
         builder = cls()
         builder.table = _resized(table, max(slots, len(builder.table.kind)), max(vertices, LANES))
@@ -145,7 +146,7 @@ class ShapeTableBuilder:
         for slot in np.flatnonzero(table.vertex_count):
             start, count = int(table.vertex_start[slot]), int(table.vertex_count[slot])
             index = table.vertex_index[start : start + count]
-            chosen = index[: len(np.unique(index))]  # without the last one's repetitions
+            chosen = index[: len(np.unique(index))]  # without the padding
             key = chosen.tobytes() + table.vertices[:, start : start + len(chosen)].T.tobytes()
             builder._blocks[key] = start, count
             builder._users[start] = key, builder._users.get(start, (key, 0))[1] + 1
@@ -153,7 +154,7 @@ class ShapeTableBuilder:
 
     @property
     def used(self) -> ShapeTable:
-        """The part of the table that has been used so far, a view."""
+        """The part of the table that has been used so far, as a view."""
         by_vertex = {
             "vertices": self.table.vertices[:, : self._vertices],
             "vertex_index": self.table.vertex_index[: self._vertices],
@@ -163,17 +164,17 @@ class ShapeTableBuilder:
 
     @property
     def free(self) -> tuple[list[int], dict[int, list[int]]]:
-        """Slots, and blocks of vertices by their length, that are used next, from the last one on."""
+        """Free slots, and free blocks of vertices by their length; the last of each list is used next."""
         return list(self._free_slots), {count: list(starts) for count, starts in self._free_blocks.items()}
 
     def __len__(self) -> int:
-        """How many shapes the table holds."""
+        """Number of shapes in the table."""
         return self._slots - len(self._free_slots)
 
     def append(self, shape: shapes.Shape, pose: Pose | None = None, margin: float = 0.0) -> int:
-        """Put a shape at a pose in its object's frame, grown by `margin` (m); returns its slot.
+        """Add a shape at a pose in its object's frame, enlarged by `margin` (m); return its slot.
 
-        Raises UnsupportedError for a kind that has no kernels, ShapeError for a bad margin.
+        Raises UnsupportedError for a kind without kernels, ShapeError for an invalid margin.
         """
         if not (np.isfinite(margin) and margin >= 0.0):
             raise ShapeError(f"margin: expected a finite number of metres >= 0, got {margin!r}")
@@ -212,7 +213,7 @@ class ShapeTableBuilder:
         table.size[slot] = 0.0
         table.size[slot, : len(size)] = size
         table.margin[slot] = margin
-        # rounded up: the sphere must hold the shape whatever the rounding above was
+        # rounded up, because the sphere must contain the shape in spite of round-off
         table.radius[slot] = np.nextafter(radius * (1 + 1e-15) + margin, inf)
         table.vertex_start[slot], table.vertex_count[slot] = start, count
         table.local_position[slot] = 0.0 if pose is None else pose.position
@@ -221,7 +222,7 @@ class ShapeTableBuilder:
         return slot
 
     def remove(self, slot: int) -> None:
-        """Free a slot for reuse. Raises InputError where there is no shape."""
+        """Free a slot for reuse. Raises InputError if it holds no shape."""
         if not (0 <= slot < self._slots and self.table.kind[slot]):
             raise InputError(f"expected the slot of a shape in the table, got {slot!r}")
         if self.table.vertex_count[slot]:
@@ -246,7 +247,7 @@ class ShapeTableBuilder:
         return self._slots - 1
 
     def _share(self, points: Array, chosen: NDArray[np.int32]) -> tuple[int, int]:
-        """Start and count of the block of the chosen points; the same ones share one block."""
+        """Start and count of the block of the chosen points; slots with equal points share one block."""
         key = chosen.tobytes() + points[chosen].tobytes()
         if key in self._blocks:
             start, count = self._blocks[key]
@@ -273,7 +274,7 @@ class ShapeTableBuilder:
 
 @device
 def bounds(table: Any, slot: int, R: Any, out: Any) -> None:
-    """Tight axis-aligned bounds of a shape under rotation R_WA (3, 3), about its origin and with its margin.
+    """Tight axis-aligned bounds of a shape under rotation R_WA (3, 3), about its origin, including its margin.
 
     out[0:3] = lower, out[3:6] = upper (m). A half-space is unbounded: -inf and inf.
     """

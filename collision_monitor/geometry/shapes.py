@@ -1,4 +1,7 @@
-"""The shapes: immutable, checked when they are made, SI units, centred on the origin, axis = local z."""
+"""Shapes: immutable, checked on construction, SI units, centred on the origin, axis along local z.
+
+Every constructor raises ShapeError for impossible values.
+"""
 
 from __future__ import annotations
 
@@ -40,12 +43,12 @@ def _points(value: ArrayLike, what: str, width: int, least: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Base of all shapes. Those with arrays are equal only to themselves, the others by their sizes."""
+    """Base class of all shapes. Shapes with arrays compare by identity, the others by their sizes."""
 
 
 @dataclass(frozen=True)
 class Sphere(Shape):
-    """radius in m."""
+    """Sphere; radius in m."""
 
     radius: float
 
@@ -55,7 +58,7 @@ class Sphere(Shape):
 
 @dataclass(frozen=True)
 class Box(Shape):
-    """size: full extents (x, y, z) in m; zero extents are allowed (a plate, a needle) but not all three."""
+    """Box; size: full extents (x, y, z) in m. Zero extents are allowed (a plate, a needle), but not all three."""
 
     size: Any
 
@@ -76,7 +79,7 @@ class Box(Shape):
 
 @dataclass(frozen=True)
 class Capsule(Shape):
-    """radius and length of the core segment (without the caps) in m."""
+    """Capsule; radius and length of the core segment (without the caps) in m."""
 
     radius: float
     length: float
@@ -88,7 +91,7 @@ class Capsule(Shape):
 
 @dataclass(frozen=True)
 class Cylinder(Shape):
-    """radius and height (length) in m."""
+    """Cylinder; radius and height (length) in m."""
 
     radius: float
     length: float
@@ -100,7 +103,7 @@ class Cylinder(Shape):
 
 @dataclass(frozen=True)
 class Cone(Shape):
-    """radius of the base and height (length) in m; the apex is at +length/2."""
+    """Cone; radius of the base and height (length) in m. The apex is at +length/2."""
 
     radius: float
     length: float
@@ -112,7 +115,7 @@ class Cone(Shape):
 
 @dataclass(frozen=True, eq=False)
 class ConvexHull(Shape):
-    """The convex hull of points (n, 3), n >= 4 and not all in one plane; interior points may be given."""
+    """Convex hull of points (n, 3) in m, n >= 4 and not all in one plane; interior points are allowed."""
 
     points: Any
 
@@ -127,7 +130,7 @@ class ConvexHull(Shape):
 
 @dataclass(frozen=True, eq=False)
 class Mesh(Shape):
-    """A triangle surface, convex or not: vertices (n, 3) in m, faces (m, 3) of vertex indices.
+    """Triangle surface, convex or not: vertices (n, 3) in m, faces (m, 3) of vertex indices.
 
     Faces are counter-clockwise seen from outside.
     """
@@ -156,7 +159,7 @@ class Mesh(Shape):
 
 @dataclass(frozen=True, eq=False)
 class Triangle(Shape):
-    """One face of a mesh: points (3, 3) in m, which may lie on one line or coincide. What a `Mesh` is tested as."""
+    """One face of a `Mesh` as its pair tests see it: points (3, 3) in m, which may lie on one line or coincide."""
 
     points: Any
 
@@ -166,7 +169,7 @@ class Triangle(Shape):
 
 @dataclass(frozen=True, eq=False)
 class HalfSpace(Shape):
-    """{x : normal . x <= offset}; the normal points out of the solid and is normalised here, the offset (m) with it."""
+    """Half-space {x : normal . x <= offset}, offset in m. The normal points out of the solid; both get normalised."""
 
     normal: Any
     offset: float = 0.0
@@ -191,7 +194,7 @@ class HalfSpace(Shape):
 
 @dataclass(frozen=True)
 class Circle(Shape):
-    """2-D, in the x-y plane: radius in m."""
+    """Circle in the x-y plane; radius in m."""
 
     radius: float
 
@@ -201,7 +204,7 @@ class Circle(Shape):
 
 @dataclass(frozen=True, eq=False)
 class Polygon(Shape):
-    """2-D, in the x-y plane: points (n, 2) in order around the boundary of a simple polygon, convex or concave."""
+    """Polygon in the x-y plane: points (n, 2) in m around the boundary of a simple polygon, convex or concave."""
 
     points: Any
 

@@ -1,8 +1,8 @@
-"""Sphere trees: a solid or a surface enclosed by ever smaller spheres, with balls inside of it too.
+"""Sphere trees: a solid or a surface enclosed by ever smaller spheres, with inner balls inside it.
 
-So the distance of two of them is known as an interval after every level, and a test may stop at any of them.
-(Hubbard, Approximating polyhedra with spheres for time-critical collision detection, 1996: the octree method, whose
-spheres stand around the cells that meet the solid. Here a cell also has a ball that is in the solid.)
+The distance of two trees is therefore known as an interval after every level, and a test may stop at any level.
+(Hubbard, Approximating polyhedra with spheres for time-critical collision detection, 1996: the octree method, with
+a sphere around each cell that meets the solid. Here, a cell also has a ball inside the solid.)
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from collision_monitor.geometry.pose import Pose
 from collision_monitor.tolerances import EPSILON, ROUNDED_UP
 
 DEEPEST: Final = 8
-"""Levels beyond the first that a tree may have: a surface then meets some 400,000 cells."""
+"""Largest number of levels below the root of a tree; a surface then meets some 400,000 cells."""
 
 MOST_PAIRS: Final = 1_000_000
-"""Pairs of spheres at which a query ends for want of memory; the interval that it has is true as any."""
+"""Pairs of spheres at which a query ends to limit its memory; its current interval is still valid."""
 
 FACES_AT_ONCE: Final = 1 << 16
-"""Pairs of a cell and a face that are looked at together, so that their table stays small."""
+"""Pairs of a cell and a face tested in one batch, so that the table stays small."""
 
 _AXES: Final = np.array([sign * np.array(d) / np.linalg.norm(d) for d in KDOP_DIRECTIONS[26] for sign in (1.0, -1.0)])
 _OCTANTS: Final = np.array(list(product((-0.25, 0.25), repeat=3)))
 
 
 class Level(NamedTuple):
-    """Spheres that together enclose the shape: center (n, 3), radius (n,); balls inside it: inner_center, inner_radius.
+    """Spheres that together enclose the shape, and balls inside it: centers (n, 3) and radii (n,) in m.
 
-    A ball of radius 0 is a point of the shape. parent (n,): the sphere of the level before that it is part of.
+    A ball of radius 0 is a point of the shape. parent (n,): index of the sphere's parent in the level before.
     """
 
     center: Array
@@ -51,21 +51,21 @@ class Level(NamedTuple):
 
 
 SphereTree = tuple[Level, ...]
-"""From one sphere to the finest level."""
+"""Levels from a single sphere to the finest level."""
 
 
 class Interval(NamedTuple):
-    """The signed distance (m) is at least lower and at most upper."""
+    """Interval of the signed distance: at least lower and at most upper (m)."""
 
     lower: float
     upper: float
 
 
 def sphere_tree(vertices: ArrayLike, faces: ArrayLike, depth: int = 5) -> SphereTree:
-    """The tree of a mesh (vertices (n, 3) in m, faces (m, 3)): the solid where it is closed, else the surface.
+    """Build the tree of a mesh (vertices (n, 3) in m, faces (m, 3)): of the solid if it is closed, else of the surface.
 
-    Level k has cells of 2^-k of the size; its spheres stand out of the shape by less than twice their radius, which is
-    0.87 cells. Raises ShapeError, InputError.
+    The cells of level k have 2^-k of the size. Its spheres have a radius of 0.87 cells and exceed the shape by less
+    than twice that. Raises ShapeError, InputError.
     """
     vertices, faces = triangles(vertices, faces)
     if not 0 <= depth <= DEEPEST:
@@ -75,9 +75,9 @@ def sphere_tree(vertices: ArrayLike, faces: ArrayLike, depth: int = 5) -> Sphere
     width = size = float((high - low).max())
     closed = is_closed(faces)
     center, parent = np.array([0.5 * low + 0.5 * high]), np.zeros(1, np.int64)
-    owner, face = np.zeros(len(faces), np.int64), np.arange(len(faces))  # the faces that may be nearest to each cell
+    owner, face = np.zeros(len(faces), np.int64), np.arange(len(faces))  # faces that may be nearest to each cell
     levels: list[Level] = []
-    carried: Level | None = None  # cells that are inside as a whole: they stay as they are
+    carried: Level | None = None  # cells that are entirely inside, which are not split
     while len(center) and len(levels) <= depth:
         nearest, distance, apart = _nearest(center, corners, owner, face)
         inside = np.zeros(len(center), bool)
@@ -100,7 +100,7 @@ def sphere_tree(vertices: ArrayLike, faces: ArrayLike, depth: int = 5) -> Sphere
             whole = np.concatenate([whole, np.ones(len(carried.parent), bool)])
         levels.append(level)
         carried = _chosen(level, whole)._replace(parent=np.flatnonzero(whole))
-        # a child's center is half a reach from its parent's: farther faces than these cannot be nearest to it
+        # a child's center is half a reach from its parent's, so farther faces cannot be nearest to it
         near = split[owner] & (apart <= distance[owner] + reach)
         place = np.cumsum(split) - 1
         owner, face = (8 * place[owner[near]] + np.arange(8)[:, None]).ravel(), np.tile(face[near], 8)
@@ -122,9 +122,9 @@ def _joined(level: Level, other: Level) -> Level:
 
 
 def _nearest(points: Array, corners: Array, owner: Indices, face: Indices) -> tuple[Array, Array, Array]:
-    """The nearest points (n, 3) of triangles to points and how far they are (n,), and the distances of all pairs.
+    """Nearest points (n, 3) of triangles to points, their distances (n,), and the distances of all pairs (m,).
 
-    A pair is point owner (m,) and triangle face (m,), sorted by the point, which has at least one.
+    A pair is point owner (m,) and triangle face (m,), sorted by the point. Each point has at least one pair.
     """
     parts = [
         closest_point_on_triangle(points[owner[some]], *np.moveaxis(corners[face[some]], 1, 0))
@@ -138,7 +138,7 @@ def _nearest(points: Array, corners: Array, owner: Indices, face: Indices) -> tu
 
 
 def _sorted(levels: list[Level]) -> list[Level]:
-    """The levels with the spheres of one parent side by side."""
+    """Reorder the levels so that the spheres of one parent are contiguous."""
     place = np.zeros(1, np.int64)
     result = []
     for level in levels:
@@ -150,7 +150,7 @@ def _sorted(levels: list[Level]) -> list[Level]:
 
 
 def _with_best_balls(levels: list[Level]) -> SphereTree:
-    """Each sphere gets the largest ball among its own and those of its descendants."""
+    """Give each sphere the largest ball among its own and those of its descendants."""
     for upper, lower in zip(levels[-2::-1], levels[:0:-1], strict=True):
         order = np.lexsort((-lower.inner_radius, lower.parent))
         parents, first = np.unique(lower.parent[order], return_index=True)
@@ -162,11 +162,11 @@ def _with_best_balls(levels: list[Level]) -> SphereTree:
 
 
 def distance_intervals(a: SphereTree, pose_a: Pose, b: SphereTree, pose_b: Pose) -> Iterator[Interval]:
-    """What is known of the signed distance after each level, ever narrower: stop where it is narrow enough.
+    """Intervals of the signed distance after each level, ever narrower; stop when one is narrow enough.
 
-    Apart, the lower end is the least distance of two spheres; the upper end, that of two balls inside. Where the
-    spheres meet, the lower end is the gap along the best of a few directions, as in SAT, and the interval does not
-    close. Only pairs of spheres that could hold the nearest points are followed.
+    If the trees are apart, the lower end is the least distance of two spheres and the upper end that of two inner
+    balls. If the spheres overlap, the lower end is the gap along the best of a few directions, as in SAT, and the
+    interval does not converge. Only pairs of spheres that could contain the nearest points are followed.
     """
     p_AB = pose_b.position - pose_a.position
     i = j = np.zeros(1, np.int64)
@@ -191,7 +191,7 @@ def distance_intervals(a: SphereTree, pose_a: Pose, b: SphereTree, pose_b: Pose)
         yield Interval(lower, upper)
         near = outer <= upper + slack
         i, j = i[near], j[near]
-        # none: two balls overlap more deeply than any two finer spheres do
+        # no pair is left if two balls overlap more deeply than any two finer spheres
         if not len(i) or 64 * len(i) > MOST_PAIRS:
             return
 

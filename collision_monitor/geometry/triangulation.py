@@ -1,4 +1,4 @@
-"""Concave polygons into convex parts: triangles by ear clipping, then fewer parts by Hertel–Mehlhorn.
+"""Division of concave polygons into convex parts: ear clipping, then fewer parts by Hertel–Mehlhorn.
 
 (Slides "Polygon triangulation: split into a set of convex polygons", "SAT: Limitations")
 """
@@ -17,8 +17,8 @@ from collision_monitor.geometry.polygons import corners, crossing_edges, is_coun
 def triangulate(points: ArrayLike) -> Indices:
     """Triangles (n - 2, 3) of a simple polygon (n, 2), as counter-clockwise indices of its corners; none is flat.
 
-    Ear clipping: cut off a corner whose triangle holds no other corner, repeat (Meisters, 1975). O(n²) for n corners,
-    O(n³) at worst. A repeated corner is used once. Raises ShapeError where the polygon is not simple.
+    Ear clipping: cut off a corner if its triangle contains no other corner, and repeat (Meisters, 1975). O(n²) for n
+    corners, O(n³) at worst. A repeated corner is used once. Raises ShapeError if the polygon is not simple.
     """
     polygon = point_set(points, "polygon", 2, least=3)
     crossing = crossing_edges(polygon)
@@ -37,10 +37,10 @@ def triangulate(points: ArrayLike) -> Indices:
 
 
 def _ear(ring: Array) -> int:
-    """The first left turn of a counter-clockwise ring whose triangle, boundary included, holds no other corner."""
+    """First left turn of a counter-clockwise ring with no other corner in its triangle, boundary included."""
     before, after = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0)
     turn = np.asarray(orient2d(before, ring, after))
-    # only reflex and straight corners can be the nearest ones in a triangle
+    # the corner of the ring nearest to an ear inside its triangle is always reflex or straight
     inner = np.flatnonzero(turn <= 0.0)
     for k in np.flatnonzero(turn > 0.0):
         others = ring[inner[(inner != (k - 1) % len(ring)) & (inner != (k + 1) % len(ring))]]
@@ -55,8 +55,9 @@ def _ear(ring: Array) -> int:
 def convex_parts(points: ArrayLike) -> list[Indices]:
     """Convex parts of a simple polygon (n, 2), as counter-clockwise indices of its corners.
 
-    Triangulates, then drops each diagonal whose two parts are convex together: at most 4 times the fewest possible
-    (Hertel and Mehlhorn, 1983). Corners may be straight. Raises ShapeError where the polygon is not simple.
+    Triangulates, then drops each diagonal between two parts that are convex together: at most 4 times the minimum
+    number of parts (Hertel and Mehlhorn, 1983). Corners may be straight. Raises ShapeError if the polygon is not
+    simple.
     """
     polygon = point_set(points, "polygon", 2, least=3)
     parts = {number: [int(i) for i in triangle] for number, triangle in enumerate(triangulate(polygon))}
@@ -64,7 +65,7 @@ def convex_parts(points: ArrayLike) -> list[Indices]:
     for i, j in [edge for edge in owner if edge[0] < edge[1] and edge[::-1] in owner]:
         first, second = parts[owner[i, j]], parts[owner[j, i]]
         along = first[first.index(j) :] + first[: first.index(j)]  # j … i
-        along += second[second.index(i) + 1 :] + second[: second.index(i)]  # … and from i back to before j
+        along += second[second.index(i) + 1 :] + second[: second.index(i)]  # … and from i back to the corner before j
         along = along[: len(along) - 1] if along[-1] == j else along
         if _convex_at(polygon, along, i) and _convex_at(polygon, along, j):
             merged, dropped = owner[i, j], owner[j, i]

@@ -1,1 +1,1 @@
-"""What an object is, and what stands for it."""
+"""Descriptions of objects, and the models that represent them."""

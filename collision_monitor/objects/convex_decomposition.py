@@ -1,8 +1,8 @@
-"""A concave mesh as a few convex parts, which together contain it, with what they add stated.
+"""Convex decomposition of a concave mesh: a few convex parts that contain it, with bounds of the error.
 
-The parts are CoACD's (Wei et al., Approximate convex decomposition, 2022), which cuts along planes and takes the hull
-of each piece. What it promises is a measure of its own, so what a monitor needs is worked out here: the parts are grown
-until no point of the mesh is outside of them, and the largest distance of a point of them from the mesh is sought.
+CoACD (Wei et al., Approximate convex decomposition, 2022) cuts the mesh along planes and takes the hull of each piece.
+CoACD guarantees only its own measure of concavity. A monitor needs more, so this module enlarges the parts until they
+cover the mesh's surface, and computes the largest distance of a point of the parts from the mesh.
 """
 
 from __future__ import annotations
@@ -22,31 +22,31 @@ from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
 from collision_monitor.geometry.shapes import ConvexHull, Mesh
 
 CONCAVITY: Final = 0.05
-"""CoACD's threshold, from 0.01 (many parts) to 1: how concave a part may be, as part of the size of the mesh."""
+"""CoACD's threshold, from 0.01 (many parts) to 1: concavity allowed in a part, relative to the mesh's size."""
 
 SEED: Final = 0
-"""CoACD searches by chance; with one seed a mesh always has the same parts."""
+"""Seed of CoACD's random search, fixed so that a mesh always has the same parts."""
 
 COVERED: Final = 1e-6
-"""Part of the size that the parts are grown by, or four times as much until the surface is in them: CoACD rounds its
+"""Part of the size by which the parts are enlarged, times four until they cover the surface, because CoACD rounds its
 corners to some 1e-5. Smaller: more tries."""
 
 SETTLED: Final = 0.02
-"""The surface error is sought to this part of itself; smaller ones cost time."""
+"""Relative accuracy of the surface error; smaller values cost time."""
 
 COARSE: Final = 1e-3
-"""Or, where it is small, to this part of the size."""
+"""Accuracy of a small surface error, as part of the size."""
 
 NEAREST_CENTRES: Final = 16
-"""Faces, by their centres, that are asked for the nearest one. Fewer: the stated error is larger than it has to be."""
+"""Faces, by their centres, among which the nearest is sought. Fewer: the stated error is larger than necessary."""
 
 INSTALL: Final = 'pip install "collision_monitor[decomposition]"'
 
 
 class Decomposition(NamedTuple):
-    """parts: convex, together they contain the mesh. surface_error (m): no point of them is farther than this from it.
+    """parts: convex, together they contain the mesh. surface_error (m): bound on their points' distance from it.
 
-    volume_error: by which part of the mesh's volume the parts' volumes add up to more.
+    volume_error: excess of the sum of the parts' volumes, as a fraction of the mesh's volume.
     """
 
     parts: tuple[ConvexHull, ...]
@@ -56,9 +56,10 @@ class Decomposition(NamedTuple):
 
 @lru_cache(maxsize=64)
 def convex_decomposition(mesh: Mesh, concavity: float = CONCAVITY) -> Decomposition:
-    """Convex parts of a closed mesh; takes seconds, and is remembered for the mesh.
+    """Decompose a closed mesh into convex parts; takes seconds. The result is cached for the mesh.
 
-    Raises UnsupportedError where CoACD is not installed, ShapeError for a mesh that is not closed, InputError.
+    Raises UnsupportedError if CoACD is not installed or leaves a hollow, ShapeError for a mesh that is not closed,
+    InputError for a concavity out of range.
     """
     if not 0.01 <= concavity <= 1.0:
         raise InputError(f"concavity: expected a number from 0.01 to 1, got {concavity}")
@@ -71,7 +72,7 @@ def convex_decomposition(mesh: Mesh, concavity: float = CONCAVITY) -> Decomposit
             "convex decomposition: expected a closed mesh, got edges that belong to an odd number of faces"
         )
     coacd.set_log_level("error")
-    # about its centre and one in size, so that where it is and how large changes nothing
+    # centred and scaled to size 1, so that the result does not depend on position and size
     used = mesh.vertices[np.unique(mesh.faces)]
     center = 0.5 * used.min(axis=0) + 0.5 * used.max(axis=0)
     size = float(np.ptp(used, axis=0).max())
@@ -81,7 +82,7 @@ def convex_decomposition(mesh: Mesh, concavity: float = CONCAVITY) -> Decomposit
         try:
             hulls.append(convex_hull(points))
         except ShapeError:
-            continue  # a flat part holds nothing that its neighbours do not
+            continue  # a flat part contains nothing that its neighbours do not
     faces = list(vertices[mesh.faces])
     grown = COVERED
     while _uncovered(faces, hulls, grown):
@@ -114,14 +115,14 @@ def _planes(hull: Hull) -> tuple[Array, Array]:
 
 
 def _grown(hull: Hull, by: float) -> Hull:
-    """The hull with every face moved outward by at least `by` (m): enlarged about its middle."""
+    """The hull enlarged about its middle, so that every face moves outward by at least `by`."""
     middle = hull.vertices.mean(axis=0)
     normal, offset = _planes(hull)
     return Hull(middle + (1.0 + by / float((offset - normal @ middle).min())) * (hull.vertices - middle), hull.faces)
 
 
 def _uncovered(polygons: list[Array], hulls: list[Hull], slack: float) -> list[Array]:
-    """What of convex polygons (k, 3) is in none of the hulls, each with its planes moved outward by `slack` (m)."""
+    """Parts of convex polygons (k, 3) that are in none of the hulls after moving their planes outward by `slack`."""
     for hull in hulls:
         normal, offset = _planes(hull)
         low, high = hull.vertices.min(axis=0) - slack, hull.vertices.max(axis=0) + slack
@@ -136,7 +137,7 @@ def _uncovered(polygons: list[Array], hulls: list[Hull], slack: float) -> list[A
 
 
 def _without(polygon: Array, normal: Array, offset: Array) -> list[Array]:
-    """What of a convex polygon is outside of the planes normal . x <= offset, as convex polygons."""
+    """Parts of a convex polygon outside the planes normal . x <= offset, as convex polygons."""
     height = polygon @ normal.T - offset
     if (height.min(axis=0) >= 0.0).any():
         return [polygon]
@@ -152,7 +153,7 @@ def _without(polygon: Array, normal: Array, offset: Array) -> list[Array]:
 
 
 def _half(polygon: Array, height: Array) -> Array:
-    """The part of a convex polygon where the height of its corners is positive, and where it is zero."""
+    """Part of a convex polygon where the height, given at its corners, is positive or zero."""
     kept = []
     for k in range(len(polygon)):
         after = (k + 1) % len(polygon)
@@ -164,7 +165,7 @@ def _half(polygon: Array, height: Array) -> Array:
 
 
 def _to_surface(points: Array, corners: Array) -> tuple[Array, Indices]:
-    """Distances (n,) of points from the nearest of some triangles (m, 3, 3), or a little more, and which it is."""
+    """Upper bounds (n,) of the distances of points from triangles (m, 3, 3), and the index of the triangle of each."""
     from scipy.spatial import cKDTree
 
     _, near = cKDTree(corners.mean(axis=1)).query(points, min(NEAREST_CENTRES, len(corners)))
@@ -175,10 +176,10 @@ def _to_surface(points: Array, corners: Array) -> tuple[Array, Indices]:
 
 
 def _farthest(polygons: list[Array], corners: Array) -> float:
-    """The largest distance of a point of some polygons from triangles (m, 3, 3), rounded up. Branch and bound.
+    """Largest distance of a point of some polygons from triangles (m, 3, 3), rounded up. Branch and bound.
 
-    A distance changes by no more than one moves: from a triangle's middle, by no more than to its farthest corner. And
-    from one face, a triangle is farthest at a corner.
+    A distance changes by at most the displacement of its point, so within a triangle it exceeds that of the middle by
+    at most the distance to the farthest corner. The distance from one face is largest at a corner of the triangle.
     """
     triangles = np.array([[p[0], p[k], p[k + 1]] for p in polygons for k in range(1, len(p) - 1)])
     known, upper = 0.0, COARSE

@@ -1,4 +1,4 @@
-"""What an object is, as one checked record: the core adds it, the codec sends it, the scenes are made of it."""
+"""Description of an object as one checked record: input of the monitor, the codec and the scenes."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def _not_negative(value: Any, what: str, unit: str) -> float:
 class ObjectDescription:
     """One object, as in `ObjectDescription.msg`; lengths in m, accelerations in m/s^2 and rad/s^2.
 
-    `shapes` may be given as one shape and is kept as a tuple of (shape, pose in the object's frame). `pose` is where
-    a static object stands; None otherwise. What the message allows to be left out is filled in here: an empty name,
-    a group or mask of 0, an acceleration of NaN. Raises InputError, ShapeError for the shapes.
+    `shapes` may be given as one shape and is stored as a tuple of (shape, pose in the object's frame). `pose` is the
+    pose of a static object in the world frame, None otherwise. Values that the message may omit get their defaults
+    here: an empty name, a group or mask of 0, an acceleration of NaN. Raises InputError; ShapeError for the shapes.
     """
 
     object_id: int
@@ -56,7 +56,7 @@ class ObjectDescription:
     def __post_init__(self) -> None:
         object_id = _uint32(self.object_id, "object id")
         what = f"object {object_id}"
-        given: Any = self.model  # or its name, as everywhere else
+        given: Any = self.model  # a Model, its number or its name
         try:
             model = Model[given.upper()] if isinstance(given, str) else Model(given)
         except (ValueError, KeyError):

@@ -1,6 +1,6 @@
-"""Containing models: a coarser, cheaper shape around an object, and how far it lies outside of the true one at most.
+"""Containing models: a coarser, cheaper shape around an object, and a bound on how far it exceeds the object.
 
-(Slides "Bounding objects": test the bounding objects first. Here a coarse answer is an answer, with its error.)
+(Slides "Bounding objects": test the bounding objects first. Here the coarse result is also reported, with its error.)
 """
 
 from __future__ import annotations
@@ -43,30 +43,30 @@ Array = NDArray[np.float64]
 PosedShapes = list[tuple[Shape, Pose]]
 
 EXCESS_CELLS: Final = 24
-"""Cells along each axis in which the excess around a concave object is sought: it is known to their half diagonal.
-Larger: as the cube slower. Smaller: the stated excess is up to 2/EXCESS_CELLS of the size too large."""
+"""Cells along each axis for the search for the excess around a concave object; its accuracy is their half diagonal.
+Larger: the time grows as the cube. Smaller: the stated excess is up to 2/EXCESS_CELLS of the size too large."""
 
 KDOPS: Final = {Model.KDOP6: 6, Model.KDOP14: 14, Model.KDOP18: 18, Model.KDOP26: 26}
 
 MODEL_NAMES: Final = tuple(m.name.lower() for m in Model)
-"""The models that there are, by name."""
+"""Names of all models."""
 
 
 class Modelled(NamedTuple):
-    """What stands for an object: convex pieces with their poses in its frame, what they are, and their excess (m).
+    """Model of an object: convex pieces with their poses in its frame, the kind of model, and its excess (m).
 
-    No point of the model is farther than the excess from the object, and no point of the object is outside the model.
+    The model contains the object, and no point of the model is farther than the excess from the object.
     """
 
     pieces: PosedShapes
-    shapes: list[int]  # for each piece: index of the shape that it is part of
+    shapes: list[int]  # for each piece: index of the object's shape that it belongs to
     model: Model
     excess: float
-    convex: bool  # the object itself, not its model
+    convex: bool  # whether the object itself, not its model, is convex
 
 
 def parse_model(model: Model | str | int) -> Model:
-    """The model of a name such as "obb". Raises InputError for a name that there is not."""
+    """Return the model with a name such as "obb" or a number. Raises InputError for an unknown one."""
     if isinstance(model, str):
         chosen = Model.__members__.get(model.upper())
     else:
@@ -77,7 +77,7 @@ def parse_model(model: Model | str | int) -> Model:
 
 
 def shape_class(shapes: Sequence[tuple[Shape, Pose]]) -> str | None:
-    """primitive, hull, mesh or compound, for which a profile has a model each; None for what has no coarser one."""
+    """Class of an object: primitive, hull, mesh or compound, each with a setting; None if there is no coarser model."""
     if any(is_planar(shape) or isinstance(shape, HalfSpace) for shape, _ in shapes):
         return None
     if len(shapes) > 1:
@@ -89,14 +89,14 @@ def shape_class(shapes: Sequence[tuple[Shape, Pose]]) -> str | None:
 
 
 def containing_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | int) -> Modelled:
-    """The model of an object of these shapes. AUTO is EXACT.
+    """Compute the model of an object of these shapes. AUTO means EXACT.
 
-    Raises InputError for an unknown name, UnsupportedError where an object has no such model.
+    Raises InputError for an unknown name, UnsupportedError if the model does not exist for the object.
     """
     chosen = parse_model(model)
     pieces, index = [], []
     for k, (shape, pose) in enumerate(shapes):
-        # the pieces' poses remember their rotations: those of a mesh that is not placed are used again
+        # the poses of the pieces cache their rotations, so those of a mesh at the origin are used again
         placed = pose.position.any() or pose.quaternion[3] != 1.0
         for piece, offset in convex_pieces(shape):
             pieces.append((piece, pose @ offset if placed else offset))
@@ -116,9 +116,9 @@ def containing_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | 
 
 
 def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model) -> Modelled:
-    """The model that a monitor works with: AUTO is exact, but where a concave mesh has to be its convex hull.
+    """Compute the model that a monitor uses: AUTO means EXACT, but the convex hull for each concave mesh.
 
-    Raises UnsupportedError for a concave mesh that is to be EXACT.
+    Raises UnsupportedError for a concave mesh with the model EXACT.
     """
     concave = [isinstance(shape, Mesh) and len(convex_pieces(shape)) > 1 for shape, _ in shapes]
     if model is Model.EXACT and any(concave):
@@ -139,14 +139,14 @@ def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model) -> Model
 
 
 def _decomposed(shapes: Sequence[tuple[Shape, Pose]], convex: bool) -> Modelled:
-    """Convex parts in place of concave meshes; the other shapes as they are."""
+    """Replace concave meshes by convex parts; keep the other shapes."""
     pieces, index, excess = [], [], 0.0
     for k, (shape, pose) in enumerate(shapes):
         parts = convex_pieces(shape)
         if isinstance(shape, Mesh) and len(parts) > 1:
             found = convex_decomposition(shape)
             excess = max(excess, found.surface_error)
-            # about its own centre a part has a small bounding sphere and keeps its digits
+            # a part about its own centre has a small bounding sphere and loses no digits
             centres = [part.points.mean(axis=0) for part in found.parts]
             parts = tuple((ConvexHull(p.points - c), Pose(c)) for p, c in zip(found.parts, centres, strict=True))
         pieces += [(part, pose @ offset) for part, offset in parts]
@@ -155,7 +155,7 @@ def _decomposed(shapes: Sequence[tuple[Shape, Pose]], convex: bool) -> Modelled:
 
 
 def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
-    """The model around the pieces, with its pose in the object's frame."""
+    """Return the model around the pieces, with its pose in the object's frame."""
     shape, pose = pieces[0]
     single = len(pieces) == 1
     match model:
@@ -188,7 +188,7 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
 
 
 def _widest(shape: Sphere | Box | Capsule | Cylinder) -> Array:
-    """A direction in which a shape that is symmetric about its origin reaches farthest."""
+    """Direction in which a shape that is symmetric about its origin extends farthest."""
     match shape:
         case Box():
             d = np.array(shape.size)
@@ -200,12 +200,12 @@ def _widest(shape: Sphere | Box | Capsule | Cylinder) -> Array:
 
 
 def _box(size: Array) -> Box:
-    """The box of these extents, rounded up."""
+    """Box of these extents (m), rounded up."""
     return Box(size + ROUNDED_UP * float(size.max()))
 
 
 def _corners(pieces: PosedShapes) -> Array:
-    """Points whose hull contains the pieces: the vertices of polytopes, the corners of boxes about round ones."""
+    """Points with a hull that contains the pieces: vertices of polytopes, corners of boxes around round shapes."""
     corners = []
     for shape, pose in pieces:
         if isinstance(shape, ConvexHull | Triangle):
@@ -218,29 +218,29 @@ def _corners(pieces: PosedShapes) -> Array:
 
 
 def _kdop(pieces: PosedShapes, k: int) -> tuple[Shape, Pose]:
-    """The slabs around the pieces as the polytope that they cut out."""
+    """k-DOP around the pieces, as a polytope."""
     from scipy.spatial import HalfspaceIntersection
 
     normals = np.array(KDOP_DIRECTIONS[k], float)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.concatenate([normals, -normals])
     far = reach(pieces, normals)
-    centre = (far[:3] - far[k // 2 : k // 2 + 3]) / 2  # of the slabs along x, y and z
+    centre = (far[:3] - far[k // 2 : k // 2 + 3]) / 2  # middle of the slabs along x, y and z
     distance = far - normals @ centre
     size = float(distance.max())
-    # Qhull needs a little room about the centre, which a flat object does not leave; and the outcome is rounded
+    # Qhull needs some space around the centre, which a flat object does not leave, and its result is rounded
     distance = np.maximum(distance, 1e-9 * size) + 1e-9 * size
     points = HalfspaceIntersection(np.column_stack([normals, -distance / size]), np.zeros(3)).intersections * size
     return ConvexHull(points), Pose(centre)
 
 
 def _excess(shapes: Sequence[tuple[Shape, Pose]], pieces: PosedShapes, model: Shape, pose: Pose) -> float:
-    """Largest distance (m) of a point of the model from the object, rounded up."""
+    """Largest distance (m) by which the model exceeds the object, rounded up."""
     if len(pieces) == 1 and model is pieces[0][0]:
         return 0.0
     if len(pieces) > 1:
         return _excess_around_concave(shapes, pieces, model, pose)
-    # to a convex object, the distance is greatest at a corner of the model
+    # the distance to a convex object is greatest at a corner of the model
     if isinstance(model, Sphere):
         return max(float(_distances(pose.position[None], pieces)[0]) + model.radius, 0.0)
     return max(float(_distances(_corners([(model, pose)]), pieces).max()), 0.0)
@@ -249,7 +249,7 @@ def _excess(shapes: Sequence[tuple[Shape, Pose]], pieces: PosedShapes, model: Sh
 def _excess_around_concave(
     shapes: Sequence[tuple[Shape, Pose]], pieces: PosedShapes, model: Shape, pose: Pose
 ) -> float:
-    """Sampled in cells: a distance changes by no more than one moves, half a cell's diagonal at most."""
+    """Excess by sampling cells: the distance changes by at most half a cell's diagonal within a cell."""
     low, high = -reach([(model, pose)], -np.eye(3)), reach([(model, pose)], np.eye(3))
     cell = (high - low) / EXCESS_CELLS
     slack = float(np.linalg.norm(cell)) / 2
@@ -267,13 +267,13 @@ def _excess_around_concave(
     if all(isinstance(s, Triangle) for s, _ in pieces):
         from scipy.spatial import cKDTree
 
-        # no nearer than the nearest face is the nearest vertex, which is found at once
+        # the distance to the nearest vertex bounds that to the nearest face and is much faster to compute
         return float(cKDTree(_corners(pieces)).query(centres)[0].max()) + slack
     return float(_distances(centres, pieces).max()) + slack
 
 
 def _distances(points: Array, pieces: PosedShapes) -> Array:
-    """Signed distances (n,) (m) of points (n, 3) from the nearest piece, rounded up."""
+    """Signed distances (n,) in m of points (n, 3) from the nearest piece, rounded up."""
     builder = ShapeTableBuilder(slots=1 + len(pieces))
     size = float(max(np.abs(reach(pieces, np.concatenate([np.eye(3), -np.eye(3)])))))
     probe = Sphere(max(1e-9 * size, 1e-300))
@@ -285,7 +285,7 @@ def _distances(points: Array, pieces: PosedShapes) -> Array:
     pairs = np.stack([np.zeros(count), np.arange(1, count + 1)], axis=1).astype(np.int32)
     rotation = np.tile(np.eye(3), (1 + count, 1, 1))
     for k, (_, pose) in enumerate(pieces, start=1):
-        # the piece in slot 0, and the probe at each point about it
+        # the piece is in slot 0, and the probe at each point around it
         table = take(builder.table, np.r_[k, np.zeros(count, int)])
         rotation[0] = pose.rotation
         rows = contact_batch(table, np.concatenate([np.zeros((1, 3)), points - pose.position]), rotation, pairs)

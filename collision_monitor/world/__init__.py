@@ -1,4 +1,4 @@
-"""Simulated worlds for demos, tests and benchmarks: scenes, and what bodies do when they meet."""
+"""Simulated worlds for demos, tests and benchmarks: scenes, and the collision response of bodies."""
 
 from collision_monitor.world.scene import Scene
 from collision_monitor.world.scenes import describe, make_scene, scene_names

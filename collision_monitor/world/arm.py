@@ -1,6 +1,6 @@
-"""A robot arm that reaches about over a table with bottles on it: everything a mesh, and concave.
+"""A robot arm that moves over a table with bottles; every object is a mesh, and concave.
 
-Each link turns about the end of the one before; their meshes are surfaces of revolution, made here.
+Each link turns about the end of the link before. The meshes are surfaces of revolution, generated here.
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.world.scene import Array, Scene, States, positive_rate, state_array
 
 CIRCLE_SEGMENTS: Final = 32
-"""Of each circle: 700 triangles for a link."""
+"""Segments of each circle; a link then has 700 triangles."""
 
 LENGTHS: Final = (0.35, 0.55, 0.5, 0.25)
-"""m, of the links from the base to the hand."""
+"""Lengths (m) of the links from the base to the hand."""
 
 JOINT_AXES: Final = np.array([[0, 0, 1], [0, 1, 0], [0, 1, 0], [0, 1, 0]], float)
-"""About which each link turns, in the frame of the one before."""
+"""Axis of each joint, in the frame of the link before."""
 
 MIDDLE: Final = np.array([0.0, 0.85, 1.35, 0.6])
 SWING: Final = np.array([2.2, 0.25, 0.35, 0.5])
 FREQUENCY: Final = np.array([0.11, 0.17, 0.23, 0.31])
-"""rad and Hz: joint k is at MIDDLE + SWING sin(2 pi FREQUENCY t)."""
+"""Middles and swings in rad, frequencies in Hz: joint k is at MIDDLE + SWING sin(2 pi FREQUENCY t)."""
 
 BOTTLES: Final = 7
 ROUND_THE_BASE: Final = 0.85
-"""m from the base, where the bottles stand."""
+"""Distance of the bottles from the base (m)."""
 
 
 def lathe(profile: list[tuple[float, float]], segments: int = CIRCLE_SEGMENTS) -> Mesh:
-    """The closed surface that a line of (radius, z) from axis to axis makes when it turns about z."""
+    """Closed surface of revolution about z of a line of (radius, z) in m that begins and ends on the axis."""
     angle = 2 * np.pi * np.arange(segments) / segments
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(segments)], axis=1)
     rings = [radius * ring + (0.0, 0.0, z) for radius, z in profile[1:-1]]
@@ -54,7 +54,7 @@ def lathe(profile: list[tuple[float, float]], segments: int = CIRCLE_SEGMENTS) -
 
 
 def link(length: float, radius: float) -> Mesh:
-    """A link of the arm: two round joints and a waist between them, about its middle."""
+    """Mesh of a link about its middle: two round joints and a waist between them."""
     half, waist = length / 2, 0.85 * radius
     end = [(radius * np.cos(a), half + radius * np.sin(a)) for a in np.linspace(0.0, np.pi / 2, 6)[:-1]]
     outline = [(radius, half - 0.5 * radius), (waist, 0.5 * half), (waist, 0.0)]
@@ -68,7 +68,7 @@ def _bottle() -> Mesh:
 
 
 class Arm(Scene):
-    """Ids 1..4 are the links from the base on, then the table and the bottles, which stand."""
+    """Scene "arm": ids 1..4 are the links from the base on, followed by the static table and bottles."""
 
     def __init__(self, objects: int | None, rate: float | None) -> None:
         if objects is not None:
@@ -97,10 +97,10 @@ class Arm(Scene):
         )
 
     def _advance(self, dt: float) -> None:
-        """The joints are functions of the time."""
+        """Do nothing, because the joints are functions of the time."""
 
     def states(self) -> States:
-        """See Scene. Forward kinematics, joint by joint; the twist is the one of this moment."""
+        """Compute the states by forward kinematics, joint by joint, with the current twists. See Scene."""
         states = state_array(self._ids)
         phase = 2 * np.pi * FREQUENCY * self.time
         angles, rates = MIDDLE + SWING * np.sin(phase), 2 * np.pi * FREQUENCY * SWING * np.cos(phase)

@@ -1,4 +1,4 @@
-"""Boxes, spheres, capsules and cylinders of many sizes that drift and turn in a volume and pass through each other."""
+"""Boxes, spheres, capsules and cylinders of many sizes that drift, turn and pass through each other."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from collision_monitor.world.collision_response import bounce_between_walls
 from collision_monitor.world.scene import Array, Scene, States, object_count, positive_rate, state_array
 
 CUBE_PER_OBJECT = 1.0
-"""m: one object for each cube of this side, at any number of objects."""
+"""Side (m) of the cube of space per object, at any number of objects."""
 EXTENTS = (0.1, 0.5)
-"""m, extents and lengths; radii are half of that."""
+"""Range (m) of the extents and lengths; radii are half of that."""
 MAX_SPEED, MAX_TURN_RATE = 1.0, 1.0
-"""m/s and rad/s, the greatest along each axis."""
+"""Largest components of velocity (m/s) and angular velocity (rad/s)."""
 
 
 class Clutter(Scene):
-    """Ids 1..n in the order box, sphere, capsule, cylinder, box, ...; the volume has no walls of its own."""
+    """Scene "clutter": ids 1..n in the order box, sphere, capsule, cylinder, box, ...; the walls are not objects."""
 
     def __init__(self, objects: int | None, seed: int, rate: float | None) -> None:
         self.name = "clutter"
@@ -45,7 +45,7 @@ class Clutter(Scene):
         self._turned_for += dt
 
     def states(self) -> States:
-        """See Scene."""
+        """Return the current states. See Scene."""
         states = state_array(self._ids)
         states["position"] = self.position
         states["linear"] = self.velocity

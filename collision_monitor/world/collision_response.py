@@ -1,8 +1,8 @@
-"""What bodies do when they meet, for worlds that are simulated; what is monitored is never touched.
+"""Collision response of bodies in simulated worlds; the monitor itself never changes a motion.
 
 Vectors are (..., 3) or (..., 2), in m and m/s; normals need not be of unit length; everything broadcasts.
 Source of all but `bounce_between_walls`: the collision response part of the lecture "Collision handling: detection
-and response"; the slide's topic is named at each function.
+and response"; each function names its slide.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ Array = NDArray[np.float64]
 
 
 def _normal_part(vector: Array, normal: Array) -> Array:
-    """u = (v.n / n.n) n, the component of a vector along the normal."""
+    """Component of a vector along the normal: u = (v.n / n.n) n."""
     along = np.sum(vector * normal, axis=-1, keepdims=True) / np.sum(normal * normal, axis=-1, keepdims=True)
     part: Array = along * normal
     return part
 
 
 def reflect(velocity: ArrayLike, normal: ArrayLike, restitution: ArrayLike = 1.0) -> Array:
-    """The velocity after hitting a wall or plane that stands still, its normal towards the body.
+    """Velocity after hitting a stationary wall or plane with its normal towards the body.
 
     Slides "Elastic collision with stationary object: horizontal and vertical walls/planes" and ": angled
     walls/planes": v = u + w, and v' = w - u; "Collision response: damped": restitution times u. A body that already
@@ -41,11 +41,11 @@ def collide(
     mass_b: ArrayLike,
     restitution: ArrayLike = 1.0,
 ) -> tuple[Array, Array]:
-    """The velocities after two free bodies met; the normal runs from A to B (spheres: along the line of centres).
+    """Velocities after a collision of two free bodies; normal from A to B (spheres: along the line of centres).
 
     Slides "Elastic collision with movable object" (only the momentum along the normal changes) and "Inelastic
-    Collisions": the coefficient of restitution is the ratio of separating to approaching speed, 1 elastic, 0 staying
-    in contact. Bodies that already part keep their velocities. Masses in kg.
+    Collisions": the coefficient of restitution is the ratio of separating to approaching speed, 1 for elastic, 0 for
+    bodies that stay in contact. Bodies that already separate keep their velocities. Masses in kg.
     """
     va, vb = np.asarray(velocity_a, dtype=np.float64), np.asarray(velocity_b, dtype=np.float64)
     n = np.asarray(normal, dtype=np.float64)
@@ -54,12 +54,12 @@ def collide(
     closing = va - vb
     approaching = np.sum(closing * n, axis=-1, keepdims=True) > 0.0
     exchanged = (1.0 + np.asarray(restitution, dtype=np.float64)[..., None]) * _normal_part(closing, n) / (ma + mb)
-    exchanged = np.where(approaching, exchanged, 0.0)  # of the impulse, per product of the masses
+    exchanged = np.where(approaching, exchanged, 0.0)  # impulse divided by the product of the masses
     return va - mb * exchanged, vb + ma * exchanged
 
 
 def stick(velocity_a: ArrayLike, velocity_b: ArrayLike, mass_a: ArrayLike, mass_b: ArrayLike) -> Array:
-    """The common velocity of two bodies that stay together: slide "Inelastic Collisions", momentum is conserved."""
+    """Common velocity of two bodies that stay together: slide "Inelastic Collisions", momentum is conserved."""
     va, vb = np.asarray(velocity_a, dtype=np.float64), np.asarray(velocity_b, dtype=np.float64)
     ma = np.asarray(mass_a, dtype=np.float64)[..., None]
     mb = np.asarray(mass_b, dtype=np.float64)[..., None]
@@ -70,11 +70,11 @@ def stick(velocity_a: ArrayLike, velocity_b: ArrayLike, mass_a: ArrayLike, mass_
 def penalty_force(
     depth: ArrayLike, closing_speed: ArrayLike, normal: ArrayLike, stiffness: float, damping: float = 0.0
 ) -> Array:
-    """Force (N) of a spring (N/m) and damper (N s/m) that push a body out along the normal.
+    """Force (N) of a spring (N/m) and a damper (N s/m) that push a body out along the normal.
 
-    depth: m, positive where it penetrates; closing_speed: m/s, positive going deeper. Slides "Penalty method normal
-    spring force", "Collision response: penalty" and ": damped". It only ever pushes: a damper alone would glue the
-    body to the surface on its way out.
+    depth: m, positive for penetration; closing_speed: m/s, positive if the depth grows. Slides "Penalty method normal
+    spring force", "Collision response: penalty" and ": damped". The force never pulls, as a damper alone would hold the
+    body on the surface on its way out.
     """
     depth, n = np.asarray(depth, dtype=np.float64), np.asarray(normal, dtype=np.float64)
     push = np.maximum(stiffness * depth + damping * np.asarray(closing_speed, dtype=np.float64), 0.0)
@@ -86,18 +86,18 @@ def penalty_force(
 def bounce_between_walls(
     position: Array, velocity: Array, low: Array, high: Array, dt: float, restitution: float = 1.0
 ) -> tuple[Array, Array]:
-    """Position and velocity after `dt` seconds between axis-aligned walls, each bounce at its exact time.
+    """Position and velocity after `dt` seconds between axis-aligned walls, with each bounce at its exact time.
 
-    low, high: where the body's centre turns round. Until the wall the speed is v and after it restitution * v, so
-    the way past the wall is folded back and scaled. With restitution 1 many bounces in one step are one triangle
-    wave; below 1 one bounce per axis and step is done, and the centre is kept inside. Source: own derivation.
+    low, high: where the body's centre turns back. The speed is v before the wall and restitution * v after it, so
+    the path past the wall is reflected and scaled. With restitution 1, many bounces in one step are one triangle
+    wave; below 1, only one bounce per axis and step is computed, and the centre is kept inside. Source: own derivation.
     """
     moved = position + velocity * dt
     if restitution == 1.0:
         room = high - low
         phase = np.mod(moved - low, 2.0 * room)
         returning = phase > room
-        inside = (moved >= low) & (moved <= high)  # untouched, not even by round-off
+        inside = (moved >= low) & (moved <= high)  # kept without any round-off
         folded = np.where(returning, high - (phase - room), low + phase)
         return (
             np.where(inside, moved, np.clip(folded, low, high)),

@@ -1,7 +1,7 @@
-"""A small scene whose every contact is known beforehand in closed form: what a monitor must say, and when.
+"""A small scene with closed-form contact times, as a reference for what a monitor must report.
 
-Each encounter has a lane of its own. Everything keeps its twist and passes through what it meets, so that contacts
-begin and end; after `PERIOD` seconds all jump back (flagged as a discontinuity) and the scene repeats.
+Each encounter has its own lane. All objects keep their twists and pass through each other, so that contacts
+begin and end. After `PERIOD` seconds all objects jump back (flagged as a discontinuity) and the scene repeats.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from collision_monitor.records import StateFlag
 from collision_monitor.world.scene import Scene, States, positive_rate, state_array
 
 PERIOD = 8.0
-"""s"""
+"""Duration of one repetition (s)."""
 LANE_SPACING = 4.0
-"""m along y from one encounter to the next: further than any two of different lanes could meet."""
+"""Distance (m) along y between two lanes, so large that objects of different lanes never meet."""
 
 Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class ExpectedContact:
-    """What happens between two objects in each period; times in s from the period's start, None: they never touch."""
+    """Contact of two objects in each period; times in s from the period's start, None if they never touch."""
 
     id_a: int
     id_b: int
@@ -39,7 +39,7 @@ class ExpectedContact:
 
 @dataclass(frozen=True)
 class _LaneObject:
-    """One of the two in a lane: where it starts and how it moves, relative to the lane."""
+    """One of the two objects of a lane: its start and its motion, relative to the lane."""
 
     name: str
     shape: Shape
@@ -51,12 +51,15 @@ class _LaneObject:
 
 
 def _gap_over_speed(distance: float, reach: float, speed: float) -> tuple[float, float]:
-    """Begin and end of touching, of two that meet head-on: their centres are within `reach` along the way."""
+    """Begin and end (s) of a head-on contact: the centres are within `reach` along the path."""
     return (distance - reach) / speed, (distance + reach) / speed
 
 
 def _spheres(offset: Vector, velocity: Vector, reach: float) -> tuple[float, float] | tuple[None, None]:
-    """The roots of |offset + velocity t| = reach: when two spheres touch whose radii add up to `reach`."""
+    """Begin and end (s) of the contact of two spheres with radii adding up to `reach`; None if they never touch.
+
+    They are the roots of |offset + velocity t| = reach.
+    """
     a = sum(v * v for v in velocity)
     b = sum(o * v for o, v in zip(offset, velocity, strict=True))
     c = sum(o * o for o in offset) - reach * reach
@@ -67,7 +70,10 @@ def _spheres(offset: Vector, velocity: Vector, reach: float) -> tuple[float, flo
 
 
 def _rod_and_ball(reach: float, ball: float, angle: float, turn_rate: float) -> tuple[float, float]:
-    """When a rod that turns about its middle touches a ball `ball` m away: ball * sin(angle left) = reach."""
+    """Begin and end (s) of the contact of a rod turning about its middle with a ball `ball` m away.
+
+    They satisfy ball * sin(angle left) = reach.
+    """
     touching = asin(reach / ball)
     return (angle - touching) / turn_rate, (angle + touching) / turn_rate
 
@@ -136,7 +142,7 @@ def _lanes() -> list[tuple[_LaneObject, _LaneObject, tuple[float | None, float |
 
 
 class Crossing(Scene):
-    """`expected` says for each lane which two meet and when; no other two ever touch."""
+    """Scene "crossing": `expected` holds the contact times of the two objects of each lane; others never touch."""
 
     def __init__(self, objects: int | None, rate: float | None) -> None:
         if objects is not None:
@@ -172,7 +178,7 @@ class Crossing(Scene):
         self._restarted = (self.time + dt) // self.period > self.time // self.period
 
     def states(self) -> States:
-        """See Scene."""
+        """Return the current states. See Scene."""
         t = self.time % self.period
         states = state_array(self._ids)
         states["position"] = self._position + self._linear * t

@@ -1,8 +1,9 @@
 """Robots and people in a warehouse hall.
 
-The hall is a grid of crossing aisles with racks between them, and grows with the number of objects. A robot keeps to
-the right-hand lane of its aisle and takes each crossing straight, by a left or by a right quarter arc. A person walks
-straight from a point in one crossing to a point in the next. Nobody gives way, so that there is something to monitor.
+The hall is a grid of crossing aisles with racks between them; its size grows with the number of objects. A robot keeps
+to the right-hand lane of its aisle, and goes straight on at a crossing or takes a quarter arc to the left or right. A
+person walks straight from a point in one crossing to a point in the next. There are no right-of-way rules, so that
+collisions occur.
 """
 
 from __future__ import annotations
@@ -21,16 +22,16 @@ ROBOT, PERSON, BUILDING = 1, 2, 4
 """Collision groups."""
 
 PITCH = np.array([10.0, 6.0])
-"""m between crossings along x and along y."""
+"""Distance (m) between crossings along x and along y."""
 AISLE = 3.0
-"""m, width of an aisle: two lanes."""
+"""Width (m) of an aisle with two lanes."""
 LANE_OFFSET = AISLE / 4
-"""m, a lane's offset from the middle of the aisle."""
+"""Offset (m) of a lane from the middle of the aisle."""
 CORNER = AISLE / 2
-"""m: arcs are centred on a rack's corner, this far from both middles."""
+"""Distance (m) of a rack's corner, the centre of an arc, from the middles of both aisles."""
 CROSSINGS_PER_OBJECT = 0.8
 OPEN_BLOCKS = 0.15
-"""Part of the blocks that has pillars at its corners instead of a rack."""
+"""Fraction of the blocks with pillars at the corners instead of a rack."""
 WALL_THICKNESS, WALL_HEIGHT, RACK_HEIGHT, PILLAR = 0.2, 4.0, 2.4, 0.4
 
 HEADINGS = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
@@ -41,7 +42,7 @@ PERSON_RADIUS, PERSON_HEIGHT = 0.25, 1.75
 
 
 def _robot_shapes(kind: int) -> list[tuple[Box | Cylinder, Pose]]:
-    """The three kinds of robot, standing on z = 0 of their frame: cart, tug with a mast, round carrier with a load."""
+    """Shapes of the three kinds of robot, on z = 0 of their frame: cart, tug with a mast, round carrier with a load."""
     if kind == 0:
         return [(Box((1.0, 0.7, 0.4)), Pose((0.0, 0.0, 0.2)))]
     if kind == 1:
@@ -51,7 +52,7 @@ def _robot_shapes(kind: int) -> list[tuple[Box | Cylinder, Pose]]:
 
 
 class Fleet(Scene):
-    """Half robots, half people; ids 1..n of the moving ones, then the building."""
+    """Scene "fleet": half robots, half people; ids 1..n for the moving objects, followed by the building."""
 
     def __init__(self, objects: int | None, seed: int, rate: float | None) -> None:
         self.name = "fleet"
@@ -69,10 +70,10 @@ class Fleet(Scene):
         self._start_people(count - robots)
         self.descriptions = self._describe(robots, count)
 
-    # -- robots: a tile is a crossing with half of each aisle that leads to it
+    # -- robots: a tile is a crossing with half of each adjacent aisle
 
     def _start_robots(self, count: int) -> None:
-        """Each robot on a lane of its own, before the crossing of its tile."""
+        """Place each robot on its own lane, before the crossing of its tile."""
         node = np.stack(np.meshgrid(*map(np.arange, self._grid), indexing="ij"), axis=-1).reshape(-1, 2)
         node, heading = np.repeat(node, 4, axis=0), np.tile(np.arange(4), len(node))
         lanes = np.flatnonzero(self._inside(node - HEADINGS[heading]))
@@ -88,7 +89,7 @@ class Fleet(Scene):
         return inside
 
     def _choose_turn(self, node: Integers, heading: Integers) -> Integers:
-        """One of the turns that stay in the hall; there always is one, for the grid has two rows and two columns."""
+        """Choose a turn that stays in the hall; one always exists, as the grid has two rows and two columns or more."""
         turns = np.array([STRAIGHT, STRAIGHT, LEFT, RIGHT])  # straight on is twice as likely
         open_ = self._inside(node[:, None] + HEADINGS[(heading[:, None] + turns) % 4])
         score = np.where(open_, self._random.random(open_.shape), -1.0)
@@ -96,7 +97,7 @@ class Fleet(Scene):
         return chosen
 
     def _tile_path(self, which: NDArray[np.intp] | slice) -> tuple[Array, Array, Array]:
-        """Lengths (m) of the way through the tile: before the crossing, through it, and after it."""
+        """Lengths (m) of the path through the tile: before the crossing, through it, and after it."""
         heading, turn = self._heading[which], self._turn[which]
         lead_in = PITCH[heading % 2] / 2 - CORNER
         lead_out = PITCH[(heading + turn) % 2] / 2 - CORNER
@@ -118,7 +119,7 @@ class Fleet(Scene):
             self._turn[left] = self._choose_turn(self._node[left], self._heading[left])
 
     def _write_robots(self, states: States) -> None:
-        """Poses and twists: worked out along (u) and to the left (v) of the heading, then turned to the hall's axes."""
+        """Write poses and twists: computed along (u) and left (v) of the heading, then rotated to the hall's axes."""
         lead_in, through, _ = self._tile_path(slice(None))
         radius = CORNER + self._turn * LANE_OFFSET
         before = np.minimum(self._travelled - lead_in, 0.0)
@@ -141,7 +142,7 @@ class Fleet(Scene):
         in_arc = turning & (before == 0.0) & (after == 0.0)
         states["angular"][:, 2] = np.where(in_arc, self._turn * self._speed / radius, 0.0)
 
-    # -- people: straight from a point in one crossing to a point in the next, so that they stay in the aisle
+    # -- people: straight paths between points in neighbouring crossings, so that they stay in the aisle
 
     def _start_people(self, count: int) -> None:
         self._goal_node = self._random.integers(0, self._grid, (count, 2))
@@ -154,12 +155,12 @@ class Fleet(Scene):
         self._walked = self._length * self._random.random(count)
 
     def _point_in_crossing(self, node: Integers) -> Array:
-        room = CORNER - 0.9 * PERSON_RADIUS  # a little less than the whole: now and then someone brushes a rack
+        room = CORNER - 0.9 * PERSON_RADIUS  # slightly more than free of the racks, so that some people brush one
         point: Array = node * PITCH + self._random.uniform(-room, room, node.shape)
         return point
 
     def _walk_on(self, who: NDArray[np.intp]) -> None:
-        """Give these people, who stand at their goal, a new one in a neighbouring crossing."""
+        """Give people at their goal a new goal in a neighbouring crossing."""
         next_node = self._goal_node[who][:, None] + HEADINGS
         score = np.where(self._inside(next_node), self._random.random(next_node.shape[:2]), -1.0)
         self._goal_node[who] = next_node[np.arange(len(who)), score.argmax(axis=1)]
@@ -186,7 +187,7 @@ class Fleet(Scene):
         self._advance_people(dt)
 
     def states(self) -> States:
-        """See Scene."""
+        """Return the current states. See Scene."""
         states = state_array(self._ids)
         robots = len(self._node)
         self._write_robots(states[:robots])

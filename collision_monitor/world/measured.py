@@ -1,4 +1,4 @@
-"""A scene as a localiser reports it: every pose and twist a little off, and how much is declared."""
+"""A scene with measurement noise, as a localiser reports it, and with the noise declared in the states."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from collision_monitor.geometry.pose import from_rotation_vector, multiply
 from collision_monitor.world.scene import Scene, States
 
 LARGEST_NOISE = 1.0
-"""m, rad, m/s and rad/s."""
+"""Largest noise, in m, rad, m/s and rad/s."""
 
 
 class Measured(Scene):
-    """`scene`, seen with normally distributed noise of standard deviation `noise` along each axis of each quantity.
+    """`scene` with normally distributed noise of standard deviation `noise` along each axis of each quantity.
 
     In m, rad, m/s and rad/s; independent from state to state, and declared in the states. Raises InputError.
     """
@@ -32,7 +32,7 @@ class Measured(Scene):
         self._steps += 1
 
     def states(self) -> States:
-        """See Scene. The same noise whenever it is asked for."""
+        """Return the current states with noise; the noise of a step is always the same. See Scene."""
         states = self._scene.states()
         random = np.random.default_rng((self._seed, self._steps))
         off = random.normal(scale=self._noise, size=(4, len(states), 3))

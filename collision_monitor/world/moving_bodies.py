@@ -1,7 +1,7 @@
 """Bodies that move and turn at random at a fixed contact density: the scenes of the benchmark.
 
-However many bodies there are, each overlaps half a neighbour on average. The numbers, their order and the file format
-are those of the benchmark that measures other systems, so that all run the very same frames.
+Each body overlaps 0.5 others on average, at any number of bodies. The numbers, their order and the file format
+equal those of the benchmark of other systems, so that all run the same frames.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Cylinder
 Array = NDArray[np.float64]
 
 BENCHMARK_SCENES: Final = ("boxes", "spheres", "mixed", "hulls")
-"""Their order is part of the seed."""
+"""Names of the scenes; their order is part of the seed."""
 
 FRAMES: Final = 12
 TIME_STEP: Final = 0.05
-"""s, between frames."""
+"""Time between frames (s)."""
 HALF_EXTENTS: Final = (0.2, 0.6)
-"""m, least and greatest half extent, radius and half length."""
+"""Range (m) of half extents, radii and half lengths."""
 MAX_RATE: Final = 1.0
-"""m/s and rad/s, greatest of each component."""
+"""Largest component of velocity (m/s) and angular velocity (rad/s)."""
 MEAN_OVERLAPS: Final = 0.5
-"""Bodies that one overlaps on average."""
+"""Mean number of bodies that a body overlaps."""
 HULLS: Final = 64
 HULL_POINTS: Final = 32
 
@@ -53,10 +53,10 @@ class MovingBodies:
     quaternions: Array
     """(F, N, 4), x, y, z, w."""
     arrays: dict[str, Any]
-    """The content of its file."""
+    """The content of the scene's file."""
 
     def save(self, path: Path) -> None:
-        """Write the scene for `load_bodies` and for other programs."""
+        """Write the scene for `load_moving_bodies` and for other programs."""
         np.savez(path, **self.arrays)
 
 
@@ -74,10 +74,10 @@ def _hull_measures(points: Array) -> tuple[float, float, float]:
 
 
 def _density(kind: NDArray[np.uint8], size: Array, hull_id: NDArray[np.int32], hulls: Array) -> float:
-    """Bodies per m^3 at which one overlaps MEAN_OVERLAPS others.
+    """Number of bodies per m^3 at which one overlaps MEAN_OVERLAPS others.
 
-    The mean excluded volume of two convex bodies in random directions, from their volumes, surfaces and integrals of
-    mean curvature: V1 + V2 + (S1 M2 + S2 M1) / 4 pi. (Isihara, 1950)
+    It follows from the mean excluded volume of two convex bodies in random orientations with volumes V, surfaces S and
+    integrals of mean curvature M: V1 + V2 + (S1 M2 + S2 M1) / 4 pi. (Isihara, 1950)
     """
     a, b, c = size.T
     choices = (
@@ -96,7 +96,7 @@ def _density(kind: NDArray[np.uint8], size: Array, hull_id: NDArray[np.int32], h
 
 
 def make_moving_bodies(name: str, n: int, seed: int = 1, frames: int = FRAMES) -> MovingBodies:
-    """The scene `name` of BENCHMARK_SCENES with n bodies. Raises InputError."""
+    """Create the scene `name` of BENCHMARK_SCENES with n bodies. Raises InputError."""
     if name not in BENCHMARK_SCENES:
         raise InputError(f"scene: expected one of {', '.join(BENCHMARK_SCENES)}, got {name!r}")
     for what, value, least in (("n", n, 1), ("seed", seed, 0), ("frames", frames, 1)):
@@ -132,7 +132,7 @@ def make_moving_bodies(name: str, n: int, seed: int = 1, frames: int = FRAMES) -
 
 
 def load_moving_bodies(path: Path) -> MovingBodies:
-    """A scene that was saved. Raises InputError where the file is none."""
+    """Load a saved scene. Raises InputError if the file is not one."""
     try:
         with np.load(path) as file:
             arrays = {key: file[key] for key in file.files}

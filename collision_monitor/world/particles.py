@@ -15,15 +15,15 @@ from collision_monitor.world.scene import Array, Scene, States, object_count, po
 Integers = NDArray[np.int64]
 
 RADII = (0.10, 0.25)
-"""m, least and greatest."""
+"""Range of the radii (m)."""
 SPACING = 0.8
-"""m, between neighbours at the start: the box grows with the number of particles, its density stays."""
+"""Distance (m) between neighbours at the start; the box grows with the number of particles at constant density."""
 SPEEDS = (0.2, 1.5)
-"""m/s at the start, least and greatest."""
+"""Range of the speeds at the start (m/s)."""
 DENSITY = 1000.0
-"""kg/m^3."""
+"""Density of the particles (kg/m^3)."""
 WALL = 0.2
-"""m, thickness."""
+"""Thickness of the walls (m)."""
 
 
 @allocating_kernel
@@ -66,7 +66,7 @@ def _overlapping_pairs(position, radius, cell_size, cells):  # type: ignore[no-u
 
 
 class Particles(Scene):
-    """Ids 1..n are the particles, then the six walls. `restitution` is that of walls and particles alike."""
+    """Scene "particles": ids 1..n for the particles, followed by the six walls. `restitution` applies to both."""
 
     def __init__(self, objects: int | None, seed: int, rate: float | None, restitution: float = 1.0) -> None:
         self.name = "particles"
@@ -79,11 +79,11 @@ class Particles(Scene):
         self.radius = random.uniform(*RADII, count)
         self.mass = DENSITY * 4.0 / 3.0 * np.pi * self.radius**3
         side = int(np.ceil(round(count ** (1.0 / 3.0), 9)))
-        self.size = side * SPACING  # of the box, from 0 to size on each axis
+        self.size = side * SPACING  # of the box, from 0 to size on each axis (m)
         place = random.permutation(side**3)[:count]
         lattice = np.stack(np.unravel_index(place, (side, side, side)), axis=1)
         jitter = random.uniform(-1.0, 1.0, (count, 3)) * (SPACING / 2 - self.radius)[:, None]
-        self.position: Array = (lattice + 0.5) * SPACING + jitter  # each inside its own cell: nobody overlaps
+        self.position: Array = (lattice + 0.5) * SPACING + jitter  # each inside its own cell, without overlaps
         direction = random.normal(size=(count, 3))
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
         self.velocity: Array = direction * random.uniform(*SPEEDS, (count, 1))
@@ -105,7 +105,7 @@ class Particles(Scene):
         return walls
 
     def _advance(self, dt: float) -> None:
-        """In parts so short that nobody moves by more than half the least radius: no overlap is stepped over."""
+        """Advance in substeps of at most half the least radius, so that no overlap is skipped."""
         fastest = float(np.sqrt((self.velocity**2).sum(axis=1).max()))
         parts = max(1, int(np.ceil(dt * fastest / (RADII[0] / 2))))
         low, high = self.radius[:, None], self.size - self.radius[:, None]
@@ -116,14 +116,14 @@ class Particles(Scene):
             self._respond()
 
     def _respond(self) -> None:
-        """Let overlapping particles collide: each pair once, the pairs of one particle one after another."""
+        """Let overlapping particles collide: each pair once, and the pairs of one particle one after another."""
         cells = max(1, int(self.size / (2 * RADII[1])))
         pairs: Integers = _overlapping_pairs(  # type: ignore[no-untyped-call]
             self.position, self.radius, self.size / cells, cells
         )
         while len(pairs):
             a, b = pairs.T
-            turn = np.full(len(self.position), len(pairs))  # the first of the pairs left that each particle is in
+            turn = np.full(len(self.position), len(pairs))  # the first remaining pair of each particle
             order = np.arange(len(pairs))
             np.minimum.at(turn, a, order)
             np.minimum.at(turn, b, order)
@@ -137,11 +137,11 @@ class Particles(Scene):
 
     @property
     def energy(self) -> float:
-        """Kinetic energy of all particles, J."""
+        """Kinetic energy of all particles (J)."""
         return float(0.5 * (self.mass * (self.velocity**2).sum(axis=1)).sum())
 
     def states(self) -> States:
-        """See Scene."""
+        """Return the current states. See Scene."""
         states = state_array(self._ids)
         states["position"] = self.position
         states["linear"] = self.velocity

@@ -1,4 +1,4 @@
-"""What every scene is: descriptions of its objects, and the states of those that move, step by step."""
+"""Base class of the scenes: descriptions of the objects, and the states of the moving ones, step by step."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ States = NDArray[np.void]
 """An array of `records.STATE`."""
 
 MAX_STEP = 60.0
-"""s: a longer step is a mistake of the caller's clock, and would take scenes with bounces and turns very long."""
+"""Longest step (s). A longer one is an error of the caller's clock, and scenes with bounces and turns would be slow."""
 TIME_ROUND_OFF = 1e-6
-"""s: more than the sum of millions of steps loses; less than any step."""
+"""Tolerance of times (s): more than the round-off of millions of steps, and less than any step."""
 
 
 class Scene(ABC):
-    """A simulated world. The same name, objects, seed and steps give the same bits."""
+    """A simulated world. The same name, objects, seed and steps give results identical to the bit."""
 
     name: str
     rate: float
-    """Hz, the steps per second it is made for."""
+    """Steps per second that the scene is designed for (Hz)."""
     duration: float | None = None
-    """s, after which it has nothing more to show; None: endless."""
+    """Time of the scene's end (s); None: endless."""
     time: float = 0.0
-    """s since the start."""
+    """Time since the start (s)."""
     descriptions: list[ObjectDescription]
 
     @abstractmethod
     def states(self) -> States:
-        """The states at `time`, ascending ids: the moving objects only, and of those the ones that are seen."""
+        """Return the states at `time` of the moving objects that are currently tracked, by ascending id."""
 
     @abstractmethod
     def _advance(self, dt: float) -> None:
-        """Move everything on by `dt` seconds, from `time`."""
+        """Advance all objects by `dt` seconds from `time`."""
 
     def step(self, dt: float | None = None) -> States:
-        """Move on by `dt` seconds (default: 1 / rate) and return the states there. Raises InputError."""
+        """Advance by `dt` seconds (default: 1 / rate) and return the new states. Raises InputError."""
         dt = 1.0 / self.rate if dt is None else float(dt)
         if not 0.0 < dt <= MAX_STEP:
             raise InputError(f"step: expected more than 0 and at most {MAX_STEP:g} s, got {dt!r}")
@@ -58,7 +58,7 @@ class Scene(ABC):
 
 
 def state_array(ids: NDArray[np.uint32]) -> States:
-    """States of these objects with everything else at rest in the origin, exactly known."""
+    """Create states of these objects, at rest at the origin and without uncertainty."""
     states = np.zeros(len(ids), dtype=STATE)
     states["id"] = ids
     states["quaternion"][:, 3] = 1.0
@@ -66,7 +66,7 @@ def state_array(ids: NDArray[np.uint32]) -> States:
 
 
 def positive_rate(rate: float | None, default: float) -> float:
-    """`rate` in Hz, or the default where it is None. Raises InputError."""
+    """Return `rate` in Hz, or the default if it is None. Raises InputError."""
     if rate is None:
         return default
     if not (math.isfinite(rate) and 0.1 <= rate <= 10_000.0):
@@ -75,7 +75,7 @@ def positive_rate(rate: float | None, default: float) -> float:
 
 
 def object_count(objects: int | None, default: int, least: int, most: int, scene: str) -> int:
-    """How many moving objects, or the default where it is None. Raises InputError."""
+    """Return the number of moving objects, or the default if it is None. Raises InputError."""
     if objects is None:
         return default
     if isinstance(objects, bool) or not isinstance(objects, int) or not least <= objects <= most:

@@ -1,4 +1,4 @@
-"""The table of the scenes: each is made by its name."""
+"""Table of the scenes, and their construction by name."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class _RegisteredScene:
 
 
 def _particles(objects: int | None, seed: int, rate: float | None, _path: Path | None) -> Scene:
-    from collision_monitor.world.particles import Particles  # here, for it compiles: names and help need not wait
+    from collision_monitor.world.particles import Particles  # here, so that names and help do not wait for its kernel
 
     return Particles(objects, seed, rate)
 
@@ -62,7 +62,7 @@ _SCENES = {
 
 
 def scene_names() -> list[str]:
-    """The names that `make_scene` takes."""
+    """Names that `make_scene` accepts."""
     return list(_SCENES)
 
 
@@ -73,7 +73,7 @@ def _registered(name: str) -> _RegisteredScene:
 
 
 def describe(name: str) -> str:
-    """One line for people about a scene. Raises InputError with the list of names."""
+    """One-line description of a scene for users. Raises InputError with the list of names."""
     return _registered(name).description
 
 
@@ -86,11 +86,12 @@ def make_scene(
     path: str | Path | None = None,
     noise: float = 0.0,
 ) -> Scene:
-    """The scene of this name, at time 0.
+    """Create the scene of this name, at time 0.
 
-    objects: how many move (None: the scene's own number); rate: Hz (None: the scene's own); path: recorded tracks,
-    for the scene that plays them; noise: of the states, as a localiser reports them (`Measured`).
-    Raises InputError for an unknown name (it lists them) and for what a scene cannot be.
+    objects: number of moving objects (None: the scene's default); rate: Hz (None: the scene's default); path: recorded
+    tracks, for the scene "trajectory"; noise: standard deviation of the states, as a localiser reports them
+    (`Measured`). Raises InputError for an unknown name (with the list of names) and for values that the scene does not
+    accept.
     """
     registered = _registered(name)
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:

@@ -1,4 +1,4 @@
-"""Drones that circle through each other's space, each on a loop of its own: nobody ever keeps a constant twist."""
+"""Drones that circle through each other's space, each on its own loop, so that no twist is ever constant."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.world.scene import Array, Scene, States, object_count, positive_rate, state_array
 
 CUBE_PER_DRONE: Final = 3.0
-"""m: one drone for each cube of this side, at any number of drones."""
+"""Side (m) of the cube of space per drone, at any number of drones."""
 LOOP_RADII: Final = (1.0, 4.0)
-"""m, radii of the loops, least and greatest."""
+"""Range of the radii of the loops (m)."""
 LOOP_SPEEDS: Final = (1.0, 4.0)
-"""m/s along them."""
+"""Range of the speeds along the loops (m/s)."""
 RADIUS, HEIGHT = 0.3, 0.15
-"""m, of a drone with its rotors."""
+"""Size of a drone with its rotors (m)."""
 
 
 class Swarm(Scene):
-    """Ids 1..n. A loop is a circle, tilted, about a point of the volume; a drone stays level and looks ahead."""
+    """Scene "swarm": ids 1..n. Loops are tilted circles about points of the volume; drones stay level, facing ahead."""
 
     def __init__(self, objects: int | None, seed: int, rate: float | None) -> None:
         self.name = "swarm"
@@ -33,14 +33,14 @@ class Swarm(Scene):
         self._radius = random.uniform(*LOOP_RADII, count)
         self._rate = random.uniform(*LOOP_SPEEDS, count) / self._radius * random.choice((-1.0, 1.0), count)  # rad/s
         self._phase = random.uniform(0.0, 2.0 * np.pi, count)
-        self._tilt = random.uniform(-0.5, 0.5, count)  # of the height against the way along x
+        self._tilt = random.uniform(-0.5, 0.5, count)  # slope of the loop along x
         self.descriptions = [ObjectDescription(int(i), Cylinder(RADIUS, HEIGHT), f"drone_{i}") for i in self._ids]
 
     def _advance(self, dt: float) -> None:
-        """The places are functions of the time."""
+        """Do nothing, because the positions are functions of the time."""
 
     def states(self) -> States:
-        """See Scene."""
+        """Return the current states. See Scene."""
         angle = self._phase + self._rate * self.time
         cosine, sine = np.cos(angle), np.sin(angle)
         states = state_array(self._ids)

@@ -1,4 +1,4 @@
-"""Reads recorded tracks from CSV: one row for each object and frame. Whatever is wrong is said with file and line."""
+"""Reader of recorded tracks in CSV, one row for each object and frame. Its errors name the file and the line."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _LARGEST = 2**31 - 1
 
 @dataclass(frozen=True, eq=False)
 class TrackFile:
-    """The rows of one file in its order: ids and frames (n,), and the columns asked for (n, k).
+    """Rows of one file in their order: ids and frames (n,), and the values of the requested columns (n, k).
 
-    Frames rise within each id.
+    Frames increase within each id.
     """
 
     path: Path
@@ -30,7 +30,7 @@ class TrackFile:
 
 
 def read_track_file(path: Path, columns: tuple[str, ...]) -> TrackFile:
-    """The columns `id`, `frame` and these of a CSV file. Raises InputError for anything that is not such a file."""
+    """Read the columns `id`, `frame` and `columns` of a CSV file. Raises InputError if the file is not valid."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             return _parse(path, csv.reader(file), columns)

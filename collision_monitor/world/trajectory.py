@@ -1,11 +1,11 @@
-"""Plays recorded tracks of people and carts from CSV files, in the format of the CITR data set (arXiv 1902.00487).
+"""Playback of recorded tracks of people and carts from CSV files in the format of the CITR data set (arXiv 1902.00487).
 
 `<clip>_ped.csv`: id, frame, label, x_est, y_est, vx_est, vy_est; `<clip>_veh.csv`: id, frame, label, x_est, y_est,
-psi_est (heading, rad), vel_est (speed along it); metres, seconds, 29.97 frames/s. The files give no sizes: a person
+psi_est (heading, rad), vel_est (speed along it); metres, seconds, 29.97 frames/s. The files contain no sizes: a person
 is a cylinder of radius 0.25 m and height 1.75 m, a cart a box of 2.4 x 1.2 x 1.8 m, both standing on z = 0.
 
-Velocities are passed on as recorded. Those of carts are filtered and lag behind the positions where a cart brakes or
-speeds up, by up to 1 m/s: predictions inherit that, as they would from any live tracker.
+Velocities are used as recorded. Those of carts are filtered and lag behind the positions by up to 1 m/s when a cart
+brakes or accelerates. Predictions inherit this error, as they would from any live tracker.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from collision_monitor.world.scene import TIME_ROUND_OFF, Scene, States, positiv
 from collision_monitor.world.track_file import TrackFile, read_track_file
 
 FRAME_RATE = 29.97
-"""Hz, of the recordings."""
+"""Frame rate of the recordings (Hz)."""
 PAUSE = 30
-"""Frames between two clips that are played one after another."""
+"""Frames between two consecutive clips."""
 PERSON_HEIGHT, CART_HEIGHT = 1.75, 1.8
 PERSON = Cylinder(0.25, PERSON_HEIGHT)
 CART = Box((2.4, 1.2, CART_HEIGHT))
@@ -36,9 +36,10 @@ _CART_COLUMNS = ("x_est", "y_est", "psi_est", "vel_est")
 
 
 class Trajectory(Scene):
-    """Everybody is described from the start and has states only while tracked. Several clips follow each other.
+    """Scene "trajectory": all objects are described at the start and have states only while tracked.
 
-    Ids: the people keep theirs, the carts' are raised above them, and those of each further clip above all before.
+    Several clips are played one after another. Ids: people keep theirs, carts get ids above those of the people, and
+    each further clip gets ids above all before.
     """
 
     def __init__(self, objects: int | None, rate: float | None, path: Path | None) -> None:
@@ -63,7 +64,7 @@ class Trajectory(Scene):
         self.duration = float(self._frame[-1]) / FRAME_RATE
 
     def _add(self, tracks: TrackFile, prefix: str) -> States:
-        """Describe the objects of one file and return their states, one for each of its rows."""
+        """Describe the objects of one file and return their states, one for each row of the file."""
         offset = max((d.object_id for d in self.descriptions), default=0)
         people = _is_people(tracks.path)
         kind: str
@@ -84,10 +85,10 @@ class Trajectory(Scene):
         return states
 
     def _advance(self, dt: float) -> None:
-        """Nothing to move: `states` looks `time` up."""
+        """Do nothing, because `states` looks `time` up."""
 
     def states(self) -> States:
-        """The states of the last frame, moved on at their twist by the part of a frame that has passed since."""
+        """Return the states of the last frame, extrapolated at their twists by the time since that frame."""
         now = self.time * FRAME_RATE
         frame = int(now + TIME_ROUND_OFF * FRAME_RATE)
         first, last = np.searchsorted(self._frame, [frame, frame + 1])
@@ -97,22 +98,22 @@ class Trajectory(Scene):
             states["position"] += states["linear"] * since
             turned = from_rotation_vector(states["angular"] * since)
             states["quaternion"] = multiply(turned, states["quaternion"])
-            states["flags"] = 0  # a comeback is told once
+            states["flags"] = 0  # the discontinuity is reported only once, in the frame itself
         return states
 
 
 def clip_paths(path: Path) -> list[Path]:
-    """The clips there, each as a path of its own. Raises InputError as the scene does."""
+    """Paths of the clips at `path`, one for each clip. Raises InputError if there are none."""
     return [path] if path.is_file() else [_prefix(clip[0]) for clip in _find_clips(path)]
 
 
 def _prefix(file: Path) -> Path:
-    """Of the clip that the file is of."""
+    """Common path prefix of the clip that the file belongs to."""
     return file.with_name(file.name.removesuffix(_PEOPLE).removesuffix(_CARTS))
 
 
 def _write_carts(states: States, tracks: TrackFile) -> None:
-    """Heading from psi, velocity along it; the yaw rate is not recorded: central differences of psi over the frames."""
+    """Write heading, velocity along it, and the yaw rate, which is not recorded: central differences of psi."""
     psi, speed = tracks.values[:, 2], tracks.values[:, 3]
     states["position"][:, 2] = CART_HEIGHT / 2
     states["quaternion"] = from_rotation_vector(psi[:, None] * np.array([0.0, 0.0, 1.0]))
@@ -129,7 +130,7 @@ def _is_people(file: Path) -> bool:
 
 
 def _find_clips(path: Path | None) -> list[list[Path]]:
-    """The files of each clip, people first. Raises InputError that says what to give."""
+    """Files of each clip, people first. Raises InputError with the accepted kinds of paths."""
     give = f"a clip's prefix (clip for clip{_PEOPLE} and clip{_CARTS}), one of these files, or a folder of them"
     if path is None:
         raise InputError(f"path: the scene 'trajectory' plays recorded tracks; give {give}")

@@ -1,8 +1,8 @@
-"""Set up everything that `make demo` and `make test` need. A second run only checks; what is broken is repaired.
+"""Set up everything that `make demo` and `make test` need. A second run only checks, and repairs what is broken.
 
-Standard library only, for this runs before anything is installed. Each finished stage leaves a stamp in the
-environment with the digest of what it was made from; it runs again when that digest changed or when what it
-installed can no longer be imported. Where the environment itself is in doubt, everything starts anew.
+It uses the standard library only, because it runs before anything is installed. Each finished stage writes a stamp with
+the digest of its inputs into the environment. A stage runs again if that digest changed or if the modules it
+installed can no longer be imported. If the environment itself may be damaged, all stages run again.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def _stamp(stage: stages.Stage) -> Path:
 
 
 def stages_to_run(ros: machine.RosInstall | None) -> tuple[list[stages.Stage], str]:
-    """Return the stages to run, in order (none: all is well), and the reason for the first of them."""
+    """Return the stages to run, in order (none if all are valid), and the reason for the first of them."""
     everything = list(stages.STAGES)
     stale: list[stages.Stage] = []
     reason = ""
@@ -44,7 +44,7 @@ def stages_to_run(ros: machine.RosInstall | None) -> tuple[list[stages.Stage], s
             stamp = _stamp(stage).read_text()
         except OSError:
             if stage.name in ("environment", "packages"):
-                # Nobody knows how far an unfinished installation got: from the start.
+                # The state of an unfinished installation is unknown, so start from the beginning.
                 return everything, f"{stage.name}: not finished yet"
             stamp = ""
         if stamp != stage.inputs(ros):
@@ -61,7 +61,7 @@ def stages_to_run(ros: machine.RosInstall | None) -> tuple[list[stages.Stage], s
 
 
 def _require(pending: list[stages.Stage], ros: machine.RosInstall | None) -> None:
-    """Find out what this machine lacks before minutes are spent, not after."""
+    """Check for missing tools before the stages spend minutes. Raises SetupError."""
     names = [stage.name for stage in pending]
     if ros:
         machine.require_ros_packages(ros)
@@ -88,7 +88,7 @@ def _run(pending: list[stages.Stage], reason: str, ros: machine.RosInstall | Non
         log.write(f"{reason}\n")
         for stage in pending:
             _stamp(stage).unlink(missing_ok=True)
-        with ThreadPoolExecutor(max_workers=2) as pool:  # compilers, all of them: more than two wait for memory
+        with ThreadPoolExecutor(max_workers=2) as pool:  # all are compilers, and more than two wait for memory
             running: list[tuple[stages.Stage, Future[None]]] = []
             for stage in pending:
                 print(f"  {stage.name:<12} {stage.text:<34}", end="", flush=True)
@@ -127,7 +127,7 @@ def main() -> int:
             fcntl.flock(lock, fcntl.LOCK_EX)
         try:
             ros = machine.ros_install(os.environ, stages.VENV)
-            for _ in range(2):  # the second time for what turned out to be broken only when all stamps were right
+            for _ in range(2):  # the second pass is for stages found broken only when all stamps were right
                 pending, reason = stages_to_run(ros)
                 if not pending:
                     return 0

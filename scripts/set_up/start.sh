@@ -1,5 +1,5 @@
 #!/bin/sh
-# Start the set-up with any Python that can run it; which one the environment gets is decided there (machine.py).
+# Start the set-up with any Python that can run it. machine.py chooses the Python of the environment.
 here=$(dirname "$0")
 for python in python3 python3.13 python3.12 python3.11 /usr/bin/python3; do
     if "$python" -I -S -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then

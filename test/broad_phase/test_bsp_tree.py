@@ -1,4 +1,4 @@
-"""The BSP tree against the exact ray parity and the exact edge–face test."""
+"""Tests of the BSP tree against the exact ray parity and the exact edge–face test."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ def test_points_and_segments(name, skew):
     p, q = rng.uniform(low, high, (2, 300, 3))
     expected = locate_in_polyhedron(p, vertices, faces)
     np.testing.assert_array_equal(locate_in_bsp_tree(p, tree), expected)
-    # on faces, edges and corners: the boundary, on either side of which the tree has a leaf
+    # faces, edges and corners are on the boundary, with leaves of the tree on both sides
     corners = vertices[faces]
     for points in (corners.mean(axis=1), corners[:, :2].mean(axis=1), vertices[np.unique(faces)]):
         assert (locate_in_bsp_tree(points, tree) == Location.BOUNDARY).all()
-    # a segment that starts inside hits at once, another where it first crosses a face
+    # a segment that starts inside hits at t = 0, any other at its first crossing of a face
     crossing = edge_face(p[:, None], q[:, None], *np.moveaxis(corners, 1, 0))
     first = np.where(crossing.meets, crossing.t, np.inf).min(axis=1)
     first = np.where(expected == Location.INSIDE, 0.0, first)

@@ -1,4 +1,4 @@
-"""The dense grid finds what brute force finds, also in scenes that break naive grids, and ignores resting pairs."""
+"""Tests of the dense grid against brute force, also in scenes that break naive grids and with resting pairs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 def brute_force(centre: Array, half: Array, starts: NDArray[np.bool_]) -> NDArray[np.int64]:
-    # centres and half extents, as box_pairs compares them: lower and upper bounds would round differently
+    # compare centres and half extents as box_pairs does, because lower and upper bounds would round differently
     with np.errstate(invalid="ignore"):
         meet = np.all(np.abs(centre[:, None] - centre[None]) <= half[:, None] + half[None], axis=-1)
     there = ~np.isnan(centre).any(axis=1) & (half >= 0).all(axis=1)
@@ -62,7 +62,7 @@ def sparse(rng, n):
 
 
 def fast(rng, n):
-    """Swept volumes of bodies that cross many cells."""
+    """Bounds of swept bodies that cross many cells."""
     return rng.uniform(0, 300, (n, 3)), rng.uniform(0.2, 0.6, (n, 3)) + (rng.random((n, 3)) < 0.05) * 100
 
 
@@ -117,7 +117,7 @@ def test_any_boxes(boxes: list[tuple[float, ...]]) -> None:
 
 
 def test_resting_pairs_are_never_visited() -> None:
-    """100,000 resting boxes in one place have 5e9 pairs; the moving one meets them all."""
+    """100,000 resting boxes in one place have 5e9 pairs; the moving box overlaps all of them."""
     n = 100_000
     pairs = box_pairs(np.zeros((n, 3)), np.ones((n, 3)), np.arange(n) == 5)
     assert np.array_equal(pairs, [sorted((5, j)) for j in range(n) if j != 5])

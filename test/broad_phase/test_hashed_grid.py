@@ -1,4 +1,4 @@
-"""The hashed grid finds what brute force finds, however the boxes are placed, moved and removed."""
+"""Tests of the hashed grid against brute force after insertions, moves and removals."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def found_pairs(grid: HashedGrid, which: NDArray[np.int32]) -> NDArray[np.int64]
 
 
 def check(grid: HashedGrid, centre: NDArray[np.float64], half: NDArray[np.float64], inside: NDArray[np.int32]) -> None:
-    # the oracle compares centres and half extents too: lower and upper bounds would round differently
+    # compare centres and half extents as the grid does, because lower and upper bounds would round differently
     apart = np.abs(centre[inside, None] - centre[None, inside])
     meet = np.all(apart <= half[inside, None] + half[None, inside], axis=-1)
     expected = inside[np.argwhere(np.triu(meet, k=1))]
@@ -66,7 +66,7 @@ def test_pairs_are_those_of_brute_force_also_after_moves(scene: str) -> None:
     check(grid, centre, half, everyone)
     gone = rng.choice(everyone, n // 4, replace=False).astype(np.int32)
     remove_boxes(grid, gone)
-    remove_boxes(grid, gone)  # a second time changes nothing
+    remove_boxes(grid, gone)  # a second removal changes nothing
     check(grid, centre, half, np.setdiff1d(everyone, gone).astype(np.int32))
 
 

@@ -1,4 +1,4 @@
-"""Every space partition finds what brute force finds, in space and in the plane."""
+"""Tests of every space partition against brute force, in space and in the plane."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Full detection finds what a look at every pair finds, with the same numbers, with one thread and with two."""
+"""Tests of full detection against the contact test of every pair, with one thread and with two."""
 
 from __future__ import annotations
 
@@ -78,10 +78,10 @@ def check(
 ) -> None:
     pairs, contacts = every_pair(shapes, positions, quaternions, margin)
     assert np.array_equal(found.pairs, pairs)
-    sized = 1e-9  # of the size, which is about 1 m; curved shapes answer within their own stated bound
+    sized = 1e-9  # of the size, which is about 1 m; curved shapes are accurate to their own stated bound
     bound = sized + found.error_bound + contacts[:, 10]
     assert (np.abs(found.signed_distance - contacts[:, 0]) <= bound).all()
-    # elsewhere two directions can be equally near, and round-off chooses
+    # for other shapes, two directions can be equally near, and round-off chooses between them
     simple = np.array([isinstance(shape, Sphere | Box) for shape in shapes])
     exact = simple[pairs].all(axis=1)
     assert np.allclose(found.normal[exact], contacts[exact, 1:4], atol=1e-9)

@@ -1,4 +1,4 @@
-"""Bounding spheres hold their points, exactly; the minimal one is the smallest that any four points define."""
+"""Tests that bounding spheres contain their points exactly, and that the minimal one is the smallest possible."""
 
 from fractions import Fraction
 from itertools import combinations
@@ -27,7 +27,7 @@ def through(points):
 
 
 def smallest_radius(points):
-    """The smallest sphere is defined by 2, 3 or 4 of the points: try them all."""
+    """Smallest radius over all spheres defined by 2, 3 or 4 of the points."""
     best = np.inf
     for k in range(2, points.shape[1] + 2):
         for chosen in combinations(range(len(points)), k):
@@ -103,7 +103,7 @@ def test_many_points():
     reach = np.linalg.norm(points - sphere.center, axis=1)
     on_it = points[reach > sphere.radius * (1 - 1e-9)]
     assert 2 <= len(on_it) <= 4
-    # the smallest one has its centre in the hull of the points on it
+    # the smallest sphere has its centre in the hull of the points on it
     weights = np.linalg.lstsq(np.vstack([on_it.T, np.ones(len(on_it))]), [*sphere.center, 1], rcond=None)[0]
     assert (weights > 0).all()
 

@@ -1,4 +1,4 @@
-"""Tests between bounding volumes against rational numbers, sampling and clipping."""
+"""Tests between bounding volumes, against rational numbers, sampling and clipping."""
 
 from fractions import Fraction
 
@@ -113,7 +113,7 @@ def test_arrays_of_volumes():
 
 
 def box_meets_triangle(half, triangle):
-    """A point of the triangle within the box: linear programming over its barycentric coordinates."""
+    """Whether a point of the triangle is in the box, by linear programming over its barycentric coordinates."""
     inside = np.vstack([triangle.T, -triangle.T])
     answer = linprog(np.zeros(3), inside, np.concatenate([half, half]), np.ones((1, 3)), [1], bounds=(0, None))
     return answer.status == 0
@@ -127,13 +127,13 @@ def test_obb_against_triangles(points, half, seed):
         return
     turn, shift = rotation(seed), np.random.default_rng(seed).normal(size=3)
     moved = triangle @ turn.T + shift
-    # 1e-6 to each side, as linear programming is no more exact
+    # a tolerance of 1e-6 to each side, the accuracy of linear programming
     assert obb_polygon(Obb(shift, turn, half + 1e-6), moved) >= box_meets_triangle(half, triangle)
     assert obb_polygon(Obb(shift, turn, half - 1e-6), moved) <= box_meets_triangle(half, triangle)
 
 
 def boxes_meet(a, b):
-    """A point in both boxes, by linear programming over its place in each."""
+    """Whether a point is in both boxes, by linear programming over its coordinates in each."""
     equal = np.hstack([a.rotation, -b.rotation])
     limits = [(-h, h) for h in (*a.half_extents, *b.half_extents)]
     return linprog(np.zeros(6), A_eq=equal, b_eq=b.center - a.center, bounds=limits).status == 0
@@ -143,7 +143,7 @@ def boxes_meet(a, b):
 @given(st.integers(0, 2**32 - 1))
 def test_obbs(seed):
     rng = np.random.default_rng(seed)
-    turns = rotation(seed), rotation(seed) if seed % 4 == 0 else rotation(seed + 1)  # one in four with the same axes
+    turns = rotation(seed), rotation(seed) if seed % 4 == 0 else rotation(seed + 1)  # in one of four, equal axes
     a, b = (Obb(rng.normal(size=3), turn, 10.0 ** rng.uniform(-1, 0.3, 3)) for turn in turns)
     larger, smaller = (a._replace(half_extents=a.half_extents + s) for s in (1e-6, -1e-6))
     assert obb_obb(larger, b) == obb_obb(b, larger)
@@ -152,7 +152,7 @@ def test_obbs(seed):
 
 
 def test_crossed_bars_are_parted_by_their_edges_alone():
-    """Two thin bars, turned about different axes, of which no face normal is a separating axis."""
+    """Two thin bars, turned about different axes, so that no face normal is a separating axis."""
     up, across = np.sqrt(0.5) * np.array([[1, -1], [1, 1]]), np.eye(3)
     about_x, about_y = across.copy(), across.copy()
     about_x[1:, 1:], about_y[::2, ::2] = up, up

@@ -1,4 +1,4 @@
-"""Axis-aligned boxes, slabs and hulls hold their points, exactly, and are tight."""
+"""Tests that axis-aligned boxes, k-DOPs and hulls contain their points exactly and are tight."""
 
 from fractions import Fraction
 
@@ -77,7 +77,7 @@ def test_convex_hull_is_closed_convex_and_holds_its_points(name):
     n = np.cross(b - a, c - a)
     length = np.linalg.norm(n, axis=1)
     big = length > 1e-9 * length.max()
-    heights = orient3d(a, b, c, points[:, None])[:, big] / length[big]  # exact: slivers have noisy normals
+    heights = orient3d(a, b, c, points[:, None])[:, big] / length[big]  # exact, because slivers have noisy normals
     assert heights.max() <= 1e-12 * size
     assert {tuple(v) for v in hull.vertices} <= {tuple(p) for p in points}
 

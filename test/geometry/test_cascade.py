@@ -1,4 +1,4 @@
-"""The cascade for two polyhedra: each stage, and against rational numbers and FCL."""
+"""Tests of the cascade for two polyhedra: each stage alone, and results against rational numbers and FCL."""
 
 import fcl
 import numpy as np
@@ -21,7 +21,7 @@ def moved(solid, shift, turn=None):
 
 
 def meet(a, b):
-    """In rational numbers, without an order."""
+    """Whether two solids meet, in rational numbers and without a cascade."""
     for (points, faces), other in ((a, b), (b, a)):
         if any(in_polyhedron(p, *other) >= 0 for p in points):
             return True
@@ -47,7 +47,7 @@ def test_each_stage():
     assert crossed.collides and crossed.stage is CascadeStage.EDGES_AND_FACES
     assert len(crossed.edges_a) and len(crossed.edges_b)
     beside = polyhedra_intersect(*u_shape(), *moved(cube(), [1.25, 0, 1.25], np.eye(3) / 2))
-    assert not beside.collides and beside.stage is CascadeStage.EDGES_AND_FACES  # between the arms
+    assert not beside.collides and beside.stage is CascadeStage.EDGES_AND_FACES  # the cube is between the arms
 
 
 def test_one_within_the_other_and_within_its_cavity():
@@ -56,7 +56,7 @@ def test_one_within_the_other_and_within_its_cavity():
     cavity = polyhedra_intersect(*moved(cube(), [1.25, 1.25, 1.25], np.eye(3) / 2), *hollow())
     assert not cavity.collides
     through = polyhedra_intersect(*moved(bar(1, 1, 5), [1.25, 1.25, -2], np.diag([0.5, 0.5, 1])), *ring())
-    assert not through.collides  # through the hole
+    assert not through.collides  # the bar passes through the hole
 
 
 @settings(max_examples=12)
@@ -88,7 +88,7 @@ def test_random_solids_against_fcl():
         if surfaces_cross:
             assert found.collides
         if not found.collides or found.stage is CascadeStage.EDGES_AND_FACES:
-            assert found.collides == surfaces_cross  # FCL's meshes have no inside
+            assert found.collides == surfaces_cross  # FCL's meshes are surfaces without an inside
         seen.add((found.collides, found.stage))
     assert len(seen) >= 3
 

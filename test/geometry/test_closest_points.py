@@ -1,4 +1,4 @@
-"""Closest points against the slide's least squares, against sampling and against scipy's bounded minimiser."""
+"""Tests of closest points against the slide's least squares, sampling and scipy's bounded minimiser."""
 
 import numpy as np
 import pytest
@@ -64,11 +64,11 @@ def test_a_common_rigid_motion_moves_the_points(seed):
 @pytest.mark.parametrize(
     ("q", "v", "alpha", "beta"),
     [
-        ((0.5, 1, 0), (1, 0, 0), 0.75, 0.25),  # beside each other from 0.5 to 1
-        ((0.75, 1, 0), (-0.5, 0, 0), 0.5, 0.5),  # antiparallel, within
+        ((0.5, 1, 0), (1, 0, 0), 0.75, 0.25),  # side by side from 0.5 to 1
+        ((0.75, 1, 0), (-0.5, 0, 0), 0.5, 0.5),  # antiparallel, B alongside A
         ((3, 4, 0), (1, 0, 0), 1, 0),  # past the end
         ((1, 0, 0), (1, 0, 0), 1, 0),  # touching in line
-        ((0.25, 0, 0), (0.5, 0, 0), 0.5, 0.5),  # one in the other
+        ((0.25, 0, 0), (0.5, 0, 0), 0.5, 0.5),  # B inside A
     ],
 )
 def test_parallel_segments_answer_with_the_middle(q, v, alpha, beta):

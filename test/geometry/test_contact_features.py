@@ -1,4 +1,4 @@
-"""Each of the six feature pairs, named."""
+"""Tests of the classification of the six feature pairs."""
 
 import numpy as np
 import pytest
@@ -10,19 +10,19 @@ from collision_monitor.geometry.contact_features import FeaturePair, FeatureType
 
 UP = [0, 0, 1]
 R2 = 2**-0.5
-ON_EDGE = np.array([[1, 0, 0], [0, R2, -R2], [0, R2, R2]])  # 45 degrees about x: a cube then stands on an edge along x
+ON_EDGE = np.array([[1, 0, 0], [0, R2, -R2], [0, R2, R2]])  # 45 degrees about x, so that a cube stands on an edge
 ON_CORNER = np.linalg.qr(np.array([[1, 1, 1], [1, 0, 0], [0, 1, 0.0]]).T)[0].T[[1, 2, 0]]
 
 
 def lowest(turn):
-    """A cube turned, its lowest point(s) at height 0 and over the origin."""
+    """A turned cube with the mean of its lowest points at the origin."""
     vertices, faces = cube()
     vertices = (vertices - 0.5) @ turn.T
     return vertices - [*vertices[np.abs(vertices[:, 2] - vertices[:, 2].min()) < 1e-9].mean(axis=0)], faces
 
 
 def below(solid, shift=(0, 0, 0)):
-    """The same, mirrored to end at height 0 from below."""
+    """The solid mirrored at height 0, so that it touches from below."""
     vertices, faces = solid
     return vertices * [1, 1, -1] + shift, faces[:, ::-1]
 
@@ -51,7 +51,7 @@ def test_the_six_pairs(name, scale, seed):
     assert letters == name
     swapped = classify_contact(shift, b, faces_b, shift, a, faces_a, -turn @ UP / scale)
     assert swapped.pair is FeaturePair[name] and (swapped.a, swapped.b) == (found.b, found.a)
-    # what is named is there
+    # the named feature contains the contact point
     for feature, points in ((found.a, a), (found.b, b)):
         assert np.abs((points[list(feature.vertices)] - shift) @ turn / scale**2)[:, 2].max() < 1e-6
         assert len(feature.vertices) == feature.type

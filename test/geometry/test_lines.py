@@ -1,4 +1,4 @@
-"""Lines, rays and segments in the plane against rational numbers."""
+"""Tests of lines, rays and segments in the plane against rational numbers."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_the_slides_forms_of_a_line():
     assert (slope, intercept) == (2, 5)  # y = 2 x + 5
     a, b, c = implicit_line([0, 5], [1, 7])
     assert a * 3 + b * 11 + c == 0
-    assert a * 0 + b * 9 + c > 0  # left of it
+    assert a * 0 + b * 9 + c > 0  # left of the line
     assert side([[3, 1], [3, 0], [3, -1]], [0, 0], [5, 0]).tolist() == [1, 0, -1]
 
 
@@ -85,7 +85,7 @@ def test_every_pair_of_extents_by_solving_the_slides_equations(points, first, se
     elif area2(a, b, c):
         assert found.relation == Relation.NONE
     else:
-        # as long as needed to behave as infinite among these points
+        # long enough to act as infinite among these points
         def cut(p, q, extent):
             p, q = np.array(p), np.array(q)
             least, greatest = np.clip(extent.value, -100, 100)
@@ -102,7 +102,7 @@ def test_nearly_parallel_segments_cross_where_they_do():
     assert found.relation == Relation.POINT
     assert np.abs(found.point).max() < 1e-15
     below = intersect([-1, 0], [1, 0], [-1, tiny], [1, np.ldexp(1.0, -1070)])
-    assert below.relation == Relation.NONE  # apart by less than anything that could be measured, but apart
+    assert below.relation == Relation.NONE  # apart by a tiny distance
 
 
 def test_touching_at_a_corner_returns_it_to_the_last_bit():

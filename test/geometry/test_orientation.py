@@ -1,4 +1,4 @@
-"""Signs against rational numbers, on lattices where most determinants vanish and beside them by one bit."""
+"""Tests of signs against rational numbers, on lattices where most determinants vanish, and one bit beside them."""
 
 from fractions import Fraction
 
@@ -15,7 +15,7 @@ NUDGES = st.lists(st.integers(-2, 2), min_size=12, max_size=12)
 
 
 def nudged(points, nudges, exponent):
-    """Lattice points divided by 3 (not representable), scaled, each coordinate moved by a few last bits."""
+    """Lattice points divided by 3 (not representable), scaled, with each coordinate moved by a few last bits."""
     x = np.array(points, float) / 3 * 2.0**exponent
     bits = np.array(nudges[: x.size]).reshape(x.shape)
     return x + bits * np.spacing(np.where(x == 0, 2.0**exponent, np.abs(x)))
@@ -63,7 +63,7 @@ def test_underflow_and_overflow_keep_the_sign(scale):
 
 
 def test_parallel_vectors_of_different_points():
-    assert cross([0, 0], [0.1, 0.3], [5, 5], [5.125, 5.375]) != 0  # 0.1 is not a tenth
+    assert cross([0, 0], [0.1, 0.3], [5, 5], [5.125, 5.375]) != 0  # 0.1 is not exactly representable
     assert cross([0, 0], [1, 3], [5, 5], [5.125, 5.375]) == 0
 
 

@@ -1,4 +1,4 @@
-"""Oriented boxes hold their points, exactly; the smallest found is as small as it is known to be."""
+"""Tests that oriented boxes contain their points exactly, and of the minimum volume against known values."""
 
 from fractions import Fraction
 
@@ -29,7 +29,7 @@ def test_it_holds_its_points_in_rational_numbers(name, make):
         reach = [sum(a * x for a, x in zip(normal, offset, strict=True)) for offset in offsets]
         assert max(map(abs, reach)) <= half
         slack = 1e-13 * np.ptp(points, axis=0).max() + 1e-15 * np.abs(points).max()
-        assert float(max(reach)) >= half - slack and float(min(reach)) <= -half + slack  # it touches on both sides
+        assert float(max(reach)) >= half - slack and float(min(reach)) <= -half + slack  # touches on both sides
 
 
 @pytest.mark.parametrize(("name", "volume"), [("cube", 8), ("turned box", 24), ("tetrahedron", 8), ("lattice", 27)])

@@ -1,4 +1,4 @@
-"""The lecture's test of two particles against what they do when they are moved."""
+"""Tests of the lecture's test of two particles against their motion."""
 
 import numpy as np
 import pytest

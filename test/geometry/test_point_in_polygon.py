@@ -1,4 +1,4 @@
-"""Point in polygon against a rational ray that meets no corner."""
+"""Tests of point in polygon against a rational ray that meets no corner."""
 
 import numpy as np
 import pytest

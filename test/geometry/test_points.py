@@ -1,4 +1,4 @@
-"""Points against points, segments and planes."""
+"""Tests of points against points, segments and planes."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ THIRDS = st.integers(0, 3)
 def test_points_coincide_within_the_threshold_in_any_direction():
     assert points_coincide([0, 0], [3, 4], 5.0)
     assert not points_coincide([0, 0], [3, 4], 4.999)
-    assert not points_coincide([-9, -9], [0, 0], 1.0)  # what the slide's difference without absolute value gets wrong
+    assert not points_coincide([-9, -9], [0, 0], 1.0)  # the slide's difference without absolute value accepts this pair
     assert points_coincide([1, 2, 3], [1, 2, 3])
     assert points_coincide(np.zeros((4, 1, 3)), np.ones((5, 3)), 1.8).shape == (4, 5)
 
@@ -46,7 +46,7 @@ def test_point_on_segment_where_the_slides_parameters_fail():
     assert point_on_segment([2, 5], [2, 1], [2, 9])  # t_x = 0 / 0
     a, b = np.array([0.1, 0.2]), np.array([0.7, 0.9])
     p = a + 0.3 * (b - a)
-    assert not point_on_segment(p, a, b)  # it is beside it by round-off, and that is what was asked
+    assert not point_on_segment(p, a, b)  # round-off puts p beside the segment, and the test is exact
     assert point_on_segment(p, a, b, tolerance=1e-15)
 
 

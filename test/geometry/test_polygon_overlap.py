@@ -1,4 +1,4 @@
-"""Polygon against polygon: the cascade against rational segments, SAT against the Minkowski difference."""
+"""Tests of polygon overlap: the cascade against rational segments, SAT against the Minkowski difference."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ SHIFTS = st.tuples(st.integers(-5, 5), st.integers(-5, 5))
 
 
 def meet(a, b):
-    """In rational numbers: a corner of one in the other, or any two edges with a common point."""
+    """Whether, in rational numbers, a corner of one polygon is in the other or two edges have a common point."""
     if any(in_polygon(p, b) >= 0 for p in a) or any(in_polygon(p, a) >= 0 for p in b):
         return True
     return any(common_points(a[i - 1], a[i], b[j - 1], b[j]) for i in range(len(a)) for j in range(len(b)))
@@ -49,7 +49,7 @@ def test_each_kind_of_evidence():
     assert polygons_intersect(square, square + 1.5) is Evidence.SEPARATE
     assert contained_vertices(square, square + 1).tolist() == [2]
     comb = np.array(HARD["comb"])
-    assert polygons_intersect(comb, square * 0.5 + [5.25, 2]) is Evidence.SEPARATE  # between the teeth
+    assert polygons_intersect(comb, square * 0.5 + [5.25, 2]) is Evidence.SEPARATE  # the square is between the teeth
 
 
 @settings(max_examples=40)
@@ -57,7 +57,7 @@ def test_each_kind_of_evidence():
 def test_sat_is_the_minkowski_difference(seed, n, m):
     rng = np.random.default_rng(seed)
     a, b = convex(rng, n), convex(rng, m)
-    hull = ConvexHull((b[None] - a[:, None]).reshape(-1, 2))  # holds the origin where they overlap
+    hull = ConvexHull((b[None] - a[:, None]).reshape(-1, 2))  # contains the origin if they overlap
     depth = hull.equations[:, 2].max()  # minus the distance of the origin from the nearest side
     found = sat_2d(a, b)
     assert found.overlaps == (depth <= 0)
@@ -71,7 +71,7 @@ def test_sat_is_the_minkowski_difference(seed, n, m):
         true = min(np.linalg.norm(p - closest_point_on_segment(p, *q)[0]) for p, q in pairs)
         assert 0 < found.distance <= true + 1e-14
         (_, high), (low, _) = project(a, found.axis), project(b, found.axis)
-        assert high < low  # their projections on the axis are apart, A's first
+        assert high < low  # the projections on the axis are apart, A's first
         assert sat_2d(a, b, found.edge).tested == 1
     swapped = sat_2d(b[::-1], a[::-1])
     assert swapped.overlaps == found.overlaps

@@ -1,4 +1,4 @@
-"""Convexity by its three tests, and which polygons are simple."""
+"""Tests of the three convexity tests and of simplicity."""
 
 from itertools import combinations
 
@@ -24,7 +24,7 @@ CONVEX = ("square", "straight corners", "needle")
 
 
 def quadrilateral_is_convex(p):
-    """Each corner is strictly left (or each right) of the diagonals' ends: by triangles only."""
+    """Whether all triangles of three consecutive corners have the same orientation."""
     signs = {area2(p[i], p[(i + 1) % 4], p[(i + 2) % 4]) > 0 for i in range(4)}
     return len(signs) == 1
 
@@ -35,7 +35,7 @@ def test_convexity_of_the_hard_ones(name):
     assert is_convex(polygon) == is_convex(polygon[::-1]) == (name in CONVEX)
     assert is_simple(polygon)
     assert is_counter_clockwise(polygon) and not is_counter_clockwise(polygon[::-1])
-    if name != "dent of one bit":  # its middle is rounded onto the edge, as the docstring says
+    if name != "dent of one bit":  # the midpoint is rounded onto the edge, see the docstring of passes_line_test
         assert passes_line_test(polygon) == (name in CONVEX)
 
 
@@ -91,8 +91,8 @@ def test_repeated_corners_count_once():
 def test_polygons_that_are_not_simple():
     assert not is_simple([(0, 0), (2, 2), (2, 0), (0, 2)])  # crossing edges
     assert not is_simple([(0, 0), (4, 0), (2, 0), (2, 2)])  # a spike
-    assert not is_simple([(0, 0), (2, 0), (1, 1), (2, 2), (0, 2), (1, 1)])  # touching itself at a corner
-    assert not is_simple([(0, 0), (4, 0), (4, 4), (2, 0), (0, 4)])  # touching an edge
+    assert not is_simple([(0, 0), (2, 0), (1, 1), (2, 2), (0, 2), (1, 1)])  # a corner touches a corner
+    assert not is_simple([(0, 0), (4, 0), (4, 4), (2, 0), (0, 4)])  # a corner touches an edge
 
 
 def test_the_area_far_from_the_origin():

@@ -1,4 +1,4 @@
-"""Points in polyhedra and edges through faces against rational numbers."""
+"""Tests of points in polyhedra and of edges through faces against rational numbers."""
 
 import numpy as np
 import pytest
@@ -67,7 +67,7 @@ def test_leading_dimensions():
 
 def test_flat_triangles_and_unused_vertices_change_nothing():
     vertices, faces = cube()
-    # split one edge: a flat triangle along it, and its neighbour in two
+    # split one edge: add a flat triangle along it, and divide its neighbour in two
     i, j, k = faces[0]
     vertices = np.vstack([vertices, (vertices[i] + vertices[j]) / 2, [9, 9, 9]])
     m = len(vertices) - 2
@@ -111,15 +111,15 @@ def test_edges_of_the_slides():
     through = edge_face([1, 1, 1], [1, 1, -3], *triangle)
     assert through.meets and through.t == 0.25 and through.point.tolist() == [1, 1, 0]
     assert not edge_face([3, 3, 1], [3, 3, -1], *triangle).meets  # through the plane beside the face
-    assert not edge_face([1, 1, 1], [1, 1, 2], *triangle).meets  # ends on one side
-    assert edge_face([1, 1, 1], [1, 1, 0], *triangle).meets  # ends on it
+    assert not edge_face([1, 1, 1], [1, 1, 2], *triangle).meets  # both ends on one side
+    assert edge_face([1, 1, 1], [1, 1, 0], *triangle).meets  # one end on the face
     table = edge_face(np.zeros((5, 1, 3)), np.ones((5, 1, 3)), *np.random.default_rng(0).normal(size=(3, 7, 3)))
     assert table.meets.shape == (5, 7) and table.point.shape == (5, 7, 3)
 
 
 def test_edges_and_closedness():
     vertices, faces = cube()
-    assert len(mesh_edges(faces)) == 18  # 12, and a diagonal for each side: V - E + F = 2
+    assert len(mesh_edges(faces)) == 18  # 12 edges and a diagonal for each side: V - E + F = 2
     assert len(vertices) - 18 + len(faces) == 2
     assert is_closed(faces) and not is_closed(faces[1:])
 

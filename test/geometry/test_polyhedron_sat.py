@@ -1,4 +1,4 @@
-"""SAT of convex polyhedra against the Minkowski difference, and what a cached axis saves."""
+"""Tests of SAT of convex polyhedra against the Minkowski difference, and of the cached axis."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_it_is_the_minkowski_difference(scale: float) -> None:
         b = moved(b, rotation(k), scale * rng.normal(size=3) * rng.choice([0.3, 1.0, 2.5]))
         difference = (b.vertices[None] - a.vertices[:, None]).reshape(-1, 3) / scale
         planes = Qhull(difference).equations
-        depth = -planes[:, 3].max()  # of the origin in it; below 0 where it is outside
+        depth = -planes[:, 3].max()  # of the origin inside the difference; negative if it is outside
         found, mirrored = sat_3d(a, b), sat_3d(b, a)
         seen.add(found.overlaps)
         assert found.overlaps == mirrored.overlaps == (depth >= 0.0)
@@ -38,7 +38,7 @@ def test_it_is_the_minkowski_difference(scale: float) -> None:
 
 
 def test_a_cached_axis_is_tested_alone_as_long_as_it_parts_them() -> None:
-    """Two rocks pass each other: the axis of the last step first, then only where it no longer does."""
+    """Two rocks pass each other; other axes than the cached one are tested only when it no longer separates them."""
     rng = np.random.default_rng(2)
     a, b = (convex_hull(rng.normal(size=(20, 3))) for _ in "ab")
     hint, alone, steps = 0, 0, 0

@@ -1,4 +1,4 @@
-"""The shape table: growth, reuse, shared hulls, and tight bounds against sampled or enumerated points."""
+"""Tests of the shape table: growth, reuse, shared hulls, and tight bounds against sampled or enumerated points."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CUBE = np.array([[x, y, z] for x in (-1.0, 1) for y in (-1, 1) for z in (-1, 1)]
 
 
 def _surface(shape, rng):
-    """Many points of the shape's surface, those that can be extreme among them."""
+    """Many points of the shape's surface, including those that can be extreme."""
     angle = np.linspace(0, 2 * np.pi, 20001)
     ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1)
     match shape:

@@ -1,4 +1,4 @@
-"""Sphere trees hold what they stand for, and their intervals hold the distance that the narrow phase finds."""
+"""Tests that sphere trees contain their meshes, and that their intervals contain the narrow phase's distance."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_every_level_encloses_the_solid_and_its_balls_are_inside(name):
         if len(points):
             assert (to_surface(points, vertices, faces) <= 1e-12 * size).all()
         if k:
-            # nothing stands out by more than a sphere's width, and each has its part of the level before
+            # no sphere exceeds the solid by more than its width, and each has a parent in the level before
             outside = locate_in_polyhedron(level.center, vertices, faces) < 0
             stand_out = np.where(outside, to_surface(level.center, vertices, faces) + level.radius, 0.0)
             assert stand_out.max() <= 2.0 * np.sqrt(0.75) * 2.0**-k * size * (1 + 1e-9)
@@ -71,7 +71,7 @@ def test_intervals_hold_the_distance_and_close(pair):
             assert interval.lower <= high and low <= interval.upper
             assert before is None or (before.lower <= interval.lower and interval.upper <= before.upper)
         if found.signed_distance > 1.0:
-            assert intervals[-1].lower > 0.0  # a tree is good enough to tell that they are apart
+            assert intervals[-1].lower > 0.0  # the tree resolves the gap
             width = 2 * np.sqrt(0.75) * 2.0**-4 * sum(np.ptp(v, axis=0).max() for v, _ in meshes)
             assert intervals[-1].upper - intervals[-1].lower <= 1.5 * width
             apart += 1

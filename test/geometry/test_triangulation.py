@@ -1,4 +1,4 @@
-"""Triangles and convex parts: they fill the polygon, do not overlap, and use its corners only."""
+"""Tests that triangles and convex parts fill the polygon, do not overlap, and use only its corners."""
 
 from fractions import Fraction
 
@@ -16,7 +16,7 @@ from collision_monitor.geometry.triangulation import convex_parts, triangulate
 
 
 def twice_area(polygon):
-    """Exact."""
+    """Twice the area, exactly."""
     return sum((area2(polygon[0], polygon[i], polygon[i + 1]) for i in range(1, len(polygon) - 1)), Fraction(0))
 
 
@@ -30,7 +30,7 @@ def check(polygon):
         assert min(areas) > 0  # counter-clockwise, none flat
         assert sum(areas) == total
         assert all(is_convex(polygon[piece]) for piece in pieces)
-        # the areas add up, so pieces that stay inside do not overlap: each inner edge is used once each way
+        # the areas add up, so pieces inside the polygon do not overlap; each inner edge occurs once in each direction
         directed = [(int(p[k - 1]), int(p[k])) for p in pieces for k in range(len(p))]
         assert len(set(directed)) == len(directed)
         inner = [edge for edge in directed if edge[::-1] in directed]
@@ -38,7 +38,7 @@ def check(polygon):
     assert len(parts) <= len(triangles)
     turns = [area2(p, q, r) for p, q, r in zip(np.roll(polygon, 1, 0), polygon, np.roll(polygon, -1, 0), strict=True)]
     reflex = sum(turn * twice_area(polygon) < 0 for turn in turns)
-    # at least one part per two reflex corners is needed; Hertel–Mehlhorn leaves at most two diagonals for each
+    # at least one part per two reflex corners is needed; Hertel–Mehlhorn leaves at most two diagonals per reflex corner
     assert (reflex + 1) // 2 + 1 <= len(parts) <= 2 * reflex + 1
     return parts
 

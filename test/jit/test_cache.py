@@ -1,4 +1,4 @@
-"""A kernel's cache folder is named by the content of its module and of everything below it."""
+"""Tests that a kernel's cache folder depends on the content of its module and of all its imports."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_the_same_content_gives_the_same_folder(package: Path) -> None:
 def test_a_kernel_outside_the_package_is_compiled_anew_when_the_package_changes(
     package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A benchmark that inlines what it measures: it went on measuring the code of the day before."""
+    """A benchmark inlines kernels of the package. Once, it kept measuring their code of the day before."""
     script = types.ModuleType("a_benchmark")
     folder = tmp_path / "elsewhere"
     folder.mkdir()

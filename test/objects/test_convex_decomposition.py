@@ -1,4 +1,4 @@
-"""Convex parts of concave meshes: they contain the mesh, and stand out of it by no more than is said."""
+"""Tests that the convex parts of a concave mesh contain it and exceed it by at most the stated error."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_parts_contain_the_mesh_and_say_how_far_they_stand_out(mesh):
         contained |= (np.vstack([points, on_it]) @ plane[:, :3].T + plane[:, 3]).max(axis=1) <= 0.0
     assert contained[len(points) :].all()
     assert contained[: len(points)][inside].all()
-    # how far what the parts add is from dense samples of the surface
+    # distance of the added volume from dense samples of the surface
     extra = np.vstack([points[contained[: len(points)] & ~inside], *(part.points for part in found.parts)])
     extra = extra[locate_in_polyhedron(extra, mesh.vertices, mesh.faces) < 0]
     apart = cKDTree(on_it).query(extra)[0].max()
@@ -62,7 +62,7 @@ def test_as_a_model_it_is_better_than_the_hull():
     ball, between = Sphere(0.4), Pose((1.5, 2.0, 0.5))
     exact = contact(U_SHAPE, Pose(), ball, between)
     c = contact(U_SHAPE, Pose(), ball, between, model="convex_decomposition")
-    assert c.signed_distance > 0.0  # the ball is between the arms, where the hull has it inside
+    assert c.signed_distance > 0.0  # the ball is between the arms, inside the hull
     assert abs(c.signed_distance - exact.signed_distance) <= c.error_bound + exact.error_bound
     monitor = cm.Monitor()
     monitor.add(1, U_SHAPE, model=Model.CONVEX_DECOMPOSITION)

@@ -1,4 +1,4 @@
-"""ObjectDescription: what it fills in and what it refuses."""
+"""Tests of ObjectDescription: defaults and refused values."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What stands for an object in the monitor: coarse models never hide a collision, plane scenes have no height."""
+"""Tests of models in the monitor: coarse models hide no collision, scenes in the plane ignore the height."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ COARSE = [Model.SPHERE, Model.AABB, Model.OBB, Model.KDOP14, Model.KDOP26, Model
 
 
 def crowd(rng, count, flat=False):
-    """Poses (n, 7) and twists (n, 6) of objects that mill about."""
+    """Poses (n, 7) and twists (n, 6) of objects in random motion."""
     quaternions = rng.normal(size=(count, 4))
     poses = np.column_stack([rng.uniform(-2, 2, (count, 3)), quaternions])
     twists = np.column_stack([rng.normal(size=(count, 3)), rng.normal(size=(count, 3))])
@@ -63,7 +63,7 @@ def test_a_coarse_model_hides_nothing_and_states_its_error(model):
         if model is not Model.CONVEX_HULL:
             assert not sure.any()
             assert np.isinf(told.predictions["upper"]).all()
-    assert wider > 0 or model is Model.CONVEX_HULL  # which is exact for these
+    assert wider > 0 or model is Model.CONVEX_HULL  # the hull is exact for these shapes
 
 
 def test_a_concave_mesh_counts_as_its_hull_and_says_so():
@@ -72,7 +72,7 @@ def test_a_concave_mesh_counts_as_its_hull_and_says_so():
     monitor.add(2, cm.Sphere(0.1))
     result = monitor.step(SECOND, [1, 2], [(0, 0, 0, 0, 0, 0, 1)] * 2)
     (row,) = result.contacts
-    assert row["status"] == ContactStatus.UNRESOLVED  # in the hole of the ring: the hull cannot know
+    assert row["status"] == ContactStatus.UNRESOLVED  # in the hole of the ring, which the hull fills
     assert (row["model_a"], row["model_b"]) == (Model.CONVEX_HULL, Model.EXACT)
     assert row["signed_distance"] + row["error_bound"] >= 0.25
     with pytest.raises(cm.UnsupportedError, match="auto"):
@@ -104,7 +104,7 @@ def test_the_plane_answers_as_tall_prisms_in_space_do():
     seen = 0
     for step in range(20):
         poses, twists = crowd(rng, len(ids), flat=True)
-        # heights, a little tilt and what moves out of the plane change nothing
+        # heights, a small tilt and motion out of the plane change nothing
         tilted = poses.copy()
         tilted[:, 2] = rng.uniform(-50, 50, len(ids))
         dizzy = twists.copy()
@@ -139,4 +139,4 @@ def test_concave_polygons_and_walls_of_the_plane():
         monitor.add(3, cm.Circle(1), static=True, pose=Pose((0, 0, 0), (1, 0, 0, 0)))
     monitor.remove(1)
     monitor.remove(2)
-    monitor.add(1, cm.Sphere(1))  # an empty monitor takes a scene of either kind
+    monitor.add(1, cm.Sphere(1))  # an empty monitor accepts a scene of either kind

@@ -1,4 +1,4 @@
-"""Which ROS 2, which Python, which compiler: every decision, with folders and interpreters made up for the test."""
+"""Tests of the choice of ROS 2, Python and compiler, with simulated folders and interpreters."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def make_ros(prefix: Path, python: str, *packages: str) -> Path:
 
 
 def probe_of(**versions: tuple[int, int] | Python) -> Callable[[str], Python | None]:
-    """A machine on which these commands run these versions."""
+    """Probe of a machine on which these commands have these versions."""
     found = {name.replace("_", "."): version for name, version in versions.items()}
 
     def probe(command: str) -> Python | None:

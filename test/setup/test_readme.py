@@ -1,4 +1,4 @@
-"""What README.md says is so: its example runs, its tables are complete, its files and targets exist."""
+"""Tests of README.md: its examples run, its tables are complete, its files and targets exist."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_the_python_example_predicts_the_impact() -> None:
     assert answer.returncode == 0, answer.stderr
     times = re.fullmatch(r"cart meets ball in (\S+) to (\S+) s\n", answer.stdout)
     assert times, answer.stdout
-    # The cart's front is at 0.5 m, the ball's near side at 3.5 m: 3 m at 2 m/s.
+    # The cart's front is at 0.5 m, the ball's near side at 3.5 m; they close 3 m at 2 m/s.
     assert float(times[1]) <= 1.5 <= float(times[2]) + 1e-3
 
 

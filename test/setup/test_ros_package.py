@@ -1,4 +1,4 @@
-"""Build with colcon as a workspace would, source it, and start the executables where `ros2 run` looks for them."""
+"""Tests of a colcon build as in a user's workspace, with the executables where `ros2 run` looks for them."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ EXECUTABLES = {"monitor", "world", "replay", "collision-monitor"}
 COLCON = "import sys; from colcon_core.command import main; sys.exit(main())"
 
 PREFIXES = ":".join(filter(None, (sys.prefix, os.environ.get("AMENT_PREFIX_PATH"))))
-"""Our messages, and ROS 2 itself where an install is sourced."""
+"""Prefixes of our messages, and of ROS 2 itself if an install is sourced."""
 
 
 @pytest.fixture(scope="module")
 def install(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The package, built and installed into a workspace of its own. Its messages come from the environment."""
+    """The package, built and installed into a separate workspace. Its messages come from the environment."""
     workspace = tmp_path_factory.mktemp("workspace")
     folders = ("--build-base", workspace / "build", "--install-base", workspace / "install")
     command = [sys.executable, "-c", COLCON, "--log-base", workspace / "log", "build", "--base-paths", ROOT, *folders]
@@ -39,8 +39,8 @@ def install(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def sourced(install: Path, *command: str | Path) -> list[str]:
-    """The command in a shell that has sourced the workspace, as a ROS user has."""
-    # colcon's scripts do not quote the interpreter that they run, so it must not stand below a folder with a space
+    """The command in a shell that has sourced the workspace, like a ROS user's shell."""
+    # colcon's scripts do not quote the path of the interpreter, so it must not contain a space
     interpreter = f"COLCON_PYTHON_EXECUTABLE={shlex.quote(os.path.realpath(sys.executable))}"
     source = f"{interpreter} source {shlex.quote(str(install))}/setup.bash"
     return ["bash", "-c", f"{source} && exec {shlex.join(map(str, command))}"]
@@ -87,11 +87,11 @@ def test_the_command_line_runs_from_the_workspace(install: Path) -> None:
 
 @pytest.mark.parametrize("name", ["monitor", "world"])
 def test_a_node_starts_and_ends_cleanly_when_interrupted(install: Path, ros_domain_id: int, name: str) -> None:
-    # The executable is the workspace's; the modules are the source's, whose kernels are compiled already.
+    # The executable is from the workspace; the modules are from the source, because their kernels are already compiled.
     command = sourced(install, "env", f"PYTHONPATH={ROOT}", executable(install, name))
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         assert process.stdout
-        first = process.stdout.readline()  # the node says that it runs
+        first = process.stdout.readline()  # the node reports that it runs
         process.send_signal(signal.SIGINT)
         rest = process.stdout.read()
         assert process.wait(30) == 0, first + rest

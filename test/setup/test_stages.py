@@ -1,4 +1,4 @@
-"""Which stages run again, and when: fresh, finished, interrupted, changed, damaged and moved set-ups."""
+"""Tests of the selection of stages after fresh, finished, interrupted, changed, damaged and moved set-ups."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ROS = machine.ros_install(os.environ, stages.VENV)
 
 @pytest.fixture
 def stamps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The stamps of a finished set-up of this environment, to be spoilt by the test."""
+    """Stamps of a finished set-up of this environment, for the test to modify."""
     monkeypatch.setattr(set_up, "STAMPS", tmp_path)
     for stage in stages.STAGES:
         (tmp_path / stage.name).write_text(stage.inputs(ROS))
@@ -37,7 +37,7 @@ def pending() -> list[str]:
 
 
 def python_in_front_of_which(tmp_path: Path, module: str) -> Path:
-    """This environment's Python, where importing that module fails as a damaged one does."""
+    """This environment's Python, in which the import of that module fails like that of a damaged one."""
     broken = tmp_path / "broken" / module
     broken.mkdir(parents=True)
     (broken / "__init__.py").write_text("raise ImportError('file too short')\n")

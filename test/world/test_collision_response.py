@@ -1,4 +1,4 @@
-"""Collision responses against the lecture's examples and the conservation laws."""
+"""Tests of the collision response against the lecture's examples and the conservation laws."""
 
 import numpy as np
 import pytest
@@ -136,7 +136,7 @@ def test_a_ball_on_an_undamped_spring_comes_back_with_its_speed():
 
 @given(st.floats(0, 1), st.floats(-50, 50), st.floats(1e-3, 1.0))
 def test_bounces_between_walls_equal_flying_from_wall_to_wall(start, speed, dt):
-    """The slow obvious version: fly to the next wall, turn round, go on."""
+    """Reference: fly to the next wall, turn back, repeat."""
     position, velocity, left = start, speed, dt
     while velocity != 0.0:
         wall = 1.0 if velocity > 0.0 else 0.0
@@ -152,7 +152,7 @@ def test_bounces_between_walls_equal_flying_from_wall_to_wall(start, speed, dt):
 
 
 def test_an_inelastic_bounce_happens_at_its_time():
-    """0.5 m at 2 m/s takes 0.25 s; the other 0.25 s go back at half the speed."""
+    """0.5 m at 2 m/s take 0.25 s; the other 0.25 s go back at half the speed."""
     at, moving = bounce_between_walls(np.array([0.5]), np.array([2.0]), np.zeros(1), np.ones(1), 0.5, 0.5)
     assert at[0] == pytest.approx(0.75)
     assert moving[0] == -1.0

@@ -1,7 +1,7 @@
-"""The known contact times of the crossing scene, found again by sampling and bisection.
+"""Tests of the crossing scene's contact times against sampling and bisection.
 
-The oracle shares nothing with the scene's closed forms or with the product's kernels: it moves the objects by their
-published twist and asks point-to-box distances, separating axes and a search along the capsule's core.
+The oracle is independent of the scene's closed forms and of the package's kernels: it moves the objects by their
+published twists and computes point-to-box distances, separating axes and a search along the capsule's core.
 """
 
 import numpy as np
@@ -45,7 +45,7 @@ def boxes_touch(a, pose_a, b, pose_b):
 
 
 def capsule_to_box(capsule, pose_a, box, pose_b):
-    """The distance along the core is convex: ternary search."""
+    """Distance by ternary search, as the distance along the core is convex."""
     at, axis = pose_a[0], pose_a[1][:, 2]
     low, high = -capsule.length / 2, capsule.length / 2
     for _ in range(100):
@@ -75,7 +75,7 @@ def touch(id_a, id_b, t):
 
 
 def changes(id_a, id_b):
-    """The times at which touching begins or ends, by samples of 10 ms and bisection."""
+    """Times at which contact begins or ends, by samples of 10 ms and bisection."""
     times = np.arange(0.0, SCENE.period, 0.01)
     states = [touch(id_a, id_b, t) for t in times]
     found = []

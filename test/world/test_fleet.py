@@ -1,4 +1,4 @@
-"""The hall: everybody stays in the aisles, keeps a plausible motion, and meets others now and then."""
+"""Tests of the hall: objects stay in the aisles, move plausibly, and collide now and then."""
 
 from itertools import pairwise
 
@@ -11,7 +11,7 @@ from collision_monitor.world.fleet import CORNER, PITCH
 
 @pytest.fixture(scope="module")
 def a_minute():
-    """A hall of 60 and its states over 60 s, every 0.1 s."""
+    """A hall of 60 moving objects, and its states over 60 s, every 0.1 s."""
     scene = make_scene("fleet", objects=60, seed=4)
     return scene, [scene.states(), *(scene.step(0.1) for _ in range(600))]
 
@@ -84,7 +84,7 @@ def test_people_and_robots_do_meet():
     met = set()
     for _ in range(300):
         xy = scene.step(0.1)["position"][:, :2]
-        close = np.linalg.norm(xy[a] - xy[b], axis=1) < 0.5  # two people touch; so do all others that near
+        close = np.linalg.norm(xy[a] - xy[b], axis=1) < 0.5  # objects of any kind this near touch
         met |= {int(a[k] >= 100) + int(b[k] >= 100) for k in np.flatnonzero(close)}
     assert met == {0, 1, 2}  # robots with robots, robots with people, people with people
 

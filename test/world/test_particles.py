@@ -1,4 +1,4 @@
-"""The particle box: conservation, walls, and the pair search against brute force."""
+"""Tests of the particle box: conservation, walls, and the pair search against brute force."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def test_energy_is_conserved_and_everyone_stays_in_the_box_for_a_minute():
         assert (scene.position <= scene.size - scene.radius[:, None]).all()
     assert scene.energy == pytest.approx(energy, rel=1e-12)
     speeds = np.linalg.norm(scene.velocity, axis=1), np.linalg.norm(start, axis=1)
-    assert (np.abs(speeds[0] - speeds[1]) > 1e-6).all()  # walls keep speeds: everyone has met another one
+    assert (np.abs(speeds[0] - speeds[1]) > 1e-6).all()  # walls keep speeds, so every particle has met another
 
 
 def test_restitution_below_one_only_loses_energy():

@@ -1,4 +1,4 @@
-"""What holds for every scene."""
+"""Tests that apply to every scene."""
 
 import numpy as np
 import pytest
@@ -92,9 +92,9 @@ def test_a_step_is_one_period_of_the_rate_unless_said_otherwise():
     assert not scene.finished
 
 
-@pytest.mark.parametrize("name", [name for name in SIMULATED if name != "arm"])  # whose twists always change
+@pytest.mark.parametrize("name", [name for name in SIMULATED if name != "arm"])  # the arm's twists always change
 def test_twists_are_the_rates_of_change_of_the_poses(name):
-    """Central differences over 1 ms, of every object that does not change its course in between."""
+    """Central differences over 1 ms of all objects that keep their twist in between."""
     dt, compared, all_ = 1e-3, 0, 0
     scene = make_scene(name) if name not in RANDOM else make_scene(name, objects=200)
     for _ in range(10):
@@ -113,7 +113,7 @@ def test_twists_are_the_rates_of_change_of_the_poses(name):
 
 
 def test_measured_states_are_off_by_as_much_as_they_declare():
-    """By 1 % for 3,000 of them along three axes; the scene behind is untouched, and the noise is the same again."""
+    """1 % for 3,000 objects along three axes; the true scene stays unchanged, and the noise is reproducible."""
     true, seen, again = (make_scene("clutter", objects=3000, noise=noise) for noise in (0.0, 0.01, 0.01))
     before = true.step(), seen.step(), again.step()
     assert before[1].tobytes() == before[2].tobytes() == seen.states().tobytes()

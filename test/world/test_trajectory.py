@@ -1,4 +1,4 @@
-"""Recorded tracks: the real clips where they are present, clips written here always, and files that are not right."""
+"""Tests of recorded tracks: the real clips if they are present, clips written here, and invalid files."""
 
 import shutil
 from pathlib import Path
@@ -20,7 +20,7 @@ CLIPS = [WRITTEN, *sorted(str(p).removesuffix("_veh.csv") for p in RECORDED.glob
 
 
 def write_clip(prefix):
-    """60 frames: two people who walk straight, and a cart on a circle that turns through psi = +-pi."""
+    """Write 60 frames: two people who walk straight, and a cart on a circle through psi = +-pi."""
     t = np.arange(60) / FRAME_RATE
     with open(f"{prefix}_ped.csv", "w") as file:
         file.write(PEOPLE)
