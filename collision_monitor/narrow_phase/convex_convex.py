@@ -12,7 +12,7 @@ from typing import Any
 from collision_monitor._jit import device
 from collision_monitor.geometry.shape_table import CONE, CYLINDER
 from collision_monitor.narrow_phase.contact_row import write
-from collision_monitor.narrow_phase.core import core_length, core_of, core_radius, rounding
+from collision_monitor.narrow_phase.core import core_length, core_pair, core_radius, rounding
 from collision_monitor.narrow_phase.epa import epa
 from collision_monitor.narrow_phase.gjk import gjk, point_on_a, simplex_point
 from collision_monitor.narrow_phase.pair_pose import PairPose
@@ -44,7 +44,7 @@ def convex_separation(table: Any, a: int, b: int, pose: PairPose, limit: float, 
     px, py, pz = pose.p
     radii = table.margin[a] + table.margin[b] + core_radius(table, a) + core_radius(table, b)
     size = core_length(table, a) + core_length(table, b)
-    _, lower, normal = gjk(core_of(table, a), core_of(table, b), work, size, limit + radii)
+    _, lower, normal = gjk(core_pair(table, a, b), work, size, limit + radii)
     out[0], out[1], out[2] = rotate(pose.R_A, normal)
     slack = SAT_ROUND_OFF * (size + abs(px) + abs(py) + abs(pz))
     return max(lower, 0.0) - radii - slack
@@ -55,10 +55,11 @@ def convex_contact(table: Any, a: int, b: int, pose: PairPose, limit: float, out
     """Whole contact in out; False, and out undefined, as soon as the distance is certified to be over `limit` (m)."""
     _place(pose, work)
     px, py, pz = pose.p
-    A, B = core_of(table, a), core_of(table, b)
+    cores = core_pair(table, a, b)
+    A, B = cores.A, cores.B
     ra, rb = rounding(table, a), rounding(table, b)
     size = core_length(table, a) + core_length(table, b)
-    count, lower, normal = gjk(A, B, work, size, limit + ra + rb)
+    count, lower, normal = gjk(cores, work, size, limit + ra + rb)
     if count == 0:
         return False
     curved = A.kind == CYLINDER or A.kind == CONE or B.kind == CYLINDER or B.kind == CONE
@@ -78,7 +79,7 @@ def convex_contact(table: Any, a: int, b: int, pose: PairPose, limit: float, out
             x, y, z = normal
             beside = sqrt((w[0] - length * x) ** 2 + (w[1] - length * y) ** 2 + (w[2] - length * z) ** 2)
             between = (w[0] / length, w[1] / length, w[2] / length)
-            d = support_difference(A, B, work, opposite(between), SPARE)
+            d = support_difference(cores, work, opposite(between), SPARE)
             if distance - dot(between, d) < beside:
                 normal = between
     elif axes_are_parallel(A, B, work):
@@ -87,7 +88,7 @@ def convex_contact(table: Any, a: int, b: int, pose: PairPose, limit: float, out
         bound = TOUCHING * size
     else:
         tolerance, most = (EPA_CURVED, EPA_CURVED_POINTS) if curved else (EPA_POLYTOPE, MAX_VERTICES)
-        upper, lower, normal, point_a = epa(A, B, work, size, count, tolerance, most)
+        upper, lower, normal, point_a = epa(cores, work, size, count, tolerance, most)
         distance = -upper
         bound = abs(upper - lower) + TOUCHING * size
     bound += SAT_ROUND_OFF * (size + abs(px) + abs(py) + abs(pz) + ra + rb)

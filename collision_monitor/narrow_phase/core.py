@@ -19,7 +19,6 @@ class Core(NamedTuple):
     size: Any  # three numbers, see ShapeTable
     first: Any  # of a hull's vertices
     count: Any
-    vertices: Any  # (3, V): those of the table
 
 
 @inlined
@@ -31,8 +30,21 @@ def half_extents(table: Any, slot: int) -> Vector:
 @inlined
 def core_of(table: Any, slot: int) -> Core:
     """The core of a shape."""
-    size = half_extents(table, slot)
-    return Core(table.kind[slot], size, table.vertex_start[slot], table.vertex_count[slot], table.vertices)
+    return Core(table.kind[slot], half_extents(table, slot), table.vertex_start[slot], table.vertex_count[slot])
+
+
+class CorePair(NamedTuple):
+    """The cores of two shapes, and the vertices (3, V) of the table, which hulls among them refer to."""
+
+    A: Core
+    B: Core
+    vertices: Any
+
+
+@inlined
+def core_pair(table: Any, a: int, b: int) -> CorePair:
+    """The cores of two shapes."""
+    return CorePair(core_of(table, a), core_of(table, b), table.vertices)
 
 
 @inlined

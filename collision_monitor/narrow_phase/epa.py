@@ -10,7 +10,7 @@ from math import inf, sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.narrow_phase.core import Core
+from collision_monitor.narrow_phase.core import CorePair
 from collision_monitor.narrow_phase.gjk import closest_on_triangle, point_on_a, simplex_point, weighted
 from collision_monitor.narrow_phase.support_point import support_difference
 from collision_monitor.narrow_phase.vector import Vector, across, cross, dot, minus, opposite, scaled
@@ -114,7 +114,7 @@ def _push_edge(work: Any, count: int, i: float, j: float) -> int:
 
 @device
 def epa(
-    A: Core, B: Core, work: Any, size: float, count: int, tolerance: float, most: int
+    cores: CorePair, work: Any, size: float, count: int, tolerance: float, most: int
 ) -> tuple[float, float, Vector, Vector]:
     """Depth of two cores that overlap or touch, from the `count` simplex points that GJK left, in A's frame.
 
@@ -130,7 +130,7 @@ def epa(
     nearest = (0.0, 0.0, 0.0)  # the direction that proves `upper`
     while count < 4:
         d = _probe(work, count, step)
-        w = support_difference(A, B, work, d, SPARE)
+        w = support_difference(cores, work, d, SPARE)
         h = dot(d, w)
         if h < upper:
             upper = h
@@ -179,7 +179,7 @@ def epa(
             break
         lower = max(lower, min(distance, lower_cap))
         n = (work[_NX + near], work[_NY + near], work[_NZ + near])
-        w = support_difference(A, B, work, n, SIMPLEX + SIMPLEX_ROW * points)
+        w = support_difference(cores, work, n, SIMPLEX + SIMPLEX_ROW * points)
         h = dot(n, w)
         if h < upper:
             upper = h

@@ -10,7 +10,7 @@ from math import inf, sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.narrow_phase.core import Core
+from collision_monitor.narrow_phase.core import CorePair
 from collision_monitor.narrow_phase.support_point import support_difference
 from collision_monitor.narrow_phase.vector import Vector, along, cross, direction, dot, minus, opposite, scaled
 from collision_monitor.narrow_phase.work_memory import NEW_WEIGHTS, ON_A, P_AB, SIMPLEX, SIMPLEX_ROW, WEIGHTS
@@ -171,7 +171,7 @@ def _closest(work: Any, count: int, size: float) -> tuple[bool, Vector]:
 
 
 @device
-def gjk(A: Core, B: Core, work: Any, size: float, limit: float) -> tuple[int, float, Vector]:
+def gjk(cores: CorePair, work: Any, size: float, limit: float) -> tuple[int, float, Vector]:
     """Distance between two cores, with the pose of B in A's frame in the scratch memory.
 
     Returns (points in the simplex, certified lower bound (m), unit direction from A to B in A's frame that proves it).
@@ -185,7 +185,7 @@ def gjk(A: Core, B: Core, work: Any, size: float, limit: float) -> tuple[int, fl
     lower = -inf
     normal = (0.0, 0.0, 0.0)
     for _ in range(MAX_ITERATIONS):
-        w = support_difference(A, B, work, opposite(toward), SIMPLEX + SIMPLEX_ROW * count)
+        w = support_difference(cores, work, opposite(toward), SIMPLEX + SIMPLEX_ROW * count)
         bound = dot(toward, w) / length
         if bound > lower:
             lower = bound

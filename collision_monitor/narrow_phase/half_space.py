@@ -37,7 +37,7 @@ def half_space_contact(table: Any, a: int, b: int, pose: PairPose, out: Any) -> 
     offset = table.size[b, 3]
     n = _normal(table, b, pose.R_B)
     d = opposite(rotate_back(pose.R_A, n))
-    own = support_point(core_of(table, a), d)
+    own = support_point(core_of(table, a), table.vertices, d)
     own = along(own, rounding(table, a), d)
     witness = rotate(pose.R_A, own)
     distance = dot(n, minus(witness, pose.p)) - (offset + table.margin[b])

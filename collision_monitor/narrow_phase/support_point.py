@@ -11,14 +11,14 @@ from typing import Any
 
 from collision_monitor._jit import inlined
 from collision_monitor.geometry.shape_table import BOX, CAPSULE, CONE, CYLINDER, SPHERE
-from collision_monitor.narrow_phase.core import Core
+from collision_monitor.narrow_phase.core import Core, CorePair
 from collision_monitor.narrow_phase.vector import Vector, minus, opposite
 from collision_monitor.narrow_phase.vertex_scan import farthest_vertex
 from collision_monitor.narrow_phase.work_memory import ON_A, P_AB, R_AB
 
 
 @inlined
-def support_point(core: Core, d: Vector) -> Vector:
+def support_point(core: Core, vertices: Any, d: Vector) -> Vector:
     """Farthest point of the core along d, which need not be a unit vector, in the shape's own frame."""
     dx, dy, dz = d
     s0, s1, s2 = core.size
@@ -37,20 +37,21 @@ def support_point(core: Core, d: Vector) -> Vector:
         return 0.0, 0.0, z
     if kind == SPHERE:
         return 0.0, 0.0, 0.0
-    best = farthest_vertex(core.vertices, core.first, core.count, dx, dy, dz)
-    return core.vertices[0, best], core.vertices[1, best], core.vertices[2, best]
+    best = farthest_vertex(vertices, core.first, core.count, dx, dy, dz)
+    return vertices[0, best], vertices[1, best], vertices[2, best]
 
 
 @inlined
-def support_difference(A: Core, B: Core, work: Any, d: Vector, at: int) -> Vector:
+def support_difference(cores: CorePair, work: Any, d: Vector, at: int) -> Vector:
     """Farthest point of B - A along d in A's frame; the pose of B in it stands in the scratch memory.
 
     Writes a row of the simplex at work[at]: the difference and the point on A; returns the difference.
     """
     dx, dy, dz = d
-    a = support_point(A, opposite(d))
+    a = support_point(cores.A, cores.vertices, opposite(d))
     lx, ly, lz = support_point(
-        B,
+        cores.B,
+        cores.vertices,
         (
             work[R_AB] * dx + work[R_AB + 3] * dy + work[R_AB + 6] * dz,
             work[R_AB + 1] * dx + work[R_AB + 4] * dy + work[R_AB + 7] * dz,
