@@ -1,4 +1,4 @@
-"""How tight each bounding volume is, and what it costs to build.
+"""Measure the tightness of each bounding volume and the time to build it.
 
 Prints two Markdown tables: volume relative to the convex hull's, and milliseconds per construction (median).
 
@@ -31,7 +31,7 @@ RUNS = 7
 
 
 def point_sets() -> dict[str, Array]:
-    """1000 points each, turned so that no set is aligned with the axes by luck."""
+    """Sets of 1000 points, turned so that no set is aligned with the axes by chance."""
     rng = np.random.default_rng(0)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     on_ball = rng.normal(size=(COUNT, 3))
@@ -56,7 +56,7 @@ def point_sets() -> dict[str, Array]:
 
 
 def kdop_volume(slabs: Kdop, inner: Array) -> float:
-    """m³, by the corners where its planes meet; `inner`: a point (3,) in it."""
+    """Volume of a k-DOP (m³) from the corners at which its planes meet; `inner`: a point (3,) in it."""
     upper = np.column_stack([slabs.directions, -slabs.upper])
     lower = np.column_stack([-slabs.directions, slabs.lower])
     return float(Qhull(HalfspaceIntersection(np.vstack([upper, lower]), inner).intersections).volume)
@@ -75,7 +75,7 @@ BUILDS: dict[str, Callable[[Array], float]] = {
 
 
 def milliseconds(build: Callable[[], object]) -> float:
-    """Median of a few runs."""
+    """Median time of a few runs (ms)."""
     times = []
     for _ in range(RUNS):
         start = time.perf_counter()
@@ -85,7 +85,7 @@ def milliseconds(build: Callable[[], object]) -> float:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure and print the tables."""
     sets = point_sets()
     volume: dict[str, list[float]] = {}
     cost: dict[str, list[float]] = {}

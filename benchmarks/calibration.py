@@ -1,8 +1,8 @@
-"""Are the probabilities and times of impact under uncertainty right? Random scenes, each against 50,000 true futures.
+"""Compare probabilities and times of impact of uncertain states with 50,000 true futures in each random scene.
 
-Two bodies with random shapes, motions and uncertainties; the monitor's answer is compared with what becomes of them
-when the errors are drawn anew for each future, position, velocity, orientation and angular velocity each on its own.
-Prints a Markdown table and ends with 1 where an answer is off by more than stated.
+A scene has two bodies with random shapes, motions and uncertainties. For each future the errors of position, velocity,
+orientation and angular velocity are drawn independently, and the resulting impact is compared with the prediction.
+Prints a Markdown table and ends with exit code 1 if a probability is off by more than 0.03 and the sampling error.
 
     python benchmarks/calibration.py                              about a minute
     python benchmarks/calibration.py --png docs/images/calibration.png
@@ -32,7 +32,7 @@ Shape = cm.Sphere | cm.Box | cm.Capsule | cm.Cylinder | cm.Cone | cm.ConvexHull
 HORIZON = 2.0
 UNCERTAIN = ("position", "orientation", "velocity", "angular_velocity")
 MOST_OFF = 0.03
-"""Of a probability; what is asked for."""
+"""Largest acceptable error of a probability."""
 
 KINDS: dict[str, Callable[[np.random.Generator], Shape]] = {
     "sphere": lambda rng: cm.Sphere(rng.uniform(0.1, 0.6)),
@@ -45,7 +45,7 @@ KINDS: dict[str, Callable[[np.random.Generator], Shape]] = {
 
 @dataclass(frozen=True)
 class Scene:
-    """Two bodies: their kinds, shapes, states (13,) as pose and twist, standard deviations (4,) as in ObjectState."""
+    """Two bodies: kinds, shapes, states (13,) as pose and twist, standard deviations (4,) in the order of UNCERTAIN."""
 
     kinds: tuple[str, str]
     shapes: tuple[Shape, Shape]
@@ -55,9 +55,10 @@ class Scene:
 
 @dataclass(frozen=True)
 class Row:
-    """What became of a scene. told: the monitor predicted the pair; too_early: of the impacts, before `earliest`.
+    """Result of one scene.
 
-    late: of the futures, without an impact until `latest`; NaN: none was stated. us: of CPU, what the uncertainty cost.
+    told: whether the monitor predicts the pair. too_early: part of the impacts before `earliest`. late: part of the
+    futures without an impact until `latest`; NaN without a `latest`. us: cost of the uncertainty (µs of CPU).
     """
 
     kinds: str
@@ -71,7 +72,7 @@ class Row:
 
 
 def random_scene(rng: np.random.Generator, turning: bool) -> Scene:
-    """On a course that brings them near each other in the next seconds, with a miss from none to some sizes."""
+    """Two random bodies that come near each other in the next seconds and miss by up to 2 m."""
     names = list(KINDS)
     kinds = (names[rng.integers(len(names))], names[rng.integers(len(names))])
     shapes = (KINDS[kinds[0]](rng), KINDS[kinds[1]](rng))
@@ -93,7 +94,10 @@ def random_scene(rng: np.random.Generator, turning: bool) -> Scene:
 
 
 def predicted(scene: Scene, profile: Profile) -> tuple[np.void | None, bool, float]:
-    """The monitor's prediction of the pair, None: not told; whether they touch at once; and µs of CPU that it cost."""
+    """The monitor's prediction of the pair or None, whether the pair touches now, and the cost of uncertainty.
+
+    The cost is the difference of the median steps with and without uncertainty (µs of CPU).
+    """
     monitors = [cm.Monitor(profile) for _ in range(2)]
     seconds = []
     result = None
@@ -120,7 +124,7 @@ def predicted(scene: Scene, profile: Profile) -> tuple[np.void | None, bool, flo
 
 
 def impact_times(scene: Scene, futures: int, rng: np.random.Generator) -> Array:
-    """When they meet in each of so many futures (s); infinite: not within the horizon."""
+    """Times of impact (futures,) in s; infinite: none within the horizon."""
     motions = []
     for state, sigma in zip(scene.states, scene.sigmas, strict=True):
         off = rng.normal(size=(4, futures, 3)) * sigma[:, None, None]
@@ -133,7 +137,7 @@ def impact_times(scene: Scene, futures: int, rng: np.random.Generator) -> Array:
 
 
 def compare(scene: Scene, profile: Profile, futures: int, rng: np.random.Generator) -> Row | None:
-    """One row; None where the pair touches from the start, which is no prediction."""
+    """Return one row, or None if the pair touches from the start, because contacts have no prediction."""
     told, touching, us = predicted(scene, profile)
     if touching:
         return None
@@ -150,7 +154,7 @@ def compare(scene: Scene, profile: Profile, futures: int, rng: np.random.Generat
 
 
 def crowd(people: int = 200, side: float = 40.0, steps: int = 20) -> str:
-    """What a step of a crowd costs without and with uncertainty, in ms of CPU."""
+    """Measure a step of a crowd without and with uncertainty (ms of CPU); returns a line of text."""
     told = []
     for stddev in (0.0, 0.15):
         rng = np.random.default_rng(0)
@@ -175,11 +179,11 @@ def crowd(people: int = 200, side: float = 40.0, steps: int = 20) -> str:
 
 
 def table(rows: list[Row], confidence: float) -> list[str]:
-    """Markdown."""
+    """Lines of the Markdown table."""
     groups: dict[str, list[Row]] = {
         "stated to meet": [r for r in rows if r.told and r.status != 2],
-        "stated to pass, told": [r for r in rows if r.told and r.status == 2],
-        "stated to pass, not told": [r for r in rows if not r.told],
+        "stated to pass, predicted": [r for r in rows if r.told and r.status == 2],
+        "stated to pass, not predicted": [r for r in rows if not r.told],
         "all": rows,
     }
     lines = [
@@ -202,7 +206,7 @@ def table(rows: list[Row], confidence: float) -> list[str]:
 
 
 def draw(rows: list[Row], confidence: float, path: Path) -> None:
-    """Stated against true probability, and how often the earliest time was violated."""
+    """Draw the stated against the true probability, and how often impacts come before the earliest time."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -215,12 +219,12 @@ def draw(rows: list[Row], confidence: float, path: Path) -> None:
         for name, color, which in (
             ("stated to meet", "tab:red", lambda r: r.told and r.status != 2),
             ("stated to pass each other", "tab:blue", lambda r: r.told and r.status == 2),
-            ("not told", "0.3", lambda r: not r.told),
+            ("not predicted", "0.3", lambda r: not r.told),
         ):
             chosen = [r for r in rows if which(r)]
             x, y = [r.truth for r in chosen], [r.probability for r in chosen]
             left.plot(x, y, "o", color=color, markersize=4, alpha=0.7, label=f"{name}: {len(chosen)} scenes")
-        left.set_xlabel("part of the true futures in which they meet within 2 s")
+        left.set_xlabel("part of the true futures with an impact within 2 s")
         left.set_ylabel("stated probability")
         left.legend(frameon=False)
         early = np.sort([r.too_early for r in rows if r.told and np.isfinite(r.too_early)])[::-1]
@@ -233,13 +237,13 @@ def draw(rows: list[Row], confidence: float, path: Path) -> None:
 
 
 def main() -> int:
-    """Ends with 1 where a probability is off by more than MOST_OFF."""
+    """Return exit code 1 if a probability is off by more than MOST_OFF and the sampling error."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", type=int, default=120)
     parser.add_argument("--futures", type=int, default=50_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--profile", default="balanced", choices=Profile.names())
-    parser.add_argument("--samples", type=int, help="in place of the profile's")
+    parser.add_argument("--samples", type=int, help="samples for each pair (default: the profile's)")
     parser.add_argument("--png", type=Path)
     args = parser.parse_args()
     profile = Profile.named(args.profile).replace(horizon=HORIZON)

@@ -1,7 +1,7 @@
-"""Compare our pairs and depths with the peers' reference: `check_pairs.py PEERS.PY SCENE.npz OURS.npz`, one JSON line.
+"""Compare our pairs and depths with the peers' reference: `check_pairs.py PEERS.PY SCENE.npz OURS.npz`.
 
-Runs under the peers' Python, whose libraries the reference needs: float64 SAT for boxes, closed form for spheres,
-Coal for mixed shapes and hulls.
+Prints one JSON line. Runs under the peers' Python, because the reference needs its libraries. The reference is float64
+SAT for boxes, the closed form for spheres, and Coal for mixed shapes and hulls.
 """
 
 import importlib.util

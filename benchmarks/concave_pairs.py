@@ -1,18 +1,18 @@
-"""How right compounds, meshes and concave polygons are: the second table of docs/narrow_phase.md.
+"""Measure the errors of compounds, meshes and concave polygons: the second table of docs/narrow_phase.md.
 
     nice python benchmarks/concave_pairs.py                  # 100,000 random pairs of each, about an hour
     nice python benchmarks/concave_pairs.py --pairs 1000     # a quick look
 
-Every object is the union of convex parts that are known by the way it was made: the shapes of a compound, the cells of
-a grid whose outer faces are the mesh, the triangles about the middle of a star. `contact` sees the mesh's triangles and
-the star's outline, the oracle only the parts, through the definitions of narrow_phase_table.py.
+Every object is the union of known convex parts: the shapes of a compound, the cells of a grid whose outer faces form
+the mesh, the triangles about the middle of a star. `contact` gets the mesh's triangles and the star's outline. The
+oracle gets only the parts, and uses the definitions of narrow_phase_table.py.
 
-- Apart, both witness points have to be in some part, and each part has to leave a gap to each of the other's along some
-  direction (the kernels propose it, the support functions of NumPy decide): the error is what these leave open.
-- Overlapping, the least translation that parts them is between the depth of the deepest pair of parts and the shortest
-  of many translations, along axes of both, after which no part meets another. A bound is refuted where that range and
-  the stated one have nothing in common, and proved where the first is in the second. In the plane the least translation
-  is known exactly: it ends on the outline of all the differences of two parts.
+- Objects that are apart: both witness points must lie in a part, and each two parts must leave a gap along some
+  direction, which the kernels propose and NumPy's support functions verify. The error is what these leave unproved.
+- Objects that overlap: the least translation that separates them is at least the depth of the deepest pair of parts,
+  and at most the shortest of many translations along axes of both after which no parts meet. A bound is refuted if this
+  range and the stated range are disjoint, and proved if the stated range contains this range. In the plane the least
+  translation is known exactly: it ends on the outline of the union of all differences of two parts.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ from collision_monitor.geometry.shapes import Shape
 from collision_monitor.narrow_phase.dispatch import contact_batch
 
 SHAPES = 20
-"""Different objects of each kind."""
+"""Number of different objects of each kind."""
 TOUCHING = 1e-9
-"""Part of the size: parts nearer than this along a translation are not parted by it."""
+"""Part of the size: a translation that leaves parts nearer than this does not separate them."""
 POLYTOPES = cm.Box | cm.ConvexHull | cm.Polygon | cm.HalfSpace
 ROUND = 2e-6
 """Part of the size to which the kernels certify the depth of round parts."""
@@ -53,7 +53,7 @@ Part = tuple[Shape, Array, Array]  # rotation (3, 3) and position (3,) in the ob
 
 
 class Object(NamedTuple):
-    """What `contact` is given, and the convex parts that it is made of."""
+    """Argument of `contact`, its convex parts, and the radius of its bounding sphere about the origin (m)."""
 
     given: Shape | list[tuple[Shape, cm.Pose]]
     parts: list[Part]
@@ -97,12 +97,12 @@ def make_object(kind: str, rng: np.random.Generator) -> Object:
 
 
 def reach_of(parts: list[Part]) -> float:
-    """Of a sphere about the object's origin that holds the parts."""
+    """Radius of a sphere about the object's origin that contains the parts (m)."""
     return max(radius(shape) + float(np.linalg.norm(p)) for shape, _, p in parts)
 
 
 def cells(rng: np.random.Generator) -> Object:
-    """Some of the 3 x 2 x 2 cells of an uneven grid as one mesh of their outer faces, two triangles each."""
+    """Mesh of the outer faces, two triangles each, of some of the 3 x 2 x 2 cells of an uneven grid."""
     lines = [np.cumsum(rng.uniform(0.3, 0.8, n + 1)) for n in (3, 2, 2)]
     lines = [line - line.mean() for line in lines]
     filled = np.zeros((5, 4, 4), bool)  # with a layer of empty cells all around
@@ -132,7 +132,7 @@ def cells(rng: np.random.Generator) -> Object:
 
 
 class Batch(NamedTuple):
-    """n poses of two objects, B about A's origin in world axes, and what `contact` says of them."""
+    """n poses of two objects, B relative to A's origin in world axes, and their contacts by `contact`."""
 
     a: Object
     b: Object
@@ -147,7 +147,7 @@ class Batch(NamedTuple):
 
 
 def answers(a: Object, b: Object, n: int, planar: bool, rng: np.random.Generator) -> tuple[Batch, float]:
-    """Random poses, about half of which overlap, their contacts, and processor seconds for all."""
+    """Contacts at n random poses, about half of them overlapping, and the processor time for all (s)."""
     about_z = [Rotation.from_rotvec(rng.uniform(0, 7, (n, 1)) * [0, 0, 1]) for _ in "ab"]
     turns = about_z if planar else [Rotation.random(n, rng=rng) for _ in "ab"]
     p = unit(rng.normal(size=(n, 3)) * [1, 1, 0 if planar else 1]) * rng.uniform(0, 1, (n, 1)) * (a.radius + b.radius)
@@ -162,7 +162,7 @@ def answers(a: Object, b: Object, n: int, planar: bool, rng: np.random.Generator
 
 
 class Pair(NamedTuple):
-    """A part of A and one of B, in some of the poses of a batch: as the functions of narrow_phase_table take them."""
+    """A part of A and a part of B in some poses of a batch, with the arguments of narrow_phase_table's functions."""
 
     a: Shape
     R_A: Array
@@ -171,14 +171,14 @@ class Pair(NamedTuple):
     p: Array
 
     def reach(self, d: Array) -> Array:
-        """(n, k): how far B has to go along the directions (n, k, 3) to leave A; below 0: the gap."""
+        """Distances (n, k) by which B must move along the directions (n, k, 3) to leave A; below 0: the gap."""
         return np.asarray(
             support(self.a, d @ self.R_A) + support(self.b, -d @ self.R_B) - (d * self.p[:, None]).sum(-1)
         )
 
 
 def pairs_of(batch: Batch, some: NDArray[np.int_]) -> list[Pair]:
-    """Each part of A with each of B."""
+    """All pairs of a part of A and a part of B."""
     R_A, R_B = batch.R_A[some], batch.R_B[some]
     return [
         Pair(a, R_A @ Ra, b, R_B @ Rb, batch.p[some] + R_B @ pb - R_A @ pa)
@@ -187,7 +187,7 @@ def pairs_of(batch: Batch, some: NDArray[np.int_]) -> list[Pair]:
 
 
 def check_apart(batch: Batch, some: NDArray[np.int_]) -> tuple[Array, int]:
-    """Errors (n,) in m of those that are said to be apart, and how many bounds cannot be true."""
+    """Errors (n,) in m of pairs that `contact` reports as apart, and the number of refuted bounds."""
     d, bound = batch.distance[some], batch.bound[some]
 
     def out(parts: list[Part], R: Array, x: Array) -> Array:
@@ -206,7 +206,7 @@ def check_apart(batch: Batch, some: NDArray[np.int_]) -> tuple[Array, int]:
 
 
 def by_kernels(pair: Pair) -> Array:
-    """Contacts (n, 15) of the two parts."""
+    """Contacts (n, 15) of the two parts by the compiled kernels."""
     builder, n = ShapeTableBuilder(slots=2), len(pair.p)
     builder.append(pair.a)
     builder.append(pair.b)
@@ -217,9 +217,10 @@ def by_kernels(pair: Pair) -> Array:
 
 
 def deepest(batch: Batch, some: NDArray[np.int_]) -> Array:
-    """The depth (n,) of the deepest pair of parts, at least: no shorter translation parts them.
+    """Lower bounds (n,) on the depth of the deepest pair of parts: no shorter translation separates the objects.
 
-    Of polytopes by their definition; of round parts what the kernels certify, which the other table checks.
+    The depth of polytopes follows from the definition. For round parts it is certified by the kernels, which
+    narrow_phase_table.py checks.
     """
 
     def depth(pair: Pair) -> Array:
@@ -232,7 +233,7 @@ def deepest(batch: Batch, some: NDArray[np.int_]) -> Array:
 
 
 def shortest_parting(batch: Batch, some: NDArray[np.int_]) -> Array:
-    """The shortest (n,) of many translations of B that certainly part them."""
+    """Lengths (n,) of the shortest of many translations of B that certainly separate the objects."""
     n, size = len(some), batch.a.radius + batch.b.radius
     sign = batch.normal[some][:, None] * np.array([[1.0], [-1.0]])
     planar = isinstance(batch.a.parts[0][0], cm.Polygon)
@@ -243,7 +244,7 @@ def shortest_parting(batch: Batch, some: NDArray[np.int_]) -> Array:
             u = np.concatenate([u, -(batch.R_B[some] @ Rp @ shape.normal)[:, None]], axis=1)
     first, last = [], []
     for pair in pairs_of(batch, some):
-        # where on the way t u the parts meet: as far as the planes n . t u <= reach(n) say, which is never too little
+        # interval of t in which the parts meet, moved by t u: by the planes n . t u <= reach(n), never too short
         low, high = np.full(u.shape[:2], -np.inf), pair.reach(u)
         for normals in planes(pair):
             along, room = u @ np.swapaxes(normals, 1, 2), pair.reach(normals)[:, None]
@@ -258,14 +259,14 @@ def shortest_parting(batch: Batch, some: NDArray[np.int_]) -> Array:
     order = np.argsort(low, axis=-1)
     low, high = np.take_along_axis(low, order, -1), np.take_along_axis(high, order, -1)
     end = np.zeros((n, u.shape[1]))
-    for k in range(low.shape[-1]):  # what begins before the way is free again makes it longer
+    for k in range(low.shape[-1]):  # an interval that begins before the end of the last one extends it
         blocked = (low[..., k] <= end + TOUCHING * size) & (high[..., k] > end) & (low[..., k] < high[..., k])
         end = np.where(blocked, high[..., k], end)
     return np.asarray(end.min(axis=1))
 
 
 def planes(pair: Pair) -> list[Array]:
-    """Directions (n, k, 3) of planes about the difference of two parts: their faces, and edge crosses of boxes."""
+    """Normals (n, k, 3) of planes that bound the difference of two parts: their faces, and edge crosses of boxes."""
     found = []
     for shape, R, sign in ((pair.a, pair.R_A, 1.0), (pair.b, pair.R_B, -1.0)):
         axes = polytope_axes(shape)
@@ -285,7 +286,7 @@ def planes(pair: Pair) -> list[Array]:
 
 
 def parting_in_plane(batch: Batch, k: int) -> float:
-    """The least translation that parts two unions of polygons: the origin's way out of all their differences."""
+    """Least translation that separates two unions of polygons: the origin's shortest way out of all differences."""
     differences = []
     for (a, *_), (b, *_) in itertools.product(batch.a.parts, batch.b.parts):
         ours, theirs = a.points @ batch.R_A[k, :2, :2].T, batch.p[k, :2] + b.points @ batch.R_B[k, :2, :2].T
@@ -294,7 +295,7 @@ def parting_in_plane(batch: Batch, k: int) -> float:
     start = np.concatenate(differences)
     along = np.concatenate([np.roll(each, -1, axis=0) - each for each in differences])
     first, last = np.full((2, len(start), len(differences)), -np.inf)
-    for j, each in enumerate(differences):  # between which parts of each edge another difference covers it
+    for j, each in enumerate(differences):  # interval of each edge that another difference covers
         side = np.roll(each, -1, axis=0) - each
         normal = np.stack([side[:, 1], -side[:, 0]], axis=1) / np.linalg.norm(side, axis=1)[:, None]
         out = start @ normal.T - (normal * each).sum(axis=1) + 1e-12  # inside by more than round-off
@@ -316,7 +317,7 @@ def parting_in_plane(batch: Batch, k: int) -> float:
 
 
 def fcl_check(batch: Batch) -> list[float]:
-    """Differences (m) to FCL's distance, for objects that are one shape or mesh each, 5 % of the size apart."""
+    """Differences (m) to FCL's distance, for two single shapes or meshes that are more than 5 % of the size apart."""
     size = batch.a.radius + batch.b.radius
     ours, theirs = (in_fcl(each.given) if isinstance(each.given, Shape) else None for each in (batch.a, batch.b))
     if ours is None or theirs is None or not isinstance(batch.b.given, cm.Mesh):
@@ -333,7 +334,7 @@ def fcl_check(batch: Batch) -> list[float]:
 
 
 def row(kinds: tuple[str, str], count: int, done: Callable[[int], None]) -> Row:
-    """One row of the table."""
+    """Measure one row of the table."""
     rng = np.random.default_rng(sum(map(ord, "".join(kinds))))
     planar = kinds[0] == "star"
     refuted = proved = overlapping = checked = 0
@@ -379,11 +380,11 @@ EVERY = (
 
 
 def main() -> None:
-    """Measure all rows, print the table."""
+    """Measure all rows and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pairs", type=int, default=100_000, help="random pairs for each two kinds (default 100,000)")
-    parser.add_argument("--only", default="", help="rows whose name holds this, as 'mesh – box'")
-    parser.add_argument("--json", type=Path, help="write the rows as JSON, too, as they are done")
+    parser.add_argument("--only", default="", help="only rows whose name contains this, as 'mesh – box'")
+    parser.add_argument("--json", type=Path, help="also write the rows as JSON, each as soon as it is measured")
     arguments = parser.parse_args()
     every = [kinds for kinds in EVERY if arguments.only in f"{kinds[0]} – {kinds[1]}"]
     count = max(arguments.pairs // SHAPES, 1) * SHAPES

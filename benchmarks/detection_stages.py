@@ -1,4 +1,7 @@
-"""Where the time of a frame goes on one thread, stage by stage: `detection_stages.py [SCENE] [N]`, microseconds."""
+"""Measure each stage of a frame of full detection on one thread, in microseconds.
+
+Usage: python benchmarks/detection_stages.py [SCENE] [N]
+"""
 
 from __future__ import annotations
 
@@ -16,13 +19,13 @@ from collision_monitor.world.moving_bodies import make_moving_bodies
 
 @kernel
 def bounds(positions, frame):
-    """Corners of the positions, and whether they are finite."""
+    """Compute the bounds of the positions and check that they are finite."""
     kernels._bounds(positions, frame, np.int64(0))
 
 
 @kernel
 def cells(positions, grid, frame):
-    """The plan of the cells and each body's cell."""
+    """Lay out the cells and assign each body to one; returns the number of cells."""
     number = kernels._cells(grid, frame)
     kernels._buckets(positions, grid, frame, np.int64(0))
     return number
@@ -30,19 +33,19 @@ def cells(positions, grid, frame):
 
 @kernel
 def sort(n, number, grid):
-    """Counting sort by cell."""
+    """Sort the bodies by cell (counting sort)."""
     sort_by_cell(n, number, grid)
 
 
 @kernel
 def gather(path, positions, quaternions, grid, frame):
-    """Centres, sizes and rotation matrices in the order of the cells."""
+    """Gather centres, sizes and rotation matrices in the order of the cells."""
     kernels._gather(path, positions, quaternions, grid, frame, np.int64(0))
 
 
 @kernel
 def candidates(grid, frame):
-    """Pairs whose bounding spheres overlap; returns how many."""
+    """Count the pairs whose bounding spheres overlap."""
     total = 0
     for a in range(STARTING):
         first, behind = places(grid, a)
@@ -55,19 +58,19 @@ def candidates(grid, frame):
 
 @kernel
 def search(table, path, grid, frame, hits):
-    """Candidates and narrow phase."""
+    """Find the candidates and run the narrow phase."""
     kernels._search(table, path, 0.0, grid, frame, hits, np.int64(0))
 
 
 @kernel
 def finish(positions, frame, hits, pairs, contacts):
-    """Sort of the contacts, and the arrays of the answer."""
+    """Sort the contacts and fill the arrays of the answer."""
     total = kernels._finish(frame, hits, pairs)
     kernels._write(positions, frame, hits, total, pairs, contacts, np.int64(0))
 
 
 def best(action: Callable[[], object], repeats: int = 30) -> float:
-    """Least time of a call in microseconds."""
+    """Shortest time of a call (µs)."""
     action()
     times = []
     for _ in range(repeats):
@@ -78,7 +81,7 @@ def best(action: Callable[[], object], repeats: int = 30) -> float:
 
 
 def main(name: str = "boxes", n: str = "10000") -> None:
-    """Print the table."""
+    """Measure the stages and print the table."""
     scene = make_moving_bodies(name, int(n))
     positions, quaternions = scene.positions[4], scene.quaternions[4]
     detector = Detector(scene.shapes)

@@ -1,7 +1,7 @@
-"""How early, how often and how wrongly does the monitor warn of real people and carts? Recorded clips, looked back at.
+"""Measure how early, how often and how wrongly the monitor warns of real people and carts in recorded clips.
 
-At every frame the monitor predicts who comes within a clearance of whom; what really happened then is in the recording.
-With uncertainty, how far objects of their kind strayed from their stated motion in the *other* clips is declared.
+At every frame the monitor predicts the pairs that come within a clearance of each other. The recording shows the pairs
+that did. With uncertainty, each object declares the deviation of its kind from the stated motion in the *other* clips.
 Prints a Markdown table.
 
     python benchmarks/early_warning.py ../shared/data/citr
@@ -30,14 +30,17 @@ Array = NDArray[np.float64]
 HORIZONS = (0.5, 1.0, 2.0)
 THRESHOLDS = (0.1, 0.3, 0.5)
 LAGS = (0.25, 0.5, 1.0, 1.5, 2.0)
-"""s: at which the strayings are measured."""
+"""s: look-aheads at which the deviations are measured."""
 BALL = 2.23606797749979
-"""The radius of a ball in which what is anywhere has a standard deviation of 1 along each axis."""
+"""Radius of a ball in which a uniform distribution has a standard deviation of 1 along each axis."""
 
 
 @dataclass(frozen=True)
 class Strayings:
-    """Variances along one axis at LAGS, of one kind of object in one clip, and how many there were."""
+    """Variances of the deviation along one axis at LAGS (m²), of one kind of object in one clip.
+
+    count: number of deviations at the last lag.
+    """
 
     variance: Array
     count: int
@@ -45,7 +48,7 @@ class Strayings:
 
 @dataclass(frozen=True)
 class Clip:
-    """states: of each frame. distance (F, P): of the pairs in each frame (m), NaN where one is not tracked."""
+    """states: for each frame. distance (F, P): of each pair in each frame (m), NaN if an object is not tracked."""
 
     name: str
     scene: Trajectory
@@ -56,14 +59,14 @@ class Clip:
 
 @dataclass(frozen=True)
 class Told:
-    """What was said of one clip at one horizon, (F, P): warned from the stated motions alone; the probability."""
+    """Predictions of one clip at one horizon, (F, P): warnings from the stated motions alone; the probabilities."""
 
     stated: NDArray[np.bool_]
     probability: Array
 
 
 def load(prefix: Path) -> Clip:
-    """All frames of a clip, and how far apart everybody was."""
+    """Read all frames of a clip and compute the distances of all pairs."""
     scene = Trajectory(None, None, prefix)
     frames = round(scene.duration * FRAME_RATE) + 1
     states = []
@@ -87,7 +90,7 @@ def load(prefix: Path) -> Clip:
 
 
 def strayings(clip: Clip, kind: str) -> Strayings:
-    """How far objects of a kind were from where their twist would have brought them."""
+    """Deviations of objects of a kind from the positions that their twist predicts."""
     ids = {d.object_id for d in clip.scene.descriptions if kind in d.name}
     tracks: dict[int, dict[int, np.void]] = {i: {} for i in ids}
     for frame, rows in enumerate(clip.states):
@@ -109,7 +112,7 @@ def strayings(clip: Clip, kind: str) -> Strayings:
 
 
 def fit(all_of: list[Strayings]) -> Array:
-    """Standard deviations of position, velocity and acceleration that explain the variances best, relative to them."""
+    """Standard deviations (3,) of position, velocity and acceleration with the best relative fit to the variances."""
     variance = np.average([s.variance for s in all_of], axis=0, weights=[s.count for s in all_of])
     t = np.array(LAGS)
     rows = np.stack([np.ones_like(t), t**2, 0.25 * t**4], axis=1) / variance[:, None]
@@ -117,7 +120,7 @@ def fit(all_of: list[Strayings]) -> Array:
 
 
 def watch(clip: Clip, horizon: float, clearance: float, sigmas: dict[str, Array] | None) -> Array:
-    """What the monitor says at each frame: (F, P) 1 where it warns or the probability where `sigmas` are declared."""
+    """Predictions at each frame (F, P): the probability if `sigmas` are declared, else 1 for a warning."""
     profile = Profile.named("balanced").replace(horizon=horizon, contact_margin=clearance)
     monitor = cm.Monitor(profile)
     kind_of = {}
@@ -140,7 +143,7 @@ def watch(clip: Clip, horizon: float, clearance: float, sigmas: dict[str, Array]
 
 @dataclass
 class Score:
-    """Counted over moments, a pair in a frame: apart now, tracked for the whole horizon."""
+    """Counts over moments. A moment is a pair in a frame that is apart now and tracked for the whole horizon."""
 
     near: int = 0
     warned: int = 0
@@ -155,7 +158,7 @@ class Score:
         self.nearest: list[float] = []
 
     def add(self, clip: Clip, warned: NDArray[np.bool_], horizon: float, clearance: float) -> None:
-        """Compare what was said with what happened."""
+        """Compare the warnings of a clip with its encounters."""
         n = round(horizon * FRAME_RATE)
         coming, judged = look_ahead(clip.distance, n, clearance)
         near = judged & (coming <= clearance)
@@ -170,7 +173,7 @@ class Score:
         for frame, pair in zip(*np.nonzero(apart[:-1] & (clip.distance[1:] <= clearance)), strict=True):
             begin = frame + 1
             if begin < n or not apart[begin - n : begin, pair].all():
-                continue  # not seen, or within the clearance a moment ago
+                continue  # not tracked, or within the clearance shortly before
             quiet = np.flatnonzero(~warned[begin - n : begin, pair])
             lead = n - 1 - quiet[-1] if len(quiet) else n
             self.encounters += 1
@@ -178,7 +181,7 @@ class Score:
             self.leads.append(lead / FRAME_RATE)
 
     def row(self, horizon: float, how: str) -> str:
-        """Of the Markdown table."""
+        """Row of the Markdown table."""
         lead = np.median(self.leads) if self.leads else np.nan
         precision = self.right / self.warned if self.warned else np.nan
         off = np.median(self.nearest) if self.nearest else np.nan
@@ -190,15 +193,15 @@ class Score:
 
 
 def look_ahead(distance: Array, n: int, clearance: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Least distance in the n frames after each, and whether it is known of a pair that is apart now, (F, P)."""
+    """Least distance in the n frames after each (m), and whether it is known and the pair is apart now, (F, P)."""
     coming = np.full_like(distance, np.nan)
     for frame in range(len(distance) - n):
-        coming[frame] = distance[frame + 1 : frame + 1 + n].min(axis=0)  # NaN where one is lost on the way
+        coming[frame] = distance[frame + 1 : frame + 1 + n].min(axis=0)  # NaN if one is lost meanwhile
     return coming, np.isfinite(coming) & (distance > clearance)
 
 
 def draw(clips: list[Clip], said: dict[float, list[Told]], clearance: float, path: Path) -> None:
-    """Warnings that are right against encounters that are found; and whether the probabilities are those of life."""
+    """Draw right warnings against encounters found, and stated probabilities against observed frequencies."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -230,7 +233,7 @@ def draw(clips: list[Clip], said: dict[float, list[Told]], clearance: float, pat
                 [p[use][which == k].mean() for k in bins], [came[use][which == k].mean() for k in bins],
                 "o-", color=color, linewidth=1, markersize=4, label=f"{horizon:g} s ahead",
             )  # fmt: skip
-        left.set_xlabel("moments before an encounter that were warned of, %")
+        left.set_xlabel("moments before an encounter with a warning, %")
         left.set_ylabel("warnings that came true, %")
         left.set_xlim(0, 102)
         left.set_ylim(0, 102)
@@ -243,10 +246,10 @@ def draw(clips: list[Clip], said: dict[float, list[Told]], clearance: float, pat
 
 
 def main() -> None:
-    """Print the table."""
+    """Measure and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path, help="of clips: NAME_ped.csv and NAME_veh.csv")
-    parser.add_argument("--clearance", type=float, default=0.5, help="m, between surfaces: nearer is an encounter")
+    parser.add_argument("folder", type=Path, help="folder of clips: NAME_ped.csv and NAME_veh.csv")
+    parser.add_argument("--clearance", type=float, default=0.5, help="m between surfaces; closer is an encounter")
     parser.add_argument("--png", type=Path)
     args = parser.parse_args()
     prefixes = sorted({f.with_name(f.name.removesuffix("_ped.csv")) for f in args.folder.glob("*_ped.csv")})

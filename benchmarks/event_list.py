@@ -1,10 +1,10 @@
-"""What the event list saves: the monitor against plain recomputation of every prediction, step by step.
+"""Measure the gain of the event list over plain recomputation of every prediction.
 
-    python benchmarks/event_list.py                    # 10,000 boxes at 100 Hz, the four ways to move
+    python benchmarks/event_list.py                    # 10,000 boxes at 100 Hz, four kinds of motion
     python benchmarks/event_list.py --objects 1000 --seconds 60 --every 1   # compared at every step of a minute
 
-Both get the same states in one run. At every --every th step the plain monitor recomputes everything, and the answers
-are compared: no collision missed, none late, none invented, within the stated bounds.
+Both monitors get the same states in one run. At every --every th step the reference monitor recomputes everything, and
+the answers are compared: no collision may be missed, late or invented, within the stated bounds.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MOVES = ("steady", "turns", "noise", "jumps")
 
 
 class Boxes:
-    """Boxes of 0.4 to 1.2 m, each overlapping half a neighbour on average, that bounce inside a cube."""
+    """Boxes of 0.4 to 1.2 m that bounce inside a cube; each overlaps half a neighbour on average."""
 
     def __init__(self, n: int, seed: int) -> None:
         self.rng = rng = np.random.default_rng(seed)
@@ -46,7 +46,7 @@ class Boxes:
         self.linear, self.angular = rng.uniform(-1, 1, (n, 3)), rng.uniform(-1, 1, (n, 3))
 
     def states(self, noise: float) -> NDArray[np.void]:
-        """All states (records.STATE), shaken by up to `noise` in every part."""
+        """States (N,) of records.STATE with random errors of up to `noise` in position, orientation and twist."""
 
         def shake() -> NDArray[np.float64]:
             return noise * self.rng.uniform(-1, 1, self.position.shape) / np.sqrt(3) if noise else np.zeros(3)
@@ -59,7 +59,7 @@ class Boxes:
         return states
 
     def move(self, dt: float, turning: float) -> None:
-        """dt seconds on; then this part of the boxes takes another course."""
+        """Move all boxes by dt seconds, then give the fraction `turning` of them a new twist."""
         self.position += self.linear * dt
         self.quaternion = multiply(from_rotation_vector(self.angular * dt), self.quaternion)
         chosen = self.rng.random(len(self.size)) < turning
@@ -67,16 +67,16 @@ class Boxes:
             velocity[chosen] = self.rng.uniform(-1, 1, (int(chosen.sum()), 3))
 
     def walls(self) -> None:
-        """Turn round whoever has left the cube."""
+        """Reverse the boxes that have left the cube."""
         out = (self.position < 0) & (self.linear < 0) | (self.position > self.side) & (self.linear > 0)
         self.linear[out] *= -1
 
 
 def run(move: str, args: argparse.Namespace) -> dict[str, object]:
-    """One way to move; the row of the table."""
+    """Measure one kind of motion; returns the row of the table."""
     boxes = Boxes(args.objects, args.seed)
     profile = Profile(threads=args.threads)
-    # noise of half the declared tolerances: two noisy states are then within them
+    # half of the declared tolerances, so that two noisy states stay within them
     noise = 0.49 * profile.position_tolerance if move == "noise" else 0.0
     turning = {"turns": 0.01, "jumps": 1.0}.get(move, 0.0)
     mine, plain = Monitor(profile), ReferenceMonitor(profile)
@@ -123,15 +123,15 @@ def run(move: str, args: argparse.Namespace) -> dict[str, object]:
 
 
 def main() -> int:
-    """Exit code 3 where the two do not agree."""
+    """Return exit code 3 if the two monitors disagree."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--objects", type=int, default=10_000)
     parser.add_argument("--seconds", type=float, default=5.0, help="simulated time at 100 Hz")
-    parser.add_argument("--every", type=int, default=25, help="compare with plain recomputation at every such step")
+    parser.add_argument("--every", type=int, default=25, help="compare with recomputation at every K-th step")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--moves", default=",".join(MOVES), help=f"of {', '.join(MOVES)}")
-    parser.add_argument("--json", action="store_true", help="one JSON line instead of a table")
+    parser.add_argument("--moves", default=",".join(MOVES), help=f"kinds of motion: {', '.join(MOVES)}")
+    parser.add_argument("--json", action="store_true", help="print one JSON line instead of a table")
     args = parser.parse_args()
     rows = [run(move, args) for move in args.moves.split(",")]
     if args.json:

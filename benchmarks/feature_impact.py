@@ -1,7 +1,7 @@
-"""Microseconds for a vertex and a face, and for two edges: easy queries, hits, and the hardest that we know.
+"""Measure impact queries of a vertex and a face, and of two edges: easy queries, hits, and the hardest known.
 
-Prints a Markdown table: the mean over a batch, and of the single queries the longest (each the fastest of 5 calls, with
-Python's part of some 5 µs), and how many were unresolved.
+Prints a Markdown table with the mean over a batch (µs), the longest single query (each the fastest of 5 calls, with
+some 5 µs of Python), and the part of hits and unresolved queries.
 
     python benchmarks/feature_impact.py
 """
@@ -22,43 +22,43 @@ COUNT, SINGLE, RUNS = 20_000, 300, 5
 
 
 def passing(rng: np.random.Generator, kind: str) -> Array:
-    """As broad phases leave them: features of size 1, 1 to 3 apart, that move by a tenth."""
+    """Queries as a broad phase returns them: features of size 1, 1 to 3 apart, that move by a tenth."""
     x = rng.normal(size=(COUNT, 4, 3))
     x[:, : 1 if kind == "face" else 2] += rng.normal(size=(COUNT, 1, 3)) * 2
     return np.concatenate([x, x + 0.1 * rng.normal(size=x.shape)], axis=1)
 
 
 def anywhere(rng: np.random.Generator, kind: str) -> Array:
-    """All eight points at random, in a heap."""
+    """All eight points at random around the origin."""
     return rng.normal(size=(COUNT, 8, 3))
 
 
 def hits(rng: np.random.Generator, kind: str) -> Array:
-    """Those of them that meet."""
+    """The random queries that meet."""
     x = anywhere(rng, kind)
     return np.asarray(x[solver(kind)(x).status != "clear"])
 
 
 def coplanar(rng: np.random.Generator, kind: str) -> Array:
-    """All in one plane, which is turned at random: they slide in it, and touch for an interval."""
+    """All points in one plane, turned at random: the features slide in it and touch for an interval."""
     x = rng.normal(size=(COUNT // 20, 8, 3)) * [1, 1, 0]
     turn = np.linalg.qr(rng.normal(size=(len(x), 3, 3)))[0]
     return np.asarray(x @ turn.transpose(0, 2, 1))
 
 
 def collinear(rng: np.random.Generator, kind: str) -> Array:
-    """All on one line."""
+    """All points on one line."""
     return rng.normal(size=(COUNT // 20, 8, 1)) * rng.normal(size=(COUNT // 20, 1, 3))
 
 
 def grazing(rng: np.random.Generator, kind: str) -> Array:
-    """Coplanar, and out of it by 1e-7: nearer than the tolerance, all along."""
+    """Coplanar queries that leave the plane by 1e-7: within the tolerance all the time."""
     x = coplanar(rng, kind)
     return x + 1e-7 * rng.normal(size=x.shape)
 
 
 def resting(rng: np.random.Generator, kind: str) -> Array:
-    """They touch at the start and hardly move."""
+    """Features that touch at the start and hardly move."""
     x = np.array(hits(rng, kind)[: COUNT // 20])
     answer = solver(kind)(x)
     t = answer.lower[:, None, None]
@@ -67,12 +67,12 @@ def resting(rng: np.random.Generator, kind: str) -> Array:
 
 
 def solver(kind: str) -> Callable[..., Any]:
-    """The one for the kind."""
+    """Query function for the kind of features."""
     return cm.vertex_face_impact if kind == "face" else cm.edge_edge_impact
 
 
 def longest(solve: Callable[..., Any], x: Array, separation: float) -> float:
-    """µs of the longest of some single queries; the unresolved ones, which used up their budget, are among them."""
+    """Longest of some single queries (µs), including the unresolved ones, which use up their budget."""
     worst = 0.0
     hardest = np.argsort(solve(x, separation).status != "unresolved", kind="stable")
     for query in x[hardest[:SINGLE]]:
@@ -86,7 +86,7 @@ def longest(solve: Callable[..., Any], x: Array, separation: float) -> float:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure and print the table."""
     print("| queries | kind | separation (m) | mean (µs) | longest (µs) | hits | unresolved |")
     print("|---|---|---:|---:|---:|---:|---:|")
     for make in (passing, anywhere, hits, coplanar, grazing, collinear, resting):

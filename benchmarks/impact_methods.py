@@ -1,8 +1,8 @@
-"""Every way to a time of impact on the same pairs: µs for a pair, misses, false alarms and the worst error.
+"""Compare all methods for the time of impact on the same pairs: µs per pair, misses, false alarms, worst error.
 
-Prints Markdown tables, one for each set of pairs; `--pairs 1000` is quicker.
-What is true is the lower end that conservative advancement says at a tolerance of 1e-12 m, which is tested against
-dense samples and exact roots elsewhere. Pairs whose nearest approach is that near to touching are left out.
+Prints a Markdown table for each set of pairs; `--pairs 1000` is quicker.
+The truth is the lower end of conservative advancement at a tolerance of 1e-12 m, which the tests compare with dense
+samples and exact roots. Pairs that pass each other within that tolerance are ignored.
 
     python benchmarks/impact_methods.py
 """
@@ -38,7 +38,7 @@ CALLS: dict[str, Any] = {
 
 
 def states(rng: np.random.Generator, count: int, spread: float, spin: float) -> Array:
-    """Motions (N, 13) in a cube."""
+    """Motions (N, 13) in a cube, as pose and twist; twice `spread` is the side of the cube (m), `spin` in rad/s."""
     q = rng.normal(size=(count, 4))
     q /= np.linalg.norm(q, axis=1, keepdims=True)
     position, linear = rng.uniform(-spread, spread, (count, 3)), rng.normal(size=(count, 3))
@@ -46,7 +46,7 @@ def states(rng: np.random.Generator, count: int, spread: float, spin: float) -> 
 
 
 def towards(rng: np.random.Generator, count: int, speed: float, spin: float) -> tuple[Array, Array]:
-    """B comes from 3 m to 5 m away and passes near A, which turns."""
+    """Motions in which B comes from 3 m to 5 m away and passes near A, which turns."""
     a, b = states(rng, count, 0.0, spin), states(rng, count, 0.0, spin)
     a[:, 7:10] = 0.0
     way = rng.normal(size=(count, 3))
@@ -57,7 +57,10 @@ def towards(rng: np.random.Generator, count: int, speed: float, spin: float) -> 
 
 
 def at_each_other(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
-    """B starts 2 m to 6 m from A, aims at it within half a metre and is there in 1 s to 2.5 s; both turn, slowly."""
+    """Motions in which B starts 2 m to 6 m from A and passes it within about half a metre after 1 s to 2.5 s.
+
+    Both turn slowly.
+    """
     a, b = states(rng, count, 0.0, 0.0), states(rng, count, 0.0, 0.0)
     way = rng.normal(size=(count, 3))
     way *= rng.uniform(2, 6, (count, 1)) / np.linalg.norm(way, axis=1, keepdims=True)
@@ -73,7 +76,7 @@ Scene = tuple[cm.Sphere | cm.Box, Array, cm.Sphere | cm.Box, Array]
 
 
 def scenes(rng: np.random.Generator, count: int) -> dict[str, Scene]:
-    """Two shapes and their motions, by what is difficult about them."""
+    """Two shapes and their motions, by the difficulty of the scene."""
     box, slab, rod, ball = cm.Box((0.7, 0.9, 0.5)), cm.Box((1.2, 0.3, 0.8)), cm.Box((2, 0.02, 0.02)), cm.Sphere(0.05)
     plate, bullet = cm.Box((1, 1, 1e-3)), cm.Sphere(5e-4)
     return {
@@ -91,7 +94,7 @@ def _each(motions: tuple[Array, Array], shape: cm.Sphere | cm.Box) -> tuple[Arra
 
 
 def truth(a_shape: Any, a: Array, b_shape: Any, b: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Times of impact (N,), and which of the pairs (N,) are not too near to a graze to tell."""
+    """Times of impact (N,), and whether each pair (N,) is certain, that is, not too close to a graze."""
     poses_a, twists_a, poses_b, twists_b = a[:, :7], a[:, 7:], b[:, :7], b[:, 7:]
     answers = cm.time_of_impact_batch(a_shape, poses_a, twists_a, b_shape, poses_b, twists_b, HORIZON, 1e-12)
     certain = answers.status != "unresolved"
@@ -99,7 +102,7 @@ def truth(a_shape: Any, a: Array, b_shape: Any, b: Array) -> tuple[Array, NDArra
 
 
 def measure(call: Any, scene: Scene, exact: Array, certain: NDArray[np.bool_]) -> str:
-    """One row of the table; the fastest of a few runs."""
+    """One row of the table, with the fastest of a few runs."""
     best = np.inf
     for _ in range(RUNS):
         start = time.process_time()
@@ -114,7 +117,7 @@ def measure(call: Any, scene: Scene, exact: Array, certain: NDArray[np.bool_]) -
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pairs", type=int, default=5000)
     count = parser.parse_args().pairs
@@ -128,7 +131,7 @@ def main() -> None:
             try:
                 call(
                     *(part[:1] if isinstance(part, np.ndarray) else part for part in scene), HORIZON
-                )  # compiled before
+                )  # compiles the kernels
                 print(f"| {method} | {measure(call, scene, exact, certain)} |")
             except UnsupportedError:
                 continue

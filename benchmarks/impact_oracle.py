@@ -1,14 +1,14 @@
-"""No impact missed, none late: `time_of_impact_batch` against fine samples, random shapes and motions of every kind.
+"""Compare `time_of_impact_batch` with fine samples, for random shapes and motions: no impact missed, none late.
 
-Prints a Markdown table and ends with 1 where an answer was wrong. No sample before the stated lower end may find two
-shapes that overlap by more than round-off; at the stated upper end they have to touch. The samples are 1/997 s apart.
-One is passed over only where the signed distance at an earlier one is more than the two can have closed since, at their
-speed and their angular speed times their farthest points.
+Prints a Markdown table and ends with exit code 1 if an answer is wrong. No sample before the stated lower end may find
+two shapes that overlap by more than round-off, and at the stated upper end they must touch. The samples are 1/997 s
+apart. A sample is skipped only if the signed distance at an earlier sample is larger than the distance that the two can
+have closed since then, at their relative speed and their angular speeds times their radii.
 
     python benchmarks/impact_oracle.py                  10,000 for each pair of kinds: under a minute
     python benchmarks/impact_oracle.py --motions 1000000 --progress oracle.json
 
-With --progress, what was found is kept in a file and a run that was cut goes on; runs with other seeds add up in it.
+With --progress the results are kept in a file and an interrupted run continues; runs with other seeds add to it.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ HORIZON = 2.0
 STEP = 1 / 997
 BATCH = 2000
 ROUND = 5
-"""Batches of one pair of kinds before the next has its turn, so that a run that is cut has as many of each."""
+"""Batches of one pair of kinds before the next, so that an interrupted run has equally many of each."""
 ROUND_OFF = 1e-8
 COUNTS = ("hits", "unresolved", "missed or late", "not touching at the upper end")
 
@@ -56,7 +56,7 @@ PAIRS = [pair for pair in combinations_with_replacement(KINDS, 2) if pair != ("h
 
 
 def states(rng: np.random.Generator, shape: Shape) -> Array:
-    """Motions (N, 13): half of them slow, half fast, in speed and in turning."""
+    """Motions (N, 13) as pose and twist; half of them are fast, separately in speed and in angular speed."""
     q = rng.normal(size=(BATCH, 4))
     q /= np.linalg.norm(q, axis=1, keepdims=True)
     fast = rng.choice([1.0, 5.0], (BATCH, 2))
@@ -70,7 +70,10 @@ def states(rng: np.random.Generator, shape: Shape) -> Array:
 def overlaps_before(
     multibody: Any, pairs: Any, step: float, until: Any, deep: float, scratch: Any, found: Any
 ) -> None:
-    """The first sample (N,) before `until` (N,) at which the pairs are deeper than `deep` (m); infinite: none is."""
+    """Write the first sample (s) before `until` (N,) at which each pair is deeper than `deep` (m) into found (N,).
+
+    Infinite if there is none.
+    """
     table, parts, bodies = multibody
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
@@ -98,7 +101,7 @@ def overlaps_before(
 
 @kernel
 def distances(multibody: Any, pairs: Any, times: Any, scratch: Any, found: Any) -> None:
-    """Signed distances (N,) of the pairs at a time (N,) of its own for each."""
+    """Write the signed distances (m) of the pairs at `times` (N,) into found (N,), one time for each pair."""
     table, parts, bodies = multibody
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
@@ -107,7 +110,7 @@ def distances(multibody: Any, pairs: Any, times: Any, scratch: Any, found: Any) 
 
 
 def check(rng: np.random.Generator, kind_a: str, kind_b: str) -> NDArray[np.int_]:
-    """COUNTS of one batch."""
+    """Counts of one batch, in the order of COUNTS."""
     a_shape, b_shape = KINDS[kind_a](rng), KINDS[kind_b](rng)
     a, b = states(rng, a_shape), states(rng, b_shape)
     answers = cm.time_of_impact_batch(a_shape, a[:, :7], a[:, 7:], b_shape, b[:, :7], b[:, 7:], HORIZON)
@@ -129,30 +132,30 @@ def check(rng: np.random.Generator, kind_a: str, kind_b: str) -> NDArray[np.int_
 
 
 class Progress:
-    """Motions and COUNTS for each pair of kinds and seed, in a file if there is one."""
+    """Number of motions and COUNTS for each pair of kinds and seed, kept in a file if a path is given."""
 
     def __init__(self, path: Path | None) -> None:
         self.path = path
         self.rows: dict[str, list[int]] = json.loads(path.read_text()) if path and path.exists() else {}
 
     def row(self, pair: tuple[str, str], seed: int) -> list[int]:
-        """Motions and COUNTS so far."""
+        """Number of motions so far and their COUNTS."""
         return self.rows.setdefault(f"{', '.join(pair)}; seed {seed}", [0] * (1 + len(COUNTS)))
 
     def add(self, pair: tuple[str, str], seed: int, counts: NDArray[np.int_]) -> None:
-        """One more batch."""
+        """Add the counts of one batch."""
         row = self.row(pair, seed)
         row[:] = [row[0] + BATCH, *(int(old + new) for old, new in zip(row[1:], counts, strict=True))]
 
     def save(self) -> None:
-        """Whole or not at all."""
+        """Write the file atomically."""
         if self.path:
             part = self.path.with_suffix(".part")
             part.write_text(json.dumps(self.rows, indent=0))
             part.replace(self.path)
 
     def table(self) -> NDArray[np.int_]:
-        """Sums (PAIRS, 1 + COUNTS) over the seeds."""
+        """Sums over the seeds, a row for each of PAIRS: number of motions and COUNTS."""
         return np.array(
             [
                 np.sum([row for name, row in self.rows.items() if name.startswith(f"{', '.join(pair)};")], axis=0)
@@ -162,11 +165,11 @@ class Progress:
 
 
 def main() -> int:
-    """Measure and print."""
+    """Measure and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--motions", type=int, default=10_000, help="for each pair of kinds")
+    parser.add_argument("--motions", type=int, default=10_000, help="random motions for each pair of kinds")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--progress", type=Path, help="file that keeps what was found")
+    parser.add_argument("--progress", type=Path, help="file that keeps the results")
     arguments = parser.parse_args()
     progress, seed = Progress(arguments.progress), arguments.seed
     batches = -(-arguments.motions // BATCH)

@@ -1,11 +1,11 @@
-"""What the monitor keeps in memory: bytes for each object with its events, and whether they grow over an hour.
+"""Measure the monitor's memory: bytes for each object with its events, and growth over an hour.
 
     python benchmarks/memory.py             # three minutes
     python benchmarks/memory.py --quick     # six simulated minutes instead of an hour
 
-Objects, after two simulated seconds at 100 Hz: held by arrays and Python objects of the monitor, its answers and the
-states; and resident memory of the process, less that before, when the kernels were loaded and the boxes made.
-Hour: 1,000 boxes at 10 Hz, 1 % of which change course in each step; objects come and go.
+Objects: memory after two simulated seconds at 100 Hz. Held are arrays and Python objects of the monitor, its answers
+and the states. Resident is the growth of the process after the kernels were loaded and the boxes made.
+Hour: 1,000 boxes at 10 Hz. 1 % change course in each step; objects are removed and added.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ PAGE = os.sysconf("SC_PAGESIZE")
 
 
 def resident() -> int:
-    """Bytes of this process in memory."""
+    """Resident memory of this process (bytes)."""
     gc.collect()
     return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE
 
 
 def monitor_of(boxes: Boxes) -> Monitor:
-    """A monitor that knows them."""
+    """Monitor of the boxes."""
     monitor = Monitor(Profile(threads=1))
     for i, size in enumerate(boxes.size):
         monitor.add(i, Box(size))
@@ -46,7 +46,7 @@ def monitor_of(boxes: Boxes) -> Monitor:
 
 
 def step_for(seconds: float, monitor: Monitor, boxes: Boxes) -> int:
-    """Steps at 100 Hz; returns how many events are pending at the end."""
+    """Step at 100 Hz; returns the number of events pending at the end."""
     for step in range(round(100 * seconds)):
         answer = monitor.step(step * 10_000_000, boxes.states(0.0))
         boxes.move(0.01, 0.01)
@@ -54,7 +54,7 @@ def step_for(seconds: float, monitor: Monitor, boxes: Boxes) -> int:
 
 
 def each_object(n: int) -> dict[str, float]:
-    """Bytes for each of n objects."""
+    """Memory of each of n objects (bytes)."""
     few, boxes = Boxes(100, seed=2), Boxes(n, seed=1)
     step_for(1.0, monitor_of(few), few)  # loads the kernels
     before = resident()
@@ -69,7 +69,7 @@ def each_object(n: int) -> dict[str, float]:
 
 
 def an_hour(seconds: int) -> list[tuple[int, float]]:
-    """Resident MB after each tenth of the time, in s."""
+    """Resident memory after each tenth of the time, as (simulated s, MB)."""
     boxes = Boxes(1000, seed=1)
     monitor = monitor_of(boxes)
     rows = []
@@ -88,12 +88,12 @@ def an_hour(seconds: int) -> list[tuple[int, float]]:
 
 
 def main() -> None:
-    """Print both."""
+    """Measure and print both tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="six simulated minutes instead of an hour")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     args = parser.parse_args()
-    with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1) as process:  # each in one of its own
+    with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1) as process:  # a process for each
         objects = list(process.map(each_object, (1_000, 10_000, 30_000)))
         hour = process.submit(an_hour, 360 if args.quick else 3600).result()
     if args.json:

@@ -1,19 +1,19 @@
-"""How right and how fast every shape pair is: the table of docs/narrow_phase.md.
+"""Measure the errors and the speed of every shape pair: the first table of docs/narrow_phase.md.
 
     nice python benchmarks/narrow_phase_table.py                  # 100,000 random pairs of each, about 6 minutes
     nice python benchmarks/narrow_phase_table.py --pairs 1000     # a quick look
 
-Each answer is checked against definitions written here in NumPy, none of which the kernels use:
+Each answer is checked against definitions in NumPy that the kernels do not use:
 
-- Apart, an answer is its own proof. Both witness points have to be in their shapes, so that the true distance is not
-  longer than between them; and the two support functions have to leave a gap along the normal, so that it is not
-  shorter than that gap. The error is the larger of the two differences.
-- Overlapping, moving by the depth along the normal has to part the two, by the support functions; and no other
-  direction may part them sooner: for polytopes and polygons none of all face normals and edge crosses (exact), for
-  curved shapes none that a search from 200 directions finds.
+- Shapes that are apart: the answer is its own proof. Both witness points must lie in their shapes, so that the true
+  distance is at most the distance of the points. The two support functions must leave a gap along the normal, so that
+  the true distance is at least that gap. The error is the larger of the two differences.
+- Shapes that overlap: translation by the depth along the normal must separate them, by the support functions, and no
+  other direction may separate them sooner. For polytopes and polygons all face normals and edge crosses are tested
+  (exact), for curved shapes a search from 200 directions.
 
-FCL's distance is the second opinion for every other pair that is apart by 5 % of the size, near the origin: nearer, and
-overlapping, FCL is no judge. Compounds, meshes and concave polygons: concave_pairs.py.
+FCL's distance is a second opinion for pairs that are apart by more than 5 % of the size. FCL is not accurate enough for
+closer and overlapping pairs. concave_pairs.py checks compounds, meshes and concave polygons.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ Array = NDArray[np.float64]
 ROOT = Path(__file__).parents[1]
 SOLIDS = ("sphere", "box", "capsule", "cylinder", "cone", "convex hull")
 SIZES = 20
-"""Different shapes of each kind: each is used with each of the other kind."""
+"""Number of random shapes of each kind; a row has so many pairs of shapes."""
 
 
 class Row(NamedTuple):
-    """One row of the table; errors relative to the sum of the two bounding radii."""
+    """One row of the table; errors relative to the sum of the two bounding radii, times in µs."""
 
     pair: str
     cases: str
@@ -90,7 +90,7 @@ def make(kind: str, rng: np.random.Generator) -> Shape:
 
 
 def radius(shape: Shape) -> float:
-    """Of a sphere about the origin that holds the shape; 0 for a half-space."""
+    """Radius of a sphere about the origin that contains the shape (m); 0 for a half-space."""
     match shape:
         case cm.Sphere() | cm.Circle():
             return float(shape.radius)
@@ -106,7 +106,7 @@ def radius(shape: Shape) -> float:
 
 
 def support(shape: Shape, d: Array) -> Array:
-    """Greatest d . x of a shape in its own frame, for directions (..., 3)."""
+    """Support values max d . x of a shape in its own frame, for directions d (..., 3)."""
     rim, along = np.hypot(d[..., 0], d[..., 1]), d[..., 2]
     match shape:
         case cm.Sphere():
@@ -131,7 +131,7 @@ def support(shape: Shape, d: Array) -> Array:
 
 
 def outside(shape: Shape, x: Array) -> Array:
-    """How far points (n, 3) in the shape's frame are out of it, at most; <= 0 inside."""
+    """Bounds (n,) in m on how far points (n, 3) in the shape's frame are outside it; <= 0 inside."""
     rim, height = np.hypot(x[:, 0], x[:, 1]), np.abs(x[:, 2])
     match shape:
         case cm.Sphere():
@@ -161,7 +161,7 @@ def outside(shape: Shape, x: Array) -> Array:
 
 
 def sides(shape: cm.Polygon) -> tuple[Array, Array]:
-    """Outward unit normals of a convex polygon's sides and their offsets."""
+    """Outward unit normals (n, 2) of a convex polygon's sides and their offsets (n,) in m."""
     along = np.roll(shape.points, -1, axis=0) - shape.points
     normal = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
     normal *= np.sign((normal * (shape.points - shape.points.mean(axis=0))).sum(axis=1))[:, None]
@@ -169,7 +169,7 @@ def sides(shape: cm.Polygon) -> tuple[Array, Array]:
 
 
 def polytope_axes(shape: Shape) -> tuple[Array, Array] | None:
-    """Unit face normals and edge directions of a polytope; None for a curved shape."""
+    """Unit face normals (f, 3) and edge directions (e, 3) of a polytope; None for a curved shape."""
     if isinstance(shape, cm.Box):
         return np.eye(3), np.eye(3)
     if not isinstance(shape, cm.ConvexHull):
@@ -181,15 +181,15 @@ def polytope_axes(shape: Shape) -> tuple[Array, Array] | None:
 
 
 def unit(v: Array) -> Array:
-    """Along the last axis; what has no length stays."""
+    """Normalise vectors along the last axis; zero vectors stay."""
     length = np.linalg.norm(v, axis=-1, keepdims=True)
     return v / np.where(length > 0, length, 1)
 
 
 def least_depth(a: Shape, R_A: Array, b: Shape, R_B: Array, p: Array) -> Array:
-    """The shortest way (n,) out of each other that the definitions find, for n poses."""
+    """Shortest translations (n,) in m that separate the shapes by the definitions, for n poses."""
 
-    def reach(d: Array) -> Array:  # (n, k, 3) -> (n, k): how far B has to go along d
+    def reach(d: Array) -> Array:  # (n, k, 3) -> (n, k): distance by which B must move along d
         return support(a, d @ R_A) + support(b, -d @ R_B) - (d * p[:, None]).sum(axis=-1)
 
     if isinstance(b, cm.HalfSpace):
@@ -210,7 +210,7 @@ def least_depth(a: Shape, R_A: Array, b: Shape, R_B: Array, p: Array) -> Array:
         crossed = np.where(length > 1e-6, crossed / np.where(length > 0, length, 1), faces[0][:, :1])
         directions = np.concatenate([*faces, crossed], axis=1)
         return np.asarray(np.minimum(reach(directions).min(axis=1), reach(-directions).min(axis=1)))
-    # curved: from the best of many directions downhill, with steps that shrink
+    # curved: descend from the best of many directions, with shrinking steps
     k = np.arange(200) + 0.5
     z, turn = 1 - 2 * k / 200, np.pi * (1 + 5**0.5) * k
     every = np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)
@@ -232,12 +232,12 @@ def least_depth(a: Shape, R_A: Array, b: Shape, R_B: Array, p: Array) -> Array:
         d = np.where(better[..., None], np.take_along_axis(tries, chosen[..., None, None], axis=2)[:, :, 0], d)
         depth, step = np.where(better, value, depth), np.where(better, step, 0.5 * step)
         u = unit(u - (u * d).sum(axis=-1, keepdims=True) * d)
-        u = unit(u + 0.7 * np.cross(d, u))  # so that a valley along neither axis is followed too
+        u = unit(u + 0.7 * np.cross(d, u))  # so that the descent also follows a valley along neither axis
     return np.asarray(depth.min(axis=1))
 
 
 class Batch(NamedTuple):
-    """n poses of two shapes: B about A's origin, world axes."""
+    """n poses of two shapes: B relative to A's origin, in world axes."""
 
     a: Shape
     b: Shape
@@ -247,7 +247,7 @@ class Batch(NamedTuple):
 
 
 def batches(kinds: tuple[str, str], count: int, rng: np.random.Generator) -> list[Batch]:
-    """Random shapes of two kinds at random poses, about half of which overlap."""
+    """Random shapes of two kinds at random poses, about half of them overlapping."""
     result = []
     planar = kinds[0] in ("circle", "polygon")
     for _ in range(SIZES):
@@ -264,7 +264,7 @@ def batches(kinds: tuple[str, str], count: int, rng: np.random.Generator) -> lis
 
 
 def answers(batch: Batch) -> tuple[Array, float]:
-    """Contacts (n, 15) of a batch by the compiled kernels, and processor seconds for each."""
+    """Contacts (n, 15) of a batch by the compiled kernels, and the processor time for each (s)."""
     builder, n = ShapeTableBuilder(slots=2), len(batch.p)
     for shape in (batch.a, batch.b):
         builder.append(shape)
@@ -279,7 +279,7 @@ def answers(batch: Batch) -> tuple[Array, float]:
 
 
 def check(batch: Batch, rows: Array) -> tuple[Array, Array, int]:
-    """Errors (n,) by the definitions (m), whether each pair is apart, and how many stated bounds cannot be true."""
+    """Errors (n,) by the definitions (m), whether each pair (n,) is apart, and the number of refuted bounds."""
     d, normal, on_a, on_b = rows[:, 0], rows[:, 1:4], rows[:, 4:7], rows[:, 7:10]
     in_a, in_b = normal[:, None] @ batch.R_A, -normal[:, None] @ batch.R_B
     gap = (normal * batch.p).sum(axis=1) - support(batch.a, in_a)[:, 0] - support(batch.b, in_b)[:, 0]
@@ -289,7 +289,7 @@ def check(batch: Batch, rows: Array) -> tuple[Array, Array, int]:
     out_b = outside(batch.b, ((on_b - batch.p)[:, None] @ batch.R_B)[:, 0])
     out = np.maximum(np.maximum(out_a, out_b), 0.0)
     error = np.maximum(error, np.where(apart, out, 0.0))
-    # the true value is at least the gap; apart, it is at most the distance of two points that are in the shapes
+    # the true distance is at least the gap; if apart, it is at most the distance of two points in the shapes
     round_off = 1e-14 * (radius(batch.a) + radius(batch.b))
     refuted = int((d + rows[:, 10] < gap - round_off).sum())
     inside = np.flatnonzero(~apart)
@@ -302,7 +302,7 @@ def check(batch: Batch, rows: Array) -> tuple[Array, Array, int]:
 
 
 def in_fcl(shape: Shape) -> Any:
-    """FCL's geometry for a shape, or None."""
+    """FCL's geometry of a shape, or None if FCL has none."""
     match shape:
         case cm.Sphere():
             return fcl.Sphere(shape.radius)
@@ -327,14 +327,17 @@ def in_fcl(shape: Shape) -> Any:
 
 
 def fcl_distance(a: Any, X_A: Any, b: Any, X_B: Any) -> float:
-    """FCL's distance of two geometries that are apart."""
+    """FCL's distance of two geometries that are apart (m)."""
     result = fcl.DistanceResult()
     objects = fcl.CollisionObject(a, X_A), fcl.CollisionObject(b, X_B)
     return float(fcl.distance(*objects, fcl.DistanceRequest(), result))
 
 
 def conformance() -> dict[tuple[str, str], tuple[int, int]]:
-    """Passed and all cases by kinds of shape, by the project's own test of them, also swapped and moved."""
+    """Numbers of passed and of all conformance cases, by kinds of shape.
+
+    Runs the project's own test of each case, also swapped and moved.
+    """
     sys.path[:0] = [str(ROOT / "test" / folder) for folder in ("narrow_phase", "helpers")]
     import test_conformance as conformance_test
 
@@ -354,7 +357,7 @@ def conformance() -> dict[tuple[str, str], tuple[int, int]]:
 
 
 def scalar_cost(batch: Batch) -> float:
-    """Seconds of one call of `contact`, on average over a few hundred."""
+    """Mean processor time of one call of `contact` over up to 300 calls (s)."""
     n = min(len(batch.p), 300)
     X_A = [cm.Pose((0, 0, 0), q) for q in Rotation.from_matrix(batch.R_A[:n]).as_quat()]
     X_B = [cm.Pose(p, q) for p, q in zip(batch.p, Rotation.from_matrix(batch.R_B[:n]).as_quat(), strict=False)]
@@ -365,7 +368,7 @@ def scalar_cost(batch: Batch) -> float:
 
 
 def convex_row(kinds: tuple[str, str], count: int, cases: str, done: Callable[[int], None]) -> Row:
-    """One row for two kinds of convex shapes."""
+    """Measure the row of two kinds of convex shapes."""
     rng = np.random.default_rng(sum(map(ord, "".join(kinds))))
     worst = {True: 0.0, False: 0.0}
     refuted, seconds, fcl_worst, fcl_count = 0, [], 0.0, 0
@@ -393,11 +396,11 @@ def convex_row(kinds: tuple[str, str], count: int, cases: str, done: Callable[[i
 
 
 def main() -> None:
-    """Measure all rows, print the table."""
+    """Measure all rows and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pairs", type=int, default=100_000, help="random pairs for each two kinds (default 100,000)")
-    parser.add_argument("--only", default="", help="rows whose name holds this, as 'box – box'")
-    parser.add_argument("--json", type=Path, help="write the rows as JSON, too")
+    parser.add_argument("--only", default="", help="only rows whose name contains this, as 'box – box'")
+    parser.add_argument("--json", type=Path, help="also write the rows as JSON")
     arguments = parser.parse_args()
     count = max(arguments.pairs // SIZES, 1) * SIZES
     every = [
@@ -437,7 +440,7 @@ def main() -> None:
 
 
 def error(x: float) -> str:
-    """As a power of ten to one digit."""
+    """Text of an error with one significant digit; empty for NaN."""
     return "" if np.isnan(x) else f"{x:.0e}".replace("e-0", "e-")
 
 

@@ -1,13 +1,13 @@
-"""Steps that may take a third of what they would: how many end in time, and what is said of what was left.
+"""Measure steps with a budget of a third of their usual time: how many end in time, and the answers for deferred pairs.
 
     python benchmarks/overload.py                      # 1,500 bodies that all change their course in every step
     python benchmarks/overload.py --overload 10 --steps 20000
     python benchmarks/overload.py --objects 300 --shapes links --no-trees
 
-First the median time of a step without a budget is measured, then --steps steps run with 1/--overload of that.
-At every --every th step plain recomputation tells the truth: how many collisions are neither told as contacts nor
-predicted (must be 0), how many intervals do not hold (must be 0), and how large a part is UNRESOLVED.
-Between the steps the same walk through 4 MB of memory is timed: how often the machine alone is late.
+The benchmark first measures the median step without a budget, then runs --steps steps with 1/--overload of that time.
+At every --every th step recomputation gives the truth. The benchmark counts collisions that are neither contacts nor
+predicted (must be 0), intervals that do not hold (must be 0), and UNRESOLVED answers.
+Between the steps it times the same walk through 4 MB of memory, which shows how often the machine alone is late.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ from collision_monitor.world.arm import link
 
 WARM = 50
 WALKED = np.arange(500_000) * 40_503 % 500_000
-"""Where the walk goes: no two places side by side."""
+"""Indices of the walk; no two consecutive ones are adjacent."""
 
 
 def machine_alone(memory: NDArray[np.float64]) -> float:
-    """Seconds for work that is always the same, and about as long as what no budget cuts."""
+    """Time (s) of constant work that takes about as long as the part of a step that no budget cuts."""
     began = time.perf_counter()
     for part in range(20):
         memory.take(WALKED[part * 10_000 : (part + 1) * 10_000]).sum()
@@ -44,12 +44,12 @@ def machine_alone(memory: NDArray[np.float64]) -> float:
 
 
 def by_pair(rows: NDArray[np.void]) -> dict[tuple[int, int], Any]:
-    """The rows by their pair of ids."""
+    """Rows by their pair of ids."""
     return {(int(row["id_a"]), int(row["id_b"])): row for row in rows}
 
 
 def wrong(mine: StepResult, truth: StepResult, horizon: float) -> tuple[int, int]:
-    """Collisions of which nothing is told, and answers that do not hold."""
+    """Number of collisions without an answer, and number of answers that do not hold."""
     told, touching = (by_pair(r.contacts[r.contacts["phase"] != records.Phase.END]) for r in (mine, truth))
     stated, true = by_pair(mine.predictions), by_pair(truth.predictions)
     certain = {k for k, e in true.items() if e["status"] == records.PredictionStatus.HIT and e["upper"] < horizon}
@@ -68,7 +68,7 @@ def _is_apart(prediction: Any, truth: Any) -> bool:
 
 
 def describe(monitor: Monitor, boxes: Boxes, shape: str) -> None:
-    """Half of them are boxes, half convex hulls as large with 32 corners; or all are long hulls."""
+    """Describe half of the bodies as boxes and half as convex hulls of 32 corners, or all as long hulls ("links")."""
     rng = np.random.default_rng(7)
     for i, size in enumerate(boxes.size):
         if shape == "links":
@@ -80,7 +80,7 @@ def describe(monitor: Monitor, boxes: Boxes, shape: str) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Measure."""
+    """Measure; returns the row of results."""
     boxes = Boxes(args.objects, args.seed)
     free, plain = Monitor(), ReferenceMonitor()
     for monitor in (free, plain):
@@ -123,7 +123,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         boxes.move(1 / RATE, args.turning)
         boxes.walls()
     compared = -(-args.steps // args.every)
-    spent = np.delete(spent, np.arange(1, args.steps, args.every))  # that found the caches full of the comparison
+    spent = np.delete(spent, np.arange(1, args.steps, args.every))  # they ran with caches full of the comparison
     return {
         "objects": args.objects,
         "full_ms": full_ms,
@@ -147,19 +147,19 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def main() -> int:
-    """Exit code 3 where a collision is missed or a bound does not hold."""
+    """Return exit code 3 if a collision is missed or a bound does not hold."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--objects", type=int, default=1500)
     parser.add_argument("--shapes", choices=("mixed", "links"), default="mixed", help="boxes and hulls, or long hulls")
-    parser.add_argument("--no-trees", action="store_true", help="for comparison: bounding spheres, then shapes")
+    parser.add_argument("--no-trees", action="store_true", help="without sphere trees, for comparison")
     parser.add_argument("--steps", type=int, default=5000)
-    parser.add_argument("--overload", type=float, default=3.0, help="times that the work is more than the budget")
-    parser.add_argument("--budget-ms", type=float, help="in place of --overload")
+    parser.add_argument("--overload", type=float, default=3.0, help="ratio of the median full step to the budget")
+    parser.add_argument("--budget-ms", type=float, help="budget (ms), in place of --overload")
     parser.add_argument("--turning", type=float, default=1.0, help="part of the boxes that change course in a step")
-    parser.add_argument("--every", type=int, default=100, help="compare with plain recomputation at every such step")
-    parser.add_argument("--pause-ms", type=float, default=2.0, help="between steps, as a robot has it")
+    parser.add_argument("--every", type=int, default=100, help="compare with recomputation at every K-th step")
+    parser.add_argument("--pause-ms", type=float, default=2.0, help="pause between steps (ms), as on a robot")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--json", action="store_true", help="one JSON line")
+    parser.add_argument("--json", action="store_true", help="print one JSON line")
     args = parser.parse_args()
     row = run(args)
     if args.json:

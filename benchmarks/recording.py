@@ -1,14 +1,14 @@
-"""What recording costs and what a killed process loses.
+"""Measure the cost of recording and the loss of a killed process.
 
     python benchmarks/recording.py            # three minutes
     python benchmarks/recording.py --quick    # half a minute
 
-Sustained: messages of 1 kB written as fast as the disk takes them, none dropped. Step: the same steps alone, beside
-20,000 messages/s that nobody keeps, and beside a recorder that does, in blocks that take turns within one run, so that
-whatever else the machine does meets all alike. Beside its work: of the last, the mean of all steps over the mean of
-those during which the recorder's thread slept, which an uneven machine hardly changes. Killed: a process that records
-20,000 messages/s is killed (SIGKILL) at a random moment; lost is the time between the last message in the file and the
-signal.
+Sustained: messages of 1 kB, written as fast as the disk takes them, none dropped. Step: the same steps alone, beside
+20,000 messages/s that are discarded, and beside a recorder that writes them. The three arms alternate in blocks within
+one run, so that other load affects all of them equally. Beside its work: for the last arm, the mean of all steps over
+the mean of the steps during which the recorder's thread slept; other load hardly changes this ratio. Killed: a process
+that records 20,000 messages/s is killed (SIGKILL) at a random moment; the loss is the time between the last message in
+the file and the signal.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ SHAPES, STATES, CONTACTS, PREDICTIONS = TYPES
 OBJECTS = 200
 WARM = 200
 ROUNDS = {False: 60, True: 8}
-"""Rounds of three blocks; quick or not."""
+"""Number of rounds of three blocks, by --quick."""
 QUIET = 0.25
-"""Cores that other processes may take while a round counts as quiet: a step that has to share its core says
-nothing of the recorder."""
+"""Most cores that other processes take during a quiet round: a step that shares its core does not measure the
+recorder."""
 RATE = 20_000
 """Messages/s that the recorder takes while steps are timed."""
 
@@ -72,12 +72,12 @@ while True:
 
 
 def payload(k: int) -> bytes:
-    """About 1 kB that compresses as states do: little."""
+    """About 1 kB that compresses as little as states do."""
     return np.random.default_rng(k % 64).normal(size=128).tobytes()
 
 
 def sustained(folder: Path, seconds: float) -> dict[str, float]:
-    """Messages/s and MB/s that reach the operating system, queue and all."""
+    """Messages/s and MB/s that reach the operating system, through the queue."""
     data = [payload(k) for k in range(64)]
     recorder = Recorder(folder / "sustained.mcap", TYPES, {"profile": "{}"}, patient=True, queue_bytes=16 << 20)
     begin, k = time.perf_counter(), 0
@@ -93,7 +93,7 @@ def sustained(folder: Path, seconds: float) -> dict[str, float]:
 
 
 class Crossing:
-    """Boxes in rows that cross each other's ways, all of them in every message."""
+    """Boxes that cross each other's paths, all of them in every message."""
 
     def __init__(self) -> None:
         rng = np.random.default_rng(5)
@@ -101,30 +101,30 @@ class Crossing:
         self.start, self.velocity = rng.uniform(0, 14, (OBJECTS, 3)), rng.uniform(-1, 1, (OBJECTS, 3))
 
     def shapes(self) -> bytes:
-        """ObjectDescriptionArray."""
+        """Encoded ObjectDescriptionArray."""
         objects = [ObjectDescription(i + 1, Box(tuple(size))) for i, size in enumerate(self.size)]
         return encode_descriptions(0, "world", objects, snapshot=True)
 
     def states(self, step: int) -> bytes:
-        """ObjectStateArray."""
+        """Encoded ObjectStateArray of the step."""
         rows = np.zeros(OBJECTS, records.STATE)
         rows["id"] = np.arange(1, OBJECTS + 1)
         rows["quaternion"][:, 3] = 1.0
         phase = self.start + 0.02 * step * self.velocity
-        rows["position"] = np.abs((phase % 28.0) - 14.0)  # to and fro between walls
+        rows["position"] = np.abs((phase % 28.0) - 14.0)  # back and forth between walls
         rows["linear"] = np.where(phase % 28.0 < 14.0, -self.velocity, self.velocity)
         return encode_states(1_000_000_000 + step * 20_000_000, "world", step + 1, rows)
 
 
 class Nobody:
-    """Takes messages and keeps none: what it slows a step by is what making and handing over messages does."""
+    """Discards all messages, to measure the cost of making and passing them on."""
 
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
-        """As of a Recorder."""
+        """Discard a message; the signature is Recorder.write's."""
 
 
 def watched(recorder: Recorder) -> list[tuple[float, float]]:
-    """When the recorder's thread begins and ends its turns and flushes, from now on (s)."""
+    """Begin and end (s) of the turns and flushes of the recorder's thread; the list grows from now on."""
     spans: list[tuple[float, float]] = []
     parts: Any = recorder._parts
 
@@ -142,7 +142,7 @@ def watched(recorder: Recorder) -> list[tuple[float, float]]:
 
 
 def beside_its_work(steps: list[tuple[float, float]], spans: list[tuple[float, float]]) -> float:
-    """Mean duration of the steps (begin, end; in order) over that of those which none of the spans meets."""
+    """Mean duration of all steps (begin, end; in order) over that of the steps that overlap no span."""
     begin, end = np.array(steps).T
     met = np.zeros(len(steps), np.bool_)
     for since, until in spans:
@@ -152,10 +152,10 @@ def beside_its_work(steps: list[tuple[float, float]], spans: list[tuple[float, f
 
 
 def step_cost(folder: Path, rounds: int, steps: int) -> dict[str, float]:
-    """Duration of a step with nothing beside it, beside messages that nobody keeps, and beside a recorder.
+    """Duration of a step alone, beside messages that are discarded, and beside a recorder.
 
-    Ratios: medians over rounds of three blocks, each the same steps in a pipeline of its own; beside_its_work: see
-    there. write_us: of a `write`.
+    Ratios are medians over rounds of three blocks; each block runs the same steps in its own pipeline. write_us: time
+    of one `write` (µs).
     """
     scene, data = Crossing(), [payload(k) for k in range(64)]
     pipelines = [Pipeline("balanced") for _ in range(3)]
@@ -172,7 +172,7 @@ def step_cost(folder: Path, rounds: int, steps: int) -> dict[str, float]:
     spans, recorded_steps = watched(recorder), []
     takers: tuple[Recorder | Nobody | None, ...] = (None, Nobody(), recorder)
     for k in range(3 * rounds):
-        arm = k % 3 if k // 3 % 2 else 2 - k % 3  # to and fro: drift meets all alike
+        arm = k % 3 if k // 3 % 2 else 2 - k % 3  # back and forth: drift affects all equally
         taker, sent, spent, in_block = takers[arm], 0, 0.0, []
         begin, busy = time.perf_counter(), _busy_elsewhere()
         for step in range(WARM + k // 3 * steps, WARM + (k // 3 + 1) * steps):
@@ -200,7 +200,7 @@ def step_cost(folder: Path, rounds: int, steps: int) -> dict[str, float]:
         if taker is recorder:
             writing, written, recorded = writing + spent, written + sent, recorded + time.perf_counter() - begin
             while recorder.status()["recorded_messages"] < written:
-                time.sleep(0.05)  # what waits for the disk belongs to this block
+                time.sleep(0.05)  # messages that wait for the disk belong to this block
     recorder.close()
     assert recorder.status()["recording_dropped"] == 0
     off, calls, on = durations.T
@@ -224,7 +224,7 @@ def step_cost(folder: Path, rounds: int, steps: int) -> dict[str, float]:
 
 
 def _busy_elsewhere() -> float:
-    """s of processor time that all other processes of this machine have taken."""
+    """Processor time that all other processes of this machine have taken (s)."""
     with open("/proc/stat", encoding="ascii") as file:
         ticks = [int(each) for each in file.readline().split()[1:9]]
     idle, stolen = ticks[3] + ticks[4], ticks[7]
@@ -232,7 +232,7 @@ def _busy_elsewhere() -> float:
 
 
 def killed(folder: Path, times: int) -> dict[str, object]:
-    """s lost by each of `times` processes that were killed while they recorded."""
+    """Time (s) lost by each of `times` processes that were killed while they recorded."""
     lost, recovered, holes = [], [], 0
     for k in range(times):
         path = folder / f"killed_{k}.mcap"
@@ -252,7 +252,7 @@ def killed(folder: Path, times: int) -> dict[str, object]:
 
 
 def snapshot_cost(repeat: int = 50) -> dict[str, float]:
-    """What a snapshot of 200 objects takes: a step waits for the copy, the recorder's thread packs it."""
+    """Cost of a snapshot of 200 objects: a step waits for the copy, and the recorder's thread packs it."""
     scene, pipeline = Crossing(), Pipeline("balanced")
     pipeline.on_shapes(scene.shapes())
     copying, packing, size = [], [], 0
@@ -268,7 +268,7 @@ def snapshot_cost(repeat: int = 50) -> dict[str, float]:
 
 
 def replay_speed(folder: Path, steps: int) -> dict[str, float]:
-    """Times real time: 200 objects at 50 Hz, one thread."""
+    """Speed of a replay in times real time: 200 objects at 50 Hz, one thread."""
     scene, pipeline = Crossing(), Pipeline("balanced")
     path = folder / "replay.mcap"
     with Recorder(path, TYPES, pipeline.metadata(), patient=True, snapshots=True) as recorder:
@@ -303,10 +303,10 @@ def replay_speed(folder: Path, steps: int) -> dict[str, float]:
 
 
 def main() -> None:
-    """Run all and print them, or one JSON object."""
+    """Run all measurements and print them, or one JSON object."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="fewer repetitions")
-    parser.add_argument("--folder", type=Path, help="on the disk that is to be measured (default: the temporary one)")
+    parser.add_argument("--folder", type=Path, help="folder on the disk to measure (default: the temporary folder)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     args = parser.parse_args()
     with tempfile.TemporaryDirectory(dir=args.folder) as name:
@@ -327,9 +327,9 @@ def main() -> None:
         f"step       {step['step_ms']:.3f} ms of {OBJECTS} boxes; {step['step_ms_recording']:.3f} ms beside "
         f"{step['messages_per_s']:,.0f} messages/s: ratio {step['ratio']:.3f} "
         f"({step['ratio_10_percent']:.3f} to {step['ratio_90_percent']:.3f}), {step['ratio_quiet']:.3f} in the "
-        f"{step['quiet_blocks']} of {ROUNDS[args.quick]} rounds when others took under {QUIET} cores, "
+        f"{step['quiet_blocks']} of {ROUNDS[args.quick]} rounds in which others took under {QUIET} cores, "
         f"{step['ratio_of_means']:.3f} of the means, {step['beside_its_work']:.3f} beside its work; "
-        f"{step['ratio_nobody']:.3f} beside messages that nobody keeps, "
+        f"{step['ratio_nobody']:.3f} beside discarded messages, "
         f"{step['ratio_to_nobody']:.3f} from there to recording; {step['write_us']:.1f} µs for each write"
     )
     lost = kill["lost_s"]

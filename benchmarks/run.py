@@ -1,10 +1,10 @@
-"""Full detection, ours and every peer that is installed, one after the other on the same saved scenes.
+"""Compare full detection with every installed peer, one after the other on the same saved scenes.
 
     python benchmarks/run.py                 everything: about half an hour
     python benchmarks/run.py --quick         a few peers, small scenes: about a minute
     python benchmarks/run.py --scenes boxes --n 10000 --only native-fcl,native-bullet
 
-Prints milliseconds per frame and how many times as long each peer takes; writes results.json and results.png into
+Prints milliseconds per frame and the ratio to our time for each peer; writes results.json and results.png into
 benchmarks/results/. `make bench-peers` installs the peers; --peers names their runner, which is not in this repository.
 """
 
@@ -36,13 +36,13 @@ QUICK = "native-fcl,native-bullet,native-coal,rapier-sensor,mujoco"
 
 
 def peers_python() -> str:
-    """The Python that has the peers' packages."""
+    """Path of the Python with the peers' packages."""
     own = PEERS_FOLDER / "bin" / "python"
     return str(own) if own.exists() else sys.executable
 
 
 def run_peers(runner: Path, scene: str, n: int, args: argparse.Namespace, folder: Path) -> list[dict[str, Any]]:
-    """The peers' results for one scene, which they leave in `folder`."""
+    """Run the peers on one scene, which they save in `folder`; returns their results."""
     answer = folder / "peers.json"
     command = [peers_python(), str(runner), "--scene", scene, "--n", str(n), "--seed", str(args.seed)]
     command += ["--peers", args.only, "--budget", str(args.budget), "--json", str(answer), "--save-scenes", str(folder)]
@@ -56,7 +56,7 @@ def run_peers(runner: Path, scene: str, n: int, args: argparse.Namespace, folder
 
 
 def run_ours(file: Path, threads: int) -> dict[str, Any]:
-    """Our result, from a process of its own like the peers'."""
+    """Run our detector in its own process, like the peers; returns its result."""
     command = [sys.executable, "-m", "collision_monitor", "bench", "--scene-file", str(file), "--json"]
     result = subprocess.run([*command, "--threads", str(threads)], capture_output=True, text=True)
     if result.returncode:
@@ -66,7 +66,7 @@ def run_ours(file: Path, threads: int) -> dict[str, Any]:
 
 
 def check(runner: Path, file: Path, folder: Path) -> dict[str, Any]:
-    """Our pairs and depths against the peers' reference."""
+    """Compare our pairs and depths with the peers' reference."""
     scene = load_moving_bodies(file)
     contacts = Detector(scene.shapes).detect(scene.positions[CHECKED_FRAME], scene.quaternions[CHECKED_FRAME])
     ours = folder / "ours.npz"
@@ -78,7 +78,7 @@ def check(runner: Path, file: Path, folder: Path) -> dict[str, Any]:
 
 
 def show(scene: str, n: int, ours: list[dict[str, Any]], peers: list[dict[str, Any]], checked: dict[str, Any]) -> None:
-    """The table of one scene."""
+    """Print the table of one scene."""
     best = min(row["median_ms"] for row in ours)
     print(f"\n{scene}, {n} objects: {ours[0]['pairs']} colliding pairs", end="")
     if checked.get("reference"):
@@ -99,7 +99,7 @@ def show(scene: str, n: int, ours: list[dict[str, Any]], peers: list[dict[str, A
 
 
 def plot(results: list[dict[str, Any]], file: Path) -> None:
-    """Time against number of objects, log-log, one panel for each scene."""
+    """Plot the time against the number of objects, log-log, with a panel for each scene."""
     import matplotlib
 
     matplotlib.use("agg")
@@ -129,17 +129,17 @@ def plot(results: list[dict[str, Any]], file: Path) -> None:
         axis.grid(which="both", linewidth=0.3)
     axes[0][0].set_ylabel("ms per frame, every pose new")
     best = {name: min(max(of_scene[name])[1] for of_scene in curves.values() if name in of_scene) for name in lines}
-    order = sorted(lines, key=lambda name: -best[name])  # as the lines lie above each other
+    order = sorted(lines, key=lambda name: -best[name])  # in the order of the lines from top to bottom
     figure.legend([lines[name] for name in order], order, loc="outside right center", fontsize=7)
     figure.savefig(file, dpi=90)
 
 
 def main() -> int:
-    """Run it all; the exit code is 0 also where a peer fails."""
+    """Run the comparison; the exit code is 0 even if a peer fails."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help=f"100 and 1,000 objects, {QUICK}")
     parser.add_argument("--peers", type=Path, default=ROOT.parent / "shared" / "bench" / "peers.py", metavar="PEERS.PY")
-    parser.add_argument("--only", metavar="A,B", help="these peers (default: all)")
+    parser.add_argument("--only", metavar="A,B", help="run only these peers (default: all)")
     parser.add_argument("--scenes", default=",".join(BENCHMARK_SCENES), metavar="A,B")
     parser.add_argument("--n", metavar="N,M", help="numbers of objects (default: 100,1000,10000)")
     parser.add_argument("--seed", type=int, default=1)
@@ -152,7 +152,7 @@ def main() -> int:
     threads = sorted({1, min(2, os.cpu_count() or 1)})
     there = args.peers.is_file()
     if not there:
-        print(f"no peers: their runner is not at {args.peers} (name it with --peers); ours alone", file=sys.stderr)
+        print(f"no peers: their runner is not at {args.peers} (set it with --peers); ours alone", file=sys.stderr)
     args.out.mkdir(parents=True, exist_ok=True)
     results = []
     for scene in args.scenes.split(","):

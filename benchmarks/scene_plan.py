@@ -1,10 +1,10 @@
-"""What the scene plan leaves out, and what it would cost to do it nevertheless: each item forced on, same states.
+"""Measure the work that the scene plan skips: each item forced on, with the same states.
 
     python benchmarks/scene_plan.py                  # 300 objects for each item
     python benchmarks/scene_plan.py --objects 1000 --steps 200
 
-Both monitors see the same scene; the answers that the second gives beyond those of the first are about pairs that
-nobody asked for, and the others are the same (test/monitor/test_scene_plan.py).
+Both monitors get the same scene. Additional answers of the second one are about pairs that are not requested; the other
+answers are the same (test/monitor/test_scene_plan.py).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from collision_monitor.world import make_scene
 from collision_monitor.world.scene import state_array
 
 POINT: Final = (1e-9, 1e-9, 1e-9)
-"""m, of a box that is a point."""
+"""Size of a box that represents a point (m)."""
 
 States = NDArray[np.void]
 Rows = NDArray[np.void]
@@ -43,7 +43,10 @@ def _same(states: States) -> States:
 
 
 class Item(NamedTuple):
-    """off: as the plan has it; on: the same with the item forced on. asked_for: which rows of `on` off has too."""
+    """Two monitors and their states. off: with the plan; on: with the item forced on.
+
+    states_on: turns the states of `off` into those of `on`. asked_for: mask of the rows of `on` that `off` has too.
+    """
 
     off: Monitor
     on: Monitor
@@ -66,7 +69,7 @@ def _played(scene: Any) -> Iterator[tuple[int, States]]:
 
 
 def rotation(objects: int) -> Item:
-    """Spheres are followed and predicted as bodies that look different turned."""
+    """Spheres, forced on: predicted like bodies whose rotation matters."""
     scene = make_scene("particles", objects=objects)
     item = Item(_monitor(scene.descriptions), _monitor(scene.descriptions), _played(scene))
     bodies = item.on._roster.bodies
@@ -75,7 +78,7 @@ def rotation(objects: int) -> Item:
 
 
 def space(objects: int) -> Item:
-    """Discs of a plane as spheres of space."""
+    """Discs in a plane, forced on: spheres in space."""
     scene = make_scene("clutter", objects=objects)
     ids = [d.object_id for d in scene.descriptions]
     random = np.random.default_rng(1)
@@ -96,7 +99,7 @@ def space(objects: int) -> Item:
 
 
 def uncertainty(objects: int) -> Item:
-    """Every state declares standard deviations, of a nanometre."""
+    """Certain states, forced on: every state declares a standard deviation of a nanometre."""
     scene = make_scene("clutter", objects=objects)
 
     def declared(states: States) -> States:
@@ -108,7 +111,7 @@ def uncertainty(objects: int) -> Item:
 
 
 def static_pairs(objects: int) -> Item:
-    """What stands is told as moving with no speed, so that its pairs among each other are visited."""
+    """Static objects, forced on: described as moving with zero speed, so that pairs of them are visited."""
     scene = make_scene("fleet", objects=objects)
     static = [d for d in scene.descriptions if d.static]
     moving = [replace(d, static=False, pose=None) if d.static else d for d in scene.descriptions]
@@ -126,7 +129,7 @@ def static_pairs(objects: int) -> Item:
 
 
 def groups(objects: int) -> Item:
-    """Four groups that never meet, all in one group."""
+    """Four groups that never meet, forced on: all objects in one group."""
     scene = make_scene("clutter", objects=objects)
     bits = [1 << (d.object_id % 4) for d in scene.descriptions]
     apart = [replace(d, group=bit, mask=bit) for d, bit in zip(scene.descriptions, bits, strict=True)]
@@ -138,7 +141,7 @@ def groups(objects: int) -> Item:
 
 
 def region(objects: int) -> Item:
-    """An eighth of the volume is of interest, all of it is watched."""
+    """A region of an eighth of the volume, forced on: no region."""
     scene = make_scene("clutter", objects=objects)
     high = 0.5 * float(scene.size)  # type: ignore[attr-defined]
     inside = Profile(region_min=(-9.0, -9.0, -9.0), region_max=(high, high, high))
@@ -154,7 +157,7 @@ def region(objects: int) -> Item:
 
 
 def sat(objects: int) -> Item:
-    """Spheres as boxes of a nanometre that are grown by the radius: each pair has its axes looked at."""
+    """Spheres, forced on: boxes of a nanometre grown by the radius, so that SAT tests the axes of each pair."""
     scene = make_scene("clutter", objects=objects)
     radii = np.random.default_rng(1).uniform(0.1, 0.4, objects).tolist()
     ids = [d.object_id for d in scene.descriptions]
@@ -164,7 +167,7 @@ def sat(objects: int) -> Item:
 
 
 def meshes(objects: int) -> Item:
-    """Boxes as closed meshes of twelve triangles."""
+    """Boxes, forced on: closed meshes of twelve triangles."""
     scene = make_scene("clutter", objects=objects)
     sizes = np.random.default_rng(1).uniform(0.2, 0.8, (objects, 3))
     corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -189,7 +192,7 @@ ITEMS: Final[dict[str, Callable[[int], Item]]] = {
 
 
 def main() -> None:
-    """Print a line for each item."""
+    """Measure and print a line for each item."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--objects", type=int, default=300)
     parser.add_argument("--steps", type=int, default=150)
@@ -207,7 +210,7 @@ def main() -> None:
         off, on = (float(np.mean(each[10:])) for each in spent)
         rows.append({"item": name, "off_ms": off, "on_ms": on, "times": on / off})
         if not args.json:
-            print(f"{name:28} left out {off:7.3f} ms   forced on {on:7.3f} ms   {on / off:5.2f} times", flush=True)
+            print(f"{name:28} skipped {off:7.3f} ms   forced on {on:7.3f} ms   {on / off:5.2f} times", flush=True)
     if args.json:
         print(json.dumps({"objects": args.objects, "load": os.getloadavg()[0], "rows": rows}))
 

@@ -1,9 +1,10 @@
-"""When each space partition wins: milliseconds of processor time to find all overlapping pairs of boxes, from nothing.
+"""Compare the space partitions: processor time (ms) to build one and find all overlapping pairs of boxes.
 
     python benchmarks/space_partitions.py                 # 1,000 and 10,000 boxes
     python benchmarks/space_partitions.py --boxes 100000
 
-The grids are compiled kernels, the others NumPy; all find the same pairs, which is checked. Prints a Markdown table.
+The grids are compiled kernels, the others NumPy. The benchmark checks that all find the same pairs. Prints a Markdown
+table.
 """
 
 from __future__ import annotations
@@ -26,35 +27,35 @@ from collision_monitor.geometry.polyhedra import locate_in_polyhedron
 Array = NDArray[np.float64]
 RUNS: Final = 5
 BRUTE_FORCE: Final = 2000
-"""Boxes up to which everything is compared with everything: the table grows with the square."""
+"""Most boxes for brute force, whose memory grows with the square of their number."""
 
 
 def crowd(n: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Boxes of about 1 m in a hall in which each meets one or two others."""
+    """Boxes of about 1 m in a hall; each meets one or two others."""
     side = (2.0 * n) ** (1 / 3)
     return rng.uniform(0, side, (n, 3)), rng.uniform(0.5, 1.0, (n, 3))
 
 
 def floor(n: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """The same on one floor, as vehicles are."""
+    """The same boxes on one floor, like vehicles."""
     lower, size = rng.uniform(0, (2.0 * n) ** 0.5, (n, 3)), rng.uniform(0.5, 1.0, (n, 3))
     return lower * [1, 1, 0], size
 
 
 def mixed(n: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """From bolts of 1 cm to halls of 10 m, each size as often."""
+    """Boxes from bolts of 1 cm to halls of 10 m, with a log-uniform size."""
     size = 10 ** rng.uniform(-2, 1, (n, 1)) * rng.uniform(0.5, 1.0, (n, 3))
     side = (40.0 * n) ** (1 / 3)
     return rng.uniform(0, side, (n, 3)), size
 
 
 def corridor(n: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """One after the other, as on a road or a belt."""
+    """Boxes in a line, as on a road or a belt."""
     return rng.uniform(0, 1, (n, 3)) * [1.2 * n, 2, 2], rng.uniform(0.5, 1.0, (n, 3))
 
 
 def islands(n: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Crowds of 50 that are a kilometre apart."""
+    """Crowds of 50 boxes that are a kilometre apart."""
     centre = 1000.0 * rng.integers(-20, 20, (n // 50 + 1, 3))
     return np.repeat(centre, 50, axis=0)[:n] + rng.uniform(0, 4, (n, 3)), rng.uniform(0.5, 1.0, (n, 3))
 
@@ -63,7 +64,7 @@ SCENES: Final = {"crowd": crowd, "floor": floor, "mixed sizes": mixed, "corridor
 
 
 def milliseconds(run: Callable[[], object]) -> float:
-    """Median of a few runs."""
+    """Median processor time of a few runs (ms)."""
     times = []
     for _ in range(RUNS):
         begin = time.process_time()
@@ -73,7 +74,7 @@ def milliseconds(run: Callable[[], object]) -> float:
 
 
 def overlaps_table(counts: list[int]) -> None:
-    """One row for each scene and number of boxes, the fastest of those that are NumPy and of all in bold."""
+    """Print a row for each scene and number of boxes; the fastest of all and the fastest in NumPy are bold."""
     names = list(PARTITIONS)
     print("| scene | boxes | pairs | " + " | ".join(names) + " |")
     print("|---|" + "---:|" * (len(names) + 2))
@@ -97,7 +98,7 @@ def overlaps_table(counts: list[int]) -> None:
 
 
 def bsp_table() -> None:
-    """Points in a static solid: the BSP tree against the exact ray parity."""
+    """Print the cost of locating points in a static solid by the BSP tree and by the exact ray parity."""
     print("\n| faces | nodes | ms to build | µs for a point | by ray parity |")
     print("|---:|---:|---:|---:|---:|")
     rng = np.random.default_rng(2)
@@ -115,7 +116,7 @@ def bsp_table() -> None:
 
 
 def torus(major: int, minor: int) -> tuple[Array, NDArray[np.int64]]:
-    """A closed mesh about the origin, radii 1 and 0.3 m."""
+    """Closed mesh of a torus about the origin, radii 1 and 0.3 m."""
     i, j = np.divmod(np.arange(major * minor), minor)
     u, v = 2 * np.pi * i / major, 2 * np.pi * j / minor
     ring = 1 + 0.3 * np.cos(v)
@@ -129,7 +130,7 @@ def torus(major: int, minor: int) -> tuple[Array, NDArray[np.int64]]:
 def main() -> None:
     """Measure and print both tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--boxes", type=int, nargs="+", default=[1000, 10_000], help="how many (default 1000 10000)")
+    parser.add_argument("--boxes", type=int, nargs="+", default=[1000, 10_000], help="numbers (default 1000 10000)")
     overlaps_table(parser.parse_args().boxes)
     bsp_table()
 

@@ -1,4 +1,4 @@
-"""What is known of the distance of two sphere trees after each level, and what it costs: a Markdown table.
+"""Measure the bounds on the distance of two sphere trees after each level, and their cost, as a Markdown table.
 
 OPENBLAS_NUM_THREADS=1 python benchmarks/sphere_trees.py
 """
@@ -14,7 +14,7 @@ from collision_monitor.geometry.sphere_tree import distance_intervals, sphere_tr
 
 
 def main() -> None:
-    """Two rings of 256 triangles, and two of 4,096."""
+    """Measure and print two rings of 256 triangles, and two of 4,096."""
     X, Y = cm.Pose(), cm.Pose((2.0, 0.5, 1.2), (0.5, 0.5, 0.5, 0.5))
     print("| triangles | s to build | distance | level | spheres | at least | at most | ms |")
     print("|---:|---:|---:|---:|---:|---:|---:|---:|")
@@ -25,7 +25,7 @@ def main() -> None:
         build = time.process_time() - begin
         ring = cm.Mesh(vertices, faces)
         true = cm.contact(ring, X, ring, Y).signed_distance
-        list(distance_intervals(tree, X, tree, Y))  # once to wake what sleeps
+        list(distance_intervals(tree, X, tree, Y))  # warms up
         begin = time.process_time()
         cells = f"{len(faces):,} | {build:.1f} | {true:.4f}"
         for k, interval in enumerate(distance_intervals(tree, X, tree, Y)):

@@ -1,10 +1,10 @@
-"""From a state's stamp to the arrival of its predictions, through DDS: world, recording monitor and listener.
+"""Measure the time from a state's stamp to the arrival of its predictions, through DDS.
 
     python benchmarks/through_node.py                                    1,000 at 100 Hz and 10,000 at 20 Hz, 60 s each
     python benchmarks/through_node.py --objects 500 --rate 50 --duration 10 --scene particles
 
-World and monitor are the commands of those names, in processes of their own; this process is the third. Everything
-stays on this machine, in a ROS domain of its own. The exit code is 1 where nothing could be measured.
+The world and the recording monitor are the commands `world` and `run`, each in its own process; this process listens.
+All traffic stays on this machine, in a ROS domain of its own. The exit code is 1 if nothing could be measured.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ from collision_monitor.ros.process import ros_context, stay_on_this_machine
 from collision_monitor.world import describe
 
 CASES = ((1_000, 100.0), (10_000, 20.0))
-"""Moving objects and messages per second where neither is given."""
+"""Default pairs of moving objects and messages per second."""
 START_PATIENCE = 180.0
-"""s for the monitor to answer; after a change it has to compile its kernels first."""
+"""s to wait for the monitor's first status; after a change it compiles its kernels first."""
 STRAGGLERS = 1.0
-"""s after the world's end in which its last answers may arrive."""
+"""s to wait for the last answers after the world has ended."""
 TICK = 0.25
-"""s between two looks at the processes."""
+"""s between two checks of the processes."""
 PUBLISHED = re.compile(r"published (\d+) messages in .* s, (\d+) periods skipped, at most ([0-9.]+) ms after")
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """Times in ms, memory in MB. `load`: mean number of runnable processes over the last minute, before and after."""
+    """Times in ms, memory in MB. load: mean number of runnable processes in the last minute, before and after."""
 
     scene: str
     objects: int
@@ -73,12 +73,12 @@ class Measurement:
 
     @property
     def dropped(self) -> int:
-        """Published states that were not answered."""
+        """Number of published states without an answer."""
         return self.published - self.answered
 
 
 class Listener:
-    """Notes when each answer arrives and which it is; looks into no more of it than that."""
+    """Notes the step, the stamp and the arrival of each answer, and decodes nothing else."""
 
     def __init__(self) -> None:
         from rclpy import create_node
@@ -107,11 +107,11 @@ class Listener:
 
     @property
     def status(self) -> codec.MonitorStatus | None:
-        """The newest."""
+        """The newest status, or None."""
         return None if self._status is None else codec.decode_status(self._status)
 
     def listen(self, seconds: float) -> None:
-        """Take what arrives."""
+        """Receive messages for so many seconds."""
         until = time.monotonic() + seconds
         while (left := until - time.monotonic()) > 0.0:
             self._executor.spin_once(timeout_sec=left)
@@ -123,7 +123,7 @@ class Listener:
 
 
 def measure(scene: str, objects: int, rate: float, duration: float, seed: int) -> Measurement:
-    """Play the scene once. Raises ProcessError where a process fails or no answer arrives."""
+    """Play the scene once. Raises ProcessError if a process fails or no answer arrives."""
     load = os.getloadavg()[0]
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -135,7 +135,7 @@ def measure(scene: str, objects: int, rate: float, duration: float, seed: int) -
         play = ["world", scene, "--objects", str(objects), "--rate", str(rate), "--duration", str(duration)]
         with Child(*play, "--seed", str(seed)) as world:
             gc.collect()
-            gc.freeze()  # or the listener itself is late now and then
+            gc.freeze()  # else garbage collection delays the listener
             while not listener.arrivals and world.running():
                 listener.listen(TICK)
             began, cpu, memory = time.monotonic(), _cpu_seconds(monitor.pid), _memory(monitor.pid)
@@ -180,7 +180,7 @@ def measure(scene: str, objects: int, rate: float, duration: float, seed: int) -
 
 
 def _wait_for_answer(listener: Listener, monitor: Child) -> None:
-    """Until the first status: the monitor publishes one as soon as it listens."""
+    """Wait for the first status, which the monitor publishes as soon as it listens."""
     patience = time.monotonic() + START_PATIENCE
     while listener.status is None:
         listener.listen(TICK)
@@ -190,18 +190,18 @@ def _wait_for_answer(listener: Listener, monitor: Child) -> None:
 
 
 def _cpu_seconds(pid: int) -> float:
-    """User and system time of all threads (proc(5), stat: fields 14 and 15)."""
+    """User and system time of all threads in s (proc(5), stat: fields 14 and 15)."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _memory(pid: int) -> float:
-    """MB of physical memory."""
+    """Physical memory (MB)."""
     return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def table(measurements: list[Measurement]) -> str:
-    """For people: one column for each measurement."""
+    """Text table with a column for each measurement."""
     rows = [("", [f"{m.scene}, {m.objects:,} at {m.rate:g} Hz" for m in measurements])]
 
     def row(name: str, texts: list[str]) -> None:
@@ -231,11 +231,11 @@ def table(measurements: list[Measurement]) -> str:
 def main() -> int:
     """Return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--objects", type=int, metavar="N", help="how many move")
+    parser.add_argument("--objects", type=int, metavar="N", help="number of moving objects")
     parser.add_argument("--rate", type=float, metavar="HZ", help="messages per second")
     parser.add_argument("--duration", type=float, default=60.0, metavar="S", help="seconds each (default: 60)")
     parser.add_argument("--scene", default="clutter", metavar="NAME", help="see `world --list` (default: clutter)")
-    parser.add_argument("--seed", type=int, default=1, metavar="K", help="of the scene's random numbers (default: 1)")
+    parser.add_argument("--seed", type=int, default=1, metavar="K", help="seed of the scene (default: 1)")
     parser.add_argument("--json", action="store_true", help="print one line of JSON in place of the table")
     args = parser.parse_args()
     if (args.objects is None) != (args.rate is None):

@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/geometry.md and docs/narrow_phase.md with the package's own functions.
+"""Draw the pictures of docs/geometry.md and docs/narrow_phase.md with the package's own functions.
 
     python docs/draw_geometry.py
 """
@@ -39,23 +39,23 @@ mpl.rcParams.update({"svg.hashsalt": "collision_monitor", "font.size": 9, "axes.
 
 
 def around(points: Array) -> Array:
-    """Points (n, 2) in order around their middle."""
+    """Return the points (n, 2) in order around their mean."""
     offset = points - points.mean(axis=0)
     return points[np.argsort(np.arctan2(offset[:, 1], offset[:, 0]))]
 
 
 def area(polygon: Array) -> float:
-    """m² of a convex polygon in order."""
+    """Area of a convex polygon with ordered corners (m²)."""
     following = np.roll(polygon, -1, axis=0)
     return 0.5 * abs(float((polygon[:, 0] * following[:, 1] - polygon[:, 1] * following[:, 0]).sum()))
 
 
 def bounding_volumes() -> None:
-    """Each bounding volume of one set of points in the plane, with its area relative to the hull's."""
+    """Draw each bounding volume of one set of points in the plane, with its area relative to the hull's."""
     rng = np.random.default_rng(4)
     turn = np.array([[0.8, -0.6], [0.6, 0.8]])
     points = np.vstack([rng.uniform([0, 0], [4, 0.9], (40, 2)), rng.uniform([3.1, 0], [4, 2.2], (25, 2))]) @ turn.T
-    # volumes in space, of the same points on two floors, seen from above
+    # the spatial volumes contain the same points on two floors, seen from above
     floors = np.vstack([np.column_stack([points, np.full(len(points), z)]) for z in (0.0, 1.0)])
     hull = around(np.unique(convex_hull(floors).vertices[:, :2], axis=0))
     box = aabb(points)
@@ -93,7 +93,7 @@ def bounding_volumes() -> None:
 
 
 def draw_axis(plot: Any, normal: Array, at: float, a: Array, b: Array, found: bool) -> None:
-    """One axis of SAT with both projections on it, `at` metres across it from the origin."""
+    """Draw one axis of SAT with both projections on it, `at` metres across it from the origin."""
     along, across = normal, np.array([-normal[1], normal[0]])
     (low_a, high_a), (low_b, high_b) = project(a, normal), project(b, normal)
     ends = np.array([min(low_a, low_b) - 0.25, max(high_a, high_b) + 0.25])
@@ -106,13 +106,13 @@ def draw_axis(plot: Any, normal: Array, at: float, a: Array, b: Array, found: bo
     if found:
         gap = np.array([high_a, low_b])[:, None] * along + at * across
         plot.plot(*gap.T, color=GAP, lw=4, solid_capstyle="butt", zorder=5)
-        for end in (high_a, low_b):  # the two lines between which nothing is
+        for end in (high_a, low_b):  # the two lines that bound the empty strip
             strip = np.array([at, at + 4.2 * np.sign(-at)])[:, None] * across + end * along
             plot.plot(*strip.T, color=GAP, lw=0.8, ls="--")
 
 
 def separating_axes() -> None:
-    """SAT of two polygons apart, which ends at the first separating axis, and overlapping, with the translation."""
+    """Draw SAT for polygons apart, which ends at the first separating axis, and overlapping, with the translation."""
     a = np.array([[0.0, 0], [2.2, 0.2], [2.5, 1.4], [1.1, 2.3], [0, 1.5]])
     triangle = np.array([[0.0, 0.3], [1.7, -0.5], [1.4, 1.5]])
     figure, plots = plt.subplots(1, 2, figsize=(10, 4.9), constrained_layout=True)
@@ -148,14 +148,14 @@ def separating_axes() -> None:
 
 
 def save(figure: Any, name: str) -> None:
-    """As SVG without a date, so that the same picture is the same file."""
+    """Save as SVG without a date, so that the same picture gives the same file."""
     IMAGES.mkdir(exist_ok=True)
     figure.savefig(IMAGES / f"{name}.svg", metadata={"Date": None})
     plt.close(figure)
 
 
 def prism(polygon: Array, height: float) -> tuple[Array, NDArray[np.int64]]:
-    """A closed mesh: a counter-clockwise polygon (n, 2), and the same `height` metres above."""
+    """Closed mesh between a counter-clockwise polygon (n, 2) and its copy `height` metres above."""
     n = len(polygon)
     vertices = np.vstack([np.column_stack([polygon, np.full(n, z)]) for z in (0.0, height)])
     k, after = np.arange(n), (np.arange(n) + 1) % n
@@ -168,7 +168,7 @@ U_PROFILE = np.array([(0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0
 
 
 def sphere_trees() -> None:
-    """The levels of a tree seen from above, and the interval of a distance after each of them."""
+    """Draw the levels of a sphere tree from above, and the interval of a distance after each level."""
     vertices, faces = prism(U_PROFILE, 0.75)
     tree = sphere_tree(vertices, faces, depth=6)
     figure, axes = plt.subplots(1, 5, figsize=(12, 2.9), constrained_layout=True, width_ratios=[1, 1, 1, 1, 1.3])
@@ -198,7 +198,7 @@ def sphere_trees() -> None:
 
 
 def contact_patches() -> None:
-    """Two boxes flush with each other, from above, and a wedge on an edge: the points of their contacts."""
+    """Draw the contact points of two boxes from above: face on face, also turned, and an edge on a face."""
     figure, plots = plt.subplots(1, 3, figsize=(10, 3.4), constrained_layout=True)
     low, high = Box((2.4, 1.6, 1.0)), Box((1.8, 1.2, 1.0))
     for plot, turn, tilt, title in (

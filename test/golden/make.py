@@ -1,4 +1,4 @@
-"""Make the golden sessions anew. Only after a change that is meant to change answers; say in the commit why it does.
+"""Record the golden sessions anew. Do so only after an intended change of answers; state the reason in the commit.
 
 python test/golden/make.py
 """
@@ -21,7 +21,7 @@ PROFILES: Final = ("balanced", "exact")
 
 
 def main() -> None:
-    """One session for each profile: 3 s of six bodies, a wall, and everything that can be refused."""
+    """Record a session for each profile: 3 s of six bodies and a wall, with invalid inputs."""
     for name in PROFILES:
         path = HERE / f"{name}.mcap"
         path.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""The golden sessions replay to the same bytes, with one thread and with two."""
+"""Golden sessions replay to the same bytes, with one thread and with two."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def test_there_are_golden_sessions() -> None:
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("path", SESSIONS, ids=lambda path: path.stem)
 def test_a_golden_session_replays_to_the_same_bytes(path: Path, threads: int) -> None:
-    """Recorded by another build of the sources: so equal bytes are asked for here, whatever their origin."""
+    """The session may come from another build of the sources, so the test compares bytes and ignores provenance."""
     report = replay(Session(path), threads=threads)
     assert report.first_difference is None, (
         f"{report.first_difference}. Where this change of answers is meant, run test/golden/make.py"

@@ -1,4 +1,4 @@
-"""Bags as other programs write them, by rosbags: odometry, poses, transforms and markers."""
+"""Bags like those of other programs, written with rosbags: odometry, poses, transforms and markers."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def pose_stamped(frame: str, stamp: int, p: Any, q: Any = (0, 0, 0, 1)) -> tuple
 
 
 def transforms(stamp: int, *links: tuple[str, str, Any, Any]) -> tuple[str, Any]:
-    """links: parent, child, position, quaternion."""
+    """TFMessage of links (parent, child, position, quaternion)."""
     each = [
         T["geometry_msgs/msg/TransformStamped"](
             header(parent, stamp),
@@ -77,7 +77,7 @@ def markers(*each: Any) -> tuple[str, Any]:
 def write_bag(
     path: Path, messages: Iterable[tuple[str, int, tuple[str, Any]]], *, storage: StoragePlugin = StoragePlugin.MCAP
 ) -> Path:
-    """messages: topic, time of receipt, (type, message or its bytes)."""
+    """Write messages (topic, time of receipt in ns, (type, message or its bytes)) into a bag; returns its path."""
     connections: dict[str, Any] = {}
     with Writer(path, version=9, storage_plugin=storage) as writer:
         for topic, received, (kind, message) in messages:

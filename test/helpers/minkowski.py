@@ -1,4 +1,4 @@
-"""Slow and obvious answers: the Minkowski difference of two point sets by qhull, and the distance to its faces."""
+"""Slow oracle: the Minkowski difference of two point sets by qhull, and the distance to its faces."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 
 
 def rotation(rng: np.random.Generator) -> np.ndarray:
-    """A uniformly random rotation (3, 3)."""
+    """Uniformly random rotation (3, 3)."""
     q = rng.normal(size=4)
     x, y, z, w = q / np.linalg.norm(q)
     return np.array(
@@ -22,12 +22,12 @@ def rotation(rng: np.random.Generator) -> np.ndarray:
 
 
 def box_points(size) -> np.ndarray:
-    """The eight corners (8, 3) of a box of full extents `size`."""
+    """Corners (8, 3) of a box of full extents `size` (m)."""
     return np.array(list(itertools.product(*[(-s / 2, s / 2) for s in size])))
 
 
 def _closest_on_triangle(a, b, c) -> np.ndarray:
-    """Closest point to the origin: of the face where it projects inside, else of the three edges."""
+    """Closest point to the origin: on the face if the origin projects inside, else on the three edges."""
     n = np.cross(b - a, c - a)
     candidates = []
     n2 = n @ n
@@ -44,7 +44,7 @@ def _closest_on_triangle(a, b, c) -> np.ndarray:
 
 
 def polytope_signed_distance(points_a: np.ndarray, points_b: np.ndarray) -> float:
-    """Signed distance of the hulls of two point sets (n, 3), from every face of the Minkowski difference."""
+    """Signed distance (m) of the hulls of two point sets (n, 3), from every face of the Minkowski difference."""
     difference = (points_b[:, None, :] - points_a[None, :, :]).reshape(-1, 3)
     hull = ConvexHull(difference)
     if (hull.equations[:, 3] <= 0).all():

@@ -1,4 +1,4 @@
-"""One pair of shapes through the batch kernels, as a record with names."""
+"""Contact of one pair of shapes by the batch kernels, as a record with named fields."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Contact:
 
 
 def contact(a, b, p=(0, 0, 0), R_A=EYE, R_B=EYE, margins=(0.0, 0.0), swap=False, origin=(0, 0, 0)) -> Contact:
-    """Contact and separation of a at `origin` and b at origin + p; checks what holds for every answer."""
+    """Contact and separation of a at `origin` and b at origin + p; checks the invariants of every answer."""
     builder = ShapeTableBuilder(slots=2)
     builder.append(a, margin=margins[0])
     builder.append(b, margin=margins[1])
@@ -51,7 +51,7 @@ def contact(a, b, p=(0, 0, 0), R_A=EYE, R_B=EYE, margins=(0.0, 0.0), swap=False,
 
 
 def size(shape) -> float:
-    """A length of the shape, for relative tolerances."""
+    """Characteristic length of the shape (m), for relative tolerances."""
     match shape:
         case shapes.Sphere():
             return shape.radius
@@ -65,7 +65,7 @@ def size(shape) -> float:
 
 
 def support(shape, R, n) -> float:
-    """Greatest n.x over the shape, by definition and independently of the kernels."""
+    """Support value max n.x over the shape turned by R, by definition and independently of the kernels."""
     d = R.T @ n
     rim = np.hypot(d[0], d[1])
     match shape:
@@ -85,12 +85,12 @@ def support(shape, R, n) -> float:
 
 
 def projected_gap(a, b, p, R_A, R_B, n) -> float:
-    """Gap of the projections on n: a lower bound of the distance, and minus an upper bound of the depth."""
+    """Gap of the projections on n: a lower bound on the signed distance."""
     return float(np.dot(p, n)) - support(b, R_B, -n) - support(a, R_A, n)
 
 
 def points_of(shape, sides: int = 0) -> np.ndarray:
-    """Vertices of a polytope; of a cylinder or a cone, an inscribed prism or pyramid with `sides` sides."""
+    """Vertices of a polytope, or of a prism or pyramid with `sides` sides inscribed in a cylinder or cone."""
     match shape:
         case shapes.Box():
             return np.array(list(product(*[(-s / 2, s / 2) for s in shape.size])))

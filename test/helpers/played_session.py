@@ -1,4 +1,4 @@
-"""Sessions of the demo scenes, recorded as the node records them, with step times that are the same in every run."""
+"""Sessions of the demo scenes, recorded like the node's, with the same step times in every run."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def record_states(
     answers: bool = True,
     start: int = START,
 ) -> Path:
-    """A session of these states (s, records.STATE), from `start` (ns) on; without answers: the inputs alone."""
+    """Record a session of states (s, records.STATE) from `start` (ns) on. answers: also record the answers."""
     pipeline = Pipeline(profile)
     recorder = Recorder(path, TYPES, pipeline.metadata(node=NODE), patient=True)
     shapes = encode_descriptions(start, "world", descriptions, snapshot=True)
@@ -60,7 +60,7 @@ def record_states(
 
 
 def played(scene: Scene, seconds: float) -> Iterable[tuple[float, States]]:
-    """The states of a scene, step by step."""
+    """Times (s) and states of a scene, step by step."""
     yield scene.time, scene.states()
     while scene.time < seconds and not scene.finished:
         states = scene.step()
@@ -76,25 +76,25 @@ def record_scene(
     profile: str = "balanced",
     rename: Callable[[str], str] = str,
 ) -> Path:
-    """A session of the named scene; rename: what its objects are called."""
+    """Record a session of the named scene. rename: maps the names of its objects."""
     scene = make_scene(name, objects=objects)
     descriptions = [replace(each, name=rename(each.name)) for each in scene.descriptions]
     return record_states(path, descriptions, played(scene, seconds), profile=profile)
 
 
 NASTY = "<script>alert('$x$ & y')</script>"
-"""A name that must do no harm."""
+"""A name that must not be interpreted as HTML or TeX."""
 
 
 def record_drive(path: Path, seconds: float = 3.0, *, speed: float = 1.0, **options: Any) -> Path:
-    """A session of the drive."""
+    """Record a session of `drive_states`."""
     return record_states(path, *drive_states(seconds, speed), profile="exact", **options)
 
 
 def drive_states(seconds: float, speed: float = 1.0) -> tuple[list[ObjectDescription], list[tuple[float, States]]]:
-    """A compound cart (1), named NASTY, drives into a post (2), which is 1.5 m ahead.
+    """Objects and states of a compound cart (1), named NASTY, that drives into a post (2) 1.5 m ahead.
 
-    A ball (3) comes towards it until 0.5 s, then turns back before it would have hit. speed: of the cart, m/s.
+    A ball (3) approaches the cart until 0.5 s, then turns back before it hits. speed: of the cart (m/s).
     """
     objects = [
         ObjectDescription(1, [(Box((1, 0.6, 0.4)), Pose()), (Sphere(0.2), Pose((0.5, 0, 0)))], name=NASTY),

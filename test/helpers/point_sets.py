@@ -1,4 +1,4 @@
-"""Point sets for the tests of bounding volumes: random ones, and ones that break careless constructions."""
+"""Point sets for tests of bounding volumes: random sets, and sets that break careless constructions."""
 
 from __future__ import annotations
 

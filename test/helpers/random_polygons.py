@@ -1,4 +1,4 @@
-"""Simple polygons for tests: random ones, and ones that are hard on purpose."""
+"""Simple polygons for tests: random and hard ones."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from numpy.typing import NDArray
 
 
 def star_shaped(rng: np.random.Generator, corners: int) -> NDArray[np.float64]:
-    """A simple polygon around the origin, mostly concave, counter-clockwise."""
+    """Random simple polygon (n, 2) around the origin, mostly concave, counter-clockwise."""
     angle = 2 * np.pi * (np.arange(corners) + rng.uniform(0, 0.9, corners)) / corners
     return (rng.uniform(0.2, 1, corners) * np.array([np.cos(angle), np.sin(angle)])).T
 
 
 def convex(rng: np.random.Generator, corners: int) -> NDArray[np.float64]:
-    """A convex polygon with its corners on an ellipse, counter-clockwise."""
+    """Random convex polygon (n, 2) with its corners on an ellipse, counter-clockwise."""
     angle = np.sort(2 * np.pi * (np.arange(corners) + rng.uniform(0, 0.9, corners)) / corners)
     return rng.normal(size=2) + np.array([np.cos(angle), 0.7 * np.sin(angle)]).T
 
 
 @st.composite
 def histograms(draw: st.DrawFn) -> NDArray[np.float64]:
-    """Columns of whole heights side by side: a simple polygon with right angles, straight corners and many ties."""
+    """Draw adjacent columns of integer heights: a simple polygon with right angles, straight corners and many ties."""
     heights = draw(st.lists(st.integers(1, 4), min_size=1, max_size=5))
     top = [(k + (1 - i % 2), h) for k, h in reversed(list(enumerate(heights))) for i in range(2)]
     base = [(k, 0) for k in range(len(heights) + 1)]

@@ -1,4 +1,4 @@
-"""The slow obvious versions, in rational numbers: what the geometry's exact decisions are compared with."""
+"""Slow oracles in rational numbers for the exact predicates of geometry."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ LATTICE = st.integers(-4, 4)
 POINTS_2D = st.tuples(LATTICE, LATTICE)
 POINTS_3D = st.tuples(LATTICE, LATTICE, LATTICE)
 EXPONENTS = st.integers(-30, 30)
-"""Of a power of two that scales a scene from 1e-9 to 1e9 without rounding."""
+"""Exponents of powers of two that scale a scene from 1e-9 to 1e9 without rounding."""
 
 
 def exact(point: Any) -> list[Fraction]:
@@ -49,7 +49,7 @@ def sign(x: Fraction) -> int:
 
 
 def on_segment(p: Any, a: Any, b: Any) -> bool:
-    """By the parameter t of the slide: p = a + t (b - a) for one t in 0 … 1."""
+    """Whether p = a + t (b - a) for a t in 0 … 1, as on the lecture's slide."""
     p, a, b = exact(p), exact(a), exact(b)
     if a == b:
         return p == a
@@ -60,7 +60,7 @@ def on_segment(p: Any, a: Any, b: Any) -> bool:
 
 
 def common_points(a: Any, b: Any, c: Any, d: Any) -> tuple[Any, Any] | None:
-    """First and last common point of the segments a, b and c, d in the plane; None where they have none."""
+    """First and last common point of the segments a, b and c, d in the plane, or None."""
     a, b, c, d = exact(a), exact(b), exact(c), exact(d)
     u, v, w = minus(b, a), minus(d, c), minus(c, a)
     turn = cross2(u, v)
@@ -75,7 +75,7 @@ def common_points(a: Any, b: Any, c: Any, d: Any) -> tuple[Any, Any] | None:
 
 
 def in_polygon(p: Any, polygon: Any) -> int:
-    """1, 0, -1: inside, on the boundary, outside; by a ray that meets no corner."""
+    """1 inside, 0 on the boundary, -1 outside; by a ray that meets no corner."""
     n = len(polygon)
     sides = [(polygon[i], polygon[(i + 1) % n]) for i in range(n)]
     if any(on_segment(p, a, b) for a, b in sides):
@@ -97,13 +97,13 @@ def in_polygon(p: Any, polygon: Any) -> int:
 
 
 def in_triangle(p: list[Fraction], a: list[Fraction], b: list[Fraction], c: list[Fraction]) -> bool:
-    """Whether a point of the plane of a triangle with an area is in it, boundary included."""
+    """Whether a point in the plane of a non-degenerate triangle is in the triangle, boundary included."""
     n = cross3(minus(b, a), minus(c, a))
     return all(dot(cross3(minus(v, u), minus(p, u)), n) >= 0 for u, v in ((a, b), (b, c), (c, a)))
 
 
 def in_polyhedron(p: Any, vertices: Any, faces: Any) -> int:
-    """1, 0, -1: inside, on the boundary, outside; by a ray that meets no edge. Faces have an area."""
+    """1 inside, 0 on the boundary, -1 outside; by a ray that meets no edge. Faces must not be degenerate."""
     q = exact(p)
     corners = [[exact(vertices[i]) for i in face] for face in faces]
     for a, b, c in corners:
@@ -125,7 +125,7 @@ def in_polyhedron(p: Any, vertices: Any, faces: Any) -> int:
 
 
 def segment_meets_triangle(p: Any, q: Any, a: Any, b: Any, c: Any) -> bool:
-    """For triangles with an area, by the slide's steps, in rational numbers."""
+    """Whether segment p, q meets a non-degenerate triangle, by the steps of the lecture's slide in rationals."""
     p, q, a, b, c = exact(p), exact(q), exact(a), exact(b), exact(c)
     n = cross3(minus(b, a), minus(c, a))
     before, after = dot(minus(p, a), n), dot(minus(q, a), n)

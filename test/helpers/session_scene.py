@@ -1,4 +1,4 @@
-"""A small scene through the pipeline and the recorder, as the node does it."""
+"""A small scene, run through the pipeline and the recorder like in the node."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ STEP = 10_000_000
 
 
 def inputs(steps: int) -> Iterator[tuple[str, bytes]]:
-    """(topic, bytes): three kinds of bodies that bounce along x through each other, and everything that goes wrong."""
+    """Inputs (topic, bytes): three kinds of bodies that swing along x through each other, and invalid messages."""
     shapes = [Sphere(0.5), Box((1.0, 0.6, 0.4)), Capsule(0.3, 0.8)]
     objects = [ObjectDescription(k, shapes[k % 3], name=f"body {k}") for k in range(1, 7)]
     wall = ObjectDescription(9, Box((0.2, 8, 8)), name="wall", static=True, pose=Pose((4, 0, 0)))
@@ -67,8 +67,8 @@ def record(
     switches: Mapping[int, Profile] | None = None,
     **options: Any,
 ) -> Recorder:
-    """The scene, recorded as the node records it; switches: profiles, and before which input each is switched to;
-    options: of the recorder."""
+    """Record the scene like the node. switches: profile by the number of the input before which it is set.
+    options: arguments of the recorder."""
     pipeline = pipeline or Pipeline("balanced")
     switches = switches or {}
     types = {**TYPES, SETTINGS: "ParameterEvent"} if switches else TYPES

@@ -1,4 +1,4 @@
-"""Closed meshes for tests, counter-clockwise from outside, on whole numbers so that rational oracles stay quick."""
+"""Closed meshes for tests, counter-clockwise from outside, on integers so that rational oracles stay quick."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Solid = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
 def voxels(filled: NDArray[np.bool_]) -> Solid:
-    """The surface of unit cubes (i, j, k), two triangles for each side between a filled and an empty one."""
+    """Surface of the filled unit cubes (i, j, k), two triangles for each side between a filled and an empty cube."""
     filled = np.pad(filled, 1)
     quads = []
     for axis in range(3):
@@ -62,7 +62,7 @@ def octahedron() -> Solid:
 CONCAVE = {"U": u_shape, "ring": ring, "hollow": hollow}
 CONVEX = {"cube": cube, "bar": lambda: bar(1, 2, 3), "octahedron": octahedron}
 
-# skew, but whole: turns the grid's planes and the rays that run along them
+# integer maps that turn the grid's planes and the rays along them
 SKEWS = {
     "upright": np.eye(3),
     "turned about z": np.array([[1, -1, 0], [1, 1, 0], [0, 0, 1]], float),

@@ -1,4 +1,4 @@
-"""Bodies that start anew or are predicted further: looked up one by one or found by one sweep, they meet the same."""
+"""Candidates of bodies with a new or extended prediction: queries of single bodies and one sweep find the same."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Snapshots: a pipeline that is thawed goes on with the same bytes as the one that was frozen, from every moment."""
+"""Snapshots: a restored pipeline gives the same bytes as the original one, from every moment."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ Answers = list[bytes | None]
 
 
 def solids(rng: np.random.Generator) -> list[Shape]:
-    """Hulls of the same points among them, which share their vertices."""
+    """Solids; some are hulls of the same points, which share their vertices."""
     points = rng.uniform(-0.5, 0.5, (12, 3))
     tetrahedron = ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
     return [
@@ -52,7 +52,7 @@ def flats(rng: np.random.Generator) -> list[Shape]:
 
 
 def inputs(shapes: list[Shape], walls: list[ObjectDescription], steps: int, seed: int) -> Iterator[tuple[str, bytes]]:
-    """("shapes" or "states", message): objects that cross, come, go and change, and inputs that are refused."""
+    """Inputs ("shapes" or "states", message): objects that cross, appear, disappear and change; refused inputs."""
     rng = np.random.default_rng(seed)
 
     def described(i: int) -> ObjectDescription:
@@ -141,7 +141,7 @@ def test_a_snapshot_is_a_numpy_file() -> None:
 
 
 def broken(change: str, snapshot: Snapshot) -> Snapshot:
-    """One that a kernel would read beside its arrays with, or that another version wrote."""
+    """Snapshot with which a kernel would read out of bounds, or that another version wrote."""
     arrays, facts = dict(snapshot.arrays), {name: dict(each) for name, each in snapshot.facts.items()}
     match change:
         case "an array is missing":

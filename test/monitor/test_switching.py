@@ -1,4 +1,4 @@
-"""A profile that changes while the monitor runs: nothing is forgotten, and from then on the new one holds."""
+"""A profile that changes while the monitor runs: nothing is lost, and the new profile holds from then on."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_contacts_persist_and_keep_their_age(profile: str | Profile) -> None:
 
 @pytest.mark.parametrize("setting", Profile.fields(), ids=lambda setting: setting.name)
 def test_every_setting_can_change_and_holds_from_then_on(setting: Any) -> None:
-    """Against plain recomputation with the new profile, at every step after the change."""
+    """Compare with plain recomputation with the new profile, at every step after the change."""
     scene = make_scene("crossing")
     monitor, plain = Monitor("balanced"), ReferenceMonitor("balanced")
     for description in scene.descriptions:
@@ -111,7 +111,7 @@ def test_predictions_are_as_exact_as_the_new_profile() -> None:
     result, expected = (each.step(round(scene.time * SECOND), states) for each in (monitor, fresh))
     for name in ("id_a", "id_b", "status"):
         assert np.array_equal(result.predictions[name], expected.predictions[name])
-    for name in ("lower", "upper"):  # found over another stretch of time, so not to the last bit
+    for name in ("lower", "upper"):  # the search covers another interval, so the last bits differ
         assert np.allclose(result.predictions[name], expected.predictions[name], atol=1e-5)
     certain = [p[p["status"] == records.PredictionStatus.HIT] for p in (rough, result.predictions)]
     before, after = (np.median(p["upper"] - p["lower"]) for p in certain)
@@ -188,7 +188,7 @@ def test_the_model_of_a_class_stands_for_what_chooses_none() -> None:
         monitor.add(10 + object_id, shape, model=Model.KDOP26)
     monitor.add(20, HalfSpace((0, 0, 1), 0.0), static=True, pose=Pose())
     poses = np.zeros((10, 7))
-    poses[:, 6] = 1.0  # all in one place: everything touches
+    poses[:, 6] = 1.0  # all in one place: all pairs touch
     ids = [*range(5), *range(10, 15)]
     models: dict[int, int] = {}
     for contact in monitor.step(0, ids, poses).contacts:

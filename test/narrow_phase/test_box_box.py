@@ -1,4 +1,4 @@
-"""Boxes against every face of their Minkowski difference, and the cases that break SAT."""
+"""Boxes against every face of their Minkowski difference, and cases that break SAT."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def on_surface(box, R, centre, point) -> bool:
 @pytest.mark.parametrize("aside", [1e-3, 1e-4, 3e-5, 1e-5, 1e-6, 1e-7, 1e-8])
 @pytest.mark.parametrize("gap", [1.0, 1e-3])
 def test_corners_nearly_across_a_face(gap, aside):
-    """Two corners are nearest, although the gap across a face is as long to nine digits."""
+    """Two corners are nearest, although the gap across a face is the same to nine digits."""
     cube = Box((1, 1, 1))
     c = contact(cube, cube, (1 + aside, 1 + aside / 2, 1 + gap))
     expected = np.hypot(gap, np.hypot(aside, aside / 2))

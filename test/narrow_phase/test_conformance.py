@@ -1,4 +1,4 @@
-"""Cases from the test suites of FCL, libccd and parry, where the folder with them stands beside the repository."""
+"""Cases from the test suites of FCL, libccd and parry, if their folder lies beside the repository."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def any_pose(record):
 
 
 def of_the_api():
-    """What the test above has no place for: shapes of the plane, triangles, and times of impact."""
+    """Cases that test_case does not cover: shapes of the plane, triangles, and times of impact."""
     cases, done = json.loads(CASES.read_text())["cases"] if CASES.exists() else [], {c["id"] for c in supported()}
     return [c for c in cases if c["id"] not in done and any_shape(c["shapeA"]) and any_shape(c["shapeB"])]
 
@@ -138,7 +138,7 @@ def test_case_of_the_api(case, swap):
 
 
 def test_what_is_left_has_no_shape():
-    """So nothing can be answered wrongly: ellipsoids, planes without a solid side, a capsule in the plane."""
+    """The remaining cases have ellipsoids, planes without a solid side, or a capsule in the plane."""
     done = {c["id"] for c in (*supported(), *of_the_api())}
     left = [c for c in json.loads(CASES.read_text())["cases"] if c["id"] not in done]
     assert all({c["shapeA"]["type"], c["shapeB"]["type"]} & {"ellipsoid", "plane", "capsule2d"} for c in left)

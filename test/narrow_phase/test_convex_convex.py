@@ -1,4 +1,4 @@
-"""GJK and EPA against brute force over all Minkowski faces, and cylinders and cones against what is known of them."""
+"""GJK and EPA against brute force over all Minkowski faces; cylinders and cones against known answers."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_capsule_against_polytopes():
 @pytest.mark.parametrize("make_a", [lambda r: Cylinder(*r.uniform(0.2, 1, 2)), lambda r: Cone(*r.uniform(0.2, 1, 2))])
 @pytest.mark.parametrize("make_b", [random_box, lambda r: Cylinder(*r.uniform(0.2, 1, 2)), random_hull])
 def test_curved_shapes_against_prisms(make_a, make_b):
-    """The inscribed 48-gon lacks 1 - cos(pi / 48) = 0.2 % of the radius: the true answer is between the two."""
+    """The inscribed 48-gon lacks 1 - cos(pi / 48) = 0.2 % of the radius, which bounds the difference."""
     rng = np.random.default_rng(11)
     sides = 48
     for _ in range(12):
@@ -147,7 +147,7 @@ def test_depth_runs_through_zero_without_a_jump(gap):
         closer = contact(a, b, p - (far.distance - gap) * far.normal)
         if gap >= 0:
             assert closer.distance == pytest.approx(gap, abs=1e-9)
-        else:  # a corner that went in by 1 mm along one normal comes out by less along a face's
+        else:  # a corner that is 1 mm deep along one normal is less deep along a face's normal
             assert gap - 1e-9 <= closer.distance <= 1e-9
 
 

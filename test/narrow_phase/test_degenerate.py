@@ -1,4 +1,4 @@
-"""Shapes and poses at the edge of what there is: nearly parallel, without thickness, folded, doubled, mirrored."""
+"""Degenerate shapes and poses: nearly parallel, without thickness, folded, doubled, mirrored."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def about(axis, angle):
 
 @pytest.mark.parametrize("angle", ANGLES)
 def test_edges_that_are_nearly_parallel(angle):
-    """Boxes and hulls, crossed by an angle from 1e-3 down to below the last bit: as if parallel, to what it moves."""
+    """Boxes and hulls at an angle from 1e-3 down to below the last bit answer like parallel ones, to the motion."""
     rng = np.random.default_rng(1)
     long, bar = Box((4, 0.3, 0.2)), Box((3, 0.2, 0.4))
     for _ in range(4):
@@ -39,7 +39,7 @@ def test_edges_that_are_nearly_parallel(angle):
             assert abs(turned.distance - straight.distance) <= 2.2 * angle + 1e-9
             gap = projected_gap(a, b, p, EYE, R, turned.normal)
             assert abs(gap - turned.distance) <= turned.bound + 1e-14
-        # in any direction of the definition the gap is no wider than what SAT has found
+        # along any direction the gap is at most the one that SAT found
         for direction in rng.normal(size=(5, 3)):
             n = direction / np.linalg.norm(direction)
             assert projected_gap(long, bar, p, EYE, R, n) <= contact(long, bar, p, EYE, R).distance + 1e-9
@@ -55,18 +55,18 @@ def test_needles_and_pancakes(kind, thin):
         a, b = (ConvexHull(rng.normal(size=(12, 3)) * scale) for _ in "ab")
         R_A, R_B, p = rotation(rng), rotation(rng), rng.normal(size=3) * 0.7
         c = contact(a, b, p, R_A, R_B)
-        # what the answer says, by the definitions: its gap is there, and its points are in the hulls
+        # check the answer by the definitions: the gap exists, and the witness points are in the hulls
         assert abs(projected_gap(a, b, p, R_A, R_B, c.normal) - c.distance) <= c.bound + 1e-12
         swapped = contact(b, a, -p, R_B, R_A)
         assert abs(swapped.distance - c.distance) <= c.bound + swapped.bound + 1e-12
         if c.distance > 0:
             apart += 1
             for shape, point, R in ((a, c.point_a, R_A), (b, c.point_b - p, R_B)):
-                # in the hull: no direction in which it is farther than all corners
+                # in the hull: no direction along which the point is farther than all corners
                 directions = np.vstack([rng.normal(size=(200, 3)), c.normal, -c.normal, R.T])
                 assert ((directions @ point) <= (directions @ R @ shape.points.T).max(axis=1) + 1e-9).all()
         else:
-            # out of the way of something thin it is not far: along the thin axis of one of them
+            # a short translation separates thin shapes: along the thin axis of one of them
             normals = [R[:, 2] for R in (R_A, R_B)] + [np.cross(R_A[:, 0], R_B[:, 0])]
             ways = [projected_gap(a, b, p, R_A, R_B, s * n / np.linalg.norm(n)) for n in normals for s in (1, -1)]
             assert c.distance >= max(ways) - c.bound - 1e-12
@@ -89,7 +89,7 @@ KINDS = [Sphere(0.5), Box((1, 1, 1)), Capsule(0.3, 0.8), Cylinder(0.5, 1), Cone(
 
 @pytest.mark.parametrize(("a", "b"), list(combinations_with_replacement(KINDS, 2)), ids=lambda s: type(s).__name__)
 def test_in_the_same_place(a, b):
-    """Identical poses: deep inside of each other, with an answer that parts them."""
+    """Identical poses: the shapes are deep in each other, and the answer separates them."""
     for R in (EYE, rotation(np.random.default_rng(4))):
         c = contact(a, b, (0, 0, 0), R, R)
         assert -(size(a) + size(b)) <= c.distance < -0.1
@@ -121,10 +121,10 @@ def test_touching_exactly(p, turn):
 
 
 def two_cubes(shift):
-    """Two cubes as one mesh that shares the corners where they coincide: with an edge of four faces, or a corner."""
+    """Two cubes as one mesh that share coinciding corners: an edge of four faces, or a common corner."""
     corners = np.vstack([CUBE, CUBE + shift])
     quads = np.array([[1, 3, 7, 5], [0, 4, 6, 2], [2, 6, 7, 3], [0, 1, 5, 4], [4, 5, 7, 6], [0, 2, 3, 1]])
-    order = np.array([0, 4, 2, 6, 1, 5, 3, 7])  # of a box's points: x first
+    order = np.array([0, 4, 2, 6, 1, 5, 3, 7])  # order of a box's corners: x first
     faces = order[quads][:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
     vertices, index = np.unique(corners, axis=0, return_inverse=True)
     return Mesh(vertices, index.ravel()[np.vstack([faces, faces + 8])])
@@ -144,7 +144,7 @@ def test_meshes_that_are_no_manifold_are_their_solids(shift):
         if not expected.overlaps:
             assert c.signed_distance == pytest.approx(expected.signed_distance, abs=1e-12)
     assert seen == {True, False}
-    # without one face it is a surface, in which nothing is inside
+    # without one face the mesh is a surface without an inside
     sheet = Mesh(mesh.vertices, mesh.faces[1:])
     assert not cm.contact(sheet, cm.Pose(), Sphere(0.1), cm.Pose()).overlaps
     assert cm.contact(mesh, cm.Pose(), Sphere(0.1), cm.Pose()).overlaps

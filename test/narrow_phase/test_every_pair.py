@@ -1,4 +1,4 @@
-"""What holds for every pair of kinds: swap symmetry, common motion, a second opinion, the same bytes on any threads."""
+"""Invariants of every pair of kinds: swap symmetry, common motion, agreement with FCL, order of the pairs."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def scaled(shape, s):
 
 @pytest.mark.parametrize(("a", "b"), PAIRS + [(k, HalfSpace((1, 2, 3), 0.1)) for k in KINDS], ids=name)
 def test_scaling_scales_the_answer(a, b):
-    """From nanometres to a million kilometres; by powers of two but for round-off nothing may change."""
+    """From nanometres to a million kilometres; scaling by powers of two changes only round-off."""
     rng = np.random.default_rng(7)
     for s in (1e-9, 2.0**-20, 1e-3, 1e9):
         for _ in range(4):
@@ -86,7 +86,7 @@ def test_scaling_scales_the_answer(a, b):
 
 
 def mirrored(shape, flip):
-    """Round shapes and boxes are their own image in a mirror through their axis."""
+    """Mirror image of a shape; round shapes and boxes are their own image in a mirror through their axis."""
     return ConvexHull(shape.points * flip) if isinstance(shape, ConvexHull) else shape
 
 
@@ -106,7 +106,7 @@ def test_a_mirror_mirrors_the_answer(a, b, flip):
 
 @pytest.mark.parametrize(("a", "b"), PAIRS, ids=name)
 def test_moving_by_the_answer_makes_them_touch(a, b):
-    """The translation by -distance along the normal brings any pair to contact: a check that needs no oracle."""
+    """Translation by -distance along the normal brings any pair into contact, a check without an oracle."""
     rng = np.random.default_rng(6)
     for _ in range(10):
         R_A, R_B, p = rotation(rng), rotation(rng), rng.normal(size=3) * 0.6
@@ -133,7 +133,7 @@ def fcl_object(shape, R, p):
 
 @pytest.mark.parametrize(("a", "b"), [q for q in PAIRS if ROCK not in q], ids=name)
 def test_fcl_agrees_on_distances(a, b):
-    """Well apart and near the origin only: elsewhere FCL is no judge."""
+    """Only for pairs that are well apart and near the origin; FCL is not accurate enough elsewhere."""
     rng = np.random.default_rng(7)
     checked = 0
     for _ in range(40):

@@ -1,4 +1,4 @@
-"""Contact patches of polytopes against the corners that half-planes cut out, and what is touched by its name."""
+"""Contact patches of polytopes against the corners of clipped half-planes, and names of the touching features."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def about_z(angle):
 
 
 def shared_corners(size_a, size_b, x, y, angle):
-    """Where two rectangles in the plane meet, by the half-planes of their sides."""
+    """Corners of the intersection of two rectangles in the plane, by the half-planes of their sides."""
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     rows = []
     for size, center, R in ((size_a, np.zeros(2), np.eye(2)), (size_b, np.array([x, y]), turn)):
@@ -93,11 +93,11 @@ def test_edges_and_corners():
     on_edge = Pose((0, 0, np.sqrt(0.5) - 0.01), (np.sin(np.pi / 8), 0, 0, np.cos(np.pi / 8)))
     c = contact(box, on_edge, GROUND, Pose())
     assert same_points(c.points_a, np.array([[-0.5, 0, -0.01], [0.5, 0, -0.01]]))
-    # an edge along a face reaches as far as the face
+    # an edge on a face: the patch ends at the face's border
     slab = Box((0.4, 3, 0.2))
     c = contact(slab, Pose((0, 0, -0.1)), box, on_edge)
     assert same_points(c.points_a, np.array([[-0.2, 0, 0], [0.2, 0, 0]]))
-    # two edges that run along each other, as far as both do
+    # two edges along each other: the patch is their common interval
     under = Pose((0.3, 0, -np.sqrt(0.5) - 0.03), on_edge.quaternion)
     c = contact(box, under, box, on_edge)
     assert c.signed_distance == pytest.approx(0.02)
@@ -117,7 +117,7 @@ def test_edges_and_corners():
 
 @pytest.mark.parametrize("gap", [0.2, 0.0, -0.05])
 def test_edges_in_the_plane_share_an_interval(gap):
-    """A polygon stands with an edge on one of another, which is concave: where both are, on the line between them."""
+    """A polygon stands on a concave one, edge on edge; the patch is the common part, on the line between them."""
     rng = np.random.default_rng(9)
     bench = cm.Polygon([(0, 0), (6, 0), (6, 1), (4, 1), (4, 0.2), (2, 0.2), (2, 1), (0, 1)])  # two seats 1 m high
     for _ in range(20):
@@ -166,7 +166,7 @@ def test_the_batch_is_the_same_and_mirrors():
     (count,), (points,) = manifold_batch(builder.table, position, rotation, AB, rows)
     (other,), (back,) = manifold_batch(builder.table, position, rotation, BA, mirrored)
     assert count == other == 4
-    # on the grown surfaces: a witness of the pair is in the same plane
+    # the points are on the grown surfaces, in the plane of the pair's witness points
     np.testing.assert_allclose(points[:, 2], 0.21, atol=1e-9)
     on_a = back + position[1] - position[0] + mirrored[0, 0] * mirrored[0, 1:4]
     assert same_points(points, on_a)

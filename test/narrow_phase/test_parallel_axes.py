@@ -15,7 +15,7 @@ UPRIGHT, UPSIDE_DOWN = np.eye(3), np.diag([1.0, -1.0, -1.0])
 
 
 def reach(shape, d):
-    """Support distances of a shape along unit directions d (N, 3), written out from its definition."""
+    """Support distances of a shape along unit directions d (N, 3), by its definition."""
     across, along = np.hypot(d[:, 0], d[:, 1]), d[:, 2]
     if isinstance(shape, Sphere):
         return np.full(len(d), shape.radius)

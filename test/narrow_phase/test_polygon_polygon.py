@@ -1,4 +1,4 @@
-"""Circles and polygons in the plane against Minkowski differences, edge by edge distances and exact predicates."""
+"""Circles and polygons in the plane against Minkowski differences, distances of edges, and exact predicates."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def distance(p, q):
 
 
 def depth(p, q):
-    """Of two convex polygons that overlap: how far the origin is inside of their Minkowski difference."""
+    """Depth of two overlapping convex polygons: distance of the origin to the border of their Minkowski difference."""
     hull = Qhull((q[:, None] - p[None]).reshape(-1, 2))
     return float((-hull.equations[:, 2]).min())
 
@@ -72,7 +72,7 @@ def test_convex_polygons_against_the_minkowski_difference(seed):
 @pytest.mark.parametrize("aside", [2.0**-k for k in (4, 10, 14, 16, 20, 24, 28, 40, 52)])
 @pytest.mark.parametrize("gap", [2.0**-k for k in (0, 10, 20, 30)])
 def test_corners_nearly_across_an_edge(gap, aside):
-    """Two corners are nearest, in a direction that is nearly an edge's normal: the gap across that edge is shorter."""
+    """Two corners are nearest, along a direction close to an edge's normal; the gap across that edge is shorter."""
     low = Polygon([(-1, -1), (0, -1), (0, 0), (-1, 0)])
     high = Polygon([(0, 0), (1, 1), (0.5, 2)])
     c = contact(low, Pose(), high, Pose((aside, gap, 0)))
@@ -82,7 +82,7 @@ def test_corners_nearly_across_an_edge(gap, aside):
     assert abs(c.signed_distance - expected) <= c.error_bound <= 1e-13
     np.testing.assert_allclose(c.point_a, (0, 0, 0), atol=1e-13)
     np.testing.assert_allclose(c.point_b, (aside, gap, 0), atol=1e-13)
-    # where the corners are clearly beside each other, their difference is the normal
+    # if the corners are clearly offset, their difference is the normal
     if aside > 1e-12:
         np.testing.assert_allclose(c.normal, np.array([aside, gap, 0]) / np.hypot(aside, gap), atol=1e-9)
 
@@ -116,7 +116,7 @@ def test_concave_polygons_are_their_convex_parts():
     assert c.signed_distance == pytest.approx(0.2, abs=1e-15)
     np.testing.assert_allclose(abs(c.normal[:2]).max(), 1.0)
     deep = contact(L_SHAPE, Pose(), Circle(0.3), Pose((0.5, 0.5, 0)))
-    # leftward or downward: half a metre and the radius
+    # the way out is to the left or down: half a metre and the radius
     assert deep.signed_distance - deep.error_bound <= -0.8 <= deep.signed_distance + deep.error_bound
 
 
@@ -154,7 +154,7 @@ def test_touching_corners_edges_and_identical_polygons():
     assert contact(square, Pose(), square, Pose((1, 0.25, 0))).signed_distance == 0.0
     assert contact(square, Pose(), square, Pose()).signed_distance == -1.0
     assert contact(Circle(1), Pose(), Circle(1), Pose()).signed_distance == -2.0
-    # resting on a long edge: the point is in the middle of what is shared
+    # resting on a long edge: the point is in the middle of the common part
     c = contact(Polygon([(-5, -1), (5, -1), (5, 0), (-5, 0)]), Pose(), square, Pose((2, -0.25, 0)))
     np.testing.assert_allclose(c.point_a, (2.5, 0, 0))
     np.testing.assert_allclose(c.point_b, (2.5, -0.25, 0))

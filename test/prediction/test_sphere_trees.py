@@ -1,4 +1,4 @@
-"""Sphere trees of long bodies contain them at every level, and are left out where they say nothing."""
+"""Sphere trees contain their body at every level; bodies that gain nothing have none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contact` for any two shapes: compounds and meshes, containing models and their excess, what is refused."""
+"""`contact` for any two shapes: compounds and meshes, containing models and their excess, refusals."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_meshes_against_the_bvh_of_fcl(seed):
     else:
         result = fcl.DistanceResult()
         distance = fcl.distance(*theirs, fcl.DistanceRequest(), result)
-        assert c.signed_distance == pytest.approx(distance, abs=1e-7)  # theirs is the coarser one
+        assert c.signed_distance == pytest.approx(distance, abs=1e-7)  # FCL's is coarser
     s = contact(RING, Y, RING, X)
     assert s.signed_distance == pytest.approx(c.signed_distance, abs=1e-11)
     R = random_pose(rng, 100)
@@ -63,7 +63,7 @@ def test_a_mesh_has_an_inside_where_it_is_closed():
     small = cm.Sphere(0.05)
     inside = contact(RING, Pose(), small, Pose((1, 0, 0)))
     assert inside.overlaps
-    # upward out of the tube it is 0.3, and at least as far as the nearest face in any direction
+    # upward out of the tube the depth is 0.3; in any direction it is at least the distance of the nearest face
     assert inside.signed_distance - inside.error_bound >= -0.3
     assert inside.signed_distance + inside.error_bound < 0.0
     assert inside.signed_distance < -0.15
@@ -72,7 +72,7 @@ def test_a_mesh_has_an_inside_where_it_is_closed():
     swapped = contact(small, Pose((1, 0, 0)), RING, Pose())
     assert swapped.signed_distance == inside.signed_distance
     np.testing.assert_allclose(swapped.normal, -inside.normal)
-    sheet = cm.Mesh(TORUS.vertices, TORUS.faces[1:])  # one face is missing: a surface without an inside
+    sheet = cm.Mesh(TORUS.vertices, TORUS.faces[1:])  # without one face: a surface without an inside
     assert not contact(sheet, Pose(), small, Pose((1, 0, 0))).overlaps
 
 
@@ -82,7 +82,7 @@ def test_a_hull_whose_origin_is_elsewhere_is_found_inside_a_mesh():
 
 
 def test_a_half_space_is_in_no_mesh():
-    """Also where its origin, which is no point of it, is inside."""
+    """Also if the origin of its frame, which is not a point of the half-space, is inside the mesh."""
     for offset in (-2.0, -0.5, -0.2, 0.0):
         c = contact(RING, Pose(), cm.HalfSpace((0, 0, 1), offset), Pose((1, 0, 0)))
         assert c.signed_distance == pytest.approx(TORUS.vertices[:, 2].min() - offset)
@@ -117,7 +117,7 @@ def test_a_compound_is_the_union_of_its_shapes(seed):
     assert c.signed_distance == pytest.approx(min(e.signed_distance for e in each), abs=1e-13)
     np.testing.assert_allclose(c.point_b - c.point_a, c.signed_distance * c.normal, atol=1e-13)
     if c.overlaps:
-        # what the bound promises: far enough along one of the axes, they are apart
+        # far enough along the normal they are apart
         out = contact(L_SHAPE, X, ROCK, Pose(Y.position + 10 * c.normal, Y.quaternion))
         assert not out.overlaps
     else:
@@ -162,7 +162,7 @@ def test_half_spaces_with_compounds():
 
 @pytest.mark.filterwarnings("error")
 def test_two_half_spaces():
-    """Facing each other they are a floor and a ceiling; else no translation parts them."""
+    """Facing each other they are a floor and a ceiling; else no translation separates them."""
     rng = np.random.default_rng(8)
     floor, ceiling = cm.HalfSpace((0, 0, 1), 0.25), cm.HalfSpace((0, 0, -1), 0.5)
     for gap in (2.0, 0.0, -3.0):

@@ -1,4 +1,4 @@
-"""Vertices against faces and edges against edges: exact contacts in rationals are never missed, misses are no hits."""
+"""Vertex-face and edge-edge impacts: no contact that is exact in rationals is missed, and no miss is a hit."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ EDGES = [[-1, 0, 1], [1, 0, 1], [0, -1, 0], [0, 1, 0], [-1, 0, -1], [1, 0, -1], 
 
 
 def combination(kind, u, w):
-    """Weights of the four points in F."""
+    """Weights of the four points in F(t, u, w)."""
     return (1, u + w - 1, -u, -w) if kind == "face" else (1 - u, u, w - 1, -w)
 
 
@@ -33,7 +33,7 @@ def meets_exactly(kind, x, t, u, w):
 
 
 def first_roots(kind, x, ends=1e-9):
-    """Times at which the features meet: roots of the cubic that says when the four points are in one plane."""
+    """Times at which the features meet, from the roots of the cubic at which the four points are coplanar."""
     start, end = x[:4], x[4:]
 
     def volume(t):
@@ -59,7 +59,7 @@ def first_roots(kind, x, ends=1e-9):
 @settings(max_examples=300, deadline=None)
 @given(st.data())
 def test_no_exact_contact_is_missed(kind, data):
-    """Small numbers in which a contact at a dyadic (t, u, w) comes out exactly, wherever and however large they are."""
+    """Small integers with an exact contact at a dyadic (t, u, w), scaled and moved without rounding."""
     eighth = st.integers(0, 8).map(lambda k: Fraction(k, 8))
     t, u = data.draw(eighth), data.draw(eighth)
     w = data.draw(eighth)
@@ -67,7 +67,7 @@ def test_no_exact_contact_is_missed(kind, data):
         u, w = 1 - u, 1 - w
     corner = st.lists(st.integers(-64, 64), min_size=3, max_size=3)
     points = [[Fraction(c) for c in data.draw(corner)] for _ in range(8)]
-    # of the first point with a weight, and of an end with one, the place is what makes F = 0
+    # place the first point with a weight, at an end with a share, so that F = 0
     weights = combination(kind, u, w)
     k = next(i for i, c in enumerate(weights) if c)
     end = 1 if t > 0 else 0
@@ -79,7 +79,7 @@ def test_no_exact_contact_is_missed(kind, data):
     exponent = data.draw(st.sampled_from([-30, 0, 30]))
     x = np.array([[float(c * Fraction(2) ** exponent) for c in p] for p in points])
     if data.draw(st.booleans()):
-        x += 2.0**30  # far from the origin; what is rounded here is another question, asked exactly below
+        x += 2.0**30  # far from the origin; rounding gives another query, which is checked exactly below
     if not meets_exactly(kind, x, t, u, w):
         return  # the division by an odd share was rounded
     answer = SOLVERS[kind](x)
@@ -105,7 +105,7 @@ def test_random_queries_against_the_roots_of_the_cubic(kind):
             if answer.status[k] == "hit" and first_roots(kind, x[k], -1e-3)[:1] == roots[:1]:
                 assert roots[0] <= answer.upper[k] + 1e-5
         elif answer.status[k] == "hit":
-            # within the tolerance of a contact, or of the features' borders
+            # within the tolerance of a contact or of the features' borders
             assert first_roots(kind, x[k], 1e-3)
     assert 100 < hits < 1500
 
@@ -151,13 +151,13 @@ def test_degenerate_features_are_found_within_the_budget(kind, x, t, scale, turn
     answer = SOLVERS[kind](x)
     assert answer.status == "hit"
     assert answer.lower <= t + 1e-12
-    assert t <= answer.upper + 1e-6  # within the tolerance they may be a little earlier
+    assert t <= answer.upper + 1e-6  # within the tolerance the impact may be earlier
     assert answer.upper - answer.lower < 1e-5
 
 
 @pytest.mark.parametrize("gap", [0.0, 1e-12, 1e-6, 0.5])
 def test_edges_that_are_nearly_parallel_come_as_near_as_they_do(gap):
-    """They cross in the middle, `gap` apart: their ends are farther, by less than the round-off of many formulas."""
+    """The edges cross in the middle, `gap` apart; their ends are farther by less than many formulas' round-off."""
     rng = np.random.default_rng(6)
     for angle in np.geomspace(1e-12, 1e-2, 60):
         along, across = np.array([1.0, 0, 0]), np.array([np.cos(angle), np.sin(angle), 0])
@@ -191,7 +191,7 @@ def test_shapes_of_queries():
     assert vertex_face_impact(np.zeros((0, 8, 3))).status.shape == (0,)
     still = vertex_face_impact([*VERTEX[:4], *VERTEX[:4]])
     assert (still.status, still.lower) == ("clear", inf)
-    assert vertex_face_impact(np.zeros((8, 3))).lower == 0.0  # all points are one: they touch from the start
+    assert vertex_face_impact(np.zeros((8, 3))).lower == 0.0  # all points coincide: they touch from the start
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The classical methods against each other, where each of them is exact, and by how much the others may be off."""
+"""The classical methods against each other: cases in which a method is exact, and errors of the others."""
 
 from __future__ import annotations
 

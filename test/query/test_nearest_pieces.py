@@ -1,4 +1,4 @@
-"""The nearest two pieces of two objects against every pair of them, and how few of them are looked at."""
+"""The nearest two pieces of two objects against every pair of pieces, and the number of pairs examined."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def torus(major: int, minor: int) -> Mesh:
 
 
 def soup(rng: np.random.Generator, count: int) -> Mesh:
-    """Triangles of very different sizes anywhere, needles among them."""
+    """Random triangles of very different sizes, including needles."""
     corners = rng.uniform(-1, 1, (count, 1, 3)) + rng.normal(size=(count, 3, 3)) * 10.0 ** rng.uniform(
         -3, 0, (count, 1, 1)
     )
@@ -73,7 +73,7 @@ def test_few_pairs_of_triangles_are_looked_at() -> None:
 
 
 def test_meshes_of_many_triangles() -> None:
-    """16,000 triangles each, all pairs of which would take 2 GB: beside each other, linked, one in the other."""
+    """Meshes of 16,000 triangles beside each other, linked, and one in the other; all pairs would take 2 GB."""
     ring = torus(256, 32)
     assert len(ring.faces) == 2 * 256 * 32
     upright = np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)

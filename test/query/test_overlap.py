@@ -1,4 +1,4 @@
-"""Each selectable narrow phase gives the same answer, and says which shapes it is for."""
+"""The methods of `overlap` give the same answer and refuse shapes that they do not support."""
 
 from __future__ import annotations
 

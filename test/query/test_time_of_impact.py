@@ -1,4 +1,4 @@
-"""`time_of_impact` for any two shapes: against exact roots, dense samples and known motions; what it refuses."""
+"""`time_of_impact` for any two shapes: against exact roots, dense samples and known motions; refusals."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_spheres_against_the_exact_root(seed, exponent):
 
 
 def test_spheres_that_graze_from_afar():
-    """By a relative 1e-14 to 1e-1 of their radius, from up to 1e9 radii away: no root is left out, no miss is a hit."""
+    """By a relative 1e-14 to 1e-1 of their radius, from up to 1e9 radii away: no root is missed, no miss is a hit."""
     rng = np.random.default_rng(0)
     statuses = []
     for _ in range(300):
@@ -154,10 +154,10 @@ def test_overlapping_already_is_an_impact_at_once():
 @pytest.mark.parametrize(
     ("linear", "angular", "status"),
     [
-        ((0.1, 0, 0), (0, 0, 0), "clear"),  # they part
+        ((0.1, 0, 0), (0, 0, 0), "clear"),  # they separate
         ((0, 0.3, 0), (0, 0, 0), "clear"),  # it slides along the face for the whole horizon, or past its end
         ((0, 0, 0), (0, 0, 0), "clear"),  # it rests
-        ((0.1, 0, 0), (0, 0, 0.05), "clear"),  # it parts faster than the turning brings it back
+        ((0.1, 0, 0), (0, 0, 0.05), "clear"),  # it separates faster than the rotation closes the gap
         ((-0.1, 0, 0), (0, 0, 0), "hit"),
         ((0.1, 0, 0), (0, 0, 1), "hit"),  # a corner turns in
     ],
@@ -168,7 +168,7 @@ def test_what_touches_goes_deeper_or_does_not(linear, angular, status, horizon):
         horizon = 2.0
     answer = time_of_impact(BOX, still(0, 0, 0), BOX, Motion(Pose((1, 0, 0)), linear, angular), horizon)
     if horizon == 1e-6 and status == "hit":
-        # whether 1e-7 m are a penetration is a matter of the tolerance: it may be left open, but is not clear
+        # 1e-7 m is close to the tolerance: the answer may be unresolved, but not clear
         assert answer.status in ("hit", "unresolved")
     else:
         assert answer.status == status
@@ -227,7 +227,7 @@ def test_touching_at_random_against_dense_samples():
         A, B = random_motion(rng), random_motion(rng, 2.5)
         gap = contact(SOLIDS[a], A.pose, SOLIDS[b], B.pose)
         B = Motion(Pose(B.pose.position - gap.signed_distance * gap.normal, B.pose.quaternion), B.linear, B.angular)
-        if k % 3:  # apart, so that more of them part, or without turning
+        if k % 3:  # apart, so that more pairs separate, or without rotation
             B = Motion(B.pose, B.linear + 2 * gap.normal, B.angular * (k % 3 - 1))
         answer = time_of_impact(SOLIDS[a], A, SOLIDS[b], B)
         seen[answer.status] += 1
@@ -241,7 +241,7 @@ def test_touching_at_random_against_dense_samples():
 
 
 def test_whole_numbers_are_numbers():
-    """Numba would compile the kernels anew for them: for a quarter of a minute, once."""
+    """Integers are converted; else Numba compiles the kernels anew for a quarter of a minute."""
     answer = time_of_impact(cm.Sphere(1), Motion(Pose(), (1, 0, 0)), BOX, still(4, 0, 0), 9, 1, 0, np.int32(50))
     assert answer.status == "hit"
     assert len(predict_pairs.signatures) == 1
@@ -275,7 +275,7 @@ def test_too_small_a_budget_is_unresolved_not_clear():
     assert answer.status == "unresolved"
     assert 0.0 < answer.lower < 8.0 and answer.upper == inf
     assert answer.contact.signed_distance > 0.0
-    # what is sure to be hit is so with any budget, in a wider interval
+    # a certain hit stays a hit with any budget, with a wider interval
     tight, wide = (time_of_impact(BOX, spin, BOX, still(4, 0, 0), 5.0, iterations=n) for n in (1000, 1))
     assert tight.status == wide.status == "hit"
     assert wide.lower < tight.lower <= wide.upper

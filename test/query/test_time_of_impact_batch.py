@@ -1,4 +1,4 @@
-"""`time_of_impact_batch` answers as `time_of_impact` does, row by row; what it refuses."""
+"""`time_of_impact_batch` answers like `time_of_impact`, row by row; refusals."""
 
 from __future__ import annotations
 
@@ -57,11 +57,11 @@ def test_each_row_is_the_answer_for_one(a, b, n):
 
 
 def test_spheres_in_many_motions_against_the_roots_in_100_digits():
-    """Also those that graze by a relative 1e-14 to 1e-1 of their radius, from up to 1e9 radii away."""
+    """Includes spheres that graze by a relative 1e-14 to 1e-1 of their radius, from up to 1e9 radii away."""
     rng = np.random.default_rng(2)
     n = 3000
     away, by = 10.0 ** rng.uniform(0.5, 9, n), 10.0 ** rng.uniform(-14, -1, n) * rng.choice([-1, 1], n)
-    by[::2] = rng.uniform(-1, 1, n // 2)  # half of them plainly
+    by[::2] = rng.uniform(-1, 1, n // 2)  # half of them do not graze
     v = rng.normal(size=(n, 3))
     v /= np.linalg.norm(v, axis=1, keepdims=True)
     side = np.cross(v, rng.normal(size=(n, 3)))

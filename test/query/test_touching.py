@@ -1,4 +1,4 @@
-"""Several impacts at one instant, and contacts that stay: what rests or slides is one contact and floods nothing."""
+"""Several impacts at one instant, and lasting contacts: an object that rests or slides is one contact."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ STEP = 20_000_000
 
 
 def test_impacts_at_one_instant_come_out_together_in_order() -> None:
-    """Eight balls fall on a floor and meet in pairs at the same time: walls and bodies in one list, by id."""
+    """Eight balls fall on a floor and meet in pairs at the same time: one list, sorted by time and ids."""
     count, answers = 8, []
     for order in (np.arange(count), np.arange(count)[::-1]):
         monitor = cm.Monitor("exact")
@@ -34,7 +34,7 @@ def test_impacts_at_one_instant_come_out_together_in_order() -> None:
 
 
 def test_what_slides_on_the_floor_is_one_contact() -> None:
-    """A box slides, and a ball rests on the floor, for ten seconds: two contacts begin, none ends, nothing piles up."""
+    """A box slides and a ball rests on the floor for ten seconds: two contacts begin, none ends, no event piles up."""
     monitor = cm.Monitor()
     monitor.add(0, cm.Box((1, 1, 1)))
     monitor.add(1, cm.Sphere(0.5))
