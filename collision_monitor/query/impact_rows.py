@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Any, Final, NamedTuple
+from typing import Final
 
 from collision_monitor._jit import device, kernel
 from collision_monitor.prediction.body_impact import body_impact
@@ -13,14 +13,6 @@ from collision_monitor.tolerances import EPSILON, LARGEST_INPUT, UNIT_QUATERNION
 
 _SMALLEST: Final = 1e-240
 """m^4/s^2, as in time_of_impact.py: below it products of lengths and speeds lose digits."""
-
-
-class ImpactTimes(NamedTuple):
-    """Answers for N motions."""
-
-    lower: Any  # (N,) s
-    upper: Any  # (N,) s
-    left: Any  # (N,) bool: left open
 
 
 @kernel
@@ -51,10 +43,11 @@ def _set_motion(motion, state, k):
 
 @kernel
 def impacts_of_rows(multibody, states, rows, query, deep, memory, times):
-    """First impacts of two bodies moving as in `rows` of the states, two arrays (N, 13); the rest of `times` stays.
+    """First impacts of two bodies moving as in `rows` of the states, two arrays (N, 13), into `times`.
 
-    query: ImpactQuery. What overlaps by more than touching (within `deep`, m) at the start is at 0; times.left: touches
-    there and is left open. memory: Scratch, and a place for an IMPACT.
+    multibody, query: the fields of a Multibody and of an ImpactQuery; memory: Scratch, and a place for an IMPACT.
+    times: lower, upper (N,), and left (N,) bool: touches at the start and is left open. What overlaps there by more
+    than touching (within `deep`, m) is at 0. The tuples are plain ones, which cost 0.1 us a call, named ones 0.6 us.
     """
     table, parts, bodies = multibody
     state_a, state_b = states
@@ -89,8 +82,8 @@ def impacts_of_spheres(a, b, reach, horizon, times):
     """The same in closed form for spheres whose radii add up to `reach` (m); a, b: columns of the states, (13, N).
 
     As `sphere_interval`, but the same for all and without a branch, so that the processor does eight at once: the first
-    root c / (-b + sqrt(D)), rounded outward for the lower end and inward for the upper one. times.left: what touches
-    at the start, grazes or underflows, which this leaves open.
+    root c / (-b + sqrt(D)), rounded outward for the lower end and inward for the upper one. times: lower, upper
+    and left, which is what touches at the start, grazes or underflows: this leaves it open.
     """
     lower, upper, left = times
     certain = reach * (1.0 - 8.0 * EPSILON)  # the radii are rounded up by nearly as much

@@ -16,7 +16,7 @@ from collision_monitor.geometry.shapes import HalfSpace, Mesh
 from collision_monitor.prediction.body_impact import make_scratch
 from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.query.contact import Compound
-from collision_monitor.query.impact_rows import ImpactTimes, impacts_of_rows, impacts_of_spheres, normalise_states
+from collision_monitor.query.impact_rows import impacts_of_rows, impacts_of_spheres, normalise_states
 from collision_monitor.query.moving_pair import ImpactQuery, MovingShape, lay_out_pair, make_moving_shape
 from collision_monitor.query.time_of_impact import ITERATIONS, check_bounded, check_query, time_of_impact
 from collision_monitor.tolerances import LARGEST_INPUT, TOUCHING, UNIT_QUATERNION
@@ -57,10 +57,9 @@ def time_of_impact_batch(
     check_bounded(a, b)
     state_a, state_b = check_states(poses_a, twists_a, poses_b, twists_b)
     count = len(state_a)
-    times = ImpactTimes(np.full(count, math.inf), np.full(count, math.inf), np.ones(count, bool))
+    lower, upper, alone = np.full(count, math.inf), np.full(count, math.inf), np.ones(count, bool)
     if not _is_special(a, b, state_a, state_b):
-        _solve(a, b, (state_a, state_b), query, times)
-    lower, upper, alone = times
+        _solve(a, b, (state_a, state_b), query, (lower, upper, alone))
     status = np.where(lower == math.inf, "clear", np.where(upper == math.inf, "unresolved", "hit"))
     for k in np.flatnonzero(alone):
         one = time_of_impact(a.shapes, _motion(state_a[k]), b.shapes, _motion(state_b[k]), *query)
@@ -121,15 +120,17 @@ def _motion(state: Array) -> Motion:
 
 
 def _solve(
-    a: MovingShape, b: MovingShape, states: tuple[Array, Array], query: ImpactQuery, times: ImpactTimes
-) -> None:
-    """Fill the times; left open are those that touch at the start."""
+    a: MovingShape, b: MovingShape, states: tuple[Array, Array], query: ImpactQuery,
+    times: tuple[Array, Array, NDArray[np.bool_]],
+) -> None:  # fmt: skip
+    """Fill lower, upper and left (N,): which touch at the start and are left open."""
     multibody = lay_out_pair(a, b, query.horizon)
     radii = multibody.bodies.motion["radius"]
-    rows = np.arange(len(times.lower))
+    rows = np.arange(len(states[0]))
     if not multibody.bodies.spin_radius.any():  # two spheres
         reach = float(radii.sum()) + query.separation
         impacts_of_spheres(states[0].T.copy(), states[1].T.copy(), reach, query.horizon, times)
-        rows = np.flatnonzero(times.left)
+        rows = np.flatnonzero(times[2])
     deep = query.separation - TOUCHING * float(radii[np.isfinite(radii)].sum())
-    impacts_of_rows(multibody, states, rows, query, deep, (make_scratch(), np.zeros(1, IMPACT)), times)
+    memory = make_scratch(), np.zeros(1, IMPACT)
+    impacts_of_rows(tuple(multibody), states, rows, tuple(query), deep, memory, times)
