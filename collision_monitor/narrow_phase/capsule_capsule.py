@@ -20,8 +20,7 @@ def capsule_capsule_contact(ra: float, la: float, rb: float, lb: float, pose: Pa
     Where the cores cross they part across both, and a core within the other's line parts at a right angle to it.
     """
     px, py, pz = pose.p
-    axis_a, axis_b = column(pose.R_A, 2), column(pose.R_B, 2)
-    u, v = scaled(axis_a, la), scaled(axis_b, lb)
+    u, v = scaled(column(pose.R_A, 2), la), scaled(column(pose.R_B, 2), lb)
     s, t = segment_segment(u, v, pose.p)
     w = (px + t * v[0] - s * u[0], py + t * v[1] - s * u[1], pz + t * v[2] - s * u[2])
     distance, n = direction(w)
@@ -36,7 +35,7 @@ def capsule_capsule_contact(ra: float, la: float, rb: float, lb: float, pose: Pa
             n = (side * c[0] / length, side * c[1] / length, side * c[2] / length)
             distance = dot(n, w)
         elif distance <= TOUCHING * (la + lb):
-            n = across(axis_a if la >= lb else axis_b, w)
+            n = across(column(pose.R_A if la >= lb else pose.R_B, 2), w)
             distance = dot(n, w)
         if length2 <= SEGMENT_PARALLEL_SIN2 * (la * la) * (lb * lb) and length2 > 0.0:
             # taken for parallel, they were compared in the middle: towards an end they may be this much nearer

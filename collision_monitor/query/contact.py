@@ -19,7 +19,7 @@ from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape
-from collision_monitor.narrow_phase.contact_row import as_contacts
+from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, as_contacts
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.objects.models import containing_model, parse_model
 from collision_monitor.query.nearest_pieces import NearestPieces
@@ -37,7 +37,7 @@ def _patch(found: NearestPieces, witness: Array) -> Array:
     radius = found.table.radius[found.pair]
     tie = FEATURE_TIE * float(radius[np.isfinite(radius)].sum())
     patches = []
-    best = found.best
+    best = as_contacts(found.best)
     for pairs, rows in found.looked_at:
         contacts = as_contacts(rows)
         level = contacts["distance"] <= best["distance"] + tie
@@ -123,13 +123,14 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
         _check_in_plane(b)
     offset = b.pose.position - a.pose.position
     found = NearestPieces(a.pieces, (a.rotation, np.zeros(3)), b.pieces, (b.rotation, offset))
-    distance, bound = float(found.best["distance"]), float(found.best["bound"])
-    normal = found.best["normal"].copy()
+    row = found.best
+    distance, bound = float(row[DISTANCE]), float(row[BOUND])
+    normal = row[NORMAL : NORMAL + 3].copy()
     enclosed = distance > 0.0 and (_holds(a, b, offset) or _holds(b, a, -offset))
     if enclosed:
         # no faces meet, but one is inside of the other, at least this deep
         distance, normal = -distance, -normal
-    point = a.pose.position + (found.best["point_a"] + found.position[found.pair[0]])
+    point = a.pose.position + (row[POINT_A : POINT_A + 3] + found.position[found.pair[0]])
     convex = len(a.pieces) == len(b.pieces) == 1
     unbounded = distance == -np.inf  # a fact about the two, with no length to be wrong about
     if distance <= 0.0 and not convex and not unbounded:

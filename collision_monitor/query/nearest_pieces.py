@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.boxes import ranges
 from collision_monitor.geometry.shape_table import ShapeTable, join
-from collision_monitor.narrow_phase.contact_row import CONTACT_ROW, DISTANCE, as_contacts
+from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.query.piece_table import PieceTable
 
@@ -31,7 +31,7 @@ PAIRS_AT_ONCE: Final = 1024
 
 
 class NearestPieces:
-    """The search, and what it found: `best`, the contact (CONTACT_ROW) of the nearest or deepest pieces, and `pair`.
+    """The search, and what it found: `best`, the contact (CONTACT_SIZE,) of the nearest or deepest, and `pair`.
 
     table, position, rotation: of the pieces of both, A's first, about one origin in the same axes. looked_at: all pairs
     (m, 2) that were tested, in batches with their contacts (m, CONTACT_SIZE): those of all as near as the nearest.
@@ -43,7 +43,7 @@ class NearestPieces:
         self.position = np.concatenate([a.position @ X_A[0].T + X_A[1], b.position @ X_B[0].T + X_B[1]])
         self.rotation = np.concatenate([X_A[0] @ a.rotation, X_B[0] @ b.rotation])
         self.looked_at: list[tuple[NDArray[np.int32], Array]] = []
-        self.best: Any = np.full(1, np.inf, CONTACT_ROW)[0]
+        self.best = np.full(CONTACT_SIZE, np.inf)
         self.pair = np.zeros(2, np.int32)
         self._first_of_b = len(a)
         if len(a) * len(b) <= ALL_PAIRS:
@@ -58,14 +58,14 @@ class NearestPieces:
         lower = np.linalg.norm(self.position[j] - self.position[i], axis=1) - (radius[i] + radius[j])
         order = np.argsort(lower, kind="stable")
         begin, size = 0, FIRST_BATCH
-        while begin < len(order) and lower[order[begin]] <= self.best["distance"]:
+        while begin < len(order) and lower[order[begin]] <= self.best[DISTANCE]:
             some = order[begin : begin + size]
             pairs = np.stack([i[some], j[some]], axis=1).astype(np.int32)
             rows = contact_batch(self.table, self.position, self.rotation, pairs)
             self.looked_at.append((pairs, rows))
             k = int(rows[:, DISTANCE].argmin())
-            if rows[k, DISTANCE] < self.best["distance"]:
-                self.best, self.pair = as_contacts(rows)[k].copy(), pairs[k]
+            if rows[k, DISTANCE] < self.best[DISTANCE]:
+                self.best, self.pair = rows[k].copy(), pairs[k]
             begin, size = begin + size, 2 * size
 
     def _descend(self, a: PieceTable, X_A: tuple[Array, Array], b: PieceTable, X_B: tuple[Array, Array]) -> None:
@@ -77,7 +77,7 @@ class NearestPieces:
         farthest = np.inf  # some pair is as near as that
         while stack:
             level, nodes, lower = stack.pop()
-            farthest = min(farthest, self.best["distance"])
+            farthest = min(farthest, self.best[DISTANCE])
             nodes = nodes[:, lower <= farthest]
             if level == last:
                 self._look_at(*_leaves(trees, nodes))
