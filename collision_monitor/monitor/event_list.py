@@ -187,7 +187,7 @@ class EventList(Stage):
         self.events = self._room[:0]
 
     def take_due(self, version: Versions, now: float) -> Events:
-        """Remove the events that are due by `now` from the list. Return those whose motions still hold, sorted."""
+        """Remove the events due by `now`: their pairs leave the event list here. Return those that still hold."""
         due = np.empty(count_until(self.events, now), IMPACT)
         passed, n = take_due(self.events, version, now, due)
         self.events = self.events[passed:]

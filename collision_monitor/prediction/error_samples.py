@@ -43,7 +43,7 @@ def make_workspace() -> Workspace:
 
 @device
 def set_frame(frame, vx, vy, vz):
-    """Complete the frame (3, 3) whose first row is a direction n. Second row: the part of v across n; third: across both.
+    """Complete the frame (3, 3) whose first row is a direction n. Second row: part of v across n; third: across both.
 
     The rows become unit vectors. If the first row is 0, it becomes a direction across v.
     """
