@@ -1,4 +1,4 @@
-"""Bodies that start anew or are predicted further: looked up one by one or found by one sweep, they meet the same."""
+"""Candidates: single queries of the hashed grid and one sweep of a dense grid find the same pairs."""
 
 from __future__ import annotations
 
@@ -38,5 +38,5 @@ def test_one_sweep_finds_the_pairs_that_looking_up_finds(scene: str, monkeypatch
         monitor.step(step * 20_000_000, played.states())
         played.step(0.02)
     some = [(bodies, pairs) for bodies, pairs in both if bodies < len(played.descriptions) / 2]
-    assert len(some) > 10, "bodies that are predicted further, beside others that are not"
+    assert len(some) > 10, "some steps predict only some of the bodies"
     assert sum(pairs for _, pairs in some) > 100

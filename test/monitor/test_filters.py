@@ -1,4 +1,4 @@
-"""Each filter leaves out exactly what it says: the answers are the full ones, filtered."""
+"""Filters: the answers with a filter are the full answers, filtered."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LOW, HIGH = (1.0, 1.0, 0.0), (3.0, 4.0, 9.0)
 
 
 def play(make: Callable[[Profile], Monitor], profile: Profile, steps: int = 50) -> list[tuple[StepResult, Rows]]:
-    """Answers and states of a scene whose objects come and go in the region."""
+    """Answers and states of a scene with objects that enter and leave the region."""
     scene = make_scene("clutter", objects=60)
     monitor = make(profile)
     for description in scene.descriptions:
@@ -58,7 +58,7 @@ def test_minimum_closing_speed(make: Callable[[Profile], Monitor]) -> None:
 @pytest.mark.parametrize("make", [Monitor, ReferenceMonitor])
 def test_pairs_that_move_apart(make: Callable[[Profile], Monitor]) -> None:
     left_out = 0
-    loose = Profile(position_tolerance=0.05)  # so that some are predicted that pass
+    loose = Profile(position_tolerance=0.05)  # so that some pairs that pass are predicted
     for (full, states), (mine, _) in zip(
         play(make, loose), play(make, loose.replace(ignore_separating=True)), strict=True
     ):
@@ -67,11 +67,11 @@ def test_pairs_that_move_apart(make: Callable[[Profile], Monitor]) -> None:
         assert np.array_equal(mine.predictions.view(np.uint8), expected.view(np.uint8))
         assert np.array_equal(mine.contacts.view(np.uint8), full.contacts.view(np.uint8))
         left_out += len(full.predictions) - len(expected)
-    assert left_out > 10 or make is ReferenceMonitor, "which knows no tolerance that predicts pairs that pass"
+    assert left_out > 10 or make is ReferenceMonitor, "the reference has no tolerance and predicts no pair that passes"
 
 
 def inside(states: Rows, radius: Rows) -> set[int]:
-    """The ids whose spheres reach into the region."""
+    """Ids of the objects with bounding spheres that reach into the region."""
     nearest = np.clip(states["position"], LOW, HIGH)
     return set(states["id"][np.linalg.norm(states["position"] - nearest, axis=1) <= radius].tolist())
 
@@ -95,7 +95,7 @@ def test_region_of_interest() -> None:
         expected = full.predictions[both_in(ids, full.predictions)]
         for name in ("id_a", "id_b", "status"):
             assert np.array_equal(plain.predictions[name], expected[name])
-        for name in ("lower", "upper", "point", "normal", "closing_speed"):  # sought from another begin
+        for name in ("lower", "upper", "point", "normal", "closing_speed"):  # the search began at another time
             assert np.allclose(plain.predictions[name], expected[name], atol=1e-4)
         full_touching = full.contacts[full.contacts["phase"] != records.Phase.END]
         touching = plain.contacts[plain.contacts["phase"] != records.Phase.END]
@@ -105,7 +105,7 @@ def test_region_of_interest() -> None:
         pairs = {(int(c["id_a"]), int(c["id_b"])) for c in touching}
         begun = {(int(c["id_a"]), int(c["id_b"])) for c in plain.contacts if c["phase"] == records.Phase.BEGIN}
         ended = {(int(c["id_a"]), int(c["id_b"])) for c in plain.contacts if c["phase"] == records.Phase.END}
-        assert (begun, ended) == (pairs - before, before - pairs), "who enters begins, who leaves ends"
+        assert (begun, ended) == (pairs - before, before - pairs), "BEGIN on entry, END on exit"
         before = pairs
         assert disagreements(mine, plain, 2.0) == []
         left_out += len(full.predictions) - len(plain.predictions)
@@ -156,7 +156,7 @@ def test_impossible_filters_are_named(settings: dict[str, Any], words: str) -> N
 
 
 def test_who_fell_silent_on_the_way_out_may_have_stayed() -> None:
-    """Without a region the pair may touch for all that is known; so it may with one."""
+    """A silent object may have stayed in the region, so the pair may touch, as it may without a region."""
     answers = []
     for profile in (Profile(), Profile(region_max=(1.0, 1e18, 1e18))):
         monitor = Monitor(profile)

@@ -1,4 +1,4 @@
-"""The monitor as a whole: against plain recomputation, against every pair looked at, and fed with what is wrong."""
+"""The monitor as a whole: against plain recomputation, against a test of every pair, and with invalid inputs."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def assert_sorted(result: StepResult) -> None:
 
 
 class Swarm:
-    """Boxes, spheres, capsules and compounds on their way through a box of space, with noise and course changes."""
+    """Boxes, spheres, capsules and compounds that move through a box of space, with noise and changes of course."""
 
     def __init__(self, n: int, seed: int) -> None:
         self.rng = rng = np.random.default_rng(seed)
@@ -115,7 +115,7 @@ def test_the_event_list_equals_plain_recomputation(noise: float, turn: float, ke
 
 @pytest.mark.parametrize("shapes", [(Sphere(0.5), Sphere(0.5)), (Box((1, 1, 1)), Capsule(0.5, 1.0))])
 def test_a_motion_that_is_kept_is_continued_not_started_anew(shapes: tuple[Shape, Shape]) -> None:
-    """They come from 14 m apart and go on through each other: told once each, for sure in time, and in no step anew."""
+    """Two bodies come from 14 m and pass through each other. The prediction becomes certain and is never made anew."""
     monitor, rate, speed = Monitor(), 10, 1.0
     for object_id, shape in enumerate(shapes):
         monitor.add(object_id, shape)
@@ -131,7 +131,7 @@ def test_a_motion_that_is_kept_is_continued_not_started_anew(shapes: tuple[Shape
         for prediction in result.predictions:
             told.append(t + prediction["lower"])
             certain = prediction["status"] == records.PredictionStatus.HIT
-            assert certain or prediction["lower"] > 1.8  # near the end of what is predicted it may not be sure yet
+            assert certain or prediction["lower"] > 1.8  # near the end of the prediction it may still be uncertain
             assert prediction["lower"] <= 6.5 - t <= prediction["upper"] or prediction["lower"] == 0.0
         touched += len(touching(result))
         queries += result.status.impact_queries
@@ -143,7 +143,7 @@ def test_a_motion_that_is_kept_is_continued_not_started_anew(shapes: tuple[Shape
 
 @pytest.mark.parametrize("shape", [Sphere(0.5), Box((1, 1, 1))])
 def test_a_pair_is_told_once_after_a_pause_longer_than_what_was_predicted(shape: Shape) -> None:
-    """They go on as they said, and are heard of again when they touch and all that was predicted of them is over."""
+    """Two bodies keep their motion. The next states arrive when they touch and their predictions have expired."""
     monitor, speed = Monitor(), 0.4
     monitor.add(0, shape)
     monitor.add(1, shape)
@@ -227,7 +227,7 @@ def test_contacts_begin_persist_and_end_once() -> None:
         assert not (len(result.contacts) and len(result.predictions))
     assert phases == [records.Phase.BEGIN, *[records.Phase.PERSIST] * (len(phases) - 2), records.Phase.END]
     assert np.allclose(durations, np.arange(len(phases)) * 0.05)
-    assert len(phases) == 42  # touching from x = -1 to x = 1, both included, and the END
+    assert len(phases) == 42  # in contact from x = -1 to x = 1, both included, and the END
 
 
 def test_crossing_happens_when_it_must() -> None:
@@ -309,7 +309,7 @@ class TestRefusals:
         monitor.step(SECOND // 20, [1, 2], still(8, 9))
         assert monitor.refused[Refusal.OLD] == 2
         result = monitor.step(SECOND // 5, [1, 1], still(3, 9))
-        assert monitor.refused[Refusal.OLD] == 3  # one id twice: the first counts
+        assert monitor.refused[Refusal.OLD] == 3  # one id twice: the monitor uses the first state
         assert touching(result) == set()
 
     def test_a_stamp_that_jumps_is_refused_until_it_is_confirmed(self, monitor: Monitor) -> None:
@@ -380,7 +380,7 @@ def test_an_object_that_is_not_heard_of_is_never_clear() -> None:
         result = monitor.step(step * SECOND // 10, [1], still(0))
         assert result.status.objects_stale == (1 if step > 3 else 0)
         statuses.append([int(c["status"]) for c in result.contacts])
-    # a gap of 1 m is open to an acceleration of 2 m/s^2 after 1 s
+    # an acceleration of 2 m/s^2 can close a gap of 1 m after 1 s
     assert statuses[:9] == [[]] * 9
     assert statuses[10:] == [[records.ContactStatus.UNRESOLVED]] * 9
     assert result.contacts[0]["error_bound"] >= 0.5 * 2.0 * 1.9**2
@@ -419,7 +419,7 @@ def test_a_new_description_ends_what_it_no_longer_allows_to_be_said() -> None:
     result = monitor.step(SECOND // 100, [1, 2], still(0.01, 0.91), moving)
     assert [(pair(c), int(c["phase"])) for c in result.contacts] == [((1, 2), records.Phase.END)]
     assert len(monitor.step(SECOND // 50, [1, 2], still(0.02, 0.92), moving).contacts) == 0
-    # a static object that becomes a moving one has not been seen: nothing is said of where it stood
+    # a static object that becomes a moving one is unseen: nothing is reported at its old place
     monitor.add(3, Sphere(0.5))
     result = monitor.step(SECOND // 20, [1, 2], still(0.05, 0.95), moving)
     assert result.status.objects_unseen == 1 and len(result.predictions) == 0
@@ -429,7 +429,7 @@ def test_a_new_description_ends_what_it_no_longer_allows_to_be_said() -> None:
     result = monitor.step(SECOND // 5, [1, 2, 3], still(0.2, 1.1, 1.2), [*moving, [0] * 6])
     assert touching(result) == {(1, 2), (1, 3), (2, 3)}
     assert {int(c["phase"]) for c in result.contacts} == {records.Phase.BEGIN}
-    monitor.add(3, Box((0.1, 0.1, 0.1)))  # only another shape: it goes on touching without a new BEGIN
+    monitor.add(3, Box((0.1, 0.1, 0.1)))  # only another shape: the contact persists without a new BEGIN
     result = monitor.step(SECOND // 4, [1, 2, 3], still(0.25, 1.15, 0.7), [*moving, [0] * 6])
     assert {pair(c): int(c["phase"]) for c in result.contacts}[(2, 3)] == records.Phase.PERSIST
 
@@ -481,7 +481,7 @@ def test_the_same_inputs_give_the_same_bytes() -> None:
 
 
 def test_the_predictions_of_bodies_that_start_together_do_not_end_together() -> None:
-    """All are described at once; what has to be predicted further is then spread over the steps, from the start."""
+    """All bodies are described at once. Their continued predictions are spread over the steps from the start."""
     rng = np.random.default_rng(5)
     monitor, n, rate = Monitor(), 400, 50
     for object_id in range(n):
@@ -499,7 +499,7 @@ def test_the_predictions_of_bodies_that_start_together_do_not_end_together() -> 
 
 @pytest.mark.parametrize("flags", [0, records.StateFlag.TWIST_UNKNOWN])
 def test_states_that_are_handed_over_stay_as_they_are(flags: int) -> None:
-    """Also those whose twist the monitor estimates, with what it is off: that is worked out on a copy."""
+    """Also states with an estimated twist: the monitor writes its standard deviations into a copy."""
     swarm, mine, copied = Swarm(20, seed=5), Monitor(), Monitor()
     swarm.describe(mine)
     swarm.describe(copied)

@@ -1,4 +1,4 @@
-"""Contacts of several points: where they are, how they move, and that nothing else depends on how many there are."""
+"""Contacts of several points: their places and speeds. No other answer depends on their number."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FOUR = Profile(contact_points=4)
 
 
 def rows_of(result: StepResult, a: int, b: int) -> NDArray[np.void]:
-    """Of one pair, checked to be numbered, with the same answer but for the points, which fit together."""
+    """Rows of one pair; checks that they are numbered and consistent, and differ only in points and speeds."""
     rows = result.contacts[(result.contacts["id_a"] == a) & (result.contacts["id_b"] == b)]
     assert rows["point_index"].tolist() == list(range(len(rows)))
     assert set(rows["point_count"].tolist()) <= {len(rows)}
@@ -45,7 +45,7 @@ def assert_same_points(found: NDArray[np.float64], expected: NDArray[np.float64]
 @pytest.mark.parametrize("far", [0.0, 1e5])
 @pytest.mark.parametrize("ground", ["half-space", "box", "tiles", "hull"])
 def test_a_box_lies_on_its_four_corners(ground: str, far: float) -> None:
-    """However it and what it lies on are turned together; and as each corner moves, it approaches."""
+    """The box and its ground are turned together. The closing speed of each corner is that of its motion."""
     rng = np.random.default_rng(3)
     slab = Box((4, 4, 1))
     below = [[x, y, z] for x in (-2, 2) for y in (-2, 2) for z in (-0.5, 0.5)]
@@ -70,7 +70,7 @@ def test_a_box_lies_on_its_four_corners(ground: str, far: float) -> None:
         feet = CORNERS[CORNERS[:, 2] < 0] @ lying.rotation.T + lying.position
         assert_same_points(rows["point_b"], feet, 1e-9 + 1e-15 * far)
         np.testing.assert_allclose(rows["signed_distance"], -0.01, atol=1e-12 + 1e-15 * far)
-        for row in rows:  # how fast the corner goes into the floor, by moving it for a moment
+        for row in rows:  # speed of the corner into the floor, from a short motion
             dt = 1e-6
             turned = multiply(from_rotation_vector(twist[3:] * dt), lying.quaternion)
             later = Pose(lying.position + twist[:3] * dt, turned)
@@ -134,7 +134,7 @@ def test_as_many_points_as_wanted_and_nothing_else_changes(most: int) -> None:
 
 
 def test_what_is_not_settled_has_one_point() -> None:
-    """A model that touches where the object may not; pairs that there was no time for."""
+    """Contacts of a model that the object may not have, and of pairs beyond the budget."""
     monitor = Monitor(FOUR)
     monitor.add(1, HalfSpace((0, 0, 1)), static=True, pose=Pose())
     monitor.add(2, ConvexHull([[0, 0, 0.5], [1, 0, -0.5], [-1, 0, -0.5], [0, 1, -0.5]]), model=Model.AABB)

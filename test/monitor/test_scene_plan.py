@@ -1,4 +1,4 @@
-"""The scene plan names what the described objects require, and follows their changes."""
+"""The scene plan lists the requirements of the described objects, and follows their changes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_it_follows_what_is_added_and_removed() -> None:
     monitor = Monitor()
     monitor.add(1, Sphere(0.5))
     before = monitor.plan
-    assert before.tests == {}, "one object meets nobody"
+    assert before.tests == {}, "one object meets no other"
     monitor.add(2, [(Box((1, 1, 1)), Pose()), (Cone(0.5, 1.0), Pose((0, 0, 1)))], group=2)
     monitor.add(3, HalfSpace((0, 0, 1), 0.0), static=True, pose=Pose())
     monitor.add(4, TETRAHEDRON, static=True, pose=Pose((9, 0, 0)))
@@ -92,7 +92,7 @@ def test_it_counts_what_is_left_out() -> None:
 
 @pytest.mark.parametrize("name", scene_plan.ITEMS)
 def test_leaving_it_out_changes_no_answer(name: str) -> None:
-    """Against the same scene with it forced on, at every step."""
+    """Compare every step with the same scene with the feature forced on."""
     item = scene_plan.ITEMS[name](80)
     told = 0
     for _, (stamp, states) in zip(range(40), item.states, strict=False):
@@ -108,7 +108,7 @@ def test_leaving_it_out_changes_no_answer(name: str) -> None:
         stated = [{(int(p["id_a"]), int(p["id_b"])) for p in r.predictions} for r in (off, on)]
         for pair in mine.keys() | forced.keys():
             first = mine.get(pair, forced.get(pair))
-            if first["lower"] < 1.9:  # at the very horizon one may see it first
+            if first["lower"] < 1.9:  # close to the horizon, one of the two may find it first
                 assert pair in stated[0] and pair in stated[1]
             if pair in mine and pair in forced:
                 assert mine[pair]["lower"] <= forced[pair]["upper"] + 1e-9

@@ -1,4 +1,4 @@
-"""Snapshots: a pipeline that is thawed goes on with the same bytes as the one that was frozen, from every moment."""
+"""Snapshots: a pipeline restored from a snapshot gives the same bytes as the original, from every step on."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ Answers = list[bytes | None]
 
 
 def solids(rng: np.random.Generator) -> list[Shape]:
-    """Hulls of the same points among them, which share their vertices."""
+    """Shapes of space; some hulls have the same points and share their vertices."""
     points = rng.uniform(-0.5, 0.5, (12, 3))
     tetrahedron = ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
     return [
@@ -67,7 +67,7 @@ def inputs(shapes: list[Shape], walls: list[ObjectDescription], steps: int, seed
     for k in range(steps):
         stamp += STEP
         if k == steps // 2:
-            stamp += 60_000_000_000  # the clock restarts, once a second message agrees
+            stamp += 60_000_000_000  # the timeline restarts when a second message confirms the jump
         states = np.zeros(20, records.STATE)
         states["id"], states["quaternion"][:, 3] = ids, 1.0
         turned = 0.02 * k * velocity
@@ -141,7 +141,7 @@ def test_a_snapshot_is_a_numpy_file() -> None:
 
 
 def broken(change: str, snapshot: Snapshot) -> Snapshot:
-    """One that a kernel would read beside its arrays with, or that another version wrote."""
+    """Return a snapshot with which a kernel would access memory outside its arrays, or that another version wrote."""
     arrays, facts = dict(snapshot.arrays), {name: dict(each) for name, each in snapshot.facts.items()}
     match change:
         case "an array is missing":

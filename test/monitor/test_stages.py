@@ -1,4 +1,4 @@
-"""Each stage of the step saves and restores its own state, all of it."""
+"""Each stage of the step saves and restores all of its own state."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STAGES = [type(stage) for stage in Monitor().stages]
 
 @pytest.fixture(scope="module")
 def busy() -> Monitor:
-    """A monitor in which every stage has something to remember."""
+    """A monitor in which every stage has state to save."""
     monitor = Monitor(Profile(pairs_per_step=3, region_min=(-50.0, -50.0, -50.0), region_max=(50.0, 50.0, 50.0)))
     monitor.add(90, HalfSpace((0, 0, 1)), static=True, pose=Pose((0, 0, -2)))
     shapes = [Sphere(0.5), Box((1, 0.6, 0.4)), [(Capsule(0.2, 1.0), Pose()), (Sphere(0.3), Pose((0.5, 0, 0)))]]
@@ -37,7 +37,7 @@ def busy() -> Monitor:
         monitor.step(k * 20_000_000, states)
         states["position"] += 0.02 * states["linear"]
         states["linear"][k::9] *= -1.0
-    monitor.step(900_000_000_000, states)  # refused: it jumps
+    monitor.step(900_000_000_000, states)  # refused: the stamp jumps
     touching = monitor.last.contacts["id_a"][0]  # type: ignore[union-attr]
     monitor.remove(int(touching))
     monitor.add(200, Sphere(0.1))
@@ -55,7 +55,7 @@ def test_the_monitor_itself_keeps_its_profile_and_its_stages_alone() -> None:
     monitor = Monitor()
     stages = {id(stage) for stage in monitor.stages}
     others = {name for name, value in vars(monitor).items() if id(value) not in stages}
-    assert others == {"_profile", "_settings"}  # which the restorer hands over
+    assert others == {"_profile", "_settings"}  # the caller of `restored` passes them
 
 
 @pytest.mark.parametrize("stage", STAGES, ids=lambda kind: kind.__name__)
@@ -79,7 +79,7 @@ def is_same(a: Any, b: Any, top: int) -> bool:
 
 
 def assert_same(a: Any, b: Any, top: int) -> None:
-    """Equal, but for the room that arrays have beyond the `top` bodies, and the order in a grid's cells."""
+    """Equal, except for array rows beyond the `top` bodies, and for the order within a grid's cells."""
     if isinstance(a, ShapeTableBuilder):
         assert a.free == b.free
         a, b = a.used, b.used

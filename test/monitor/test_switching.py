@@ -1,4 +1,4 @@
-"""A profile that changes while the monitor runs: nothing is forgotten, and from then on the new one holds."""
+"""A profile that changes while the monitor runs: the state is kept, and the new profile holds from then on."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_contacts_persist_and_keep_their_age(profile: str | Profile) -> None:
     before = monitor.step(0, states)
     assert len(before.contacts) > 5
     monitor.profile = profile
-    after = monitor.step(SECOND // 10, states)  # nothing has moved
+    after = monitor.step(SECOND // 10, states)  # no object has moved
     kept = np.isin(after.contacts[["id_a", "id_b"]], before.contacts[["id_a", "id_b"]])
     assert kept.sum() == len(before.contacts)
     assert set(after.contacts["phase"][kept].tolist()) == {records.Phase.PERSIST}
@@ -75,7 +75,7 @@ def test_contacts_persist_and_keep_their_age(profile: str | Profile) -> None:
 
 @pytest.mark.parametrize("setting", Profile.fields(), ids=lambda setting: setting.name)
 def test_every_setting_can_change_and_holds_from_then_on(setting: Any) -> None:
-    """Against plain recomputation with the new profile, at every step after the change."""
+    """Compare every step after the change with plain recomputation with the new profile."""
     scene = make_scene("crossing")
     monitor, plain = Monitor("balanced"), ReferenceMonitor("balanced")
     for description in scene.descriptions:
@@ -111,7 +111,7 @@ def test_predictions_are_as_exact_as_the_new_profile() -> None:
     result, expected = (each.step(round(scene.time * SECOND), states) for each in (monitor, fresh))
     for name in ("id_a", "id_b", "status"):
         assert np.array_equal(result.predictions[name], expected.predictions[name])
-    for name in ("lower", "upper"):  # found over another stretch of time, so not to the last bit
+    for name in ("lower", "upper"):  # the search covered another time window, so equal only within a tolerance
         assert np.allclose(result.predictions[name], expected.predictions[name], atol=1e-5)
     certain = [p[p["status"] == records.PredictionStatus.HIT] for p in (rough, result.predictions)]
     before, after = (np.median(p["upper"] - p["lower"]) for p in certain)

@@ -1,4 +1,4 @@
-"""Steps that end before all was looked at: what is said of the rest holds, and nothing that collides is clear."""
+"""Steps with a budget: the bounds for pairs that are not examined hold, and no collision is missed."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def by_pair(rows: np.ndarray[Any, Any]) -> dict[tuple[int, int], Any]:
 
 
 def rods(scene: Scene) -> list[ObjectDescription]:
-    """Long hulls and boxes in place of the scene's objects: their bounding spheres say little, their trees more."""
+    """Replace the scene's objects with long hulls and boxes: their sphere trees are much tighter than their spheres."""
     random = np.random.default_rng(4)
     corners = random.normal(size=(40, 3))
     corners *= (0.8, 0.1, 0.08) / np.linalg.norm(corners, axis=1, keepdims=True)
@@ -42,7 +42,7 @@ def rods(scene: Scene) -> list[ObjectDescription]:
 
 
 def play(profile: Profile, mode: str, steps: int = 25, *, long: bool = False) -> list[tuple[StepResult, StepResult]]:
-    """Answers with a budget, and those of plain recomputation of the same states."""
+    """Answers with a budget, and the answers of plain recomputation for the same states."""
     scene = make_scene("clutter", objects=150 if long else 300)
     limited, plain = Monitor(profile), ReferenceMonitor(profile.replace(pairs_per_step=1_000_000_000))
     for description in rods(scene) if long else scene.descriptions:
@@ -52,7 +52,7 @@ def play(profile: Profile, mode: str, steps: int = 25, *, long: bool = False) ->
     answers = []
     for step in range(steps):
         states = scene.states()
-        if mode == "jumps":  # all change their course in every step: nothing of the last step can be used
+        if mode == "jumps":  # all objects change their course in every step, so that no prediction can be kept
             states["linear"] += random.uniform(-0.3, 0.3, states["linear"].shape)
         answers.append((limited.step(step * SECOND // 50, states), plain.step(step * SECOND // 50, states)))
         scene.step()
@@ -96,7 +96,7 @@ def test_no_collision_is_reported_clear_and_every_interval_holds(mode: str, limi
 
 @pytest.mark.parametrize("mode", MODES)
 def test_sphere_trees_tell_more_than_bounding_spheres(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With as many pairs in a step, fewer are told that do not collide, and none later than it does."""
+    """With the same number of pairs in a step, fewer pairs are reported that do not collide."""
     told = []
     for corners in (sphere_trees.MOST_CORNERS, 0):
         monkeypatch.setattr(sphere_trees, "MOST_CORNERS", corners)
@@ -115,7 +115,7 @@ def test_a_budget_that_is_enough_changes_no_answer(mode: str) -> None:
         a, b = (np.sort(each.predictions, order=["id_a", "id_b"]) for each in (free, limited))
         for name in ("id_a", "id_b", "status"):
             assert np.array_equal(a[name], b[name])
-        # sought from another begin, so not the same to the last bit
+        # the search began at another time, so not equal to the last bit
         assert (a["lower"] <= b["upper"]).all() and (b["lower"] <= a["upper"]).all()
 
 
@@ -149,7 +149,7 @@ def test_the_most_urgent_are_done_first() -> None:
 
 
 def test_touching_pairs_take_turns() -> None:
-    """With a budget for a few, each of the touching pairs is looked at again within a few steps."""
+    """With a budget for a few pairs, each touching pair is examined again within some steps."""
     scene = make_scene("clutter", objects=120)
     monitor = Monitor()
     for description in scene.descriptions:
@@ -167,7 +167,7 @@ def test_touching_pairs_take_turns() -> None:
 
 
 def test_a_cut_step_replays_with_the_pairs_it_came_to() -> None:
-    """The clock leaves room for another number of pairs in every step; a replay has no clock, also from the middle."""
+    """The clock allows another number of pairs in each step. Replays without it, also from the middle, are equal."""
     scene = make_scene("clutter", objects=300)
     live = Pipeline(Profile(budget_ms=50.0))
     again = Pipeline(live.monitor.profile, timed=False)
@@ -212,7 +212,7 @@ class TestBudgets:
             assert budget.done == FEWEST
 
     def test_a_bad_estimate_is_forgotten(self) -> None:
-        """After a hiccup no pair seems to fit; steps go on soon nevertheless."""
+        """After one slow measurement no pair seems to fit. The estimate recovers within some steps."""
         clock = StepClock()
         clock.cost[EXAMINE] = 1.0
         tries = []
@@ -225,7 +225,7 @@ class TestBudgets:
         assert len(tries) > 5
 
     def test_a_bad_estimate_is_forgotten_where_other_work_goes_on(self) -> None:
-        """Pairs of trees that fit use up the few pairs of each step; the others come to their turn all the same."""
+        """Cheap pairs of trees use up the guaranteed pairs of each step. The other pairs are examined nevertheless."""
         clock = StepClock()
         clock.cost[EXAMINE] = 1.0
         for _ in range(100):

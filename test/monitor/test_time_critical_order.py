@@ -1,4 +1,4 @@
-"""The order in which pairs are looked at when there is not time for all of them."""
+"""The order in which pairs are examined if the budget does not suffice for all of them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_cheap_ones_first_and_then_by_turns(rows: list[tuple[int, int, bool, flo
     bodies = make_bodies(BODIES)
     bodies.motion["radius"] = 1.0
     bodies.motion["radius"][0] = np.inf  # a half-space
-    bodies.spin_radius[3:] = 1.0  # the others but these are spheres
+    bodies.spin_radius[3:] = 1.0  # bodies 1 and 2 are spheres
     pairs, events = np.zeros(len(rows), PAIR), np.zeros(len(rows), IMPACT)
     for k, (i, j, touched, lower) in enumerate(sorted(rows)):
         pairs[k] = ((i << 32) | j, i, j, 0.0, 0, touched, 0)
@@ -39,9 +39,9 @@ def test_cheap_ones_first_and_then_by_turns(rows: list[tuple[int, int, bool, flo
     dear = order[cheap:]
     touched, lower = pairs["touched"][dear] == 1, events["lower"][dear]
     for of_one_kind in (touched, ~touched):
-        assert (np.diff(lower[of_one_kind]) >= 0.0).all()  # who waits longest comes first
+        assert (np.diff(lower[of_one_kind]) >= 0.0).all()  # the pair that has waited longest comes first
     both = 2 * min(int(touched.sum()), int((~touched).sum()))
-    assert touched[:both].tolist() == [False, True] * (both // 2)  # and none of the two kinds waits for the other
+    assert touched[:both].tolist() == [False, True] * (both // 2)  # the two kinds alternate
 
 
 def test_who_waits_as_long_as_others_is_not_always_the_last() -> None:

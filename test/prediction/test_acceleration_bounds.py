@@ -1,4 +1,4 @@
-"""What objects declare that they may do widens the interval of an impact: against formulas and simulated drivers."""
+"""Acceleration bounds widen the interval of an impact: against formulas and simulated drivers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HORIZON = 2.0
 
 
 def head_on(speed: float, gap: float, uncertain: bool = True, **bounds: float) -> np.void:
-    """The prediction of a ball that drives at another one that stands."""
+    """Predict the impact of a ball that moves towards a ball at rest."""
     monitor = cm.Monitor(Profile.named("balanced").replace(horizon=HORIZON, uncertainty=uncertain))
     monitor.add(0, cm.Sphere(0.5), **bounds)
     monitor.add(1, cm.Sphere(0.5))
@@ -56,12 +56,12 @@ def test_turning_harder_reaches_sooner() -> None:
         (told,) = monitor.step(0, [0, 1], poses, twists).predictions
         lowers.append(float(told["lower"]))
     turned = 0.5 * lowers[0]  # rad, until it meets the ball
-    assert lowers[1] <= (sqrt(0.5**2 + 2 * turned) - 0.5) / 1.0  # turning alike and harder
+    assert lowers[1] <= (sqrt(0.5**2 + 2 * turned) - 0.5) / 1.0  # the same rotation, accelerated
     assert lowers[1] > 0.3 * lowers[0]
 
 
 def test_no_driver_within_the_bounds_touches_before_the_lower_end() -> None:
-    """Balls that accelerate at will, anew every 50 ms and as hard as they declared, followed in small steps."""
+    """Balls accelerate at random within their bounds, with a new acceleration every 50 ms; simulated in small steps."""
     rng = np.random.default_rng(3)
     drivers, dt, radius = 500, 0.01, 0.5
     told = 0
@@ -81,7 +81,7 @@ def test_no_driver_within_the_bounds_touches_before_the_lower_end() -> None:
         told += 1
         p, v, a = np.tile(start, (drivers, 1)), np.tile(velocity, (drivers, 1)), np.zeros((drivers, 3))
         for step in range(int(found["lower"][0] / dt)):
-            if step % 5 == 0:  # half of them straight at the other one, half anywhere
+            if step % 5 == 0:  # half of them towards the other ball, half in any direction
                 a = -p + rng.normal(0, 1, p.shape) * (np.arange(drivers) % 2)[:, None]
                 a *= bound / np.linalg.norm(a, axis=1, keepdims=True)
             p += v * dt + 0.5 * a * dt * dt

@@ -49,7 +49,7 @@ def _table(a: Any, b: Any) -> ShapeTable:
 
 
 def _along(shapes: tuple[Any, Any], rotations: Array, row: Array, times: Array) -> Array:
-    """The gap along the axis at the times (T,), as it is: supports of the shapes as they stand then."""
+    """The true gap along the axis at the times (T,), from the supports of the moved shapes."""
     n, m, *offsets, p, v, w_a, w_b, acceleration = row
     axis = rotation_matrix(from_rotation_vector(times[:, None] * np.cross(n, m))) @ n
     gap = np.einsum("ti,ti->t", axis, p + times[:, None] * v + 0.5 * times[:, None] ** 2 * acceleration)
@@ -64,7 +64,7 @@ def _along(shapes: tuple[Any, Any], rotations: Array, row: Array, times: Array) 
     ("a", "b"), [("box", "box"), ("box", "capsule"), ("sphere", "box"), ("cylinder", "box"), ("cone", "hull")]
 )
 def test_the_gap_stays_open_along_every_axis(a: str, b: str) -> None:
-    """Until the time that is told; which is the last such time for slow turning, where the bound is nearly exact."""
+    """The gap stays open until the returned time."""
     rng = np.random.default_rng(7)
     shapes, count = (SHAPES[a], SHAPES[b]), 60
     q = rng.normal(size=(2, count, 4))
@@ -74,11 +74,11 @@ def test_the_gap_stays_open_along_every_axis(a: str, b: str) -> None:
     n /= np.linalg.norm(n, axis=1, keepdims=True)
     rows[:, 1] -= np.einsum("ki,ki->k", rows[:, 1], n)[:, None] * n
     rows[: count // 4, 1] = 0.0  # axes at rest
-    rows[::3, 8] = 0.0  # and no acceleration
+    rows[::3, 8] = 0.0  # no acceleration
     rows[:, 2:4] *= rng.choice([0.0, 0.3], (count, 2, 1))
     gaps = np.array([_along(shapes, rotation[:, k], rows[k], np.zeros(1))[0] for k in range(count)])
     gap = 0.5
-    rows[:, 4] += (gap - gaps)[:, None] * n  # so that it is half a metre along each axis
+    rows[:, 4] += (gap - gaps)[:, None] * n  # so that the gap is half a metre along each axis
     found = np.empty(count)
     _advances(_table(*shapes), rotation, rows, gap, UNTIL, found)
     assert (found > 0.0).all()
@@ -89,7 +89,7 @@ def test_the_gap_stays_open_along_every_axis(a: str, b: str) -> None:
 
 @pytest.mark.parametrize(("a", "b"), [("box", "box"), ("cylinder", "box")])
 def test_with_an_axis_that_turns_with_a_face_little_is_left(a: str, b: str) -> None:
-    """A ball-like motion onto a turning face: along the face's own normal, nearly the true time; at rest, far less."""
+    """A ball meets a turning face. Along the face's normal the bound is nearly exact; an axis at rest gives less."""
     shapes = (SHAPES[a], cm.Sphere(0.2))
     n, w = np.array([0.0, 0.0, 1.0]), np.array([0.4, -0.3, 0.0])
     rows = np.zeros((2, 9, 3))

@@ -1,4 +1,4 @@
-"""Predicted impacts against the motions sampled densely, and against closed forms."""
+"""Predicted impacts against densely sampled motions, and against closed forms."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ HORIZON = 2.0
 
 
 class PairScene:
-    """Pairs of bodies (2 k, 2 k + 1), each pair for itself, with reference motions from t = 0."""
+    """Independent pairs of bodies (2 k, 2 k + 1) with reference motions from t = 0."""
 
     def __init__(self, shapes: list[tuple[Shape, Shape]], rng: np.random.Generator, tube: float = 0.0) -> None:
         n = 2 * len(shapes)
@@ -69,7 +69,7 @@ class PairScene:
         return events[:hits]
 
     def distances(self, t: NDArray[np.float64] | float) -> NDArray[np.float64]:
-        """Signed distance of every pair at the time t, or at a time of its own."""
+        """Signed distance (m) of every pair at the time t (one time, or one for each pair)."""
         times = np.broadcast_to(t, len(self.pairs)).repeat(2)[:, None]
         position = np.zeros((len(self.table.kind), 3))
         rotation = np.zeros((len(self.table.kind), 3, 3))
@@ -121,12 +121,12 @@ def test_no_impact_is_missed_and_none_is_late(kind_a: str, kind_b: str, tube: fl
     upper[hits["i"] // 2] = hits["upper"]
     assert np.all(scene.distances(upper)[hits["i"] // 2] <= round_off), "not in contact by the upper end"
     assert np.all(hits["lower"] <= hits["upper"])
-    # the safe time is not merely safe: the pair is nearly within the tube there
+    # the safe time is tight too: the pair is nearly within the tube there
     at = np.where(np.isfinite(lower), lower, 0.0)
     near = scene.distances(at)[events["i"] // 2]
     settled = events["status"] == HIT
     reach = 2 * tube * (1 + events["lower"][settled]) + TOLERANCE
-    # SAT bounds the distance of boxes from below: seen from a corner it can be half of it
+    # SAT bounds the distance of boxes from below; at a corner it can be half of the distance
     assert np.all(near[settled] <= 2 * reach + round_off)
 
 

@@ -1,4 +1,4 @@
-"""Bodies that say how hard they accelerate: against roots of polynomials, dense samples, and in the monitor."""
+"""Bodies with declared accelerations: against roots of polynomials, against dense samples, and in the monitor."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ VALID, UNKNOWN = int(StateFlag.ACCELERATION_VALID), int(StateFlag.TWIST_UNKNOWN)
 
 
 def first_root(p: NDArray[np.float64], v: NDArray[np.float64], a: NDArray[np.float64], reach: float) -> float:
-    """When |p + v t + a t^2 / 2| first is `reach`, from 0 on; infinite: never."""
+    """First time t >= 0 (s) at which |p + v t + a t^2 / 2| is `reach`; infinite: never."""
     quartic = [a @ a / 4, v @ a, v @ v + p @ a, 2 * p @ v, p @ p - reach**2]
     roots = np.roots(quartic)
     real = roots[np.abs(roots.imag) < 1e-9].real
@@ -80,7 +80,7 @@ def test_shapes_that_turn_against_dense_samples(a: cm.Box, b: cm.Box) -> None:
 
 
 def test_who_brakes_in_time_does_not_meet() -> None:
-    """From 2 m/s with 2 m/s^2 it stops after 1 m: 1 mm before the wall, or 1 mm after it."""
+    """From 2 m/s at -2 m/s^2 the body stops after 1 m: 1 mm before the wall, or 1 mm behind it."""
     wall = cm.HalfSpace((-1, 0, 0), -1.5)  # x >= 1.5
     still = Motion(Pose())
     for start, status in ((-0.001, "clear"), (0.001, "hit")):
@@ -101,7 +101,7 @@ def test_an_acceleration_has_three_finite_numbers() -> None:
 
 
 def scene(count: int, flags: int) -> tuple[NDArray[np.void], NDArray[np.float64]]:
-    """States that accelerate, and the accelerations (N, 3)."""
+    """States with accelerations, and the accelerations (N, 3)."""
     rng = np.random.default_rng(11)
     rows = np.zeros(count, STATE)
     rows["id"], rows["quaternion"][:, 3], rows["flags"] = np.arange(count), 1.0, flags
@@ -129,7 +129,7 @@ def monitor_of(count: int) -> tuple[cm.Monitor, list[cm.Box | cm.Sphere]]:
 
 
 def test_the_monitor_predicts_along_the_acceleration() -> None:
-    """At every step as two bodies alone do, and to the true time; who keeps his acceleration is not predicted anew."""
+    """Each step agrees with the query for two bodies. A body that keeps its acceleration is not predicted anew."""
     count, steps = 10, 5
     rows, _ = scene(count, VALID)
     start = rows.copy()
@@ -183,7 +183,7 @@ def test_one_that_is_not_finite_is_refused() -> None:
 
 
 def test_an_estimated_twist_is_that_at_the_last_state() -> None:
-    """From rest with 2 m/s^2: after 0.1 s it is at 0.01 m, was 0.1 m/s fast in the mean, and is 0.2 m/s fast."""
+    """From rest at 2 m/s^2: after 0.1 s the position is 0.01 m, the mean speed was 0.1 m/s, the speed is 0.2 m/s."""
     monitor = cm.Monitor("exact")
     monitor.add(0, cm.Sphere(0.5))
     monitor.add(1, cm.Sphere(0.5), static=True, pose=cm.Pose((2.0, 0, 0)))
@@ -199,7 +199,7 @@ def test_an_estimated_twist_is_that_at_the_last_state() -> None:
 
 @pytest.mark.parametrize("shape", [cm.Box((1.0, 0.7, 0.4)), cm.Box((0.1, 1.6, 0.1))], ids=["spheres", "sphere trees"])
 def test_a_bound_says_how_fast_they_close_when_it_begins(shape: cm.Box) -> None:
-    """Not how fast they close now: who has no time for a pair is told by the bound how urgent it is."""
+    """The closing speed of a bound is that at its begin, not that of now: it shows how urgent the pair is."""
     pairs, speed, hard = 20, 0.5, 2.0
     monitor = cm.Monitor(Profile(pairs_per_step=1))
     rows = np.zeros(2 * pairs, STATE)

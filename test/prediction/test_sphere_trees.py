@@ -1,4 +1,4 @@
-"""Sphere trees of long bodies contain them at every level, and are left out where they say nothing."""
+"""Sphere trees of long bodies contain them at every level, and are left out where they gain nothing."""
 
 from __future__ import annotations
 

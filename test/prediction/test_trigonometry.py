@@ -22,7 +22,7 @@ def both(x):
 
 
 def exact(x: float) -> tuple[Fraction, Fraction]:
-    """Taylor's series after an exact reduction; the rest is below 1e-40."""
+    """Taylor's series after an exact reduction; the remainder is below 1e-40."""
     r = Fraction(x) % (2 * PI)
     r -= 2 * PI if r > PI else 0
     terms, term = [], Fraction(1)

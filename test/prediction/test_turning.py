@@ -1,4 +1,4 @@
-"""How far bodies have turned away from their reference, against SciPy's rotations."""
+"""Angles by which bodies have turned away from their reference motions, against SciPy's rotations."""
 
 import numpy as np
 import pytest

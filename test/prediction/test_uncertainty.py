@@ -29,7 +29,7 @@ def state(object_id: int, position: Array | tuple[float, ...], velocity: Array |
 
 
 def predict(shapes: list[cm.Shape], states: NDArray[np.void], covariance: Array | None = None) -> np.void | None:
-    """The prediction of the only pair; None: not told."""
+    """The prediction of the only pair; None: not reported."""
     monitor = cm.Monitor(Profile.named("balanced").replace(horizon=HORIZON))
     for object_id, shape in enumerate(shapes):
         fixed = isinstance(shape, cm.HalfSpace)
@@ -39,7 +39,7 @@ def predict(shapes: list[cm.Shape], states: NDArray[np.void], covariance: Array 
 
 
 def sphere_impacts(reach: float, p: Array, v: Array) -> Array:
-    """First times (n,) in [0, HORIZON] at which |p + v t| <= reach, infinite for none: the quadratic's root."""
+    """First times (n,) in [0, HORIZON] at which |p + v t| <= reach, by the quadratic formula; infinite: never."""
     a, b, c = (v * v).sum(1), (p * v).sum(1), (p * p).sum(1) - reach**2
     discriminant = b * b - a * c
     root = (-b - np.sqrt(np.maximum(discriminant, 0.0))) / a
@@ -94,7 +94,7 @@ def test_spheres_agree_with_monte_carlo(with_covariance: bool) -> None:
 )
 @pytest.mark.parametrize("gap", [1.0, 1.9, 2.6])
 def test_a_wall_is_the_normal_integral(shape: cm.Shape, gap: float) -> None:
-    """A flat wall is met if the height at the end of the horizon is below that of the shape: one normal variable."""
+    """A shape hits a flat wall if its height at the horizon, a normal variable, is small enough."""
     sigma_p, sigma_v, speed = 0.1, 0.2, 1.0
     rows = state(1, (0, 0, gap + 0.5), (0.3, 0, -speed), sigma_p, sigma_v)
     answer = predict([cm.HalfSpace((0, 0, 1)), shape], rows)
@@ -112,7 +112,7 @@ def test_what_nobody_declares_is_not_computed() -> None:
 
 
 def test_pairs_far_from_meeting_are_not_told() -> None:
-    """A crowd that stands 2 m apart and is known to 5 cm: nobody may meet anybody, though the boxes are widened."""
+    """People at rest, 2 m apart, with errors of 5 cm: no two of them may meet, although the boxes are widened."""
     side = 8
     monitor = cm.Monitor()
     grid = np.stack(np.meshgrid(*[2.0 * np.arange(side)] * 2), -1).reshape(-1, 2)
@@ -120,7 +120,7 @@ def test_pairs_far_from_meeting_are_not_told() -> None:
         monitor.add(object_id, cm.Cylinder(0.25, 1.75))
     rows = np.concatenate([state(k, (*at, 0), (0, 0, 0), 0.05, 0.05) for k, at in enumerate(grid)])
     assert len(monitor.step(0, rows).predictions) == 0
-    rows["velocity_stddev"] = 0.5  # 1 m after two seconds: neighbours may meet, and nobody else
+    rows["velocity_stddev"] = 0.5  # 1 m after two seconds: only neighbours may meet
     told = monitor.step(SECOND // 100, rows).predictions
     assert len(told) == 2 * side * (side - 1) + 2 * (side - 1) ** 2
     assert (told["status"] == PredictionStatus.POSSIBLE).all()
@@ -129,7 +129,7 @@ def test_pairs_far_from_meeting_are_not_told() -> None:
 
 
 def test_it_grows_while_an_object_is_not_heard_of() -> None:
-    """Two that stand 1 m apart: the longer one is silent, the more likely they meet, until they may touch already."""
+    """Two objects at rest, 1 m apart: the longer one is silent, the more likely they meet, until they may touch now."""
     monitor = cm.Monitor()
     for object_id in (0, 1):
         monitor.add(object_id, cm.Sphere(0.5))
@@ -163,7 +163,7 @@ def test_a_declared_acceleration_widens_it() -> None:
 
 
 def test_who_declares_uncertainty_now_and_then_is_told_of() -> None:
-    """The other one comes near in a step in which nothing is declared; from the next one on something is again."""
+    """The second object comes near in a step without a declared uncertainty; later steps declare one again."""
     monitor = cm.Monitor()
     told = []
     monitor.add(1, cm.Sphere(0.5))
