@@ -1,1 +1,1 @@
-"""The monitor: a door, and the stages of a step."""
+"""The monitor and the stages of its step."""

@@ -1,4 +1,4 @@
-"""Stage 6, active pairs: those that touch, and those whose certified time has run out; each step looks at them all."""
+"""Stage 6, active pairs: examine in every step the pairs that touch and those whose certified time has run out."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ PAIR = np.dtype(
         ("key", np.uint64),  # (smaller id << 32) | larger id; the set is sorted by it
         ("i", np.int32),  # body slots; body i has the smaller id
         ("j", np.int32),
-        ("since", np.float64),  # s after the monitor's origin: when it began to touch
+        ("since", np.float64),  # s after the monitor's origin: begin of the contact; NaN before
         ("touching", np.uint8),
-        ("touched", np.uint8),  # the same, one step before
-        ("leaving", np.uint8),  # gone with the next step: certified apart for a while, or reported once more (END)
+        ("touched", np.uint8),  # the same, in the step before
+        ("leaving", np.uint8),  # the next step drops it: it is certified apart for a while, or was reported as END
     ]
 )
 
 
 PREFETCH_AHEAD: Final = 2
-"""Pairs whose bodies are prefetched while one is examined."""
+"""How many pairs ahead the bodies are prefetched."""
 
 Rows = NDArray[np.void]
 
 
 class Active(NamedTuple):
-    """The active pairs (n,), all that is known of a pair at one index."""
+    """The active pairs (n,). The data of one pair have the same index in all columns."""
 
     pairs: Any  # PAIR
-    events: Any  # IMPACT: when it may touch, or did
+    events: Any  # IMPACT: its last predicted impact
     results: Any  # (n, RESULT): its contact in this step
 
 
 class ActivePairs(Stage):
-    """The pairs that are examined in every step, and the contacts whose object was removed since the last one."""
+    """The pairs that every step examines, and the contacts whose pair was removed since the last step."""
 
     SAVED = ("pairs", "events", "_orphans")
     CACHES = ("results",)
@@ -57,7 +57,7 @@ class ActivePairs(Stage):
         self.pairs: Rows = np.zeros(0, PAIR)
         self.events: Rows = np.zeros(0, IMPACT)
         self.results = np.empty((0, RESULT))
-        self._orphans: list[tuple[int, float]] = []  # contacts (key, since) that ended with their object
+        self._orphans: list[tuple[int, float]] = []  # contacts (key, since) of removed pairs
 
     @property
     def active(self) -> Active:
@@ -77,7 +77,7 @@ class ActivePairs(Stage):
         return np.flatnonzero((self.pairs["i"] == i) | (self.pairs["j"] == i))
 
     def end(self, indices: NDArray[np.intp]) -> None:
-        """Take pairs out; a contact among them is reported as ended in the next step."""
+        """Remove pairs. The next step reports the contacts among them as END."""
         for pair in self.pairs[indices]:
             if pair["touching"]:
                 self._orphans.append((int(pair["key"]), float(pair["since"])))
@@ -85,24 +85,24 @@ class ActivePairs(Stage):
         self.events = np.delete(self.events, indices)
 
     def end_unchecked(self, roster: Roster, i: int) -> None:
-        """End the pairs of body i that are not checked any more."""
+        """Remove the pairs of body i that are no longer checked."""
         of_body = self.of_body(i)
         kept = [is_checked(roster, int(pair["i"]), int(pair["j"])) for pair in self.pairs[of_body]]
         self.end(of_body[~np.array(kept, np.bool_)])
 
     def end_of(self, is_out: NDArray[np.bool_]) -> None:
-        """End the pairs of the bodies that are marked."""
+        """Remove the pairs of the marked bodies. is_out (N,): by slot."""
         self.end(np.flatnonzero(is_out[self.pairs["i"]] | is_out[self.pairs["j"]]))
 
     def end_all(self) -> None:
-        """End every pair; the times of their begin are of another clock."""
+        """Remove every pair. Their contacts end with an unknown duration, because the timeline restarts."""
         self.pairs["since"] = np.nan
         self.end(np.arange(len(self.pairs)))
 
     # ------------------------------------------------------------------ the step
 
     def unite(self, step: StepContext, due: Rows) -> None:
-        """Take in the events (IMPACT) that came due; pairs whose motion has changed or that ended leave."""
+        """Add the pairs of the events (IMPACT) that are due. Drop the pairs that ended, or whose motion changed."""
         room = len(self.pairs) + len(due)
         pairs, events = np.empty(room, PAIR), np.empty(room, IMPACT)
         order = np.argsort(due["key"], kind="stable")
@@ -110,17 +110,17 @@ class ActivePairs(Stage):
         self.pairs, self.events, self.results = pairs[:n], events[:n], np.empty((n, RESULT))
 
     def keep(self, kept: NDArray[np.bool_]) -> None:
-        """Keep the pairs that are marked."""
+        """Keep the marked pairs and drop the others. kept (n,)."""
         self.pairs, self.events = self.pairs.compress(kept), self.events.compress(kept)
         self.results = self.results[: len(self.pairs)]
 
     def examine_all(self, step: StepContext, scratch: Scratch) -> Rows:
-        """Examine every pair; the events (IMPACT) of pairs that are certified apart for a while."""
+        """Examine every pair. Return the events (IMPACT) of pairs that are certified apart for a while."""
         later = np.empty(len(self.pairs), IMPACT)
         return later[: self.examine(step, np.arange(len(self.pairs)), scratch, later)]
 
     def examine(self, step: StepContext, which: NDArray[np.intp], scratch: Scratch, later: Rows) -> int:
-        """Examine the pairs `which` (M,); what is certified apart for a while goes into `later` (IMPACT): how many."""
+        """Examine the pairs `which` (M,). Write the events of pairs certified apart to `later`; return how many."""
         queries = step.settings.impact, step.settings.contact
         n, tests, made = _examine(step.roster.multibody, self.active, which, step.now, queries, scratch, later)
         step.work.narrow_phase_tests += tests
@@ -128,7 +128,7 @@ class ActivePairs(Stage):
         return int(n)
 
     def take_orphans(self, now: float) -> Rows:
-        """The END (records.CONTACT) of the contacts whose object is gone, each reported once."""
+        """Return and forget the END (records.CONTACT) of each contact whose pair was removed."""
         ended = np.zeros(len(self._orphans), records.CONTACT)
         if len(ended):
             keys, since = zip(*self._orphans, strict=True)
@@ -159,10 +159,11 @@ class ActivePairs(Stage):
 
 @kernel
 def _unite(bodies, pairs, events, due, order, new_pairs, new_events):
-    """The active pairs with those that came due, by key; both have an event of their own at the same index.
+    """Merge the active pairs with those of the due events, by key, into new_pairs; their events into new_events.
 
-    Left out are pairs that do not touch and whose motion has changed (they were predicted anew), and pairs of bodies
-    that are gone. order (D,): of `due` by key. Returns how many there are.
+    A pair leaves the active pairs here if it is marked as leaving, if one of its bodies was removed, or if it does not
+    touch and its motion changed (then it was predicted anew). order (D,): sorts `due` by key. Returns the number of
+    pairs.
     """
     n = k = m = 0
     while k < pairs.size or m < order.size:
@@ -206,11 +207,12 @@ def _ask_for(table, bodies, i):
 
 @kernel
 def _examine(multibody, active, which, now, queries, scratch, later):
-    """Examine the active pairs `which` (M,) at `now`: a contact goes into the results, another pair is predicted on.
+    """Examine the active pairs `which` (M,) at `now`: write contacts into the results, predict the other pairs further.
 
-    All that is known of a pair stays at its index; it is `leaving` where it has just ended, or is certified apart for a
-    while: then its event goes into `later` (IMPACT). queries: an ImpactQuery and a ContactQuery.
-    Returns (how many later, narrow-phase tests, impact queries).
+    The pairs keep their indices. A pair that does not touch and is certified apart for a while returns to the event
+    list: it is marked as leaving, and its event goes into `later` (IMPACT). A pair without a further impact, or one
+    that this step predicted anew, is marked as leaving too. queries: an ImpactQuery and a ContactQuery.
+    Returns (number of events in `later`, narrow-phase tests, impact queries).
     """
     table, bodies = multibody.table, multibody.bodies
     pairs, events, results = active
@@ -244,6 +246,6 @@ def _examine(multibody, active, which, now, queries, scratch, later):
 
 @inlined
 def is_predicted_anew(bodies, i, j, now, event):
-    """Whether this step has predicted the pair anew already, since a body left the motion that the event rests on."""
+    """Whether this step predicted the pair anew already, because a body left the motion that the event rests on."""
     is_new = bodies.motion[i].time == now or bodies.motion[j].time == now
     return is_new and not holds(bodies.version, event)

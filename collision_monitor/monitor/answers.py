@@ -1,4 +1,4 @@
-"""Stage 7, answers: from active pairs and pending events to the records that are published, and the status."""
+"""Stage 7, answers: convert active pairs and pending events to the published records, and compute the status."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ Rows = NDArray[np.void]
 
 
 class Answers(Stage):
-    """The last step's answers, and a digest of all that were given."""
+    """The answers of the last step, and a digest of all answers so far."""
 
     SAVED = ("digest", "last", "step_count")
 
@@ -53,7 +53,7 @@ class Answers(Stage):
         self.last: StepResult | None = None
 
     def contacts(self, step: StepContext, active: ActivePairs) -> Rows:
-        """The contacts (records.CONTACT) of the active pairs, by ids, with the END of those whose object is gone."""
+        """Contacts (records.CONTACT) of the active pairs, sorted by ids, with the END of contacts of removed pairs."""
         roster, multibody = step.roster, step.roster.multibody
         contacts = np.empty(len(active.pairs), records.CONTACT)
         n = write_contacts(active.pairs, active.results, roster.bodies, roster.parts.index, step.now, contacts)
@@ -64,11 +64,11 @@ class Answers(Stage):
         if not len(ended):
             return contacts
         both = joined([contacts, ended])
-        begins = both["phase"] != Phase.END  # the END of what was comes before the BEGIN of what is
+        begins = both["phase"] != Phase.END  # a pair's END comes before its next BEGIN
         return both[np.lexsort((begins, both["id_b"], both["id_a"]))]
 
     def predictions(self, step: StepContext, active: ActivePairs, events: EventList) -> tuple[Rows, NDArray[np.int32]]:
-        """The predictions (records.PREDICTION) of stated motions within the horizon, and the slots (n, 2) of each."""
+        """Predictions (records.PREDICTION) of the stated motions within the horizon, and their body slots (n, 2)."""
         p, roster = step.profile, step.roster
         pending = events.until(step.now + p.horizon)
         predictions = np.empty(len(pending) + len(active.pairs), records.PREDICTION)
@@ -79,7 +79,7 @@ class Answers(Stage):
         return predictions[:n], slots[:n]
 
     def filtered(self, step: StepContext, predictions: Rows) -> Rows:
-        """The predictions that the profile's filters leave."""
+        """Drop the predictions that the profile's filters exclude."""
         p = step.profile
         if not (p.min_closing_speed > 0.0 or p.ignore_separating):
             return predictions
@@ -92,14 +92,14 @@ class Answers(Stage):
         return predictions[kept]
 
     def finish(self, result: StepResult) -> StepResult:
-        """Make this the last result, and count it in the digest."""
+        """Store this as the last result and add it to the digest. Return it."""
         for part in (result.contacts, result.predictions):
             self.digest = int(chain_digest(np.uint64(self.digest), part.view(np.uint64)))
         self.last, self.step_count = result, result.step
         return result
 
     def repeated(self) -> StepResult:
-        """The last result, as that of a step that was refused."""
+        """Return the last result as that of a refused step."""
         assert self.last is not None, "the first stamp is always accepted"
         return dataclasses.replace(self.last, accepted=False, cut=None)
 
@@ -108,7 +108,7 @@ class Answers(Stage):
         last = self.last
         facts |= {"step": self.step_count, "digest": self.digest, "last": None}
         if last is not None:
-            snapshot.arrays.update(contacts=last.contacts, predictions=last.predictions)  # made anew in every step
+            snapshot.arrays.update(contacts=last.contacts, predictions=last.predictions)  # every step makes new arrays
             facts["last"] = [last.stamp_ns, last.step, dataclasses.asdict(last.status)]
 
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
@@ -124,7 +124,7 @@ class Answers(Stage):
 def step_status(
     step: StepContext, active: ActivePairs, events: EventList, contacts: Rows, predictions: Rows
 ) -> StepStatus:
-    """What the step did."""
+    """Count objects, answers and work of the step."""
     roster = step.roster
     unresolved = np.count_nonzero(contacts["status"] == UNSETTLED)
     unresolved += np.count_nonzero(predictions["status"] == UNRESOLVED)
@@ -144,9 +144,9 @@ def step_status(
 
 @kernel
 def write_contacts(pairs, results, bodies, shape_index, now, contacts):
-    """Contacts (records.CONTACT) of the pairs that touch or have just ended; returns how many.
+    """Write the contacts (records.CONTACT) of the pairs that touch or have just ended; return their number.
 
-    results (n, RESULT): of the pairs; shape_index (S,): a shape's place in its object's description.
+    results (n, RESULT): of the pairs. shape_index (S,): a shape's place in its object's description.
     """
     n = 0
     for k in range(pairs.size):
@@ -183,7 +183,7 @@ def write_contacts(pairs, results, bodies, shape_index, now, contacts):
 
 
 class Predicted(NamedTuple):
-    """Where predictions come from."""
+    """The sources of the predictions."""
 
     pairs: Any  # (n,) PAIR: active pairs
     active: Any  # (n,) IMPACT: their events
@@ -191,7 +191,7 @@ class Predicted(NamedTuple):
 
 
 class Times(NamedTuple):
-    """The times (s) that predictions are made at and until, and the age from which a state is stale."""
+    """The time of the predictions (s), their horizon (s), and the age from which a state is stale (s)."""
 
     now: float
     horizon: float
@@ -200,9 +200,10 @@ class Times(NamedTuple):
 
 @kernel
 def write_predictions(predicted, bodies, shape_index, times, predictions, slots):
-    """Predictions (records.PREDICTION) of the active pairs that do not touch, then of the pending events.
+    """Write the predictions (records.PREDICTION) of the active pairs that do not touch, then of the pending events.
 
-    shape_index (S,): a shape's place in its object's description; slots (n, 2): of the bodies. Returns how many.
+    shape_index (S,): a shape's place in its object's description. slots (n, 2), written: body slots of each prediction.
+    Returns the number of predictions.
     """
     pairs, active, pending = predicted
     now, horizon, stale_after = times
@@ -229,7 +230,7 @@ def write_predictions(predicted, bodies, shape_index, times, predictions, slots)
         row.shape_a, row.shape_b = shape_index[event.shape_i], shape_index[event.shape_j]
         row.status = event.status
         if bodies.excess[i] + bodies.excess[j] > 0.0:
-            # the models meet; whether and when the objects do is not known
+            # the models meet; it is unknown whether and when the objects do
             row.status = UNRESOLVED
             row.upper = inf
         row.method = BOUND_ONLY if event.method == TREE_BOUND else event.method
@@ -244,9 +245,9 @@ def write_predictions(predicted, bodies, shape_index, times, predictions, slots)
 
 @kernel
 def chain_digest(digest, words):
-    """64-bit digest of `digest` and then words (n,) uint64, in order; four independent lanes, mixed at the end.
+    """64-bit digest of `digest` followed by words (n,) uint64; four independent lanes, mixed at the end.
 
-    It tells equal answers from unequal ones; it is not meant to resist someone who forges them.
+    It distinguishes equal answers from unequal ones. It is not meant to resist forgery.
     """
     prime = np.uint64(0x9E3779B97F4A7C15)
     shift = np.uint64(31)

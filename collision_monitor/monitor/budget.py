@@ -1,7 +1,7 @@
-"""How much a step may still do, counted in pairs.
+"""Budgets of a step, counted in pairs: by the clock or by number.
 
-Against the clock, so that a step ends in time; and by a number, so that a replay stops where the recorded step stopped.
-The clock decides only how many pairs are looked at; which ones, and what is said of the others, is decided without it.
+With a budget in time, a step ends in time. With a number of pairs, a replay stops where the recorded step stopped. The
+clock decides only how many pairs a step examines. Their order, and the answers for the others, do not depend on it.
 """
 
 from __future__ import annotations
@@ -12,59 +12,59 @@ from time import perf_counter
 from typing import Final, Self
 
 FEWEST: Final = 8
-"""Pairs in a step at least, so that what is left is settled in the end."""
+"""Smallest number of pairs in a step, so that all pairs are examined in the end."""
 
 WORTH_A_LOOK: Final = 5e-5
-"""Work (s) between two looks at the clock, at least; or a pair."""
+"""Least work between two readings of the clock (s); it is at least one pair."""
 
 LEARNING: Final = 0.2
-"""Weight of the latest measurement in the running means; that of a pair's cost rises at once and falls slowly."""
+"""Weight of the latest measurement in the running means. The cost of a pair rises at once and falls by this weight."""
 
 SPREAD: Final = 4.0
-"""Mean deviations that the end of a step may take longer than usual."""
+"""Reserve for the end of a step, beyond its mean duration, in mean deviations."""
 
 OUTLIER: Final = 4.0
-"""A time that is this many times the usual one counts as that: the machine was busy with something else."""
+"""A measured time is clipped to this many times the usual one: the machine was busy with something else."""
 
 EXAMINE, REFINE, TREES = 0, 1, 2
-"""What is done to a pair: looked at now, its first impact sought, or to a handful of pairs: when their trees meet."""
+"""Kinds of work: examine a pair now, search for its first impact, or compare a HANDFUL of pairs of sphere trees."""
 
 HANDFUL: Final = 8
-"""Pairs of sphere trees that cost about as much as one pair of shapes, and count as one."""
+"""Number of pairs of sphere trees that cost about as much as one pair of shapes, and count as one pair."""
 
 
 class PairBudget:
-    """So many pairs and no more. `done`: how many were handed out."""
+    """A budget of `limit` pairs. `done`: number of pairs granted so far."""
 
     def __init__(self, limit: int) -> None:
         self.done = 0
         self._limit = limit
 
     def next(self, left: int, work: int) -> int:
-        """How many of the pairs that are left to do now; 0: stop. work: EXAMINE or REFINE."""
+        """Return how many of the remaining `left` pairs to do next; 0: stop. work: EXAMINE, REFINE or TREES."""
         del work
         count = min(left, self._limit - self.done)
         self.done += count
         return count
 
     def stop(self) -> None:
-        """No more will be asked for."""
+        """End the budgeted part of the step."""
 
 
 class StepClock:
-    """The steady clock of one monitor's steps; a context, entered by whoever hands a step's answers on.
+    """The steady clock of one monitor's steps: a context, which a caller that publishes the answers enters too.
 
-    It learns what a pair costs, and what a step still takes once no more pairs are looked at.
+    It learns the cost of a pair, and the duration of the rest of a step after the last pair.
     """
 
     def __init__(self) -> None:
-        self.cost = [1e-5, 1e-5, 1e-5]  # s for a pair, by kind of work
+        self.cost = [1e-5, 1e-5, 1e-5]  # estimated time for a pair (s), by kind of work
         self.began = self.stopped = 0.0
         self._end = self._deviation = self._aside = 0.0  # s
         self._depth = 0
 
     def __enter__(self) -> Self:
-        """Entered again within a step, it goes on."""
+        """Start the clock. Within a running step it continues."""
         if self._depth == 0:
             self.began, self.stopped, self._aside = perf_counter(), 0.0, 0.0
         self._depth += 1
@@ -72,7 +72,7 @@ class StepClock:
 
     @contextmanager
     def aside(self) -> Iterator[None]:
-        """What is done meanwhile comes on top of the budget: no time is reserved for it."""
+        """Context for work outside of the budget: later steps reserve no time for it."""
         began = perf_counter()
         yield
         self._aside += perf_counter() - began
@@ -90,28 +90,28 @@ class StepClock:
 
     @property
     def reserve(self) -> float:
-        """s to be left for the end of a step."""
+        """Time to reserve for the end of a step (s)."""
         return self._end + SPREAD * self._deviation
 
 
 class TimeBudget(PairBudget):
-    """As many pairs as fit into `seconds` from the step's begin on, but FEWEST in any case, so that work goes on."""
+    """As many pairs as fit into `seconds` from the begin of the step, but at least FEWEST and at most `limit`."""
 
     def __init__(self, clock: StepClock, seconds: float, limit: int) -> None:
         super().__init__(limit)
         self._clock = clock
         self._deadline = clock.began + seconds - clock.reserve
-        self._out = (0, 0, 0.0)  # the pairs that are being done: how many, what work, since when
+        self._out = (0, 0, 0.0)  # the pairs granted last: number, kind of work, start time
 
     def next(self, left: int, work: int) -> int:
-        """See PairBudget. About half of what seems to fit: so the estimate is checked on the way."""
+        """See PairBudget. Grants about half of the pairs that seem to fit, to correct the estimate on the way."""
         now = self._measure()
         cost = self._clock.cost[work]
         fit = int((self._deadline - now) / cost)
         if fit < 1:
             if now < self._deadline:
-                self._clock.cost[work] *= 1.0 - LEARNING  # or one bad estimate would stop all steps to come
-            self._limit = min(self._limit, max(self.done, FEWEST))  # the step is over
+                self._clock.cost[work] *= 1.0 - LEARNING  # else one bad estimate would stop all later steps
+            self._limit = min(self._limit, max(self.done, FEWEST))  # grant no more in this step
             self._clock.stopped = self._clock.stopped or now
             return super().next(left, work)
         count = super().next(min(left, fit, max(fit // 2, 1 + int(WORTH_A_LOOK / cost))), work)
@@ -119,7 +119,7 @@ class TimeBudget(PairBudget):
         return count
 
     def stop(self) -> None:
-        """What comes now is the end of the step."""
+        """Mark the begin of the end of the step, which `StepClock.reserve` estimates."""
         self._clock.stopped = self._clock.stopped or self._measure()
 
     def _measure(self) -> float:

@@ -1,4 +1,4 @@
-"""Stage 3, candidates: which pairs a body that starts a new motion, or is predicted further, has to be predicted in."""
+"""Stage 3, candidates: find the pairs to predict for the bodies that start a new motion or are predicted further."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from collision_monitor.prediction.impact_record import pair_key
 from collision_monitor.prediction.motion import swept_box
 
 MOST_QUERIES: Final = 0.01
-"""Part of the bodies up to which each is looked up in the hashed grid; for more, a new grid is built and swept once."""
+"""Up to this fraction of the bodies, each is queried in the hashed grid. For more, a dense grid is built and swept."""
 
 Pairs = NDArray[np.int32]
 
 
 class Candidates(Stage):
-    """The grid of swept boxes, and the pairs of bodies whose boxes meet."""
+    """The hashed grid of the bodies' swept boxes; finds the pairs of bodies whose boxes overlap."""
 
     SAVED = ("grid",)
     CACHES = ("_found",)
@@ -41,16 +41,16 @@ class Candidates(Stage):
         self._found = np.zeros((1024, 2), np.int32)
 
     def enlarge(self, capacity: int) -> None:
-        """Make room for so many bodies; the boxes stay."""
+        """Make room for `capacity` bodies; the boxes stay."""
         if len(self.grid.box) < capacity:
             self.grid = regridded(self.grid.box, capacity)
 
     def forget(self, slots: NDArray[np.int32]) -> None:
-        """Take the boxes of these bodies out of the grid."""
+        """Remove the boxes of these bodies from the grid."""
         remove_boxes(self.grid, slots)
 
     def find(self, step: StepContext, which: NDArray[np.int32]) -> Pairs:
-        """Pairs (P, 2) of the bodies in `which` with all whose swept boxes meet theirs, but for those never checked."""
+        """Find the checked pairs (P, 2) of the bodies in `which` with all bodies whose swept boxes overlap theirs."""
         pairs = self._partners(step, which)
         pairs = pairs[: keep_checked(step.roster.bodies, step.roster.allowed_keys, pairs)]
         step.work.candidate_pairs = len(pairs)
@@ -66,7 +66,7 @@ class Candidates(Stage):
             pairs = box_pairs(centre, half, is_new[:top])
             return pairs[: keep_new(bodies, self.grid, pairs, is_new, step.now, margin)]
         search = Search(which, is_new, np.empty(len(self.grid.box), np.int32))
-        while True:  # at most twice: the second time there is room for all
+        while True:  # at most twice: the second time the array is large enough
             n = int(find_partners(bodies, self.grid, search, step.now, margin, self._found))
             if n <= len(self._found):
                 return self._found[:n]
@@ -84,7 +84,7 @@ class Candidates(Stage):
 
 
 def is_checked(roster: Roster, i: int, j: int) -> bool:
-    """Whether the bodies i and j have been seen and their pair is checked."""
+    """Whether both bodies have a state and their pair is checked."""
     slots = np.array([[i, j]], np.int32)
     seen = roster.bodies.seen[slots].all()
     return bool(seen) and keep_checked(roster.bodies, roster.allowed_keys, slots) == 1
@@ -92,7 +92,7 @@ def is_checked(roster: Roster, i: int, j: int) -> bool:
 
 @device
 def _allowed(allowed, id_a, id_b):
-    """Is the pair in the sorted keys (smaller id << 32 | larger id)?"""
+    """Whether the pair is in the sorted keys (smaller id << 32 | larger id)."""
     if allowed.size == 0:
         return False
     key = pair_key(id_a, id_b)
@@ -103,17 +103,18 @@ def _allowed(allowed, id_a, id_b):
 class Search(NamedTuple):
     """A search for partners in the grid."""
 
-    which: Any  # (M,) int32: the bodies that look for partners
-    is_new: Any  # (N,) bool: marks these
+    which: Any  # (M,) int32: the bodies to find partners for
+    is_new: Any  # (N,) bool: marks these bodies
     found: Any  # (N,) int32: scratch
 
 
 @inlined
 def _finds(bodies, is_new, i, j):
-    """Of a pair whose boxes meet: is it for i, which starts anew or is predicted further, to look at what is new?
+    """Whether body i of a pair with overlapping boxes is the one that reports it, so that each pair is found once.
 
-    Where both are new, for the one that was predicted less far, or else has the smaller slot; and there is nothing to
-    look at with one that is predicted no further than i was before.
+    Body i must start anew or be predicted further. If both bodies do, the one that was predicted less far reports the
+    pair, on a tie the one with the smaller slot. A body that is not new counts only if it is predicted further than i
+    was before: otherwise the pair is known already.
     """
     covered = bodies.motion[i].covered
     if not is_new[i]:
@@ -126,10 +127,11 @@ def _finds(bodies, is_new, i, j):
 
 @kernel
 def find_partners(bodies, grid, search, now, margin, pairs):
-    """Pairs of each body of the search with all whose swept box meets its own, each pair once, into pairs (P, 2).
+    """Write the pairs of each body of the search with all bodies whose swept box overlaps its own, each pair once.
 
-    Only what a body sweeps after the time until which it was predicted before can meet what is not known yet.
-    Returns how many there are; more than P: call again with more room.
+    A body that is predicted further needs only the box that it sweeps after the time until which it was predicted
+    before: earlier impacts are known. pairs (P, 2). Returns the number of pairs; if it exceeds P, call again with a
+    larger array.
     """
     which, is_new, found = search
     n = 0
@@ -149,9 +151,10 @@ def find_partners(bodies, grid, search, now, margin, pairs):
 
 @kernel
 def keep_new(bodies, grid, pairs, is_new, now, margin):
-    """Move those of the pairs (P, 2) of overlapping boxes, one of them new, to the front that `find_partners` finds.
+    """Move the pairs (P, 2) that `find_partners` would find to the front; return their number.
 
-    Returns how many. Where most boxes are looked at anyway, all their pairs are found sooner by one sweep.
+    The pairs are those of overlapping boxes with at least one new body, found by one sweep over all boxes. If many
+    bodies are new, the sweep is faster than one query for each.
     """
     n = 0
     for k in range(pairs.shape[0]):
@@ -161,7 +164,7 @@ def keep_new(bodies, grid, pairs, is_new, now, margin):
             if not _finds(bodies, is_new, i, j):
                 continue
         covered = bodies.motion[i].covered
-        if covered > now:  # else what is new of it is its whole box
+        if covered > now:  # else its whole box is new
             swept = swept_box(bodies, i, covered, margin)
             if not regions_overlap(swept, grid.box[j]):
                 continue
@@ -172,9 +175,9 @@ def keep_new(bodies, grid, pairs, is_new, now, margin):
 
 @kernel
 def keep_checked(bodies, allowed, pairs):
-    """Move the pairs (P, 2) that are checked to the front; returns how many.
+    """Move the pairs (P, 2) that are checked to the front; return their number.
 
-    Static pairs, groups that ignore each other and allowed pairs are left out.
+    Pairs of two static bodies, pairs whose groups ignore each other and allowed pairs are not checked.
     """
     n = 0
     for k in range(pairs.shape[0]):

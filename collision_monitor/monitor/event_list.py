@@ -1,8 +1,10 @@
-"""Stage 5, the event list: predicted impacts, ordered by the time until which each pair is certified apart.
+"""Stage 5, event list: keep the predicted impacts sorted by the time until which each pair is certified apart.
 
-A sorted array instead of a heap: a step takes the due ones off the front, drops those whose motion has changed
-(lazy invalidation by version) and merges the new ones in, in one pass; what will be published is its front part.
-Source: lecture slides "List of collisions": ordered on time, only the first has to be looked at.
+The list is a sorted array instead of a heap. A pair leaves the event list in one of three ways: `take_due` takes the
+events that are due off the front, `add` drops those whose motions changed (lazy invalidation by the bodies' versions)
+while it merges new ones in, in one pass, and `replace` exchanges bounds for better ones. `clear` empties the list. The
+published predictions are the front part of the list.
+Source: lecture slides "List of collisions": ordered on time, only the first has to be examined.
 """
 
 from __future__ import annotations
@@ -28,7 +30,7 @@ def _before(a, b):
 
 @kernel
 def sort_order(events, order, spare):
-    """The order of events by (lower, key) into order (n,) int64: merge sort from runs sorted by insertion.
+    """Write the order of events by (lower, key) into order (n,) int64: merge sort of runs sorted by insertion.
 
     spare (n,) int64: scratch.
     """
@@ -61,7 +63,7 @@ def sort_order(events, order, spare):
 
 @kernel
 def count_until(events, time):
-    """How many events at the front (sorted) begin by this time (s)."""
+    """Count the events with `lower` <= time (s) in a sorted array: they are at its front."""
     low, high = 0, events.size
     while low < high:
         middle = (low + high) // 2
@@ -74,7 +76,7 @@ def count_until(events, time):
 
 @kernel
 def take_due(events, version, now, due):
-    """Events at the front (sorted) that are due by `now` and still hold, into due; returns (how many passed, due)."""
+    """Write the events that are due by `now` and still hold into `due`. Returns (number due, number written)."""
     passed = n = 0
     while passed < events.size and events[passed].lower <= now:
         if holds(version, events[passed]):
@@ -86,7 +88,7 @@ def take_due(events, version, now, due):
 
 @kernel
 def merge(old, new, order, version, merged):
-    """old, and new in its order, both sorted, into merged; what no longer holds is left out. Returns the length."""
+    """Merge `old`, sorted, and `new`, sorted by `order`. Drop events of `old` that do not hold. Return the length."""
     i = k = n = 0
     while i < old.size or k < new.size:
         if i < old.size and not holds(version, old[i]):
@@ -109,7 +111,10 @@ def _hash(key, mask):
 
 @device
 def _place(key, new, place):
-    """Where in the hash table `place` (a power of two) of indices into `new` the key is, or belongs."""
+    """Position of the key, or of the free slot for it, in the hash table `place` of indices into `new`.
+
+    Its size is a power of two; -1: free.
+    """
     mask = place.size - 1
     at = _hash(key, mask)
     while place[at] >= 0 and new[place[at]].key != key:
@@ -119,7 +124,7 @@ def _place(key, new, place):
 
 @kernel
 def keep_first(new, bodies, pending, pairs, room, keep):
-    """`EventList.first_of_pairs`: returns how many. room (R,) int32: a hash table; keep (len(new),) bool: all True."""
+    """`EventList.first_of_pairs`; returns their number. room (R,) int32: a hash table. keep (n,) bool: all True."""
     later = 0
     for k in range(new.size):
         later += _was_predicted(new[k], bodies)
@@ -142,7 +147,7 @@ def keep_first(new, bodies, pending, pairs, room, keep):
                 pending[k] = new[at]
                 pending[k].lower = lower
             elif pending[k].status == UNRESOLVED and new[at].method == BOUND_ONLY:
-                pending[k].method = BOUND_ONLY  # the later one is not sought yet, and may settle it
+                pending[k].method = BOUND_ONLY  # so that it is refined: the new one is only a bound, and may settle it
     for k in range(pairs.size):
         if pairs[k].leaving == 0:
             at = place[_place(pairs[k].key, new, place)]
@@ -158,12 +163,12 @@ def keep_first(new, bodies, pending, pairs, room, keep):
 
 @inlined
 def _was_predicted(event, bodies):
-    """Was its pair predicted before this step, by motions that still hold?"""
+    """Whether its pair was predicted before this step, by motions that still hold."""
     return min(bodies.motion[event.i].covered, bodies.motion[event.j].covered) > -inf
 
 
 class EventList(Stage):
-    """Predicted impacts (IMPACT), sorted by (lower, key). Grows as needed."""
+    """The predicted impacts (IMPACT), sorted by (lower, key)."""
 
     SAVED = ("events",)
     CACHES = ("_room", "_spare")
@@ -172,7 +177,7 @@ class EventList(Stage):
         self._room: Events = np.empty(256, IMPACT)
         self._spare: Events = np.empty(256, IMPACT)
         self.events: Events = self._room[:0]
-        """The pending events in order; a view that the next `add` replaces."""
+        """The pending events, sorted; a view, which the next `add` replaces."""
 
     def __len__(self) -> int:
         return len(self.events)
@@ -182,34 +187,35 @@ class EventList(Stage):
         self.events = self._room[:0]
 
     def take_due(self, version: Versions, now: float) -> Events:
-        """Take the events off that are due by `now`; return those whose motions still hold, in order."""
+        """Remove the events due by `now`: their pairs leave the event list here. Return those that still hold."""
         due = np.empty(count_until(self.events, now), IMPACT)
         passed, n = take_due(self.events, version, now, due)
         self.events = self.events[passed:]
         return due[:n]
 
     def until(self, time: float) -> Events:
-        """The events that begin by this time (s): a view."""
+        """The events with `lower` <= time (s): a view."""
         return self.events[: count_until(self.events, time)]
 
     def first_of_pairs(self, new: Events, bodies: Bodies, active: NDArray[np.void]) -> Events:
-        """The events of `new` (IMPACT) that are the first impact of their pair; moves them to its front.
+        """Move the events of `new` (IMPACT) that are the first impact of their pair to its front, and return them.
 
-        Where a pair was predicted further, it may have an earlier impact: among the pending events, or in the active
-        pairs (PAIR), which every step examines. An earlier one that is not certain ends where the later one is.
+        A pair that is predicted further may have an earlier impact among the pending events, or among the active pairs
+        (PAIR), which every step examines; then the new event is dropped. If the earlier pending one is UNRESOLVED and
+        the new one is a HIT, the pending one keeps its lower end and takes everything else from the new one.
         """
         room = np.empty(4 << (2 * len(new)).bit_length(), np.int32)
         return new[: keep_first(new, bodies, self.events, active, room, np.ones(len(new), np.bool_))]
 
     def replace(self, which: NDArray[np.intp], new: Events, version: Versions) -> None:
-        """`add`, in place of the events at the indices `which`."""
+        """Remove the events at the indices `which` from the list, and `add` the new ones."""
         kept = np.ones(len(self.events), np.bool_)
         kept[which] = False
         self.events = self.events.compress(kept)
         self.add(new, version)
 
     def add(self, new: Events, version: Versions) -> None:
-        """Merge `new` in, in any order; pairs leave the list here whose motions no longer hold."""
+        """Merge `new`, in any order, into the list. Pairs whose motions no longer hold leave the event list here."""
         need = len(self.events) + len(new)
         if need > len(self._spare):
             self._spare = np.empty(2 * need, IMPACT)

@@ -1,6 +1,6 @@
-"""What is not told: objects outside of a region, slow encounters, and pairs that move apart.
+"""Filters of the answers: objects outside of a region, slow encounters, and pairs that move apart.
 
-Each leaves out what it says and changes nothing else: the answers are those without it, less these.
+A filter only removes answers. The other answers do not change.
 """
 
 from __future__ import annotations
@@ -14,16 +14,17 @@ from collision_monitor.settings.setting import EVERYWHERE, Vector
 
 
 def is_bounded(low: Vector, high: Vector) -> bool:
-    """Whether a region leaves anything out."""
+    """Whether the region from low to high (m) excludes anything."""
     return min(high) < EVERYWHERE or max(low) > -EVERYWHERE
 
 
 def bodies_in(
     bodies: Bodies, top: int, now: float, low: Vector, high: Vector, stale_acceleration: float
 ) -> NDArray[np.bool_]:
-    """Which of the first `top` bodies may reach into the box from low to high (m), by their bounding spheres at `now`.
+    """Mask (top,) of the bodies whose bounding spheres may reach into the box from low to high (m) at `now`.
 
-    Who is silent may have turned round meanwhile, by stale_acceleration (m/s^2).
+    A stale object widens its bounds here: the radius of its sphere grows by what it may have moved off its predicted
+    path since its last state, at stale_acceleration (m/s^2).
     """
     age = np.where(bodies.static[:top], 0.0, now - bodies.time[:top])
     centre = bodies.position[:top] + bodies.linear[:top] * age[:, None]
@@ -34,12 +35,12 @@ def bodies_in(
 
 
 def closes_fast(predictions: NDArray[np.void], least: float) -> NDArray[np.bool_]:
-    """Which predictions close at `least` m/s; those whose speed is not known may."""
+    """Mask of the predictions with a closing speed of at least `least` m/s, or with an unknown one."""
     return np.asarray(~(predictions["closing_speed"] < least) | (predictions["method"] == Method.BOUND))
 
 
 def approaches(bodies: Bodies, i: NDArray[np.int32], j: NDArray[np.int32], now: float) -> NDArray[np.bool_]:
-    """Whether the origins of bodies i and j (n,) come nearer at `now`, or stay as they are."""
+    """Mask of the pairs of bodies i and j (n,) whose origins approach each other, or keep their distance, at `now`."""
     position, velocity = np.zeros((len(i), 3)), np.zeros((len(i), 3))
     for slots, sign in ((i, -1.0), (j, 1.0)):
         age = np.where(bodies.static[slots], 0.0, now - bodies.time[slots])

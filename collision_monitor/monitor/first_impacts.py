@@ -1,4 +1,4 @@
-"""Stage 4, first impacts: when each candidate pair meets first, on all threads."""
+"""Stage 4, first impacts: predict when each candidate pair meets first, on all threads."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from collision_monitor.prediction.pair_impacts import bound_pairs, predict_pairs
 from collision_monitor.records import joined
 
 FEWEST_PAIRS_FOR_THREADS: Final = 500
-"""Handing work to a thread costs as much as predicting some 100 pairs."""
+"""Fewer pairs stay on one thread: passing work to another costs as much as predicting some 100 pairs."""
 
 Events = NDArray[np.void]
 Pairs = NDArray[Any]
 
 
 class FirstImpacts(Stage):
-    """Predicts pairs; keeps nothing but its threads, and the scratch memory of each."""
+    """Predicts pairs. Keeps no state but its threads and the scratch memory of each."""
 
     CACHES = ("_scratch", "pool")
 
@@ -34,7 +34,7 @@ class FirstImpacts(Stage):
         self.use_threads(threads)
 
     def use_threads(self, threads: int) -> None:
-        """Work on so many threads from now on."""
+        """Use this number of threads from now on."""
         if self.pool is not None:
             self.pool.shutdown()
         self._scratch = [make_scratch() for _ in range(threads)]
@@ -46,24 +46,24 @@ class FirstImpacts(Stage):
         return self._scratch[0]
 
     def predict(self, step: StepContext, pairs: Pairs) -> Events:
-        """First impacts (IMPACT) of pairs (P, 2) of body slots in their order; pairs without one are left out."""
+        """First impacts (IMPACT) of pairs (P, 2) of body slots, in their order. Pairs without one are left out."""
         if self.pool is None or len(pairs) < FEWEST_PAIRS_FOR_THREADS:
             return self._find(predict_pairs, step, pairs)
 
         def part(pairs: Pairs, scratch: Scratch) -> tuple[Events, int]:
             return _impacts(predict_pairs, step, pairs, scratch)
 
-        # the kernels hold no lock; the parts are put together in order, so the answer is the same for any number
+        # the kernels release the GIL; the parts are joined in order, so any number of threads gives the same answer
         parts = list(self.pool.map(part, np.array_split(pairs, len(self._scratch)), self._scratch))
         step.work.impact_queries += sum(queries for _, queries in parts)
         return joined([events for events, _ in parts])
 
     def bound(self, step: StepContext, pairs: Pairs) -> Events:
-        """As `predict`, but by the bounding spheres alone where that is faster."""
+        """As `predict`, but with only a bound by the bounding spheres for pairs that are not cheap (`is_cheap`)."""
         return self._find(bound_pairs, step, pairs)
 
     def refine(self, step: StepContext, bounds: Events) -> Events:
-        """First impacts from now on of the pairs of events (IMPACT) of which only a bound is known."""
+        """First impacts from now on of pairs whose events (IMPACT) are only bounds. Pairs without one are left out."""
         return self._find(refine, step, bounds)
 
     def _find(self, kernel: Callable[..., tuple[int, int]], step: StepContext, pairs: Pairs) -> Events:
@@ -81,7 +81,7 @@ class FirstImpacts(Stage):
 def _impacts(
     kernel: Callable[..., tuple[int, int]], step: StepContext, pairs: Pairs, scratch: Scratch
 ) -> tuple[Events, int]:
-    """Impacts (IMPACT) that a kernel finds for pairs, in their order, and the distance queries that it made."""
+    """Impacts (IMPACT) that the kernel finds for the pairs, in their order, and the number of distance queries."""
     events = np.empty(len(pairs) + 1, IMPACT)
     n, queries = kernel(step.roster.multibody, pairs, step.now, step.settings.impact, events, scratch)
     return events[:n], queries

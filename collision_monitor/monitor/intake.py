@@ -1,4 +1,4 @@
-"""Stage 1, states in: arguments become states, and each state is taken or refused with a reason."""
+"""Stage 1, intake: convert the arguments of a step to states, and store each state or refuse it with a reason."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STATE_NUMBERS: Final = 20
 
 _POSITION_STDDEV: Final = 16
 _ORIENTATION_STDDEV: Final = 17
-"""Places of these among the numbers of a records.STATE; those of their rates of change stand two behind."""
+"""Indices among the numbers of a records.STATE. Those of velocity and angular velocity are larger by two."""
 
 _TWIST_UNKNOWN: Final = int(StateFlag.TWIST_UNKNOWN)
 _DISCONTINUITY: Final = int(StateFlag.DISCONTINUITY)
@@ -54,7 +54,7 @@ States = NDArray[np.void]
 
 
 class Intake(Stage):
-    """Takes states into the roster; counts what is refused, by reason, and keeps the text of the last refusal."""
+    """Stores states in the roster, counts the refused inputs by reason, and keeps the text of the last refusal."""
 
     SAVED = ("refused", "last_refusal")
     CACHES = ("_buffer",)
@@ -65,17 +65,17 @@ class Intake(Stage):
         self._buffer = np.empty(64, records.STATE)
 
     def refuse(self, reason: Refusal, text: str, count: int = 1) -> None:
-        """Count a refused input."""
+        """Count refused inputs; `text` describes the last of these."""
         self.refused[reason] += count
         self.last_refusal = text
 
     def states(
         self, ids: ArrayLike, poses: Any, twists: Any, covariance: Any
     ) -> tuple[States, NDArray[np.float64]]:
-        """The arguments of `Monitor.step` as states (N,) records.STATE and covariances (N, 12), or (0, 12) for none.
+        """Convert the arguments of `Monitor.step` to states (N,) records.STATE and covariances (N, 12), or (0, 12).
 
-        With covariances the states have their worst standard deviations. The caller's arrays stay as they are.
-        Raises InputError.
+        With covariances, the states get the standard deviations along their worst axes. The caller's arrays are not
+        changed. Raises InputError.
         """
         try:
             given = np.asarray(ids)
@@ -100,7 +100,7 @@ class Intake(Stage):
         return states, known
 
     def _own(self, given: States, *, is_written: bool) -> States:
-        """The states themselves where they lie as the kernels read them and stay as they are, else a copy."""
+        """Return the states themselves if the kernels can read them and nothing writes to them, else a copy."""
         if given.ndim != 1:
             raise InputError(f"states: expected one dimension, got shape {given.shape}")
         unknown = given["flags"] & _TWIST_UNKNOWN  # the kernel writes their standard deviations
@@ -120,7 +120,7 @@ class Intake(Stage):
         roster: Roster,
         uncertain: UncertainPredictions,
     ) -> None:
-        """Store states of `time` (s) as the bodies' last ones, with their uncertainties; refuse the others."""
+        """Store usable states as their bodies' last ones at `time` (s), with their uncertainties. Refuse the others."""
         if len(states) == 0:
             return
         slots = roster.slots_of(states["id"])
@@ -153,7 +153,7 @@ class Intake(Stage):
 
 
 def _states(ids: NDArray[Any], poses: Any, twists: Any) -> States:
-    """States of ids (N,), poses (N, 7) and twists (N, 6). Raises InputError."""
+    """Build states from ids (N,), poses (N, 7) and twists (N, 6). Raises InputError."""
     if ids.ndim != 1 or not np.issubdtype(ids.dtype, np.integer):
         raise InputError(f"ids: expected one dimension of integers, got {ids.dtype} of shape {ids.shape}")
     try:
@@ -180,10 +180,10 @@ def _states(ids: NDArray[Any], poses: Any, twists: Any) -> States:
 def take_states(bodies, slots, numbers, flags, time, verdicts):
     """Store states as the bodies' last ones.
 
-    slots (M,) int32, -1: unknown id; numbers (M, 21) float64: the rows of records.STATE; flags (M,) uint32;
-    time: of all states, in seconds. Where the twist is estimated, its standard deviations are written into numbers.
-    verdicts (M,) uint8: ACCEPTED or why not.
-    Returns (how many were accepted, whether any of them is uncertain).
+    slots (M,) int32, -1: unknown id. numbers (M, 21) float64: the rows of records.STATE; where the twist is estimated,
+    its standard deviations are written into them. flags (M,) uint32. time: of all states (s).
+    verdicts (M,) uint8, written: ACCEPTED or the reason of the refusal.
+    Returns (number of accepted states, whether any of them is uncertain).
     """
     accepted = 0
     uncertain = False
@@ -220,11 +220,11 @@ def take_states(bodies, slots, numbers, flags, time, verdicts):
         elif bodies.seen[i] and (flags[k] & _DISCONTINUITY) == 0:
             _estimate_twist(bodies, i, numbers[k, :3], (x, y, z, w), time - bodies.time[i])
             for c in range(3 if accelerates else 0):
-                # what is estimated is the mean since the last state, and it was that fast half-way
+                # the estimate is the mean velocity since the last state, which the body had half-way
                 bodies.linear[i, c] += 0.5 * numbers[k, 13 + c] * (time - bodies.time[i])
             for c in (_POSITION_STDDEV, _ORIENTATION_STDDEV):
                 if numbers[k, c] > 0.0 and not numbers[k, c + 2] > 0.0:
-                    # of a difference of two poses, if the last one was as uncertain as this one
+                    # of the difference of two poses; assumes that the last one was as uncertain as this one
                     numbers[k, c + 2] = sqrt(2.0) * numbers[k, c] / (time - bodies.time[i])
         else:
             bodies.linear[i] = 0.0
@@ -245,7 +245,7 @@ def take_states(bodies, slots, numbers, flags, time, verdicts):
 
 @device
 def _estimate_twist(bodies, i, position, quaternion, elapsed):
-    """Twist from the last pose to this one: difference of positions, logarithm of the relative rotation."""
+    """Estimate the twist from the last pose: difference of positions, logarithm of the relative rotation."""
     x, y, z, w = quaternion
     for c in range(3):
         bodies.linear[i, c] = (position[c] - bodies.position[i, c]) / elapsed

@@ -1,4 +1,4 @@
-"""The monitor: what touches now and what will touch next, step by step. The door to the stages of a step."""
+"""The monitor: contacts now and predicted collisions, step by step. `Monitor._take_step` is the list of the stages."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ Events = NDArray[np.void]
 
 
 class Monitor:
-    """Keeps objects, follows their states, and answers with contacts and predicted collisions at every step.
+    """Keeps objects, follows their states, and reports contacts and predicted collisions at every step.
 
-    The answers are a function of the profile, the descriptions and the states in the order in which they were given:
-    no clock, no random numbers, the same bytes on every run. A profile with `budget_ms` adds the clock, which decides
-    how many pairs a step examines, and nothing else: with the same `pairs_per_step` instead (`StepResult.cut`), and
-    timed=False, the answers are the same again.
+    The answers are a function of the profile, the descriptions and the states in the order in which they were given.
+    They use no clock and no random numbers, and are the same bytes on every run. A profile with `budget_ms` adds the
+    clock, which decides only how many pairs a step examines: a monitor with timed=False and that number as
+    `pairs_per_step` (`StepResult.cut`) gives the same answers again.
     """
 
     def __init__(self, profile: str | Profile = "balanced", *, timed: bool = True) -> None:
@@ -66,7 +66,7 @@ class Monitor:
 
     @property
     def stages(self) -> tuple[Stage, ...]:
-        """All that keeps state between two steps, in the order in which it is restored."""
+        """The stages that keep state between two steps, in the order in which they are restored."""
         return (
             *(self._roster, self._timeline, self._intake, self._tracking, self._candidates, self._first_impacts),
             *(self._events, self._active_pairs, self._time_critical, self._uncertain, self._answers),
@@ -76,9 +76,9 @@ class Monitor:
 
     @property
     def profile(self) -> Profile:
-        """The settings of the next step. May be set at any time, to a Profile or to its name (`Profile.switched`).
+        """The settings of the next step. They can be set at any time, to a Profile or to its name (`Profile.switched`).
 
-        Nothing is forgotten: contacts persist, and what the change concerns is predicted anew in the next step.
+        Contacts persist. If a setting that predictions depend on changes, the next step predicts all objects anew.
         """
         return self._profile
 
@@ -90,7 +90,7 @@ class Monitor:
         if Profile.changes_predictions(changed):
             self._roster.renew_all()
         if "horizon" in changed:
-            self._roster.bodies.slack[:] = 0.0  # it is counted in horizons
+            self._roster.bodies.slack[:] = 0.0  # its limits are multiples of the horizon
         if "threads" in changed:
             self._first_impacts.use_threads(new.threads)
         self._prepare_for_budget()
@@ -108,39 +108,39 @@ class Monitor:
         return self._roster.ids
 
     def name(self, object_id: int) -> str:
-        """The object's name for people. Raises InputError for an unknown id."""
+        """Name of an object, for display. Raises InputError for an unknown id."""
         return self._roster.name(object_id)
 
     @property
     def plan(self) -> ScenePlan:
-        """Which tests and grid cells the objects described now require; `print` it."""
+        """The tests and grid cells that the objects described now require; `print` shows them."""
         is_uncertain = self._uncertain.counts(self._profile)
         return scene_plan(self._roster, self._candidates.grid, uncertain=is_uncertain, outside=self._tracking.outside)
 
     def add(self, object_id: int, shape: Shape | Sequence[tuple[Shape, Pose]], **fields: Any) -> None:
-        """Describe an object: one shape, or several with their poses in its frame.
+        """Describe an object of one shape, or of several with their poses in its frame.
 
-        The further fields are those of `ObjectDescription`: name, static, pose, group, mask, padding, model, allowed,
-        max_linear_acceleration, max_angular_acceleration. Raises as `describe` does.
+        The other fields are those of `ObjectDescription`: name, static, pose, group, mask, padding, model, allowed,
+        max_linear_acceleration, max_angular_acceleration. Raises the errors of `describe`.
         """
         self.describe(ObjectDescription(object_id, shape, **fields))
 
     def describe(self, description: ObjectDescription) -> None:
-        """Take in a new object, or the new description of a known one, whose state is kept.
+        """Add a new object, or replace the description of a known one and keep its state.
 
-        Raises InputError, ShapeError; UnsupportedError for a shape or model that is not offered.
+        Raises InputError, ShapeError; UnsupportedError for an unsupported shape or model.
         """
         i = self._roster.describe(description, self.model_of(description))
         self._make_room()
-        self._candidates.forget(np.array([i], np.int32))  # the next step puts its new box in
+        self._candidates.forget(np.array([i], np.int32))  # the next step inserts its new box
         self._time_critical.describe(self._roster, i, self._profile)
         self._uncertain.describe(i, description)
         self._active_pairs.end_unchecked(self._roster, i)
 
     def model_of(self, description: ObjectDescription) -> Model:
-        """The model that represents such an object: its own choice, or else the profile's for its class of shapes.
+        """The model that represents an object: its own choice, or else the profile's for its class of shapes.
 
-        An object that was described before another choice of the profile keeps its model until it is described again.
+        When the profile's choice changes, a described object keeps its model until it is described again.
         """
         kind = shape_class(description.shapes)
         if description.model is not Model.AUTO or kind is None:
@@ -163,12 +163,12 @@ class Monitor:
 
     @property
     def clock(self) -> StepClock:
-        """The clock of the steps; whoever hands the answers on enters it, so that the budget includes that time."""
+        """The clock of the steps. A caller that publishes answers enters it, so that the budget includes that time."""
         return self._time_critical.clock
 
     @property
     def last(self) -> StepResult | None:
-        """The answers of the last step that was accepted; None before the first."""
+        """The answers of the last accepted step; None before the first."""
         return self._answers.last
 
     @property
@@ -178,22 +178,22 @@ class Monitor:
 
     @property
     def refused(self) -> dict[Refusal, int]:
-        """How many inputs were refused, by reason."""
+        """Number of refused inputs by reason."""
         return self._intake.refused
 
     @property
     def last_refusal(self) -> str:
-        """Why the last one was."""
+        """Text of the last refusal."""
         return self._intake.last_refusal
 
     def refuse(self, reason: Refusal, text: str, count: int = 1) -> None:
-        """Count a refused input; also for inputs that the caller refuses."""
+        """Count refused inputs, also those that the caller refuses."""
         self._intake.refuse(reason, text, count)
 
     # ------------------------------------------------------------------ steps
 
     def reset(self) -> None:
-        """Forget all states, events and contacts; the objects stay and are unseen until their next state."""
+        """Forget all states, events and contacts. All objects that are not static are unseen until their next state."""
         self._timeline.forget()
         self._restart()
 
@@ -206,14 +206,14 @@ class Monitor:
     def step(
         self, stamp_ns: int, ids: ArrayLike, poses: Any = None, twists: Any = None, covariance: Any = None
     ) -> StepResult:
-        """Take in the states of some objects at `stamp_ns` and answer for all objects at the latest time so far.
+        """Observe the states of some objects at `stamp_ns` and report on all objects at the latest time so far.
 
-        Either ids (N,), poses (N, 7: position, quaternion xyzw), twists (N, 6: linear, angular; default 0), or as
-        `ids` a structured array of records.STATE. World frame, SI units.
-        covariance (N, 12): of position and of linear velocity, upper triangles row by row, in place of the states'
-        standard deviations along one axis.
-        Single rows that cannot be used are refused and counted (`refused`), never raised. Raises InputError for
-        arrays of another shape.
+        Pass either ids (N,), poses (N, 7: position, quaternion xyzw) and twists (N, 6: linear, angular; default 0), or
+        a structured array of records.STATE as `ids`. World frame, SI units.
+        covariance (N, 12): upper triangles, row by row, of the covariances of position and linear velocity. They
+        replace the standard deviations in the states.
+        Unusable rows are refused and counted (`refused`); they raise nothing. Raises InputError for arrays of
+        another shape.
         """
         if not isinstance(stamp_ns, int | np.integer) or isinstance(stamp_ns, bool):
             raise InputError(f"stamp_ns: expected an integer number of nanoseconds, got {stamp_ns!r}")
@@ -248,7 +248,7 @@ class Monitor:
         contacts = self._answers.contacts(step, self._active_pairs)
         predictions, slots = self._answers.predictions(step, self._active_pairs, self._events)
         if uncertain.active:
-            with self.clock.aside():  # no budget cuts it: with its time kept free, nothing else would be done
+            with self.clock.aside():  # outside of the budget: reserving its time would leave none for the pairs
                 touching = self._active_pairs.touching_keys
                 predictions = uncertain.complete(step, predictions, slots, touching, self._first_impacts.pool)
         predictions = self._answers.filtered(step, predictions)
@@ -259,7 +259,7 @@ class Monitor:
         return self._answers.finish(result)
 
     def _advance(self, stamp_ns: int) -> bool:
-        """Move the timeline to the stamp; False: the stamp was refused."""
+        """Move the timeline to the stamp. Return False if the stamp is refused."""
         seconds = (stamp_ns - self._timeline.now_ns) * 1e-9
         match self._timeline.advance(stamp_ns, self._profile.max_time_step):
             case Progress.RESTARTS:
@@ -274,7 +274,7 @@ class Monitor:
         return True
 
     def _predict_moved(self, step: StepContext, *, bounds_only: bool) -> Events:
-        """First impacts (IMPACT) of the bodies whose predictions no longer hold or end too soon."""
+        """Return first impacts (IMPACT) of the bodies whose predictions no longer hold or end too soon."""
         moved, ending = self._tracking.find(step, self._uncertain)
         which = np.concatenate([moved, ending])
         if len(which) == 0:
@@ -290,7 +290,7 @@ class Monitor:
     # ------------------------------------------------------------------ snapshots
 
     def snapshot(self) -> Snapshot:
-        """Copies of all that later answers depend on; each stage saves its own state."""
+        """Copy all state that later answers depend on; each stage saves its own."""
         snapshot = Snapshot({}, {FACTS: {}})
         for stage in self.stages:
             stage.save(snapshot, snapshot.facts[FACTS])
@@ -298,9 +298,9 @@ class Monitor:
 
     @classmethod
     def restored(cls, profile: Profile | str, snapshot: Snapshot) -> Self:
-        """A monitor that goes on from a snapshot with the same answers, without a clock.
+        """Return a monitor without a clock that continues from a snapshot with the same answers.
 
-        Raises InputError where the snapshot is damaged, or of a program that keeps other things.
+        Raises InputError if the snapshot is damaged, or was written by a program that saves other state.
         """
         monitor = cls(profile, timed=False)
         try:

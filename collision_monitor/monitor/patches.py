@@ -1,7 +1,7 @@
-"""Contacts of several points: where faces or edges lie on each other, a row for each corner of what they share.
+"""Contacts of several points: where faces or edges lie on each other, one row for each corner of their shared area.
 
-Asked for by the setting `contact_points`. The pairs that touch are looked at once more, so that a monitor that tells
-one point of each pays nothing.
+The setting `contact_points` requests them. They need a second examination of the pairs that touch, so a monitor that
+reports one point for each contact pays nothing.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from collision_monitor.tolerances import FEATURE_TIE
 
 SHAPE_PAIR = np.dtype(
     [
-        ("of", np.int64),  # the pair of bodies that they belong to
-        ("tie", np.float64),  # m: what is deeper than the contact less this lies in its plane
+        ("of", np.int64),  # index of the active pair that the shapes belong to
+        ("tie", np.float64),  # m: shapes within this of the contact's distance lie in its plane
         ("slot", np.int32, 2),
         ("position", np.float64, (2, 3)),  # m, about the origin of body i
         ("rotation", np.float64, (2, 3, 3)),
@@ -38,9 +38,9 @@ SHAPE_PAIR = np.dtype(
 
 @allocating_kernel
 def _shape_pairs(multibody, active, now, found):
-    """The shapes of each settled contact whose bounding spheres come as near as it: found (m,) SHAPE_PAIR; how many.
+    """Find the pairs of shapes of each settled contact whose bounding spheres are at least as near as the contact.
 
-    Where that is more than there is room for, the rest is only counted.
+    Written into found (m,) SHAPE_PAIR; returns their number. If it exceeds m, the rest is only counted.
     """
     table, parts, bodies = multibody
     pairs, _, results = active
@@ -84,25 +84,25 @@ def _shape_pairs(multibody, active, now, found):
 
 
 class _Patches(NamedTuple):
-    """The patches (m,) of the shapes of contacts, in the order of the contacts."""
+    """The patches of m pairs of shapes, in the order of the active pairs."""
 
     of: Any  # int64: index of the active pair
     tie: Any  # m
     corners: Any  # (m, 4, 3): about the origin of body i
-    count: Any  # int64: how many of these there are
+    count: Any  # int64: number of corners
 
 
 class _Points(NamedTuple):
-    """The points of the contacts (n,)."""
+    """The points of the contacts of n active pairs."""
 
     count: Any  # int64
-    position: Any  # (n, 4, 3): on A, in the world, where there are several
-    closing: Any  # (n, 4): closing speeds there
+    position: Any  # (n, 4, 3): on A, in the world; only where count > 1
+    closing: Any  # (n, 4): closing speeds there (m/s)
 
 
 @allocating_kernel
 def _join(bodies, active, now, patches, most, points, work):
-    """Join the patches of the shapes of each pair into its points: at most `most` corners."""
+    """Join the patches of the shapes of each active pair into its points, at most `most` of them."""
     pairs, _, results = active
     of, tie = patches.of, patches.tie
     corners = np.empty((CORNERS, 3))
@@ -140,10 +140,10 @@ def _join(bodies, active, now, patches, most, points, work):
 def with_patches(
     contacts: NDArray[np.void], multibody: Multibody, active: Active, now: float, most: int
 ) -> NDArray[np.void]:
-    """The contacts (records.CONTACT) of the active pairs, those with a patch as at most `most` rows, one by one.
+    """Repeat each contact (records.CONTACT) with a patch for each of its points, at most `most` of them.
 
-    The shapes of a compound that lie in the same plane have one patch: the wheels of a cart. A contact that is not
-    settled has one point.
+    The shapes of a compound that touch in the same plane, for example the wheels of a cart, share one patch. A contact
+    that is not settled keeps one point.
     """
     pairs, results = active.pairs, active.results
     shapes = np.empty(2 * len(pairs), SHAPE_PAIR)
@@ -172,7 +172,7 @@ def with_patches(
 
 
 def _repeated(contacts: NDArray[np.void], points: _Points) -> NDArray[np.void]:
-    """Each contact once for each of its points, those of several with their points on A and closing speeds."""
+    """Repeat each contact for each of its points, and set the points and closing speeds where there are several."""
     count = points.count
     of = np.repeat(np.arange(len(contacts)), count)
     index = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)

@@ -1,4 +1,4 @@
-"""What a step returns: its answers, and what it did."""
+"""The result of a step: its answers and its status."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 @dataclass
 class Work:
-    """What a step does, counted by its stages; the fields are those of StepStatus."""
+    """Counters of a step's work, filled by its stages; the fields are those of StepStatus."""
 
     objects_moved: int = 0
     candidate_pairs: int = 0
@@ -22,7 +22,7 @@ class Work:
 
 @dataclass(frozen=True)
 class StepStatus:
-    """What a step did; the fields are those of MonitorStatus.msg."""
+    """Counts of objects, answers and work in a step; the fields are those of MonitorStatus.msg."""
 
     objects: int
     objects_static: int
@@ -44,10 +44,10 @@ class StepStatus:
 class StepResult:
     """The answers of one step: `contacts` (records.CONTACT) by ids, `predictions` (records.PREDICTION) soonest first.
 
-    With a profile of several `contact_points`, a contact has `point_count` rows, and `point_index` counts them.
+    If the profile's `contact_points` is larger than 1, a contact has `point_count` rows, numbered by `point_index`.
 
-    accepted is False where the whole step was refused for its stamp; the answers are then those of the last time.
-    cut: number of pairs that were examined before the budget ran out; None: all were.
+    accepted: False if the step was refused because of its stamp; the answers are then those of the last accepted step.
+    cut: number of pairs that were examined before the budget ran out; None: all pairs were examined.
     """
 
     stamp_ns: int

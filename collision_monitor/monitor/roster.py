@@ -22,14 +22,14 @@ from collision_monitor.prediction.impact_record import pair_keys
 from collision_monitor.records import Model, ShapeType
 
 FIRST_CAPACITY = 64
-"""Slots of bodies at first; there are twice as many whenever they do not suffice."""
+"""Initial number of body slots; it is doubled when all are used."""
 
 
 class Roster(Stage):
-    """Which objects there are. A body's slot never changes while its object is described.
+    """The described objects. A body keeps its slot as long as its object is described.
 
-    bodies, parts: as the kernels read them. top: slots below have been used. planar: the scene is one of the plane.
-    renewed: slots whose description changed, to be predicted anew in the next step.
+    bodies, parts: the arrays that the kernels read. top: number of slots that have been used so far. planar: the scene
+    lies in the x-y plane. renewed: slots that the next step predicts anew, for example after a new description.
     """
 
     SAVED = (
@@ -56,12 +56,12 @@ class Roster(Stage):
 
     @property
     def multibody(self) -> Multibody:
-        """Shapes, parts and bodies as the kernels read them; to be fetched again after `describe`."""
+        """Shapes, parts and bodies as the kernels read them. Read it again after `describe`, which may replace them."""
         return Multibody(self._shapes.table, self.parts, self.bodies)
 
     @property
     def capacity(self) -> int:
-        """How many bodies there is room for."""
+        """Number of body slots."""
         return len(self.bodies.used)
 
     @property
@@ -75,11 +75,11 @@ class Roster(Stage):
         return sorted(self._slots)
 
     def __len__(self) -> int:
-        """How many objects are described."""
+        """Number of described objects."""
         return len(self._slots)
 
     def name(self, object_id: int) -> str:
-        """The object's name for people. Raises InputError for an unknown id."""
+        """Name of an object, for display. Raises InputError for an unknown id."""
         self.slot(object_id)
         return self._names[object_id]
 
@@ -90,7 +90,7 @@ class Roster(Stage):
         return self._slots[object_id]
 
     def slots_of(self, ids: NDArray[np.uint32]) -> NDArray[np.int32]:
-        """Slot of each id, -1 where unknown; messages usually name the same objects as the last one did."""
+        """Slot of each id, -1 where unknown. Cached, because messages usually name the same objects as the last one."""
         if not np.array_equal(ids, self._last_ids):
             self._last_slots = self.find_slots(ids)
             self._last_ids = ids.copy()
@@ -114,9 +114,9 @@ class Roster(Stage):
     # ------------------------------------------------------------------ changing
 
     def describe(self, d: ObjectDescription, model: Model) -> int:
-        """Take in a new object, or the new description of a known one, whose state is kept; returns its slot.
+        """Add a new object, or replace the description of a known one and keep its state. Return its slot.
 
-        Raises InputError, ShapeError; UnsupportedError for a shape or model that is not offered.
+        Raises InputError, ShapeError; UnsupportedError for an unsupported shape or model.
         """
         if not d.static and any(isinstance(shape, HalfSpace) for shape, _ in d.shapes):
             raise UnsupportedError(f"object {d.object_id}: a HalfSpace has no end and can only be static")
@@ -153,7 +153,7 @@ class Roster(Stage):
             bodies.linear[i] = bodies.angular[i] = bodies.acceleration[i] = 0.0
             bodies.seen[i] = True
         elif bodies.static[i]:
-            bodies.seen[i] = False  # it moves now, and where to is not known yet
+            bodies.seen[i] = False  # it moves from now on, and has no state yet
         bodies.static[i] = d.static
         bodies.version[i] += 1
         self._names[d.object_id] = d.name
@@ -163,7 +163,7 @@ class Roster(Stage):
         return i
 
     def remove(self, object_id: int) -> None:
-        """Forget an object. Raises InputError for an unknown id."""
+        """Remove an object. Raises InputError for an unknown id."""
         i = self.slot(object_id)
         self._drop_shapes(i)
         self.bodies.used[i] = self.bodies.seen[i] = self.bodies.static[i] = False
@@ -175,18 +175,18 @@ class Roster(Stage):
         self._forget_ids()
 
     def renew_all(self) -> None:
-        """Let the next step predict every object anew."""
+        """Mark every object to be predicted anew in the next step."""
         self.renewed.update(self.used().tolist())
 
     def forget_states(self) -> None:
-        """Forget all states: every object is unseen until its next state, but for static ones."""
+        """Forget all states: every object that is not static is unseen until its next state."""
         bodies = self.bodies
         bodies.seen[:] = bodies.static & bodies.used
         bodies.version[:] += 1
         self.renewed = set(self.used().tolist())
 
     def _is_planar(self, d: ObjectDescription) -> bool:
-        """Whether the object is one of the plane. Raises UnsupportedError where it meets objects of space."""
+        """Whether the object lies in the plane. Raises UnsupportedError if the scene would mix plane and space."""
         kinds = {is_planar(shape) for shape, _ in d.shapes}
         if any(known != d.object_id for known in self._slots):
             kinds.add(self.planar)
@@ -299,7 +299,7 @@ class Roster(Stage):
 
 
 def _check_chains(bodies: Bodies, parts: Parts, kind: NDArray[Any]) -> None:
-    """Every body in use has shapes, and no chain of them leads round in a circle. Raises InputError."""
+    """Check that every body in use has shapes, and that no chain of shapes is circular. Raises InputError."""
     check_range("bodies.first_shape", bodies.first_shape, -1, len(kind))
     check_range("parts.next", parts.next, -1, len(kind))
     following, left = parts.next.tolist(), len(kind)
@@ -315,9 +315,9 @@ def _check_chains(bodies: Bodies, parts: Parts, kind: NDArray[Any]) -> None:
 
 @kernel
 def count_bodies(bodies, count, now, stale_after):
-    """How many of the first `count` slots hold bodies that are static, unseen, and stale.
+    """Count the static, the unseen and the stale bodies in the first `count` slots.
 
-    Unseen: without any state. Stale: without a state for stale_after (s).
+    Unseen: without any state. Stale: not static, and the last state is older than stale_after (s).
     """
     static = unseen = stale = 0
     for i in range(count):

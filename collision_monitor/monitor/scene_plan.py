@@ -1,6 +1,6 @@
-"""The scene plan: which tests and which grid cells the objects that are described require, and what nothing requires.
+"""The scene plan: the tests and grid cells that the described objects require, and the features that they do not.
 
-`Monitor.plan` makes it from what is described at that moment, so it follows every change; `print` shows it.
+`Monitor.plan` computes it from the objects that are described at that moment; `print` shows it.
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ from collision_monitor.narrow_phase.dispatch import KIND_NAMES, TEST_METHODS, pa
 
 @dataclass(frozen=True)
 class ScenePlan:
-    """What a step works with."""
+    """The objects, tests and grid cells of a scene."""
 
     shapes: dict[str, int]
-    """How many of each kind are described; the parts of a compound count one by one."""
+    """Number of shapes of each kind; each part of a compound counts."""
     moving: int
     static: int
     turning: int
-    """Moving objects whose rotation matters: all but single spheres at their frame's origin."""
+    """Moving objects whose rotation matters: all but single spheres and circles at their frame's origin."""
     tests: dict[tuple[str, str], str]
-    """The narrow phase test, a file of `narrow_phase/`, for each two kinds that can meet."""
+    """The narrow-phase test, a file of `narrow_phase/`, for each two kinds that can meet."""
     cells: dict[float, int]
-    """Objects in the grid by cell width (m): swept boxes, so both size and speed count."""
+    """Objects in the grid by cell width (m). The grid holds swept boxes, so the width depends on size and speed."""
     groups: int
-    """How many pairs of (group, mask) there are; with one, nothing is told apart by group."""
+    """Number of different (group, mask) pairs; with one, groups distinguish nothing."""
     never_meet: int
-    """Pairs of objects, not both static, whose groups ignore each other."""
+    """Number of pairs of objects, not both static, whose groups ignore each other."""
     planar: bool
-    """The scene is one of the x-y plane."""
+    """The scene lies in the x-y plane."""
     modelled: int
-    """Objects for which a larger model stands, meshes among them."""
+    """Objects that a larger model represents, for example meshes."""
     uncertain: bool
-    """States declare how uncertain they are, and it is wanted to know."""
+    """Some states declare uncertainties, and the profile includes them."""
     outside: int
     """Objects outside of the region of interest."""
 
@@ -56,7 +56,7 @@ class ScenePlan:
 
     @property
     def unneeded(self) -> list[str]:
-        """What is left out because nothing in the scene requires it."""
+        """The features that the scene does not require, each with the reason."""
         used = set(self.tests.values())
         reasons = (
             ("box_box" not in used, "SAT: no two boxes can meet"),
@@ -74,7 +74,7 @@ class ScenePlan:
 
 
 def scene_plan(roster: Roster, grid: HashedGrid, *, uncertain: bool, outside: int) -> ScenePlan:
-    """The plan for what is described now."""
+    """Compute the plan for the objects that are described now."""
     table, parts, bodies = roster.multibody
     used = np.flatnonzero(bodies.used)
     static = bodies.static[used]
@@ -113,7 +113,7 @@ def scene_plan(roster: Roster, grid: HashedGrid, *, uncertain: bool, outside: in
 
 
 def _ignoring(filters: NDArray[np.uint32], counts: NDArray[np.int64]) -> int:
-    """How many pairs ignore each other, of objects of which counts (n,) have the (group, mask) of filters (n, 2)."""
+    """Count the pairs of objects that ignore each other. counts (n,): objects with each row of filters (n, 2)."""
     group, mask = filters.T
     meets = (group[:, None] & mask) != 0
     ignoring = ~(meets & meets.T)

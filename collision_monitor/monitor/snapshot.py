@@ -1,7 +1,7 @@
-"""All that the answers to come depend on, at one moment: so that a replay can begin there and give the same bytes.
+"""Snapshot of the monitor: all state that later answers depend on, so that a replay can start there with equal bytes.
 
-The arrays are those that the kernels work on, as they are; the facts are what else there is. Encoded it is an .npz
-file, which NumPy opens anywhere; nothing in it is code, and what does not fit this program is refused.
+The arrays are copies of those that the kernels work on; the facts hold the rest. A snapshot is encoded as an .npz
+file, which NumPy opens anywhere. It contains no code, and data that does not fit this program is refused.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from collision_monitor.errors import InputError
 _FACTS: Final = "facts"
 
 Facts = dict[str, Any]
-"""What JSON can hold, by name."""
+"""JSON values by name."""
 
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """Copies: what goes on changing is not seen in it. facts: by owner and name, what JSON can say."""
+    """Copies of the monitor's state, which later steps do not change. facts: JSON values by owner and name."""
 
     arrays: dict[str, NDArray[Any]]
     facts: dict[str, Facts]
 
     @property
     def nbytes(self) -> int:
-        """Bytes of memory, about."""
+        """Size of the arrays in bytes."""
         return sum(array.nbytes for array in self.arrays.values())
 
     def encode(self) -> bytes:
-        """As the bytes of an .npz file."""
+        """Encode as the bytes of an .npz file."""
         arrays: dict[str, Any] = {_FACTS: np.frombuffer(json.dumps(self.facts).encode(), np.uint8), **self.arrays}
         file = BytesIO()
         np.savez_compressed(file, **arrays)
@@ -46,7 +46,7 @@ class Snapshot:
 
     @classmethod
     def decode(cls, data: bytes) -> Snapshot:
-        """Raises InputError for bytes that are no such file."""
+        """Decode the bytes of `encode`. Raises InputError for other bytes."""
         try:
             with np.load(BytesIO(data), allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
@@ -56,7 +56,7 @@ class Snapshot:
         return cls(arrays, facts)
 
     def array(self, name: str, like: NDArray[Any], rows: int | None = None) -> NDArray[Any]:
-        """A copy of an array with the type and row shape of `like`; rows: how many. Raises InputError."""
+        """Copy an array. Raises InputError if its type or row shape differs from `like`, or its length from `rows`."""
         found = self.arrays.get(name)
         fits = found is not None and found.dtype == like.dtype and found.ndim == like.ndim
         if found is None or not fits or found.shape[1:] != like.shape[1:] or rows not in (None, len(found)):
@@ -66,13 +66,13 @@ class Snapshot:
         return found.copy()
 
     def columns(self, prefix: str, like: NamedTuple, rows: int) -> dict[str, NDArray[Any]]:
-        """Copies of the arrays `prefix.NAME` for each field NAME of a named tuple of arrays. Raises InputError."""
+        """Copy the arrays `prefix.NAME` for each field NAME of the named tuple `like`. Raises InputError."""
         return {name: self.array(f"{prefix}.{name}", column, rows) for name, column in like._asdict().items()}
 
     def check_slots(self, name: str, rows: NDArray[np.void]) -> None:
-        """Check the body slots `i` and `j` of rows of pairs, and bring their shape slots into range.
+        """Check the body slots `i` and `j` of rows of pairs, and clip their shape slots to the valid range.
 
-        Shapes are never read where the pair does not meet, and may then be anything. Raises InputError.
+        The shape slots of a pair that does not meet are never read and may hold any number. Raises InputError.
         """
         top, shapes = len(self.arrays["bodies.used"]), len(self.arrays["parts.next"])
         check_range(name, rows["i"], 0, top)
@@ -83,7 +83,7 @@ class Snapshot:
 
 
 def check_range(name: str, values: NDArray[Any], low: int, high: int) -> None:
-    """Raises InputError where one is not low <= value < high: a kernel would read or write beside its arrays."""
+    """Raise InputError unless low <= value < high: with other slots a kernel would access memory outside its arrays."""
     if values.size and not (values.min() >= low and values.max() < high):
         raise InputError(
             f"snapshot, {name}: expected numbers from {low} to {high - 1}, got {values.min()} to {values.max()}"
@@ -91,17 +91,17 @@ def check_range(name: str, values: NDArray[Any], low: int, high: int) -> None:
 
 
 class Stage(ABC):
-    """A stage of the monitor's step that keeps state between two steps, and saves and restores it by itself."""
+    """A stage of the monitor's step. It keeps its state between two steps, and saves and restores it."""
 
     SAVED: ClassVar[tuple[str, ...]] = ()
-    """Attributes that later answers depend on: `save` puts them into the snapshot."""
+    """Attributes that later answers depend on; `save` copies them into the snapshot."""
     CACHES: ClassVar[tuple[str, ...]] = ()
-    """Attributes that only save time, or are written anew before they are read: no snapshot has them."""
+    """Attributes that only save time, or are written before they are read; a snapshot does not contain them."""
 
     @abstractmethod
     def save(self, snapshot: Snapshot, facts: Facts) -> None:
-        """Copy the saved attributes into the snapshot's arrays and into `facts`, under names of their own."""
+        """Copy the attributes in SAVED into the snapshot's arrays and `facts`, under names that no other stage uses."""
 
     @abstractmethod
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
-        """Take over what `save` wrote. Raises InputError, KeyError, TypeError, ValueError for what cannot be that."""
+        """Restore what `save` wrote. Raises InputError, KeyError, TypeError, ValueError for other content."""

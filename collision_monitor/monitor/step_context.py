@@ -1,4 +1,4 @@
-"""What every stage of a step reads: the objects, the settings and the time."""
+"""The context of a step that every stage reads: the objects, the settings and the time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from collision_monitor.settings.profile import Profile
 
 
 class MotionSettings(NamedTuple):
-    """How far bodies are predicted, and how far off their predicted motion they may be."""
+    """How far ahead bodies are predicted, and how far they may deviate from their predicted motion."""
 
     horizon: float  # s
     margin: float  # m
@@ -33,7 +33,7 @@ class KernelSettings(NamedTuple):
 
     @classmethod
     def of(cls, p: Profile) -> Self:
-        """The settings of a profile."""
+        """Extract the settings from a profile."""
         return cls(
             ImpactQuery(p.contact_margin, p.impact_tolerance, p.impact_iterations),
             ContactQuery(p.contact_margin, p.stale_acceleration),
@@ -51,7 +51,7 @@ class KernelSettings(NamedTuple):
 
 @dataclass(slots=True)
 class StepContext:
-    """One step: the objects, the settings, the time, and the count of what the stages do."""
+    """One step: the objects, the settings, the time, and the counters of its work."""
 
     roster: Roster
     profile: Profile

@@ -1,7 +1,7 @@
-"""Stage 6b, active pairs within a budget: the most urgent first, and of the others what their bounds say.
+"""Stage 6b, time-critical: examine active pairs within a budget, the most urgent first; bound the others.
 
-(Slides "Time-critical collision detection": from coarse to fine, and the answer so far whenever time is up. Hubbard,
-Approximating polyhedra with spheres for time-critical collision detection, 1996.)
+Sources: slides "Time-critical collision detection" (from coarse to fine, with an answer whenever time is up); Hubbard,
+Approximating polyhedra with spheres for time-critical collision detection, 1996.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ Indices = NDArray[np.intp]
 
 
 class TimeCritical(Stage):
-    """Examines active pairs as long as the budget of a step lasts.
+    """Examines active pairs until the budget of a step is used up.
 
-    clock: measures the steps. timed: whether a budget in time counts; else only the number of pairs does.
+    clock: measures the steps. timed: whether a budget in time applies; otherwise only the number of pairs does.
     """
 
     SAVED = ("_deferred",)
@@ -43,28 +43,28 @@ class TimeCritical(Stage):
     def __init__(self, *, timed: bool) -> None:
         self.clock = StepClock()
         self._timed = timed
-        self._deferred = 0  # pairs that the last step left
-        self._tree_of: dict[int, Tree | None] = {}  # by slot: of bodies that a step with a budget has met
-        self._trees: Trees | None = None  # all of them, until one changes
+        self._deferred = 0  # number of pairs that the last step did not examine
+        self._tree_of: dict[int, Tree | None] = {}  # by slot; None: the body has no tree
+        self._trees: Trees | None = None  # all trees; None after a change
 
     @staticmethod
     def has_budget(profile: Profile) -> bool:
-        """Whether a step may have to leave pairs."""
+        """Whether the profile limits the work of a step."""
         return profile.budget_ms < NO_BUDGET or profile.pairs_per_step < NO_LIMIT
 
     def budget(self, profile: Profile) -> PairBudget | None:
-        """The budget of a step; None: it does everything, and the last step left nothing."""
+        """The budget of a step; None if there is no limit and the last step deferred nothing."""
         p = profile
         if p.budget_ms < NO_BUDGET and self._timed:
             return TimeBudget(self.clock, 1e-3 * p.budget_ms, p.pairs_per_step)
         return PairBudget(p.pairs_per_step) if self.has_budget(p) or self._deferred else None
 
     def end_step(self, step: StepContext) -> None:
-        """Remember what the step left."""
+        """Store how many pairs the step deferred."""
         self._deferred = step.work.deferred
 
     def prepare(self, step: StepContext, impacts: FirstImpacts) -> None:
-        """Make the trees and load the kernels that only some steps with a budget need: no step has to wait for them."""
+        """Make the trees and load the kernels that steps with a budget may need, so that no step waits for them."""
         none = np.empty(0, IMPACT)
         self._tighten(step, none, impacts)
         impacts.refine(step, none)
@@ -72,7 +72,7 @@ class TimeCritical(Stage):
     # ------------------------------------------------------------------ sphere trees
 
     def describe(self, roster: Roster, i: int, profile: Profile) -> None:
-        """Body i has other shapes: its tree is made now where steps have a budget, so that none has to make it."""
+        """Drop the sphere tree of body i, which has new shapes. If steps have a budget, make the new tree now."""
         self._tree_of.pop(i, None)
         self._trees = None
         if self.has_budget(profile):
@@ -83,7 +83,7 @@ class TimeCritical(Stage):
         self._tree_of[i] = body_tree(table, parts.next, int(bodies.first_shape[i]))
 
     def _all_trees(self, roster: Roster) -> Trees:
-        """The sphere trees of all bodies; they depend on the shapes alone."""
+        """The sphere trees of all bodies, cached. They depend only on the shapes."""
         if self._trees is None or len(self._trees.root) < roster.capacity:
             for i in roster.used().tolist():
                 if i not in self._tree_of:
@@ -92,7 +92,7 @@ class TimeCritical(Stage):
         return self._trees
 
     def _can_tighten(self, step: StepContext, events: Events) -> NDArray[np.bool_]:
-        """Mask of the events that rest on bounding spheres alone, where a sphere tree may give a later begin."""
+        """Mask of the events that are bounds by bounding spheres and that a sphere tree may delay."""
         trees = self._all_trees(step.roster)
         if not len(trees.radius):
             return np.zeros(len(events), np.bool_)
@@ -107,9 +107,9 @@ class TimeCritical(Stage):
     def _tightened(
         self, step: StepContext, events: Events, budget: PairBudget, impacts: FirstImpacts
     ) -> tuple[Indices, Events]:
-        """Events that rest on bounding spheres alone with the begin by their sphere trees; soonest first, by budget.
+        """Replace bounds by bounding spheres with bounds by sphere trees, soonest first, within the budget.
 
-        Returns the indices of those that were done, and these events; CLEAR: the trees do not meet.
+        Returns the indices of the events that were done, and the new events; CLEAR: the trees do not meet.
         """
         todo = np.flatnonzero(self._can_tighten(step, events))
         todo = todo[np.lexsort((events["key"][todo], events["lower"][todo]))]
@@ -125,7 +125,7 @@ class TimeCritical(Stage):
     def examine(
         self, step: StepContext, active: ActivePairs, events: EventList, impacts: FirstImpacts, budget: PairBudget
     ) -> None:
-        """Examine the active pairs, and refine the pending events, both by urgency and as long as the budget lasts."""
+        """Examine the active pairs and refine the pending events, the most urgent first, within the budget."""
         version = step.roster.bodies.version
         self._let_pass(step, active, events, impacts, budget)
         later = self._examine_urgent(step, active, impacts, budget)
@@ -139,7 +139,7 @@ class TimeCritical(Stage):
     def _let_pass(
         self, step: StepContext, active: ActivePairs, events: EventList, impacts: FirstImpacts, budget: PairBudget
     ) -> None:
-        """Take out pairs that came due and whose sphere trees do not meet yet; they are events again."""
+        """Remove active pairs whose sphere trees do not meet yet. Those that meet later return to the event list."""
         new = np.flatnonzero((active.pairs["touched"] == 0) & self._can_tighten(step, active.events))
         if not len(new):
             return
@@ -157,7 +157,7 @@ class TimeCritical(Stage):
     def _examine_urgent(
         self, step: StepContext, active: ActivePairs, impacts: FirstImpacts, budget: PairBudget
     ) -> Events:
-        """Examine pairs, the most urgent first, as long as the budget lasts; the others get what their bounds say.
+        """Examine active pairs, the most urgent first, within the budget; the others get bounds (`leave`).
 
         Returns the events of pairs that are certified apart for a while.
         """
@@ -168,7 +168,7 @@ class TimeCritical(Stage):
             n += active.examine(step, order[at : at + count], impacts.scratch, later[n:])
             at += count
         done, left = order[:at], order[at:]
-        active.events["lower"][done[active.pairs["touching"][done] == 1]] = step.now  # examined last at this time
+        active.events["lower"][done[active.pairs["touching"][done] == 1]] = step.now  # time of the last examination
         step.work.deferred += len(left)
         n += int(leave(step.roster.bodies, active.active, left, step.now, step.settings.contact, later[n:]))
         return later[:n]
@@ -176,9 +176,9 @@ class TimeCritical(Stage):
     def _refine(
         self, step: StepContext, pending: Events, impacts: FirstImpacts, budget: PairBudget
     ) -> tuple[Indices, Events]:
-        """Seek the first impacts of pending pairs of which only a bound is known, soonest first, by budget.
+        """Search for the first impacts of the pending events that are only bounds, soonest first, within the budget.
 
-        Returns the indices of the events that were done, and the events in place of them.
+        Returns the indices of the events that were done, and the events that replace them.
         """
         todo = np.flatnonzero((pending["method"] == BOUND_ONLY) | (pending["method"] == TREE_BOUND))
         found = [np.zeros(0, IMPACT)]
@@ -200,11 +200,12 @@ class TimeCritical(Stage):
 
 @kernel
 def leave(bodies, active, which, now, query, later):
-    """As `active_pairs.examine`, for the pairs `which` (M,) that this step does not examine.
+    """Bound the active pairs `which` (M,) that this step does not examine; counterpart of `ActivePairs.examine`.
 
-    A pair that touched goes on touching, UNRESOLVED, with the distance of the centres and a bound that holds whatever
-    it is. A pair that did not is UNRESOLVED from now on. Where the bounding spheres are apart, neither.
-    query: ContactQuery. Returns the number of events in `later`.
+    A pair that touched stays a contact, UNRESOLVED, with the distance of the centres and an error bound that holds for
+    any shapes within the bounding spheres. A stale object widens its bounds here too. A pair that did not touch may
+    meet from now on, UNRESOLVED. If the bounding spheres are apart, the contact ends, and the pair returns to the event
+    list or is dropped. query: ContactQuery. Returns the number of events in `later`.
     """
     pairs, events, results = active
     n_later = 0
@@ -225,7 +226,7 @@ def leave(bodies, active, which, now, query, later):
                     later[n_later] = event
                     n_later += 1
                 else:
-                    event.lower = min(since, now)  # the pair that waits longest is examined first
+                    event.lower = min(since, now)  # the pair that has waited longest is examined first
                     stays = True
         if touching:
             bounded_contact(bodies, i, j, there, reach, results[k])
@@ -235,12 +236,12 @@ def leave(bodies, active, which, now, query, later):
 
 
 _WAIT = np.dtype([("lower", np.float64), ("key", np.uint64)])
-"""Since when an active pair waits (s), and what decides among equals; sorted as events are."""
+"""Time since which an active pair waits (s), and the key that breaks ties; sorted as events are."""
 
 
 @kernel
 def _by_turns(bodies, pairs, events, step, waits, order, turns):
-    """`urgency` into turns (n,) int64; waits (n,) _WAIT and order (n,) int64: scratch. Returns how many are cheap."""
+    """`urgency`, into turns (n,) int64. waits (n,) _WAIT, order (n,) int64: scratch. Returns how many are cheap."""
     for k in range(pairs.size):
         waits[k].lower = events[k].lower
         waits[k].key = ((pairs[k].key ^ step) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(32)
@@ -254,7 +255,7 @@ def _by_turns(bodies, pairs, events, step, waits, order, turns):
             order[left] = k
             left += 1
     cheap = n
-    apart = touched = 0  # how far each of the two has come
+    apart = touched = 0  # positions in `order` of the next pair of each kind
     while n < pairs.size:
         while apart < left and pairs[order[apart]].touched == 1:
             apart += 1
@@ -272,10 +273,11 @@ def _by_turns(bodies, pairs, events, step, waits, order, turns):
 def urgency(
     bodies: Bodies, pairs: NDArray[np.void], events: NDArray[np.void], step: int
 ) -> tuple[NDArray[np.int64], int]:
-    """The order in which to look at active pairs, and how many are cheap, which come first and cost nothing.
+    """Return the order in which to examine active pairs, and the number of cheap ones, which come first.
 
-    The rest by turns: those that did not touch, since their certified time ran out, and those that did, since they were
-    looked at last. Ties change from step to step, so that nobody waits forever.
+    Cheap pairs do not count against the budget. The others alternate between pairs that did not touch, ordered by the
+    end of their certified time, and pairs that did, ordered by their last examination. Ties are broken differently in
+    each step, so that no pair waits forever.
     """
     order, turns = np.empty((2, len(pairs)), np.int64)
     cheap = _by_turns(bodies, pairs, events, np.uint64(step), np.empty(len(pairs), _WAIT), order, turns)

@@ -1,4 +1,4 @@
-"""Stamps to seconds: the monitor's clock. A stamp that jumps has to be confirmed by a second message."""
+"""The monitor's timeline: stamps to seconds. A stamp that jumps has to be confirmed by a second message."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ class Progress(Enum):
     """How a stamp continues the timeline."""
 
     CONTINUES = 0
-    RESTARTS = 1  # a second message confirmed the jump: times of before mean nothing any more
-    REFUSED = 2  # it jumps, and no second message has confirmed it yet
+    RESTARTS = 1  # a second message confirmed the jump: all earlier times are void
+    REFUSED = 2  # the stamp jumps, and no second message has confirmed the jump yet
 
 
 class Timeline(Stage):
-    """The latest time so far, in nanoseconds, and as seconds after the first stamp (the origin)."""
+    """The latest time so far, in nanoseconds and in seconds after the origin, which is the first stamp."""
 
     SAVED = ("_origin_ns", "now_ns", "_jump_ns")
 
@@ -29,7 +29,7 @@ class Timeline(Stage):
         self._jump_ns: int | None = None  # a refused stamp; the next message may confirm it
 
     def seconds(self, stamp_ns: int) -> float:
-        """A stamp as seconds after the origin."""
+        """Convert a stamp to seconds after the origin."""
         assert self._origin_ns is not None
         return (stamp_ns - self._origin_ns) * NANOSECOND
 
@@ -39,11 +39,11 @@ class Timeline(Stage):
         return self.seconds(self.now_ns)
 
     def forget(self) -> None:
-        """Begin anew with the next stamp, whatever it is."""
+        """Accept any next stamp as the new origin."""
         self._origin_ns = None
 
     def advance(self, stamp_ns: int, max_time_step: float) -> Progress:
-        """Move the latest time to the stamp; a stamp that is older by at most max_time_step (s) leaves it as it is."""
+        """Move the latest time to the stamp. A stamp that is older by at most max_time_step (s) does not change it."""
         if self._origin_ns is None:
             self._begin(stamp_ns)
             return Progress.CONTINUES

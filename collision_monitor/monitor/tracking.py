@@ -1,6 +1,8 @@
-"""Stage 2, tracking: which bodies left their predicted motion, and the region of interest.
+"""Stage 2, tracking: find the bodies that left their predicted motion, and apply the region of interest.
 
-A body that keeps its motion is never started anew: where its predictions end too soon, they are continued.
+A body that left its reference motion starts anew from its last state. A body that keeps its motion does not: its
+predictions are continued before they end. A stale object widens its bounds here, in `find_moved` and
+`restart_motion`; its contacts widen theirs in `prediction.body_contact.widening`.
 """
 
 from __future__ import annotations
@@ -24,10 +26,10 @@ from collision_monitor.prediction.turning import BLOCK, COLUMNS, make_columns, t
 FIRST_SLACK: Final = 0.5
 SHORTEST_SLACK: Final = 0.0625
 LONGEST_SLACK: Final = 1.0
-"""How far beyond the horizon a body is predicted, in horizons: at first, at least, and at most."""
+"""Slack: how far beyond the horizon a body is predicted, in horizons; initial, smallest and largest value."""
 
 WIDER: Final = 1.1
-"""Workspace for standard deviations that vary a little from state to state."""
+"""Factor on the spread of a box, because standard deviations vary a little from state to state."""
 
 GOLDEN_RATIO: Final = 0.6180339887498949
 PLASTIC_RATIO: Final = 0.7548776662466927
@@ -37,31 +39,32 @@ Slots = NDArray[np.int32]
 
 
 class Uncertainty(NamedTuple):
-    """What declared uncertainty adds to the boxes of bodies."""
+    """The declared uncertainties, which widen the boxes of bodies."""
 
     spread: Any  # prediction.spread.Spread
     sigmas: float  # standard deviations by which boxes are widened; 0: nothing is uncertain
 
 
 class Tracking(Stage):
-    """Compares the bodies' states with their predicted motions, and starts those anew that left them."""
+    """Compares the bodies' states with their predicted motions, and starts the bodies anew that left them."""
 
     SAVED = ("_outside",)
     CACHES = ("_columns",)
 
     def __init__(self) -> None:
-        self._outside: NDArray[np.bool_] = np.zeros(0, np.bool_)  # bodies outside of the region, which rest
+        self._outside: NDArray[np.bool_] = np.zeros(0, np.bool_)  # by slot: outside of the region
         self._columns = make_columns()
 
     @property
     def outside(self) -> int:
-        """How many bodies are outside of the region of interest."""
+        """Number of bodies outside of the region of interest."""
         return int(np.count_nonzero(self._outside))
 
     def apply_region(self, step: StepContext, grid: HashedGrid) -> NDArray[np.bool_] | None:
-        """Let bodies rest that are outside of the region, in no grid and no event; start those anew that came in.
+        """Exclude the bodies outside of the region, and mark those that came in to be predicted anew.
 
-        Returns which bodies (top,) are outside; None: no region leaves anything out.
+        An excluded body leaves the grid, and its pairs leave the event list, because its version changes. Returns the
+        mask (top,) of the bodies outside, or None if there is no region.
         """
         p, roster = step.profile, step.roster
         top, bodies = roster.top, roster.bodies
@@ -81,7 +84,7 @@ class Tracking(Stage):
         return outside
 
     def find(self, step: StepContext, uncertain: UncertainPredictions) -> tuple[Slots, Slots]:
-        """Slots of the bodies to predict anew, and of others that are not predicted far enough."""
+        """Find the slots of the bodies to predict anew, and of those to predict further."""
         roster = step.roster
         moved, ending = self._moved(step, uncertain)
         if roster.renewed:
@@ -94,7 +97,7 @@ class Tracking(Stage):
         return moved, ending
 
     def _moved(self, step: StepContext, uncertain: UncertainPredictions) -> tuple[Slots, Slots]:
-        """Slots of the bodies that left their predicted motion, and of others that are not predicted far enough."""
+        """Find the slots of bodies that left their predicted motion, and of those whose prediction ends too soon."""
         roster = step.roster
         found = np.empty((2, roster.top), np.int32)
         uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
@@ -104,7 +107,7 @@ class Tracking(Stage):
     def restart(
         self, step: StepContext, moved: Slots, ending: Slots, uncertain: UncertainPredictions, grid: HashedGrid
     ) -> None:
-        """Start `moved` anew from their last states, and predict `ending` further; their boxes go into the grid."""
+        """Start `moved` anew from their last states, and predict `ending` further. Update their boxes in the grid."""
         bodies = step.roster.bodies
         uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
         if len(moved):
@@ -113,7 +116,7 @@ class Tracking(Stage):
             continue_motion(bodies, uncertainty, grid, ending, step.now, step.settings.motion)
 
     def remember_cover(self, step: StepContext, which: Slots) -> None:
-        """The bodies `which` have been predicted until their cover times."""
+        """Record that the bodies `which` have been predicted until their cover times."""
         remember_cover(step.roster.bodies, which)
 
     def save(self, snapshot: Snapshot, facts: Facts) -> None:
@@ -127,7 +130,7 @@ class Tracking(Stage):
 
 @device
 def _turned_away(bodies, start, count, columns, angles):
-    """`turned_away`, unless turning moves none of them."""
+    """`turned_away`, skipped if rotation moves none of the bodies."""
     turns = False
     for i in range(start, start + count):
         turns |= bodies.spin_radius[i] > 0.0
@@ -137,13 +140,14 @@ def _turned_away(bodies, start, count, columns, angles):
 
 @kernel
 def find_moved(bodies, uncertainty, count, now, settings, columns, found):
-    """Slots among the first `count` whose predictions no longer hold at `now`, into found[0]; returns how many.
+    """Find the bodies among the first `count` slots whose predictions no longer hold at `now`, or end too soon.
 
-    Those that hold but end within the horizon go into found[1], their number is returned second.
-    A body's surface may be off its reference by tube_0 now and drift by tube_1 a second; both are checked, with the
-    drift that a body without a new state may have made; and so is whether it may be further off, by the uncertainty,
-    than its box allows for. Its slack is halved where it left its motion and doubled where that held until
-    it was predicted no further: a body that turns often is not predicted far. columns: scratch, of `make_columns`.
+    The slots of the former are written into found[0], those of the latter, which end within the horizon, into found[1];
+    returns both numbers. A prediction holds while the body's surface is within tube_0 (m) of its reference motion and
+    drifts from it by at most tube_1 (m/s), and while its uncertainty fits into its box. A stale object widens its
+    bounds here: deviation and drift include what it may have accelerated since its last state.
+    The slack of a body is halved when it leaves its motion, and doubled when the motion held to the end: a body that
+    often changes its motion is not predicted far. columns: scratch, of `make_columns`.
     """
     sigmas = uncertainty.sigmas
     horizon, stale_acceleration = settings.horizon, settings.stale_acceleration
@@ -171,7 +175,7 @@ def find_moved(bodies, uncertainty, count, now, settings, columns, found):
             ux, uy, uz = ux + (ax * age - m.ax * since), uy + (ay * age - m.ay * since), uz + (az * age - m.az * since)
             harder = sqrt((ax - m.ax) ** 2 + (ay - m.ay) ** 2 + (az - m.az) ** 2)
         apart = sqrt(dx * dx + dy * dy + dz * dz)
-        # of half a difference of accelerations, over the two horizons for which a body is predicted at most
+        # half the difference of accelerations, over two horizons: a body is predicted at most that far
         drift = sqrt(ux * ux + uy * uy + uz * uz) + harder * horizon
         if age > 0.0:
             apart += 0.5 * stale_acceleration * age * age
@@ -181,10 +185,10 @@ def find_moved(bodies, uncertainty, count, now, settings, columns, found):
             dx, dy, dz = bodies.angular[i, 0] - m.wx, bodies.angular[i, 1] - m.wy, bodies.angular[i, 2] - m.wz
             off = sqrt(dx * dx + dy * dy + dz * dz)
             drift += r * off
-            # known at the last state's time: the difference from there to now is bounded by the rate's
+            # the angle is of the last state's time; from then to now it grows at most by the difference of the rates
             apart += r * (angles[i % BLOCK] + off * age)
         if not (apart <= m.tube_0 and drift <= m.tube_1):
-            if bodies.slack[i] > 0.0:  # else it is new
+            if bodies.slack[i] > 0.0:  # 0: the body is new
                 bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
             moved[n] = i
             n += 1
@@ -200,14 +204,14 @@ def find_moved(bodies, uncertainty, count, now, settings, columns, found):
 
 @kernel
 def remember_cover(bodies, which):
-    """Bodies `which` (M,) have been predicted until their cover times, by this motion."""
+    """Record that the bodies `which` (M,) have been predicted until their cover times, by this motion."""
     for i in which:
         bodies.motion[i].covered = bodies.motion[i].cover
 
 
 @device
 def _is_covered(bodies, uncertainty, i, now, settings):
-    """Is body i as certain as its box allows for?"""
+    """Whether the box of body i is wide enough for its uncertainty."""
     spread, sigmas = uncertainty
     m = bodies.motion[i]
     age = now - bodies.time[i]
@@ -218,9 +222,9 @@ def _is_covered(bodies, uncertainty, i, now, settings):
 
 @device
 def _cover_spread(bodies, uncertainty, i, now, most, stale_acceleration):
-    """Let the box of body i allow for its uncertainty from now until its cover time: most[0] + most[1] t at most (m).
+    """Widen the box of body i for its uncertainty from now until its cover time, by at most most[0] + most[1] t (m).
 
-    That holds until it has been silent for twice as long, and for states that are a little less certain.
+    This suffices until the age of its last state has doubled, and for states that are a little less certain.
     """
     spread, sigmas = uncertainty
     m = bodies.motion[i]
@@ -233,16 +237,17 @@ def _cover_spread(bodies, uncertainty, i, now, most, stale_acceleration):
 
 @device
 def _cover(bodies, i, now, horizon):
-    """Predict body i over the horizon and some slack; the rest of the step knows from `covered` what is new of it.
+    """Set the cover time of body i: the end of the horizon and a share of its slack.
 
-    Cover times are spread by the body's slot and time, so that they do not end together: over (1/2, 1] of the slack,
-    and at first over all of it, for most bodies begin in the same step.
+    The later stages predict only what lies after `covered`. The share depends on the body's slot and the time, so that
+    the predictions of bodies do not end together. It lies in the upper half of the slack, and for a new body anywhere
+    in it, because most bodies begin in the same step.
     """
     m = bodies.motion[i]
     if bodies.static[i]:
         m.cover = np.inf
         return
-    periods = now / horizon if horizon > 0.0 else 0.0  # 0: only what touches now is asked for
+    periods = now / horizon if horizon > 0.0 else 0.0  # 0: the profile requests only present contacts
     share = (i * GOLDEN_RATIO + periods * PLASTIC_RATIO) % 1.0
     if bodies.slack[i] == 0.0:
         bodies.slack[i] = FIRST_SLACK * horizon
@@ -253,9 +258,10 @@ def _cover(bodies, i, now, horizon):
 
 @kernel
 def restart_motion(bodies, uncertainty, grid, which, now, settings):
-    """Make the last state of each body in `which` (M,) its reference; the grid gets what it sweeps from `now` on.
+    """Make the last state of each body in `which` (M,) its reference motion, and put its swept box into the grid.
 
-    A stale body's tube is widened here by what it may have accelerated since its last state.
+    The version of the body changes, so that its pairs leave the event list. A stale object widens its bounds here: its
+    tube grows by what it may deviate, at stale_acceleration, until the age of its last state has doubled.
     """
     stale_acceleration = settings.stale_acceleration
     for k in range(which.size):
@@ -289,9 +295,9 @@ def restart_motion(bodies, uncertainty, grid, which, now, settings):
 
 @kernel
 def continue_motion(bodies, uncertainty, grid, which, now, settings):
-    """Predict each body in `which` (M,), which is on its reference, further; what it sweeps from `now` on in the grid.
+    """Predict each body in `which` (M,), which kept its reference motion, further; put its swept box into the grid.
 
-    That it is within its tube at `now` is known again, so the tube starts to widen from here.
+    The body is known to be within tube_0 of its reference at `now`, so its tube widens from `now` on.
     """
     for k in range(which.size):
         i = which[k]
@@ -300,6 +306,6 @@ def continue_motion(bodies, uncertainty, grid, which, now, settings):
         m.tube_time = now
         m.covered = m.cover
         _cover(bodies, i, now, settings.horizon)
-        # no more than it did: what it could meet until `covered` is known already
+        # no wider than before, because the candidates until `covered` were found with that width
         _cover_spread(bodies, uncertainty, i, now, allowed, settings.stale_acceleration)
         put_box(grid, i, swept_box(bodies, i, now, settings.margin))

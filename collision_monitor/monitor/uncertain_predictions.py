@@ -1,7 +1,7 @@
-"""Uncertain predictions: times and probabilities where states declare uncertainty, and pairs that may meet by it.
+"""Uncertain predictions: times and probabilities of impact from declared uncertainties, also for pairs stated to pass.
 
 Pairs whose stated motions pass each other are kept in a list like the event list: an entry holds as long as the
-motions of both bodies do. Nothing here runs before a state declares an uncertainty.
+motions of both bodies hold. Nothing here runs until a state declares an uncertainty or an object an acceleration.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ from collision_monitor.records import PREDICTION, Method, PredictionStatus
 from collision_monitor.settings.profile import Profile
 
 Pool = ThreadPoolExecutor | None
-"""Threads to share work among; None: there is one."""
+"""Threads that share the work; None: one thread."""
 
 ANSWERS: Final = ("earliest", "most_likely", "latest", "probability")
 FEWEST_SAMPLED_PAIRS_FOR_THREADS: Final = 8
-"""Handing work to a thread costs as much as some of them."""
+"""Fewer pairs stay on one thread: passing work to another costs as much as some of them."""
 
 INTERVAL: Final = ("lower", "upper", "status")
 
 ENTRY = np.dtype(
     [
         ("key", np.uint64),  # pair_key of the ids
-        ("until", np.float64),  # s: looked for until then; what comes near each other later is found again
+        ("until", np.float64),  # s: end of the prediction; the broad phase finds the pair again for later times
         ("i", np.int32),  # body slots; body i has the smaller id
         ("j", np.int32),
         ("version_i", np.uint32),
@@ -57,9 +57,10 @@ Pairs = NDArray[np.int32]
 
 @kernel
 def renew(entries, pairs, bodies, spread, now, renewed):
-    """The entries that still hold, then those of the pairs (P, 2) in which a body may be uncertain, into renewed.
+    """Write the entries that still hold, then those of the pairs (P, 2) in which a body may be uncertain, into renewed.
 
-    A body whose box allows for uncertainty is not looked at anew when it declares some again. Returns how many.
+    A pair also counts if a body's box is wide enough for uncertainty, because a body that declares some later within
+    that width starts no new search. Returns the number of entries.
     """
     n = 0
     motion = bodies.motion
@@ -83,56 +84,56 @@ def renew(entries, pairs, bodies, spread, now, renewed):
 
 @lru_cache(maxsize=16)
 def sigmas_for(probability: float) -> float:
-    """How many standard deviations off bodies may be that meet with less than this probability.
+    """Number of standard deviations by which bodies may be off if they meet with less than this probability.
 
-    For flat faces: to meet, one of the errors of the two positions and the two velocities must exceed it, and four
-    times the probability that one does is less than what is asked for.
+    For flat faces: to meet, one of the errors of the two positions and the two velocities must exceed this number. Four
+    times the probability that one error does so is `probability`, which is clipped to 0.9.
     """
     return NormalDist().inv_cdf(1.0 - 0.25 * min(probability, 0.9))
 
 
 class UncertainPredictions(Stage):
-    """The uncertainties of all bodies, and the pairs that only they could bring together."""
+    """The uncertainties of all bodies, and the pairs that may meet because of them."""
 
     SAVED = ("active", "spread", "entries")
     CACHES = ("_workspaces",)
 
     def __init__(self, capacity: int) -> None:
         self.active = False
-        """Whether any state has declared an uncertainty, or any object how hard it may accelerate."""
+        """Whether any state has declared an uncertainty, or any object a bound on its acceleration."""
         self.spread = make_spread(capacity)
         self.entries: Records = np.empty(0, ENTRY)
-        """The pairs, by key."""
+        """The pairs (ENTRY), sorted by key."""
         self._workspaces = [make_workspace()]  # one for each thread
 
     # ------------------------------------------------------------------ the bodies
 
     def enlarge(self, capacity: int) -> None:
-        """Make work for so many bodies; the slots stay."""
+        """Make room for `capacity` bodies; the slots stay."""
         if len(self.spread.stddev) < capacity:
             spread = make_spread(capacity)
             enlarge(self.spread, spread)
             self.spread = spread
 
     def describe(self, i: int, d: ObjectDescription) -> None:
-        """Take in what the object in slot i has declared of its accelerations."""
+        """Store the acceleration bounds that the object in slot i declares."""
         bounds = (0.0, 0.0) if d.static else (d.max_linear_acceleration, d.max_angular_acceleration)
         self.spread.acceleration[i] = bounds
         self.active |= any(bounds)
 
     def forget(self, i: int) -> None:
-        """The body in slot i is gone."""
+        """Clear the uncertainty of the body in slot i, which is removed."""
         for array in self.spread:
             array[i] = 0.0
         self.active = bool(self.spread.stddev.any() or self.spread.acceleration.any())
 
     def take(self, slots: Pairs, numbers: Any, covariance: NDArray[np.float64], planar: bool) -> None:
-        """Take in the uncertainties of states that were accepted; arguments as of `take_spread`."""
+        """Store the uncertainties of accepted states; for the arguments see `take_spread`."""
         take_spread(self.spread, slots, numbers, covariance, planar)
         self.active = True
 
     def sigmas(self, profile: Profile) -> float:
-        """By how many standard deviations swept boxes are widened; 0 while nothing is uncertain."""
+        """Number of standard deviations by which swept boxes are widened; 0 while nothing is uncertain."""
         return sigmas_for(profile.min_probability) if self.counts(profile) else 0.0
 
     def counts(self, profile: Profile) -> bool:
@@ -142,7 +143,7 @@ class UncertainPredictions(Stage):
     # ------------------------------------------------------------------ the step
 
     def add_pairs(self, step: StepContext, pairs: Pairs) -> None:
-        """Take in pairs (P, 2) whose swept boxes meet, found in this step; what no longer holds is dropped."""
+        """Add pairs (P, 2) whose swept boxes overlap, found in this step. Drop the entries that no longer hold."""
         if not self.counts(step.profile):
             return
         renewed = np.empty(len(self.entries) + len(pairs), ENTRY)
@@ -155,10 +156,10 @@ class UncertainPredictions(Stage):
     def complete(
         self, step: StepContext, predictions: Records, slots: Pairs, touching: NDArray[np.uint64], pool: Pool
     ) -> Records:
-        """Fill in times and probabilities, and add the pairs that may meet though they are stated to pass.
+        """Fill in times and probabilities of predictions, and add the pairs that may meet though stated to pass.
 
-        predictions (n,): of stated motions, with the body slots (n, 2); touching: keys of the pairs that touch now.
-        Returns them soonest first.
+        predictions (n,): of the stated motions; slots (n, 2): their body slots; touching: keys of the pairs that touch
+        now. Returns the predictions, soonest first.
         """
         if not step.profile.horizon > 0.0:
             return predictions
@@ -179,7 +180,7 @@ class UncertainPredictions(Stage):
         return _sorted(both)
 
     def _widen(self, step: StepContext, predictions: Records, slots: Pairs) -> None:
-        """Widen the intervals of bodies that have declared how hard they may accelerate."""
+        """Widen the intervals of the bodies that declare bounds on their accelerations."""
         if not self.spread.acceleration.any():
             return
         ends = [np.ascontiguousarray(predictions[name]) for name in INTERVAL]
@@ -189,7 +190,7 @@ class UncertainPredictions(Stage):
             predictions[name] = column
 
     def _judge(self, step: StepContext, slots: Pairs, stated: bool, pool: Pool) -> NDArray[np.float64]:
-        """Answers (n, 4) for pairs of body slots (n, 2), on all threads; the same for any number of them."""
+        """Compute the answers (n, 4) for pairs of body slots (n, 2) on all threads; their number changes no answer."""
         p = step.profile
         sampling = Sampling(
             step.settings.impact,
@@ -243,7 +244,7 @@ def _sorted(predictions: Records) -> Records:
 def _possible(
     step: StepContext, keys: NDArray[np.uint64], slots: Pairs, answers: NDArray[np.float64]
 ) -> Records:
-    """Predictions (records.PREDICTION) of pairs that may meet though they are stated to pass."""
+    """Build the predictions (records.PREDICTION) of pairs that may meet though they are stated to pass."""
     bodies = step.roster.bodies
     rows = np.zeros(len(keys), PREDICTION)
     for name, column in zip(ANSWERS, answers.T, strict=True):

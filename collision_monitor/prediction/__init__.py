@@ -1,1 +1,1 @@
-"""Where objects will be and when they will meet."""
+"""Motions of bodies, and predictions of their contacts."""

@@ -1,9 +1,8 @@
-"""The interval of an impact where a body may accelerate: by how much it is earlier, and until when it is still certain.
+"""Intervals of impacts under declared bounds on accelerations: earliest possible and certain contact.
 
-A body that accelerates by at most a (m/s^2), and changes its turning by at most alpha (rad/s^2), has no point farther
-from where it is stated to be than (a + alpha r) t^2 / 2, t seconds after its last state. Before the first time at which
-the stated gap is as small as the two bodies' deviations together there is no contact; where they are stated to overlap
-by more than that, there is.
+A body accelerates by at most a (m/s^2) and alpha (rad/s^2). Then t seconds after its last state, each of its points is
+within (a + alpha r) t^2 / 2 of its stated position; r is the body's radius. Contact is impossible before the stated
+gap is as small as the deviations of both bodies together. Contact is certain when the stated overlap exceeds them.
 """
 
 from __future__ import annotations
@@ -19,14 +18,14 @@ from collision_monitor.prediction.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.prediction.motion import carry_on
 
 SEGMENTS: Final = 8
-"""In each of them the deviation is bounded by its chord: too wide by 1 / 256 of that at the end, at most."""
+"""In each segment of the time a chord bounds the deviation: too wide by at most 1 / 256 of the deviation at the end."""
 
 CONTACT_NODES: Final = 16
-"""Times after the stated impact at which it is asked whether contact is certain."""
+"""Number of steps from the stated impact to the horizon, after each of which certain contact is tested."""
 
 
 class Intervals(NamedTuple):
-    """The predictions of pairs of bodies: ends of their intervals and statuses, to be widened in place."""
+    """The predictions of pairs of bodies: the ends of their intervals and their statuses, changed in place."""
 
     pairs: Any  # (P, 2) int32: body slots
     lower: Any  # (P,) s
@@ -36,7 +35,7 @@ class Intervals(NamedTuple):
 
 @device
 def _first_possible(multibody, i, j, until, off, query, work):
-    """A time in [0, until] before which the bodies cannot touch; off: coefficients of their deviation in t (m)."""
+    """Return a time in [0, until] before which the bodies cannot touch; off: their deviation (m), a polynomial in t."""
     table, parts, bodies = multibody
     A, B = work.motion[0], work.motion[1]
     first = until
@@ -58,7 +57,7 @@ def _first_possible(multibody, i, j, until, off, query, work):
 
 @device
 def _first_certain(multibody, i, j, window, off, margin, work):
-    """A time in the window at which the bodies touch whatever they do; infinite: none is known."""
+    """Return a time in the window at which the bodies touch however they accelerate; infinite: none found."""
     table, parts, bodies = multibody
     A, B = work.motion[0], work.motion[1]
     begin, end = window
@@ -77,16 +76,16 @@ def _first_certain(multibody, i, j, window, off, margin, work):
 
 @device
 def _bound(bodies, spread, i):
-    """How hard any point of body i may leave its stated motion (m/s^2)."""
+    """Largest acceleration of any point of body i relative to its stated motion (m/s^2)."""
     turning = spread.acceleration[i, 1]
     return spread.acceleration[i, 0] + (turning * bodies.spin_radius[i] if turning > 0.0 else 0.0)
 
 
 @kernel
 def widen_intervals(multibody, spread, intervals, now, horizon, query, work):
-    """Widen intervals (Intervals) by the accelerations that the bodies have declared. horizon: s after `now`.
+    """Widen intervals (Intervals) by the acceleration bounds that the bodies declare. horizon: s after `now`.
 
-    Where a body may avoid contact, the upper end becomes infinite and the status UNRESOLVED.
+    If a body can avoid contact, the upper end becomes infinite and the status UNRESOLVED.
     """
     bodies = multibody.bodies
     pairs, lower, upper, status = intervals

@@ -1,15 +1,15 @@
-"""How long two shapes may go on before the gap between them along an axis can close.
+"""Advance of two shapes: a time until which the gap between them along an axis stays open.
 
-The axis n turns at u; from a time on at which it is n, after d seconds it is n + d m and a rest, where m = u x n. Seen
-from a shape that turns at w it turns by k = m + n x w a second. So the gap along it is at least
+The axis n turns at u. After d seconds it is n + d m and a remainder, where m = u x n. In the frame of a shape that
+turns at w, it changes by k = m + n x w per second. So the gap along it is at least
 
     gap + d (n.v + m.p) + d^2 m.v - [h_A(n + d k_A) - h_A(n)] - [h_B(-n - d k_B) - h_B(-n)] - c d^2 / 2
 
-p and v: position and velocity of B's origin relative to A's; where it accelerates by a there is n.a d^2 / 2 more, of
-which no more is counted than keeps the bound concave. h: support values of the cores about those origins. c bounds the
-rest: |m|^2 |p| and, for each shape, (|w - u|^2 + |w x u|) r with its farthest point r.
-Where one corner is nearest all the while it is exact to second order with an axis at rest; a face or an edge that turns
-needs an axis that turns with it, else the gap seems to close by |w| r.
+p and v: position and velocity of B's origin relative to A's. A relative acceleration a adds n.a d^2 / 2, which is
+counted only as far as the bound stays concave. h: support values of the cores about those origins. c bounds the
+remainder: |m|^2 |p| and, for each shape, (|w - u|^2 + |w x u|) r, where r is the distance of its farthest point.
+With an axis at rest the bound is exact to second order as long as one corner stays the nearest. A face or an edge that
+turns needs an axis that turns with it; otherwise the gap seems to close at |w| r.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from collision_monitor.narrow_phase.support_value import core_support
 from collision_monitor.tolerances import EPSILON
 
 PIECES: Final = 8
-"""Parabolas that are looked at, at most: one more than there are edge directions in two boxes, and one to see it."""
+"""Most parabolas to examine: one more than two boxes have edge directions, and one to detect the end."""
 
 
 class Placed(NamedTuple):
-    """Two shapes at one time, and how their bodies go on. World axes, m, m/s, rad/s."""
+    """Two shapes at one time, and the motion of their bodies. World axes, m, m/s, m/s^2, rad/s."""
 
     a: Any  # slots in the shape table
     b: Any
     R_a: Any  # (3, 3)
     R_b: Any
-    o_a: Any  # where the shapes are from their bodies' origins
+    o_a: Any  # offsets of the shapes from their bodies' origins
     o_b: Any
-    p: Any  # body b's origin from body a's
+    p: Any  # position of b's origin relative to a's
     v: Any
     acceleration: Any  # of b's origin relative to a's, constant
     w_a: Any
@@ -44,7 +44,7 @@ class Placed(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """A lower bound on a gap: start + rate d - curvature d^2 after d seconds, less what the cores turn into it."""
+    """Lower bound on a gap after d seconds: start + rate d - curvature d^2, minus the growth of the cores' support."""
 
     start: Any  # m
     rate: Any  # m/s
@@ -52,7 +52,7 @@ class Gap(NamedTuple):
 
 
 class Axis(NamedTuple):
-    """A direction in a shape's own axes, and by how much it turns there a second."""
+    """A direction in a shape's own axes, and its change there per second."""
 
     x: Any
     y: Any
@@ -76,7 +76,7 @@ def cross(a, b):
 
 @inlined
 def _seen_from(R, n, k):
-    """The direction n, which turns by k a second, as seen from a shape turned by R (3, 3)."""
+    """The direction n, which changes by k per second, in the axes of a shape with rotation R (3, 3)."""
     return Axis(
         n[0] * R[0, 0] + n[1] * R[1, 0] + n[2] * R[2, 0],
         n[0] * R[0, 1] + n[1] * R[1, 1] + n[2] * R[2, 1],
@@ -89,7 +89,7 @@ def _seen_from(R, n, k):
 
 @inlined
 def _bend(table, s, w, u, offset):
-    """How hard the core of a shape that turns at w can leave the first order, along an axis that turns at u (m/s^2)."""
+    """Share in c, the bound on the remainder (m/s^2), of a core that turns at w; the axis turns at u."""
     d = (w[0] - u[0], w[1] - u[1], w[2] - u[2])
     c = cross(w, u)
     rate = dot(d, d) + sqrt(dot(c, c))
@@ -97,16 +97,17 @@ def _bend(table, s, w, u, offset):
         return 0.0
     arm = sqrt(dot(offset, offset))
     if table.kind[s] == SPHERE:
-        return rate * arm  # turning about its own centre does not move a sphere
+        return rate * arm  # rotation about its own centre does not move a sphere
     radius = table.radius[s]
     return rate * (arm + (radius - rounding(table, s) + 4.0 * EPSILON * radius))
 
 
 @inlined
 def advance(table, at, n, m, rate, gap, until):
-    """A time d in (0, until] (s) up to which the gap along the axis n (unit) stays positive; close to the last such.
+    """Return a time d in (0, until] (s) up to which the gap along the axis n (unit) stays positive; close to the last.
 
-    m: how n turns, across it (1/s); rate: how fast the gap grows by itself (m/s); gap: along n now (m).
+    m: change of n per second, across it (1/s). rate: growth of the gap without motion, from the tube (m/s). gap: along
+    n now (m).
     """
     u = cross(n, m)
     nw_a, nw_b = cross(n, at.w_a), cross(n, at.w_b)
@@ -119,7 +120,7 @@ def advance(table, at, n, m, rate, gap, until):
         bent = 0.5 * sqrt(dot(at.acceleration, at.acceleration)) * until * until
         last = (at.p[0] + until * at.v[0], at.p[1] + until * at.v[1], at.p[2] + until * at.v[2])
         bend += mm * (sqrt(max(dot(at.p, at.p), dot(last, last))) + bent)
-    # n turns while they accelerate: m.a d^3 / 2, bounded by its chord
+    # n turns while the bodies accelerate: m.a d^3 / 2, bounded by its chord
     bend += abs(dot(m, at.acceleration)) * until - dot(n, at.acceleration)
     curvature = max(0.5 * bend - dot(m, at.v), 0.0)
     A, B = _seen_from(at.R_a, n, k_a), _seen_from(at.R_b, n, k_b)
@@ -130,16 +131,16 @@ def advance(table, at, n, m, rate, gap, until):
 
 @inlined
 def _line(size, x, dx, d):
-    """The line that size |x + d dx| follows about d: how far it is below size |x| at 0, and its slope."""
+    """The line that size |x + d dx| follows near d: its depth below size |x| at d = 0, and its slope."""
     side = copysign(size, x + d * dx)
     return size * abs(x) - side * x, side * dx
 
 
 @inlined
 def _between_boxes(sa, sb, A, B, gap, remaining):
-    """`advance` for cores that are boxes: the bound is the least of parabolas, one for each choice of their sides.
+    """`advance` for cores that are boxes: the bound is the minimum of parabolas, one for each choice of their sides.
 
-    Newton's method from outside: the roots fall until the sides at one are those that it was made of.
+    Newton's method from outside: the roots decrease until the parabola at a root is the one that gave the root.
     """
     curvature = gap.curvature
     d, last = 0.0, inf
@@ -166,7 +167,7 @@ def _between_boxes(sa, sb, A, B, gap, remaining):
 
 @inlined
 def _gap_after(table, shapes, A, B, h, gap, d):
-    """Lower bound on the gap after d seconds; h: the support values of both shapes at d = 0."""
+    """Lower bound on the gap after d seconds (m); h: the support values of both shapes at d = 0."""
     a, b = shapes
     h_a, h_b = h
     value = gap.start + d * gap.rate - gap.curvature * d * d
@@ -179,9 +180,9 @@ def _gap_after(table, shapes, A, B, h, gap, d):
 
 @device
 def _between_any(table, shapes, A, B, gap, remaining):
-    """`advance` for all cores: the bound is looked at in turn from outside, where it is negative, and inside.
+    """`advance` for all cores: brackets the root of the bound between times outside (bound < 0) and inside.
 
-    Inside is where the chord has its root: below a concave function.
+    The root of a chord lies inside, because the bound is concave and the chord lies below it.
     """
     h = (core_support(table, shapes[0], A.x, A.y, A.z), core_support(table, shapes[1], -B.x, -B.y, -B.z))
     low, f_low = 0.0, gap.start
@@ -194,10 +195,10 @@ def _between_any(table, shapes, A, B, gap, remaining):
                 return d
             high, f_high = d, f
         else:
-            # beyond the two points their line lies above the bound: its root is past the last safe time
+            # beyond its two points, the line through them lies above the bound: its root is past the last safe time
             drop = f_low - f
             far = d + f * ((d - low) / drop) if drop > 0.0 else high
-            low, f_low = d, f  # f may be a rounding below 0: half the tolerance is there for it
+            low, f_low = d, f  # f may be below 0 by round-off, which half of the tolerance covers
             if f <= 0.05 * gap.start:
                 break
             if far < high:

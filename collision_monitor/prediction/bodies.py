@@ -11,21 +11,21 @@ from collision_monitor.prediction.motion import MOTION
 
 
 class Bodies(NamedTuple):
-    """N slots of bodies, structure of arrays but for the motions. World frame."""
+    """N slots of bodies: a structure of arrays, except for the motions. World frame, SI units."""
 
     used: Any  # (N,) bool: the slot holds a body
     id: Any  # (N,) uint32
-    version: Any  # (N,) uint32: counts up whenever the motion changes
+    version: Any  # (N,) uint32: incremented whenever the motion changes
     static: Any  # (N,) bool
-    seen: Any  # (N,) bool: there is a state (always for static bodies)
+    seen: Any  # (N,) bool: the body has a state (static bodies always have)
     group: Any  # (N,) uint32
     mask: Any  # (N,) uint32
     first_shape: Any  # (N,) int32: slot in the shape table; further shapes follow by Parts.next
-    spin_radius: Any  # (N,) float64: the farthest point that turning moves (m)
-    model: Any  # (N,) uint8: records.Model that stands for it
-    excess: Any  # (N,) float64: how far the model lies outside of the object at most (m)
+    spin_radius: Any  # (N,) float64: distance of the farthest point that rotation moves (m); 0: none
+    model: Any  # (N,) uint8: records.Model that represents the object
+    excess: Any  # (N,) float64: largest distance by which the model exceeds the object (m)
     concave: Any  # (N,) bool: a concave object has a convex model, which may overlap where the object is not
-    slack: Any  # (N,) float64: how far beyond the horizon it is predicted (s)
+    slack: Any  # (N,) float64: largest time beyond the horizon that is predicted (s); 0: not set
     motion: Any  # (N,) MOTION
     ref_quaternion: Any  # (N, 4): the reference motion's orientation at its time
     # the last state
@@ -34,15 +34,15 @@ class Bodies(NamedTuple):
     quaternion: Any  # (N, 4)
     linear: Any  # (N, 3)
     angular: Any  # (N, 3)
-    acceleration: Any  # (N, 3): where it is measured, else 0
+    acceleration: Any  # (N, 3): 0 where it is not measured
 
 
 class Parts(NamedTuple):
-    """How the shapes in the table make up bodies; K slots like the table."""
+    """The assignment of the shapes in the table to bodies; K slots, like the table."""
 
     next: Any  # (K,) int32: the body's next shape, -1 after the last
     index: Any  # (K,) uint32: its place in the body's description
-    placed: Any  # (K,) bool: it has a pose of its own in the body's frame
+    placed: Any  # (K,) bool: its pose in the body's frame is not the identity
 
 
 class Multibody(NamedTuple):
@@ -54,7 +54,7 @@ class Multibody(NamedTuple):
 
 
 def make_bodies(capacity: int) -> Bodies:
-    """Empty slots."""
+    """Make `capacity` empty slots."""
     n = capacity
     motion = np.zeros(n, MOTION)
     motion["covered"] = -np.inf
@@ -84,7 +84,7 @@ def make_bodies(capacity: int) -> Bodies:
 
 
 def make_parts(capacity: int) -> Parts:
-    """No shapes."""
+    """Make `capacity` slots without shapes."""
     return Parts(np.full(capacity, -1, np.int32), np.zeros(capacity, np.uint32), np.zeros(capacity, np.bool_))
 
 
@@ -96,7 +96,10 @@ def enlarge(source: NamedTuple, target: NamedTuple) -> None:
 
 @inlined
 def place_shape(table, parts, s, R_body, R_shape):
-    """Rotation of shape s of a body turned by R_body into R_shape; returns its offset from the body in the world."""
+    """Write the rotation of shape s of a body with rotation R_body into R_shape; return its offset from the body (m).
+
+    Both are in world axes.
+    """
     if not parts.placed[s]:
         for r in range(3):
             for c in range(3):
@@ -126,7 +129,7 @@ def next_pair(parts, first_b, a, b):
         a, first_b = bodies.first_shape[i], bodies.first_shape[j]
         b = first_b
         while a >= 0:
-            if b == first_b: ...what depends on a alone
+            if b == first_b: ...  # depends on a alone
             ...
             a, b = next_pair(parts, first_b, a, b)
     """

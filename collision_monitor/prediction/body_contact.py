@@ -36,12 +36,12 @@ ROUND_OFF: Final = 1.0 + 1e-14
 class ContactQuery(NamedTuple):
     """What counts as a contact."""
 
-    margin: float  # m: pairs up to this far apart touch
-    stale_acceleration: float  # m/s^2: how hard a body may accelerate after its last state
+    margin: float  # m: pairs whose distance is at most this touch
+    stale_acceleration: float  # m/s^2: largest acceleration of a body after its last state
 
 
 class Now(NamedTuple):
-    """Body j relative to body i by their last states, carried on to one time."""
+    """Body j relative to body i at one time, extrapolated from their last states."""
 
     p: Any  # (3,): position of j's origin from i's (m)
     v: Any  # (3,): its velocity (m/s)
@@ -51,7 +51,7 @@ class Now(NamedTuple):
 
 @inlined
 def relative_now(bodies, i, j, time):
-    """Body j relative to body i at `time` (s), as Now."""
+    """Compute body j relative to body i at `time` (s)."""
     age_i, age_j = age_of(bodies, i, time), age_of(bodies, j, time)
     p = (
         relative_position_now(bodies, i, age_i, j, age_j, 0),
@@ -68,7 +68,7 @@ def relative_now(bodies, i, j, time):
 
 @inlined
 def widening(now, stale_acceleration):
-    """How far the bodies may be off by accelerations since their last states (m): here stale objects widen bounds."""
+    """Deviation (m) of both bodies by unknown accelerations. A stale object widens the bounds of its contacts here."""
     return 0.5 * stale_acceleration * (now.age_i * now.age_i + now.age_j * now.age_j)
 
 
@@ -82,11 +82,11 @@ def closing_now(bodies, i, j, now, row):
 
 @device
 def body_contact(multibody, i, j, time, query, scratch, result):
-    """The deepest contact of the shapes of bodies i and j at `time` (s), from their last states, into a result row.
+    """Write the deepest contact of bodies i and j at `time` (s), from their last states, into a result row.
 
-    The error bound holds what the bodies may have accelerated since then, and the excess of their models. A pair that
-    may touch within its bound counts as touching, with the status UNRESOLVED.
-    Returns (touching, narrow-phase tests made).
+    The error bound includes the excess of the bodies' models, and what they may have accelerated since their last
+    states (`widening`). A pair that may touch within its error bound counts as touching, with the status UNRESOLVED.
+    Returns (touching, number of narrow-phase tests).
     """
     table, parts, bodies = multibody
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
@@ -140,9 +140,9 @@ def body_contact(multibody, i, j, time, query, scratch, result):
 
 @device
 def bounded_contact(bodies, i, j, now, reach, result):
-    """A contact of bounding spheres alone, into a result row: the true distance is within `reach` (m) of the centres'.
+    """Write a contact from the bounding spheres alone into a result row, with the status UNRESOLVED.
 
-    now: the two bodies (Now).
+    Its distance is that of the centres; the true one differs by at most `reach` (m). now: the two bodies (Now).
     """
     distance = sqrt(now.p[0] * now.p[0] + now.p[1] * now.p[1] + now.p[2] * now.p[2])
     result[:] = 0.0

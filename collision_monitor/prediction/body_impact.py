@@ -1,7 +1,7 @@
 """Time of impact of two bodies at constant twist, as an interval whose lower end is safe.
 
-Conservative advancement along a separating axis (Mirtich 1996), with the rotation followed to first order
-(advance.py), which makes it converge quadratically where a bound by |w| r converges linearly.
+Conservative advancement along a separating axis (Mirtich 1996). It follows the rotation to first order (advance.py) and
+therefore converges quadratically, while a bound by |w| r converges linearly.
 Lecture topics: "predict the time to collide", "Compute fractional time at which collision actually occurred".
 """
 
@@ -34,19 +34,19 @@ from collision_monitor.tolerances import EPSILON
 AT_REST: Final = (0.0, 0.0, 0.0)
 
 FARTHER: Final = 4.0
-"""Factor by which the search along a turning axis may exceed the advance along an axis at rest. Larger: the bound on
-where the bodies are by then is worse. Smaller: the search may stop short."""
+"""Factor by which the advance along a turning axis may exceed that along an axis at rest. Larger: the bound on where
+the bodies are by then is looser. Smaller: the advance may stop short."""
 
 NEWTON_STEPS: Final = 12
 """Steps towards a time of certain overlap; pairs that need more stay UNRESOLVED."""
 
 
 class ImpactQuery(NamedTuple):
-    """What a kernel searches for: the first time at which the gap is at most `margin`."""
+    """Query for the first time at which the gap is at most `margin`."""
 
     margin: float  # m
     tolerance: float  # m: gap beyond the margin at which the search ends
-    iterations: int  # most distance computations for a pair of shapes
+    iterations: int  # largest number of distance computations for a pair of shapes
 
 
 class Window(NamedTuple):
@@ -57,7 +57,7 @@ class Window(NamedTuple):
 
 
 class Tube(NamedTuple):
-    """How far the bodies together may be off their reference motions: start + growth t, t seconds after the begin."""
+    """Bound on the deviation of both bodies from their reference motions: start + growth t, t (s) after the begin."""
 
     start: Any  # m
     growth: Any  # m/s
@@ -73,7 +73,7 @@ class ShapePair(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Workspace for one thread's intermediate results, so that the kernels allocate nothing."""
+    """Scratch memory of one thread, so that the kernels allocate nothing."""
 
     rotation: Any  # (4, 3, 3)
     quaternion: Any  # (1, 4)
@@ -86,30 +86,32 @@ CLOSING: Final = CONTACT_SIZE
 
 
 def make_scratch() -> Scratch:
-    """Scratch for one thread."""
+    """Make the scratch memory of one thread."""
     return Scratch(np.zeros((4, 3, 3)), np.zeros((1, 4)), np.zeros(CLOSING + 1), np.zeros(WORK_SIZE))
 
 
 @inlined
 def _turning(before, n, elapsed):
-    """How a unit vector that was `before` turns, across it (1/s)."""
+    """Change per second, across n, of a unit vector that was `before` and is n after `elapsed` (s)."""
     x, y, z = (n[0] - before[0]) / elapsed, (n[1] - before[1]) / elapsed, (n[2] - before[2]) / elapsed
     along = x * n[0] + y * n[1] + z * n[2]
     return (x - along * n[0], y - along * n[1], z - along * n[2])
 
 
-# What looks at one pair of shapes takes the table and the parts alone: a kernel's tuples of arrays travel on the stack,
-# and with the bodies' 21 arrays a sample of an uncertain pair takes 1.7 times as long (fleet of 115 noisy objects).
+# Functions of one pair of shapes take only the table and the parts, without the bodies: a kernel passes its tuples of
+# arrays on the stack, and with the bodies' 21 arrays a sample of an uncertain pair takes 1.7 times as long (fleet of
+# 115 noisy objects).
 
 
 @device
 def shape_impact(table, parts, pair, window, tube, query, scratch):
-    """When the gap between the shapes of a pair (ShapePair) first is within the wanted one, in the window.
+    """Find the first time in the window at which the gap between the shapes of a pair (ShapePair) is the wanted one.
 
     The wanted gap is query.margin plus the tube, whose time begins with the window.
-    Returns (status, t, queries, guess): the gap is wider at every time before t; at t it is within query.tolerance of
-    the wanted one (HIT), t is the window's end (CLEAR), or the iterations ran out (UNRESOLVED). guess: how long after t
-    the shapes overlap by as much as they should, from how fast the gap closed last; 0 where nothing indicates it.
+    Returns (status, t, queries, guess). The gap is wider at every time before t. HIT: at t it is within query.tolerance
+    of the wanted one. CLEAR: t is the window's end. UNRESOLVED: the iterations, or the resolution of the time, ran out.
+    guess: estimated time (s) after t at which the overlap exceeds the tube, from how fast the gap closed last; 0:
+    unknown.
     """
     A, B, a, b = pair
     begin, end = window
@@ -153,7 +155,7 @@ def shape_impact(table, parts, pair, window, tube, query, scratch):
         t_before, gap_before, n_before = t, gap, n
         if d >= end - t:
             return CLEAR, end, iteration, guess
-        if t + d <= t:  # the resolution of the time is reached before the gap is
+        if t + d <= t:  # the time has no finer resolution
             break
         t += d
     return status, t, iteration, guess
@@ -161,9 +163,9 @@ def shape_impact(table, parts, pair, window, tube, query, scratch):
 
 @device
 def contact_at(table, parts, pair, t, scratch):
-    """Contact of a pair of shapes (ShapePair) at time t into scratch.out; returns the signed distance (m).
+    """Write the contact of a pair of shapes (ShapePair) at time t into scratch.out; return the signed distance (m).
 
-    scratch.out is a contact row about A's origin, and behind it the closing speed.
+    scratch.out holds a contact row about A's origin, followed by the closing speed (m/s).
     """
     A, B, a, b = pair
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
@@ -185,9 +187,9 @@ def contact_at(table, parts, pair, t, scratch):
 
 @inlined
 def closing_speed(v, wa, wb, p, out):
-    """Speed (m/s) at which the witness points of a contact row `out` approach along its normal.
+    """Speed (m/s) at which the witness points of a contact row `out` about A's origin approach along its normal.
 
-    v: velocity of B relative to A; wa, wb: angular velocities; p: position of B relative to A.
+    v, p: velocity and position of B relative to A; wa, wb: angular velocities.
     """
     ax, ay, az = out[POINT_A], out[POINT_A + 1], out[POINT_A + 2]
     bx, by, bz = out[POINT_B] - p[0], out[POINT_B + 1] - p[1], out[POINT_B + 2] - p[2]
@@ -199,10 +201,10 @@ def closing_speed(v, wa, wb, p, out):
 
 @inlined
 def _certain_overlap(multibody, pair, start, guess, window, tube, query, scratch):
-    """A time in [start, window.end] at which a pair overlaps by more than the tube; inf: none found.
+    """Return a time in [start, window.end] at which a pair overlaps by more than the tube; inf: none found.
 
-    Newton steps on the signed distance, the first one to start + guess where that helps. The contact at the time found
-    stays in scratch.out. The tube's time begins with the window.
+    Newton steps on the signed distance; start + guess is tried first if it lies in the interval. The contact at the
+    returned time stays in scratch.out. The tube's time begins with the window.
     """
     begin, end = window
     guessed = 0.0 < guess < end - start
@@ -225,7 +227,7 @@ def _certain_overlap(multibody, pair, start, guess, window, tube, query, scratch
 
 @inlined
 def tube_of(A, B, begin):
-    """The tube of two motions (MOTION) whose time begins at `begin`."""
+    """The tube of two motions (MOTION) together, from `begin` on. Stale objects have widened it (tracking.py)."""
     return Tube(
         A.tube_0 + B.tube_0 + A.tube_1 * (begin - A.tube_time) + B.tube_1 * (begin - B.tube_time),
         A.tube_1 + B.tube_1,
@@ -234,10 +236,11 @@ def tube_of(A, B, begin):
 
 @device
 def body_impact(multibody, i, j, window, query, scratch, event):
-    """First impact of bodies i and j in the window into the IMPACT record `event`; returns distance queries made.
+    """Write the first impact of bodies i and j in the window into the IMPACT record `event`.
 
-    event.status = CLEAR where there is none. Overlapping or within query.margin already is an impact at the begin.
-    The reference motions and their tubes are read from `bodies`; the body with the smaller id is i in the record.
+    event.status = CLEAR if there is none. Bodies that overlap, or are within query.margin, at the begin have their
+    impact there. The reference motions and their tubes are those in `bodies`; in the record, i is the body with the
+    smaller id. Returns the number of distance queries.
     """
     table, parts, bodies = multibody
     begin, end = window
@@ -247,8 +250,8 @@ def body_impact(multibody, i, j, window, query, scratch, event):
     event.status = CLEAR
     tube = tube_of(A, B, begin)
     approach = approach_at(A, B, begin)
-    bent = half_acceleration(A, B) * (end - begin)  # m/s: a path that bends is within that of its tangent
-    # the time in which the bounding spheres overlap holds every impact
+    bent = half_acceleration(A, B) * (end - begin)  # m/s: the path deviates from its tangent by less
+    # every impact lies in the time in which the bounding spheres overlap
     first, last = 0.0, end - begin
     reach = A.radius + B.radius + query.margin
     if reach < inf:
@@ -290,7 +293,7 @@ def body_impact(multibody, i, j, window, query, scratch, event):
 
 @inlined
 def _set_geometry(event, A, t, out):
-    """Point, normal and closing speed of the impact, from a contact at time t about A's origin."""
+    """Set point, normal and closing speed of the impact from a contact at time t about A's origin."""
     ta = t - A.time
     event.point_x = A.x + (A.vx + 0.5 * A.ax * ta) * ta + 0.5 * (out[POINT_A] + out[POINT_B])
     event.point_y = A.y + (A.vy + 0.5 * A.ay * ta) * ta + 0.5 * (out[POINT_A + 1] + out[POINT_B + 1])
@@ -301,16 +304,16 @@ def _set_geometry(event, A, t, out):
 
 @inlined
 def _sphere_impact(pair, approach, reach, tube, window, first, event):
-    """Two spheres: closed form for both ends of the interval. first: of the lower end, s after the window's begin."""
+    """Impact of two spheres, in closed form at both ends. first: the lower end (s after the window's begin)."""
     begin, end = window
     event.method = CLOSED_FORM
     event.shape_i, event.shape_j = pair.a, pair.b
     event.lower = begin + first
     sure = inf
-    certain = reach * (1.0 - 8.0 * EPSILON) - tube.start  # the radii are rounded up by nearly as much
+    certain = reach * (1.0 - 8.0 * EPSILON) - tube.start  # the bounding radii are rounded up by nearly as much
     if certain > 0.0:
         sure, _ = sphere_interval(approach.p, approach.v, certain, -tube.growth, end - begin, -1.0)
-        if certain - tube.growth * sure <= 0.0:  # the tube has outgrown the spheres: nothing is sure any more
+        if certain - tube.growth * sure <= 0.0:  # the tube has outgrown the spheres: no contact is certain
             sure = inf
     event.status = HIT if sure < inf else UNRESOLVED
     event.upper = begin + sure if sure < inf else inf

@@ -1,4 +1,4 @@
-"""How shapes make up a body: the chain of its parts, its bounding sphere, and whether turning moves it."""
+"""Layout of a body from its shapes: the chain of its parts, its bounding sphere, and its spin radius."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collision_monitor.prediction.bodies import Multibody
 
 
 def lay_out_body(multibody: Multibody, i: int, slots: Sequence[int], shape_of: Sequence[int]) -> None:
-    """Make the shapes in the table's `slots` those of body i. shape_of: the place of each in the description."""
+    """Assign the shapes in the table's `slots` to body i. shape_of: index of each in the object's description."""
     table, parts, bodies = multibody
     chain = np.asarray(slots)
     bodies.first_shape[i] = slots[0]
@@ -24,4 +24,4 @@ def lay_out_body(multibody: Multibody, i: int, slots: Sequence[int], shape_of: S
     radius = float((np.linalg.norm(position, axis=1) + table.radius[chain]).max())
     bodies.motion["radius"][i] = radius
     is_round = len(slots) == 1 and table.kind[slots[0]] in (SPHERE, CIRCLE) and not position.any()
-    bodies.spin_radius[i] = 0.0 if is_round else radius  # only one ball about the origin is never moved by turning
+    bodies.spin_radius[i] = 0.0 if is_round else radius  # rotation moves every body but a single ball about its origin

@@ -1,4 +1,4 @@
-"""Samples of the errors of two bodies' states: their covariance, its root, and the motions of one sample."""
+"""Samples of the errors of two bodies' states: their covariance, its Cholesky factor, and the motions of one sample."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from collision_monitor.prediction.spread import FIFTH_ROOT, unknown_acceleration
 
 
 class Workspace(NamedTuple):
-    """Workspace for one thread's intermediate results."""
+    """Scratch memory of one thread."""
 
-    motion: Any  # (2,) MOTION: the two bodies, from now on
+    motion: Any  # (2,) MOTION: the two bodies; time 0 is now
     quaternion: Any  # (1, 4)
     rotation: Any  # (2, 3, 3): the stated orientations now
     frame: Any  # (3, 3): rows across the path, along it, and across both
     joint: Any  # (6, 6): covariance of position at the time of closest approach and of velocity, then its root
     block: Any  # (3, 3)
-    axes: Any  # (AXES, 4): directions that parted the bodies in other samples
+    axes: Any  # (AXES, 4): directions that separated the bodies in other samples
     scratch: Scratch
 
 
 def make_workspace() -> Workspace:
-    """Workspace for one thread."""
+    """Make the scratch memory of one thread."""
     return Workspace(
         np.zeros(2, MOTION),
         np.zeros((1, 4)),
@@ -43,9 +43,9 @@ def make_workspace() -> Workspace:
 
 @device
 def set_frame(frame, vx, vy, vz):
-    """Complete the frame whose first row is a direction n: the second the part of v across n, the third across both.
+    """Complete the frame (3, 3) whose first row is a direction n. Second row: part of v across n; third: across both.
 
-    Where the first row is 0 it becomes some direction across v.
+    The rows become unit vectors. If the first row is 0, it becomes a direction across v.
     """
     n = sqrt(frame[0, 0] ** 2 + frame[0, 1] ** 2 + frame[0, 2] ** 2)
     v = sqrt(vx * vx + vy * vy + vz * vz)
@@ -67,7 +67,7 @@ def set_frame(frame, vx, vy, vz):
 
 @inlined
 def _across(x, y, z):
-    """A unit vector across (x, y, z); level where that is possible."""
+    """Return a horizontal unit vector perpendicular to (x, y, z)."""
     level = sqrt(x * x + y * y)
     if level > 1e-6 * abs(z):
         return -y / level, x / level, 0.0
@@ -76,9 +76,10 @@ def _across(x, y, z):
 
 @device
 def add_covariance(spread, i, age, t, stale_acceleration, planar, work):
-    """Add body i's part to work.joint, the covariance of (position t seconds from now, velocity) along the frame.
+    """Add body i's part to work.joint (6, 6): covariance of its position t seconds from now and its velocity.
 
-    The acceleration nobody told acts as an error of the velocity that is right at t.
+    Both are along the axes of work.frame. age: s since the body's last state. A stale object widens its spread here:
+    its unknown acceleration acts as a velocity error whose displacement at t is right.
     """
     at = age + t
     s = unknown_acceleration(spread, i, age > 0.0, 0, stale_acceleration)
@@ -110,9 +111,9 @@ def add_covariance(spread, i, age, t, stale_acceleration, planar, work):
 
 @device
 def take_root(joint):
-    """The lower Cholesky factor of a covariance (6, 6), of which the upper triangle is read, in its place.
+    """Replace a covariance (6, 6), given by its upper triangle, by its lower Cholesky factor.
 
-    A coordinate without variance of its own gets an empty column.
+    A coordinate without variance of its own gets a zero column.
     """
     for c in range(6):
         d = joint[c, c]
@@ -130,7 +131,7 @@ def take_root(joint):
 
 @inlined
 def turn(m, R, w, off, error):
-    """Let the motion m (MOTION), which is R and turns at w (3,), be off by error (3,) times `off` (rad now, rad/s)."""
+    """Set rotation and angular velocity of m (MOTION) to R and w (3,), off by error (3,) times `off` (rad, rad/s)."""
     x, y, z = error
     m.wx, m.wy, m.wz = w[0] + off[1] * x, w[1] + off[1] * y, w[2] + off[1] * z
     dx, dy, dz = off[0] * x, off[0] * y, off[0] * z
@@ -149,10 +150,10 @@ def turn(m, R, w, off, error):
 
 @device
 def orientation_spread(spread, i, radius, age, t):
-    """How an error of the orientation goes on that is one standard deviation t seconds from now: (rad now, rad/s).
+    """Orientation error that is one standard deviation t seconds from now: (rad now, mean rad/s from now to t).
 
-    That of a rate which is not known is on average in proportion to how much of the whole it makes; 0, 0 where turning
-    moves nothing. age: s since the last state.
+    These are averages: each source of the error (pose, rate, acceleration) contributes in proportion to its share of
+    the variance at t. (0, 0) if rotation moves nothing. age: s since the last state.
     """
     if radius == 0.0:
         return 0.0, 0.0
@@ -167,7 +168,7 @@ def orientation_spread(spread, i, radius, age, t):
 
 @device
 def shift(work, z, t, p, v):
-    """Put body j where sample z (12,) of the errors has it: position p + what is off at t, velocity v + what is off."""
+    """Move body j by sample z (12,) of the errors: its velocity is v + the error, its position p + the error at t."""
     B, L, F, y = work.motion[1], work.joint, work.frame, work.block
     for r in range(6):
         value = 0.0

@@ -1,4 +1,4 @@
-"""From the times of impact of weighted samples to the times and the probability that are published."""
+"""Distribution of the time of impact: published times and probability from the times of weighted samples."""
 
 from __future__ import annotations
 
@@ -20,15 +20,16 @@ PROBABILITY: Final = 3
 
 
 OUTWARD: Final = 2.0
-"""Standard errors of a quantile by which the earliest time is earlier and the latest later than the samples' own."""
+"""Standard errors by which the earliest and the latest time lie outside of the quantiles of the samples."""
 
 
 @device
 def summarise(times, weights, order, confidence, safe, answer):
-    """Quantiles of the samples' times of impact into answer (4,); safe: a time before which hardly any impact is.
+    """Write earliest, most likely and latest time (s) and probability into answer (4,).
 
-    earliest: of the impacts at most 1 - confidence are before; `safe` where there are too few samples to tell.
-    Both quantiles are moved outward by what they may be off for so few samples.
+    times (n,): inf: no impact; weights (n,); order (n,): sorts the times; safe: a time before which hardly any impact
+    lies. At most 1 - confidence of the impacts lie before `earliest`, which is at most `safe` if too few samples meet.
+    Both quantiles are moved outward by OUTWARD standard errors, because the samples are few.
     """
     n = 0
     total = squares = all_squares = 0.0
@@ -60,7 +61,7 @@ def summarise(times, weights, order, confidence, safe, answer):
         if below >= most:
             answer[LATEST] = times[order[k]]
             break
-    # the shortest time in which half of the impacts are
+    # the shortest interval that contains half of the impacts
     low = 0
     inside = 0.0
     shortest = inf

@@ -1,4 +1,4 @@
-"""One predicted impact of two bodies as a record: its key, its status, and the motions that it rests on."""
+"""Record of one predicted impact of two bodies: its key, its status, and the versions of the motions it rests on."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from collision_monitor.records import Method, PredictionStatus
 HIT: Final = int(PredictionStatus.HIT)
 UNRESOLVED: Final = int(PredictionStatus.UNRESOLVED)
 CLEAR: Final = 254
-"""No impact. Never published, and therefore apart from every PredictionStatus."""
+"""No impact. It is never published, and differs from every PredictionStatus."""
 
 CLOSED_FORM: Final = int(Method.CLOSED_FORM)
 CONSERVATIVE_ADVANCEMENT: Final = int(Method.CONSERVATIVE_ADVANCEMENT)
 BOUND_ONLY: Final = int(Method.BOUND)
 TREE_BOUND: Final = 255
-"""A bound by the bodies' sphere trees, which BOUND_ONLY has not used yet; published as BOUND too."""
+"""A bound by the bodies' sphere trees; BOUND_ONLY events have not used them yet. Published as BOUND too."""
 
 IMPACT = np.dtype(
     [
@@ -53,7 +53,7 @@ def pair_key(id_a, id_b):
 
 
 def pair_keys(id_a: NDArray[np.uint32], id_b: NDArray[np.uint32]) -> NDArray[np.uint64]:
-    """`pair_key` of arrays of ids (n,) with id_a < id_b."""
+    """`pair_key` for arrays of ids (n,) with id_a < id_b."""
     keys: NDArray[np.uint64] = (id_a.astype(np.uint64) << np.uint64(32)) | id_b
     return keys
 
@@ -65,15 +65,15 @@ def ids_of(key):
 
 
 def ids_of_keys(keys: NDArray[np.uint64]) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
-    """`ids_of` of an array of keys (n,)."""
+    """`ids_of` for an array of keys (n,)."""
     return keys >> np.uint64(32), keys & np.uint64(0xFFFFFFFF)
 
 
 @inlined
 def write_pair(bodies, i, j, record):
-    """Key, slots and versions of the pair of bodies i and j into a record (IMPACT, or another with these fields).
+    """Write key, slots and versions of the pair of bodies i and j into a record (IMPACT, or one with these fields).
 
-    id[i] < id[j].
+    Body i must have the smaller id.
     """
     record.key = pair_key(bodies.id[i], bodies.id[j])
     record.i, record.j = i, j
@@ -82,5 +82,5 @@ def write_pair(bodies, i, j, record):
 
 @inlined
 def holds(version, record):
-    """Whether the motions that the record rests on are unchanged: version (N,) are the bodies' versions now."""
+    """Whether the motions that the record rests on are unchanged. version (N,): the bodies' current versions."""
     return version[record.i] == record.version_i and version[record.j] == record.version_j

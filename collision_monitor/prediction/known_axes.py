@@ -1,7 +1,8 @@
-"""Directions that parted two bodies in one sample of their motion, tried first in the next: a few products each.
+"""Known axes: directions that separated two bodies in one sample of their motion, tried first in the next samples.
 
-For bodies that do not turn the gap along a fixed direction n is linear in time: n.p - h + n.v t, where h is how far the
-two reach along it. Where it stays open no distance is computed; where it closes, the search begins at that time.
+For bodies that do not turn, the gap along a fixed direction n is linear in time: n.p - h + n.v t, where h is the reach
+of both shapes along n. It costs a few products. If the gap stays open, no distance is computed; if it closes, the
+search begins at that time.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ from collision_monitor.narrow_phase.support_value import core_support
 from collision_monitor.prediction.bodies import place_shape
 
 AXES: Final = 8
-"""Half of them of samples that passed, half of such that met. More: each costs 2 ns a sample."""
+"""Half of them are from samples that passed, half from samples that met. Each more costs 2 ns per sample."""
 
 
 @device
 def remember(table, parts, pair, passed, n, scratch, axes):
-    """Keep the direction in scratch.out as one of the axes (AXES, 4) of a pair of shapes (ShapePair).
+    """Store the direction in scratch.out as one of the axes (AXES, 4) of a pair of shapes (ShapePair).
 
-    n: how many were before; passed: whether the sample passed.
+    n: index of the sample, which selects the axis to replace; passed: whether the sample passed.
     """
     A, B, a, b = pair
     R_a, R_b, out = scratch.rotation[2], scratch.rotation[3], scratch.out
@@ -48,7 +49,7 @@ def remember(table, parts, pair, passed, n, scratch, axes):
 
 @inlined
 def parted_until(axes, A, B, end, wanted):
-    """A time until which the gap is larger than `wanted` (m); infinite: until `end`."""
+    """Return a time (s) until which the gap is larger than `wanted` (m); infinite: until `end`."""
     px, py, pz = B.x - A.x, B.y - A.y, B.z - A.z
     vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
     latest = 0.0

@@ -1,7 +1,7 @@
-"""Bodies and how they move: constant twist and acceleration from a reference state, and how far the truth may be off.
+"""Motion of bodies: constant twist and acceleration from a reference state, and a tube that bounds the deviation.
 
-The deviation of a body is bounded by a tube: every point of it stays within tube_0 + tube_1 * (t - tube_time) metres
-of where the reference motion puts it. While that holds, what was predicted from the reference holds too.
+Every point of a body stays within tube_0 + tube_1 * (t - tube_time) metres of its place in the reference motion. While
+that holds, the predictions made from the reference motion hold too. The tube of a stale object is wider (tracking.py).
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ MOTION = np.dtype(
         ("time", np.float64),  # s after the monitor's origin, like all times
         ("tube_0", np.float64),  # m
         ("tube_1", np.float64),  # m/s
-        ("spread_0", np.float64),  # m: what its box allows for its uncertainty, from tube_time on
+        ("spread_0", np.float64),  # m: width of its box for its uncertainty, from tube_time on
         ("spread_1", np.float64),  # m/s
         ("tube_time", np.float64),  # when the body was last within tube_0 of the reference
         ("cover", np.float64),  # collisions are predicted until this time
-        ("covered", np.float64),  # and were, before this step; -inf: nothing was
+        ("covered", np.float64),  # and were until this time before this step; -inf: not at all
         ("wx", np.float64),  # rad/s
         ("wy", np.float64),
         ("wz", np.float64),
         ("rotation", np.float64, (3, 3)),  # at `time`
     ]
 )
-"""The reference motion that predictions rest on, one record for each body: a prediction reads two of them whole."""
+"""The reference motion that predictions rest on. One record per body, because a prediction reads two of them whole."""
 
 
 @inlined
 def quaternion_to_matrix(q, i, out):
-    """Rotation matrix of the unit quaternion q[i] (x, y, z, w) into out (3, 3)."""
+    """Write the rotation matrix of the unit quaternion q[i] (x, y, z, w) into out (3, 3)."""
     x, y, z, w = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
     out[0, 0] = 1.0 - 2.0 * (y * y + z * z)
     out[0, 1] = 2.0 * (x * y - w * z)
@@ -60,7 +60,7 @@ def quaternion_to_matrix(q, i, out):
 
 @inlined
 def rotation_at(m, t, out):
-    """out (3, 3) = exp((t - m.time) [w]x) R: the rotation of the motion m (MOTION) at time t (Rodrigues' formula)."""
+    """Write the rotation of the motion m (MOTION) at time t, exp((t - m.time) [w]x) R, into out (3, 3) (Rodrigues)."""
     R = m.rotation
     rate = sqrt(m.wx * m.wx + m.wy * m.wy + m.wz * m.wz)
     angle = rate * (t - m.time)
@@ -83,7 +83,7 @@ def rotation_at(m, t, out):
 
 @inlined
 def relative_position(A, B, t):
-    """Position of motion B relative to motion A at time t (m): positions are subtracted before anything is added."""
+    """Position of motion B relative to motion A at time t (m). Positions are subtracted first, against round-off."""
     ta, tb = t - A.time, t - B.time
     sa, sb = 0.5 * ta * ta, 0.5 * tb * tb
     return (
@@ -106,7 +106,7 @@ def relative_velocity(A, B, t):
 
 @inlined
 def half_acceleration(A, B):
-    """Half of how hard motion B accelerates relative to motion A (m/s^2); 0 where neither does."""
+    """Half the magnitude of the acceleration of motion B relative to motion A (m/s^2)."""
     x, y, z = B.ax - A.ax, B.ay - A.ay, B.az - A.az
     return 0.5 * sqrt(x * x + y * y + z * z)
 
@@ -119,7 +119,7 @@ def position_now(bodies, i, age, c):
 
 @inlined
 def relative_position_now(bodies, i, age_i, j, age_j, c):
-    """Coordinate c of body j's origin relative to body i's (m), each so long (s) after its last state."""
+    """Coordinate c of body j's origin relative to body i's (m), each extrapolated by the age (s) of its last state."""
     moved = bodies.linear[j, c] * age_j - bodies.linear[i, c] * age_i
     bent = 0.5 * bodies.acceleration[j, c] * age_j * age_j - 0.5 * bodies.acceleration[i, c] * age_i * age_i
     return bodies.position[j, c] - bodies.position[i, c] + (moved + bent)
@@ -127,7 +127,7 @@ def relative_position_now(bodies, i, age_i, j, age_j, c):
 
 @inlined
 def relative_velocity_now(bodies, i, age_i, j, age_j, c):
-    """Coordinate c of its velocity (m/s)."""
+    """Coordinate c of the velocity (m/s) of body j's origin relative to body i's."""
     return (
         bodies.linear[j, c]
         - bodies.linear[i, c]
@@ -137,7 +137,7 @@ def relative_velocity_now(bodies, i, age_i, j, age_j, c):
 
 @device
 def turn_quaternion(q, i, wx, wy, wz, t, out):
-    """out (4,) = the orientation q[i] after t seconds at angular velocity w in the world."""
+    """Write the orientation q[i] after t (s) at angular velocity w (rad/s, world frame) into out (4,)."""
     x, y, z, w = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
     rate = sqrt(wx * wx + wy * wy + wz * wz)
     if rate * abs(t) == 0.0:
@@ -154,7 +154,7 @@ def turn_quaternion(q, i, wx, wy, wz, t, out):
 
 @inlined
 def chord_angle(ax, ay, az, aw, bx, by, bz, bw):
-    """Upper bound on the angle (rad) between two unit quaternions; exact to second order for small ones."""
+    """Upper bound on the angle (rad) between two unit quaternions; exact to second order for small angles."""
     dot = ax * bx + ay * by + az * bz + aw * bw
     sign = 1.0 if dot >= 0.0 else -1.0
     dx, dy, dz, dw = ax - sign * bx, ay - sign * by, az - sign * bz, aw - sign * bw
@@ -170,7 +170,7 @@ def age_of(bodies, i, now):
 
 @device
 def rotation_now(bodies, i, now, q, R):
-    """Rotation of body i at `now`, from its last state, into R (3, 3); q (1, 4): scratch."""
+    """Write the rotation of body i at `now`, extrapolated from its last state, into R (3, 3); q (1, 4): scratch."""
     wx, wy, wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
     turn_quaternion(bodies.quaternion, i, wx, wy, wz, age_of(bodies, i, now), q[0])
     quaternion_to_matrix(q, 0, R)
@@ -178,13 +178,13 @@ def rotation_now(bodies, i, now, q, R):
 
 @device
 def swept_box(bodies, i, begin, margin):
-    """A box that holds body i, and `margin` more, from `begin` until its cover time."""
+    """Box that contains body i, its tube and spread, and `margin` (m), from `begin` until its cover time."""
     m = bodies.motion[i]
     sweep = 0.0 if bodies.static[i] else m.cover - begin
     half = m.radius + margin + m.tube_0 + m.spread_0 + (m.tube_1 + m.spread_1) * (begin - m.tube_time + sweep)
     ahead = 0.5 * sweep
     middle = begin - m.time + ahead
-    # of a t^2 / 2 the middle of both ends, and half of what is between
+    # a t^2 / 2: the mean of both ends, and half of their difference
     first, last = 0.25 * (middle - ahead) ** 2, 0.25 * (middle + ahead) ** 2
     between, bent = first + last, last - first
     return Region(
@@ -199,7 +199,7 @@ def swept_box(bodies, i, begin, margin):
 
 @device
 def carry_on(bodies, i, now, q, m):
-    """Body i's last state carried on to `now` as the motion m (MOTION), whose time 0 is now; returns its age (s)."""
+    """Write body i's last state, extrapolated to `now`, as the motion m (MOTION) with time 0 = now. Return its age."""
     age = 0.0 if bodies.static[i] else now - bodies.time[i]
     m.ax, m.ay, m.az = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
     m.x, m.y, m.z = (

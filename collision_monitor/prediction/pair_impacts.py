@@ -1,4 +1,4 @@
-"""First impacts of many pairs of bodies: sought exactly, or bounded by their bounding spheres."""
+"""First impacts of many pairs of bodies: exact, or bounded by their bounding spheres."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from collision_monitor.prediction.sphere_interval import approach_at, meeting_of
 
 @inlined
 def window_of(bodies, i, j, now):
-    """The times for which the pair has to be predicted now: until both cover times, from where it was predicted to.
+    """Times for which the pair has to be predicted now: from where it was predicted to, until both cover times.
 
-    Empty (begin >= end) where nothing is left of them.
+    Empty (begin >= end) if nothing is left to predict.
     """
     begin = max(now, min(bodies.motion[i].covered, bodies.motion[j].covered))
     return Window(begin, cover_of(bodies, i, j))
@@ -29,10 +29,10 @@ def cover_of(bodies, i, j):
 
 @kernel
 def predict_pairs(multibody, pairs, now, query, events, scratch):
-    """First impacts of pairs (P, 2) until both bodies' cover times, into events (IMPACT).
+    """Write the first impacts of pairs (P, 2) until both bodies' cover times into events (IMPACT).
 
     The search begins at `now`, or at the time until which the pair was predicted before.
-    Returns (how many impacts, distance queries made).
+    Returns (number of impacts, number of distance queries).
     """
     n = queries = 0
     for k in range(pairs.shape[0]):
@@ -48,16 +48,16 @@ def predict_pairs(multibody, pairs, now, query, events, scratch):
 
 @inlined
 def is_cheap(bodies, i, j):
-    """Is the pair settled as fast as its bound? Two spheres, or one with a half-space, which has no bounding sphere."""
+    """Whether an exact search costs no more than a bound: two spheres, or a half-space (it has no bounding sphere)."""
     spheres = bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0
     return spheres or not (isfinite(bodies.motion[i].radius) and isfinite(bodies.motion[j].radius))
 
 
 @inlined
 def bound_impact(bodies, i, j, window, margin, event):
-    """From when on the pair's bounding spheres meet in the window, into the IMPACT record `event`, UNRESOLVED.
+    """Write the first time in the window at which the pair's bounding spheres meet into the IMPACT record `event`.
 
-    event.status = CLEAR where they do not, and the bodies cannot.
+    event.status = UNRESOLVED, or CLEAR if the spheres, and therefore the bodies, do not meet.
     """
     begin, end = window
     if bodies.id[i] > bodies.id[j]:
@@ -80,7 +80,7 @@ def bound_impact(bodies, i, j, window, margin, event):
 
 @kernel
 def bound_pairs(multibody, pairs, now, query, events, scratch):
-    """As `predict_pairs`, but of all pairs that are not cheap only the bound."""
+    """As `predict_pairs`, but with `bound_impact` for all pairs that are not cheap."""
     bodies = multibody.bodies
     n = queries = 0
     for k in range(pairs.shape[0]):
@@ -99,7 +99,7 @@ def bound_pairs(multibody, pairs, now, query, events, scratch):
 
 @kernel
 def refine(multibody, bounds, now, query, events, scratch):
-    """First impacts from `now` on of the pairs of `bounds` (IMPACT), into events; as `predict_pairs`."""
+    """Write the first impacts from `now` on of the pairs of `bounds` (IMPACT) into events; as `predict_pairs`."""
     n = queries = 0
     for k in range(bounds.size):
         i, j = bounds[k].i, bounds[k].j

@@ -1,4 +1,4 @@
-"""When two spheres that grow as they move meet, in closed form."""
+"""Time interval in which two moving, growing spheres overlap, in closed form."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collision_monitor.prediction.motion import half_acceleration, relative_posi
 from collision_monitor.tolerances import EPSILON
 
 _SMALLEST: Final = 1e-240
-"""m^4/s^2: a product of a squared length and a squared speed whose round-off is near the smallest number there is."""
+"""m^4/s^2: product of a squared length and a squared speed below which round-off nears the smallest float64."""
 
 
 class Approach(NamedTuple):
@@ -22,24 +22,25 @@ class Approach(NamedTuple):
 
 @inlined
 def approach_at(A, B, t):
-    """The approach of motion B to motion A (MOTION) at time t."""
+    """Approach of motion B to motion A (MOTION) at time t."""
     return Approach(relative_position(A, B, t), relative_velocity(A, B, t))
 
 
 @device
 def sphere_interval(d, v, reach, growth, end, outward):
-    """First and last time in [0, end] at which |d + v t| <= reach + growth t; (inf, -inf): never. d, v: (3,).
+    """First and last time (s) in [0, end] at which |d + v t| <= reach + growth t; (inf, -inf): never. d, v: (3,).
 
-    Rounded so that no such time is left out (outward = 1), or so that all between are such for certain (outward = -1).
-    Closed form: the discriminant as |reach v - growth d|^2 - |d x v|^2, the root as c / (-b + sqrt(D)): neither cancels
-    (Numerical Recipes 5.6; Haines et al., Precision improvements for ray/sphere intersection, 2019).
+    Rounded outward, so that the interval contains all these times (outward = 1), or inward, so that it contains only
+    these (outward = -1). In the closed form neither the discriminant |reach v - growth d|^2 - |d x v|^2 nor the root
+    c / (-b + sqrt(D)) cancels (Numerical Recipes 5.6; Haines et al., Precision improvements for ray/sphere
+    intersection, 2019).
     """
     dx, dy, dz = d
     vx, vy, vz = v
     size = dx * dx + dy * dy + dz * dz + reach * reach
     rate = vx * vx + vy * vy + vz * vz + growth * growth
     if size * rate < _SMALLEST and rate > 0.0:
-        # what is made of these would underflow: in units of their own, which only the time knows of
+        # the products would underflow: scale lengths and speeds, and convert the times back
         length = 1.0 / max(abs(dx), abs(dy), abs(dz), reach, 1e-300)
         speed = 1.0 / max(abs(vx), abs(vy), abs(vz), abs(growth), 1e-300)
         unit = length / speed
@@ -62,7 +63,7 @@ def _interval(d, v, reach, growth, end, outward):
     c = pp - reach * reach - 4.0 * e * (pp + reach * reach)
     a = vv - growth * growth - 4.0 * e * (vv + growth * growth)
     b = dx * vx + dy * vy + dz * vz - reach * growth
-    # most pairs part or pass, and need no root to see it
+    # most pairs move apart or pass; these are found without a root
     if c > 0.0 and a >= 0.0 and b > 0.0 and b * b > 100.0 * EPSILON * EPSILON * qq:
         return inf, -inf
     sx, sy, sz = reach * vx - growth * dx, reach * vy - growth * dy, reach * vz - growth * dz
@@ -91,7 +92,7 @@ def _interval(d, v, reach, growth, end, outward):
 
 @inlined
 def meeting_of_spheres(A, B, approach, begin, t, event):
-    """Point, normal and closing speed of the meeting of the bounding spheres of A and B, t seconds after begin.
+    """Write point, normal and closing speed of the contact of the bounding spheres of A and B, t (s) after begin.
 
     approach: of B to A at begin. event: the IMPACT record to write.
     """

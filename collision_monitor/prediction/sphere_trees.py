@@ -1,9 +1,9 @@
-"""Sphere trees of long bodies: when two could meet at the earliest, between their bounding spheres and their shapes.
+"""Sphere trees of long bodies: bounds on the first contact that are tighter than those of the bounding spheres.
 
-(Slides "Time-critical collision detection": from coarse to fine through the spheres of a tree.) A monitored body is
-convex, or a model of it is; one that is long is halved across its length, LEVELS times, and each piece has a sphere.
-The octree of `geometry.sphere_tree` is finer and for solids with holes; its cells stand out too far for this: what it
-says of two long hulls after a hundred pairs of spheres is said here after ten (docs/tradeoff.md).
+Source: slides "Time-critical collision detection" (from coarse to fine through the spheres of a tree). A tree halves a
+long body across its length, LEVELS times, and gives each piece a sphere. The pieces are those of the convex hull of
+the body. The octree of `geometry.sphere_tree` is finer and made for solids with holes, but its cells stand out too
+far: for two long hulls it needs a hundred pairs of spheres where ten suffice here (docs/tradeoff.md).
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ from collision_monitor.tolerances import ROUNDED_UP
 Array = NDArray[np.float64]
 
 LEVELS: Final = 2
-"""Below the first: four pieces. One more costs twice as much and tells little."""
+"""Number of levels below the first: four pieces. One more level costs twice as much and gains little."""
 
 WORTH: Final = 0.4
-"""A tree whose finest spheres are larger than this part of the first says hardly more than that one."""
+"""Largest radius of the finest spheres, as a fraction of the first one's. Beyond it a tree gains hardly anything."""
 
 MOST_CORNERS: Final = 2000
-"""Beyond it a tree takes a second to make."""
+"""Most corners of a body with a tree. With more, a tree takes a second to make."""
 
 
 class Trees(NamedTuple):
     """The trees of all bodies, one after another; centres in the body's frame (m)."""
 
-    root: Any  # (N,) int32: a body's first sphere; -1: it has no tree, but its bounding sphere
+    root: Any  # (N,) int32: a body's first sphere; -1: no tree, only the bounding sphere
     center: Any  # (K, 3)
     radius: Any  # (K,)
-    child: Any  # (K,) int32: the first of its two halves, -1: none
-    stack: Any  # (M, 2) int32: scratch, the pairs of spheres that are still to be looked at
+    child: Any  # (K,) int32: the first of its two halves; -1: none
+    stack: Any  # (M, 2) int32: scratch, the pairs of spheres still to examine
 
 
 Tree = tuple[Array, Array]
@@ -51,7 +51,10 @@ _CHILD: Final = np.array([2 * k + 1 if k < 2**LEVELS - 1 else -1 for k in range(
 
 
 def body_tree(table: Any, next_part: NDArray[np.int32], first_shape: int) -> Tree | None:
-    """Of the body whose shapes begin at that slot of the table; None where it has corners nowhere, or no length."""
+    """Make the tree of the body whose shapes begin at that slot of the table; None if no tree is useful.
+
+    That is so if a shape is neither a box nor a hull, if the body is not long, or if it has more than MOST_CORNERS.
+    """
     corners, margin, slot = [], 0.0, first_shape
     while slot >= 0:
         if table.kind[slot] == CONVEX_HULL:
@@ -69,7 +72,7 @@ def body_tree(table: Any, next_part: NDArray[np.int32], first_shape: int) -> Tre
 
 
 def _halved(corners: Array, margin: float) -> Tree | None:
-    """Of the convex hull of the corners (n, 3), grown by the margin (m)."""
+    """Make the tree of the convex hull of the corners (n, 3), grown by the margin (m); None if it is not long."""
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     axes = np.linalg.svd(corners - middle, full_matrices=False)[2]
     if len(axes) < 3:
@@ -96,7 +99,7 @@ def _halved(corners: Array, margin: float) -> Tree | None:
 
 
 def _section(points: Array, cut: float) -> Array:
-    """Points (m, 3) of the plane x = cut, of whose convex hull the section of the points' hull is: of all lines."""
+    """Points (m, 3) in the plane x = cut whose convex hull is the section of the points' hull: where lines cross it."""
     low, high = points[points[:, 0] < cut], points[points[:, 0] > cut]
     share = (cut - low[:, None, 0]) / (high[:, 0] - low[:, None, 0])
     section: Array = (low[:, None] + share[..., None] * (high - low[:, None])).reshape(-1, 3)
@@ -104,7 +107,7 @@ def _section(points: Array, cut: float) -> Array:
 
 
 def joined_trees(trees: list[Tree | None], capacity: int) -> Trees:
-    """Of the bodies in the slots 0, 1, …; capacity: how many slots there are."""
+    """Join the trees of the bodies in the slots 0, 1, … (None: no tree); capacity: number of slots."""
     size = 2 ** (LEVELS + 1) - 1
     there = [tree for tree in trees if tree is not None]
     root = np.full(capacity, -1, np.int32)
@@ -121,17 +124,17 @@ def joined_trees(trees: list[Tree | None], capacity: int) -> Trees:
 
 
 class _Ball(NamedTuple):
-    """A sphere of a tree about its body's origin, in world axes, and how it goes on while the body turns."""
+    """A sphere of a tree relative to its body's origin, in world axes, and its change while the body turns."""
 
     p: Any  # (3,): centre (m)
     v: Any  # (3,): velocity of the centre relative to the body's origin (m/s)
-    radius: Any
+    radius: Any  # m
     growth: Any  # of the radius (m/s)
 
 
 @inlined
 def _ball(trees, at, m, R, rate, span):
-    """Sphere `at` of a body in motion m (MOTION), turned by R, which turns at `rate` (rad/s) for `span` seconds.
+    """Sphere `at` of a body in motion m (MOTION) with rotation R, which turns at `rate` (rad/s) for `span` (s).
 
     at = -1: the body's bounding sphere.
     """
@@ -144,7 +147,7 @@ def _ball(trees, at, m, R, rate, span):
     growth = rate * sqrt(cx * cx + cy * cy + cz * cz)
     if rate * span >= 2.0:
         return _Ball((x, y, z), (0.0, 0.0, 0.0), trees.radius[at], growth)
-    # off its tangent by (rate t)^2 / 2 of the lever, whose chord over the span is
+    # it leaves its tangent by (rate t)^2 / 2 of the lever; its chord over the span is
     growth *= 0.5 * rate * span
     v = (m.wy * z - m.wz * y, m.wz * x - m.wx * z, m.wx * y - m.wy * x)
     return _Ball((x, y, z), v, trees.radius[at], growth)
@@ -152,17 +155,17 @@ def _ball(trees, at, m, R, rate, span):
 
 @device
 def tree_meeting(bodies, trees, i, j, window, margin, rotation):
-    """Seconds after the window's begin before which the trees of bodies i and j cannot meet; inf: not within it.
+    """Return a time (s after the window's begin) before which the trees of bodies i and j cannot meet; inf: never.
 
-    A sphere's centre moves straight on from where its body's bounding sphere meets the other, as fast as it does then;
-    by how much turning moves it off that way is a growth of its radius. rotation (2 or more, 3, 3): scratch.
+    The centres of the spheres move straight, with their velocity at the time when the bounding spheres meet. Their
+    deviation from that by rotation is counted as growth of the radius. rotation (2 or more, 3, 3): scratch.
     """
     A, B = bodies.motion[i], bodies.motion[j]
     R_i, R_j = rotation[0], rotation[1]
     begin, end = window
     tube = tube_of(A, B, begin)
     p, v = approach_at(A, B, begin)
-    growth = tube.growth + half_acceleration(A, B) * (end - begin)  # no more than that off its tangent
+    growth = tube.growth + half_acceleration(A, B) * (end - begin)  # bounds the deviation from the tangent
     reach = A.radius + B.radius + margin + tube.start
     soonest, last = sphere_interval(p, v, reach, growth, end - begin, 1.0)
     if soonest > last:
@@ -177,7 +180,7 @@ def tree_meeting(bodies, trees, i, j, window, margin, rotation):
     stack = trees.stack
     stack[0, 0], stack[0, 1] = trees.root[i], trees.root[j]
     waiting, best = 1, inf
-    while waiting > 0:  # each pair of spheres is taken off once, and puts its two halves on: as many as the trees have
+    while waiting > 0:  # terminates: each pair of spheres is removed once, and adds two with the halves of one
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
         ball_a, ball_b = _ball(trees, a, A, R_i, rate_a, span), _ball(trees, b, B, R_j, rate_b, span)
@@ -212,9 +215,9 @@ def tree_meeting(bodies, trees, i, j, window, margin, rotation):
 
 @kernel
 def tighten(bodies, trees, events, now, margin, rotation):
-    """Let events (IMPACT) of which only the bounding spheres are known begin when the sphere trees meet.
+    """Delay events (IMPACT) that are bounds by bounding spheres until the sphere trees meet.
 
-    status = CLEAR where they do not, as long as the motions are predicted. rotation (2 or more, 3, 3): scratch.
+    status = CLEAR if they do not meet before the cover times. rotation (2 or more, 3, 3): scratch.
     """
     for k in range(events.size):
         event = events[k]

@@ -1,8 +1,9 @@
-"""How uncertain the bodies' states are, and how that grows with time.
+"""Spread: the uncertainty of the bodies' states, and its growth with time.
 
-A body is off where it said to be by e_p + e_v t + e_a t^2 / 2, t seconds after its last state: errors of position and
-velocity with the covariances that were declared, and an acceleration that nobody told, anywhere in a ball: it has a
-variance of a^2 / 5 along each axis. a is the declared bound, or while the body is not heard of the profile's.
+The position of a body is off by e_p + e_v t + e_a t^2 / 2, t seconds after its last state. e_p and e_v are errors of
+position and velocity with the declared covariances. e_a is an unknown acceleration anywhere in a ball of radius a, so
+its variance is a^2 / 5 along each axis. a is the declared bound, or, for a body without updates, the profile's
+stale_acceleration: a stale object widens its spread here, in `unknown_acceleration`.
 """
 
 from __future__ import annotations
@@ -15,36 +16,37 @@ from numpy.typing import NDArray
 from collision_monitor._jit import device, kernel
 
 FIFTH_ROOT: Final = 0.4472135954999579
-"""Standard deviation along one axis of what is anywhere in a ball of radius 1."""
+"""Standard deviation along one axis of a uniform distribution in a ball of radius 1."""
 
 _STDDEV: Final = 16
-"""Where the standard deviations begin among the numbers of a records.STATE."""
+"""Index of the first standard deviation among the numbers of a records.STATE."""
 
 _DIAGONAL: Final = np.array([0, 3, 5])
 
 
 SEMI_DEFINITE: Final = 1e-9
-"""How negative an eigenvalue may be, in parts of the largest one: round-off of who computed the covariance."""
+"""Largest magnitude of a negative eigenvalue, relative to the largest one, that counts as the sender's round-off."""
 
 
 class Spread(NamedTuple):
-    """N slots, like the bodies'."""
+    """Uncertainties of the bodies' states; N slots, like the bodies."""
 
     stddev: Any  # (N, 4): position (m), orientation (rad), velocity (m/s), angular velocity (rad/s), along one axis
-    covariance: Any  # (N, 12): of position and of velocity, upper triangles
+    covariance: Any  # (N, 12): of position (m^2) and velocity (m^2/s^2), upper triangles
     acceleration: Any  # (N, 2): declared bounds (m/s^2, rad/s^2); 0: none
 
 
 def make_spread(capacity: int) -> Spread:
-    """Slots without uncertainty."""
+    """Make `capacity` slots without uncertainty."""
     n = capacity
     return Spread(np.zeros((n, 4)), np.zeros((n, 12)), np.zeros((n, 2)))
 
 
 def worst_stddevs(covariance: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Covariances (n, 12) with 0 for what is unknown (NaN), and standard deviations (n, 2) along their worst axes.
+    """Return covariances (n, 12) with 0 for unknown ones (NaN), and standard deviations (n, 2) along their worst axes.
 
-    What is no covariance has one that is infinite or negative: minus the root of the most negative eigenvalue.
+    The standard deviation of an invalid covariance is infinite, or negative: minus the root of the magnitude of the
+    most negative eigenvalue.
     """
     triangles = covariance.reshape(-1, 2, 6)
     infinite = np.isinf(triangles).any(axis=2)
@@ -60,9 +62,10 @@ def worst_stddevs(covariance: NDArray[np.float64]) -> tuple[NDArray[np.float64],
 
 @kernel
 def take_spread(spread, slots, numbers, covariance, planar):
-    """Store the uncertainties of states. slots (M,) int32, -1: of none; numbers (M, 21): the rows of records.STATE.
+    """Store the uncertainties of states.
 
-    covariance (M, 12), or (0, 12); where it is all 0 the standard deviations tell. planar: there is none along z.
+    slots (M,) int32, -1: skip the state; numbers (M, 21): the rows of records.STATE; covariance (M, 12), or (0, 12):
+    where one is all 0, the standard deviations replace it. planar: set the uncertainty along z to 0.
     """
     for k in range(slots.size):
         i = slots[k]
@@ -87,7 +90,7 @@ def take_spread(spread, slots, numbers, covariance, planar):
 
 @device
 def is_uncertain(spread, i):
-    """Has body i declared any uncertainty, or how hard it may accelerate?"""
+    """Whether body i has declared any uncertainty, or a bound on its acceleration."""
     s, a = spread.stddev, spread.acceleration
     declared = s[i, 0] > 0.0 or s[i, 1] > 0.0 or s[i, 2] > 0.0 or s[i, 3] > 0.0
     return declared or a[i, 0] > 0.0 or a[i, 1] > 0.0
@@ -95,7 +98,10 @@ def is_uncertain(spread, i):
 
 @device
 def unknown_acceleration(spread, i, silent, which, stale_acceleration):
-    """Standard deviation along one axis of body i's untold acceleration: m/s^2 (which 0) or rad/s^2 (1)."""
+    """Standard deviation along one axis of body i's unknown acceleration: m/s^2 (which 0) or rad/s^2 (which 1).
+
+    A stale object widens its spread here: a silent body without a declared bound may accelerate by stale_acceleration.
+    """
     declared = spread.acceleration[i, which]
     if declared > 0.0:
         return FIFTH_ROOT * declared
@@ -104,9 +110,10 @@ def unknown_acceleration(spread, i, silent, which, stale_acceleration):
 
 @device
 def surface_spread(spread, i, spin_radius, age, ahead, stale_acceleration):
-    """Bounds on the standard deviation along one axis of every point of body i: now (m), growth until `ahead` (m/s).
+    """Bound the standard deviation along one axis of every point of body i: now (m), and growth until `ahead` (m/s).
 
-    age: s since its last state. The parts are added, not their squares: a line in time that is nowhere too low.
+    age, ahead: s since the last state, s from now. The parts are added instead of their squares, so that the bound is
+    linear in time and never too low.
     """
     s_p, s_o = spread.stddev[i, 0], spread.stddev[i, 1]
     s_v, s_w = spread.stddev[i, 2], spread.stddev[i, 3]
@@ -115,7 +122,7 @@ def surface_spread(spread, i, spin_radius, age, ahead, stale_acceleration):
     turning = unknown_acceleration(spread, i, False, 1, stale_acceleration)
     now = s_p + s_v * age + 0.5 * silent * age * age
     growth = s_v + silent * age + 0.5 * ahead_a * ahead
-    if s_o + s_w + turning > 0.0:  # what has no end does not turn
+    if s_o + s_w + turning > 0.0:  # else 0 * inf for a half-space, which does not turn
         now += spin_radius * (s_o + s_w * age + 0.5 * turning * age * age)
         growth += spin_radius * (s_w + turning * (age + 0.5 * ahead))
     return now, growth

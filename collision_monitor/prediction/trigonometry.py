@@ -1,7 +1,7 @@
-"""Sine and cosine from additions and multiplications alone.
+"""Sine and cosine from additions and multiplications alone, equal on every processor.
 
-The C library's differ in the last bit from one processor to the next; these are the same bytes everywhere, which a
-replay on another machine needs, and both come at the cost of one.
+The C library's results differ in the last bit between processors. These are the same bytes everywhere, which a replay
+on another machine needs, and both together cost as much as one of the C library's.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ HALF_PI_2: Final = 6.077100506303966e-11
 HALF_PI_3: Final = 2.0222662487959506e-21
 
 LARGEST: Final = 1e6
-"""rad; beyond, the parts of pi / 2 are too short and the C library is asked."""
+"""rad. Beyond it the parts of pi / 2 are too short, and the C library is used."""
 
 
 @inlined
@@ -37,7 +37,7 @@ def sin_cos(x):
 
 @inlined
 def sin_cos_within(x):
-    """The same for |x| < LARGEST; without a branch, so that a loop over many takes several at once."""
+    """`sin_cos` for |x| < LARGEST, without branches, so that a compiler can vectorise a loop over many x."""
     k = np.rint(x * TWO_OVER_PI)
     r = ((x - k * HALF_PI_1) - k * HALF_PI_2) - k * HALF_PI_3
     z = r * r

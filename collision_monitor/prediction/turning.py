@@ -1,4 +1,4 @@
-"""How far bodies have turned away from their reference motion, several at once."""
+"""Angles by which bodies have turned away from their reference motions, several bodies at once."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from collision_monitor.prediction.motion import chord_angle
 from collision_monitor.prediction.trigonometry import LARGEST, sin_cos_within
 
 BLOCK: Final = 128
-"""Bodies whose numbers are laid side by side in the cache."""
+"""Number of bodies whose data are copied into columns that fit the cache."""
 COLUMNS: Final = 12
 
 
 def make_columns() -> NDArray[np.float64]:
-    """Scratch (COLUMNS + 1, BLOCK) for a block; the last row for the angles."""
+    """Make scratch (COLUMNS + 1, BLOCK) for a block; the last row is for the angles."""
     return np.empty((COLUMNS + 1, BLOCK))
 
 
 @device
 def turned_away(bodies, start, count, columns, angles):
-    """Upper bounds on the angles (rad) between bodies' last states and their references at that time, into angles.
+    """Write upper bounds on the angles (rad) between bodies' last states and their references at that time into angles.
 
-    Of `count` <= BLOCK bodies from slot `start` on; columns (COLUMNS, BLOCK): scratch. inf: turned too far to tell.
-    No branch, no call: the processor takes four or eight bodies at a time.
+    For `count` <= BLOCK bodies from slot `start` on; columns (COLUMNS, BLOCK): scratch. inf: the reference has turned
+    too far to compute it. The loop has no branch and no call, so the processor takes four or eight bodies at a time.
     """
     for k in range(count):
         i = start + k

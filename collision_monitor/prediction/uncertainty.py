@@ -1,9 +1,10 @@
-"""When and how likely two bodies meet whose states are uncertain: earliest, most likely, latest time, probability.
+"""Time and probability of impact of two bodies with uncertain states: earliest, most likely and latest time.
 
 The relative motion is a straight line whose start and velocity are normally distributed (spread.py). Evenly spread
-samples of it, each followed exactly as the stated motion is, give the distribution of the time of impact
-(docs/uncertainty.md). The samples are laid along what matters: the error of the position at the time of closest
-approach decides whether they meet, its part across the path first; what is left of the velocity's error comes after.
+samples of it, each followed as exactly as the stated motion, give the distribution of the time of impact
+(docs/uncertainty.md). The coordinates of the samples are ordered by importance. First comes the error of the position
+at the time of closest approach, which decides whether the bodies meet, and of it the part across the path. The
+remaining error of the velocity comes after it.
 """
 
 from __future__ import annotations
@@ -44,21 +45,21 @@ from collision_monitor.prediction.sphere_interval import sphere_interval
 from collision_monitor.prediction.spread import is_uncertain, surface_spread
 
 GAP_NODES: Final = 9
-"""Times between now and the horizon at which the gap is compared with its uncertainty."""
+"""Number of times from now to the horizon at which the gap is compared with its uncertainty."""
 
 SAMPLE_TOLERANCE: Final = 0.05
-"""Within how many standard deviations of the gap a sample's impact is settled: its probability is off by 0.004."""
+"""Tolerance of a sample's impact in standard deviations of the gap; it changes the probability by 0.004."""
 
 PILOT_PART: Final = 0.2
-"""A pair that is stated to pass, and met with less than this part of the probability that is told in the coarse lattice
-of samples, is left out; and again after each further one."""
+"""A pair that is stated to pass is left out if it meets with less than this fraction of min_probability in the first
+coarse lattice of samples. The test is repeated after each further one."""
 
 
 @device
 def _first_contact(multibody, i, j, window, tube, query, work):
     """First time in the window at which bodies i and j are within query.margin and the tube; infinite: never.
 
-    They move as in work.motion, whose time 0 is now; so is the tube's.
+    They move as in work.motion. Time 0 of the motions and of the tube is now.
     """
     table, parts, bodies = multibody
     A, B = work.motion[0], work.motion[1]
@@ -89,7 +90,7 @@ def _first_contact(multibody, i, j, window, tube, query, work):
 
 @device
 def _gap_at(multibody, i, j, t, work):
-    """Signed distance (m) of the shapes of bodies i and j at t; its direction into work.block[0]."""
+    """Signed distance (m) of the shapes of bodies i and j at t; writes its direction into work.block[0]."""
     table, parts, bodies = multibody
     A, B, out, normal = work.motion[0], work.motion[1], work.scratch.out, work.block[0]
     best = inf
@@ -106,7 +107,7 @@ def _gap_at(multibody, i, j, t, work):
 
 @inlined
 def _is_straight(parts, bodies, i, j, A, B):
-    """Whether the bodies are a shape each that moves straight and does not turn, and not two spheres."""
+    """Whether each body is one shape that moves straight and does not turn, and they are not both spheres."""
     a, b = bodies.first_shape[i], bodies.first_shape[j]
     turns = A.wx != 0.0 or A.wy != 0.0 or A.wz != 0.0 or B.wx != 0.0 or B.wy != 0.0 or B.wz != 0.0
     round = bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0
@@ -116,10 +117,11 @@ def _is_straight(parts, bodies, i, j, A, B):
 
 @device
 def _lay_along(multibody, i, j, tube, sampling, work):
-    """The time that matters most, returned, and the frame to lay the samples along, into work.frame.
+    """Return the time that matters most, and write the frame along which to lay the samples into work.frame.
 
-    Stated to meet, or two spheres: the closest approach of the centres, and the miss across the path. Else, and where
-    a body has no end: where the gap is smallest in standard deviations, the design point of reliability theory.
+    For bodies that are stated to meet, or two spheres: the closest approach of the centres, and the miss across the
+    path. Otherwise, and with a half-space: the time and direction of the gap that is smallest in standard deviations,
+    which is the design point of reliability theory.
     """
     bodies, horizon = multibody.bodies, sampling.horizon
     A, B, frame, normal = work.motion[0], work.motion[1], work.frame, work.block[0]
@@ -146,14 +148,14 @@ def _lay_along(multibody, i, j, tube, sampling, work):
 
 
 class Sampling(NamedTuple):
-    """How pairs are judged."""
+    """Settings and samples for the probabilities of pairs."""
 
     query: Any  # ImpactQuery
     horizon: float  # s
     stale_acceleration: float  # m/s^2
-    stated: bool  # the pairs meet as they are stated to move
-    sigmas: float  # standard deviations within which a pair that is not stated to meet has to come near
-    safe_sigmas: float  # standard deviations by which larger bodies meet before hardly any impact
+    stated: bool  # the stated motions of the pairs meet
+    sigmas: float  # a pair that is stated to pass is left out unless it meets when grown by so many stddevs
+    safe_sigmas: float  # bodies grown by so many standard deviations meet before nearly all impacts
     min_probability: float
     confidence: float
     planar: bool
@@ -163,10 +165,11 @@ class Sampling(NamedTuple):
 
 @allocating_kernel
 def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers):
-    """Times and probabilities of impact of pairs (P, 2) of body slots from `now` on into answers (P, 4).
+    """Write times (s after `now`) and probabilities of impact of pairs (P, 2) of body slots into answers (P, 4).
 
-    Left out are pairs that are not stated to meet and do not within `sigmas` standard deviations, or with much less
-    than the least probability. NaN: left out, or neither body has declared any uncertainty.
+    An answer is NaN if neither body has declared an uncertainty, or if the pair is left out. Pairs that are stated to
+    pass are left out if they do not meet within `sigmas` standard deviations, or only with a probability far below
+    min_probability.
     """
     table, parts, bodies = multibody
     query, horizon, stated = sampling.query, sampling.horizon, sampling.stated
@@ -215,7 +218,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
             _is_straight(parts, bodies, i, j, A, B)
             and turn_i[0] + turn_i[1] + turn_j[0] + turn_j[1] == 0.0
         )
-        work.axes[:, 3] = inf  # none is known
+        work.axes[:, 3] = inf  # no axis is known yet
         stride = max(1, weights.size // PILOT)
         seen = 0.0
         likely = True
