@@ -48,7 +48,7 @@ def encode_parameter_event(stamp_ns: int, node: str, changed: Mapping[str, Any])
 
 
 def _write_value(writer: Writer, name: str, value: Any) -> None:
-    """Write a ParameterValue: the kind, then a field for each kind, of which only that of the kind counts."""
+    """Write a ParameterValue: the kind, then one field for each kind. Readers use only the field of the kind."""
     kind = _KINDS.get(type(value))
     if kind is None:
         raise writer.error(f"{name}: expected one of {', '.join(k.__name__ for k in _KINDS)}, got {value!r}")

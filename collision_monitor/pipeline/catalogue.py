@@ -26,10 +26,10 @@ class Catalogue:
         self._removed: set[int] = set()  # since the last step: the next step ends their contacts and needs their names
 
     def changes(self, message: ObjectDescriptionArray) -> list[Change]:
-        """Return the changes that a message requests, in order. A snapshot first removes each object that it does not
-        mention.
+        """Return the changes that a message requests, in order.
 
-        An object that the message mentions and the codec refused keeps its last description.
+        A snapshot first removes each object that it does not mention. An object that the message mentions and the codec
+        refused keeps its last description.
         """
         if not message.snapshot:
             return list(message.objects)

@@ -204,8 +204,7 @@ class Pipeline:
     # -- status and metadata
 
     def status(self, *, silent: bool = False, **live: Any) -> bytes:
-        """Return a MonitorStatus: the last step's counters, and the fields of `codec.status.LIVE_FIELDS` from the
-        caller.
+        """Return a MonitorStatus: the last step's counters, and the caller's fields of `codec.status.LIVE_FIELDS`.
 
         silent: no states arrive any more, so every moving object that was seen counts as stale.
         """

@@ -30,7 +30,7 @@ class LiveSettings:
         node.add_post_set_parameters_callback(self._apply)
 
     def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Add the parameters that a profile sets, and convert whole numbers to decimal ones where needed."""
+        """Add the parameters that a profile sets, and convert a whole number if the setting is a decimal one."""
         given = {each.name: self._as_meant(each) for each in parameters}
         named: dict[str, Parameter] = {}
         if isinstance(chosen := given[PROFILE].value if PROFILE in given else None, str):

@@ -1,4 +1,4 @@
-"""The conditions that an expectation can state: each returns whether a history meets it, and what the history holds."""
+"""The conditions that an expectation can state. Each returns whether a history meets it, and what was found."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def no_contact(names: PairSelector) -> Condition:
 
 
 def _unseen(history: History, names: PairSelector) -> list[str]:
-    """Return the names of those of these objects that move and have no states."""
+    """Return the names of the selected objects that move and have no states."""
     ids = set(history.objects) if names == ANY else history.ids_of(names[0]) | history.ids_of(names[1])
     seen = set(history.states["id"].tolist())
     return sorted(history.name_of(i) for i in ids if i not in seen and not history.objects[i].static)

@@ -98,7 +98,7 @@ class History:
 
     @property
     def longest_step(self) -> float:
-        """Time between two steps (s) beyond which there is a gap, of which nothing is known."""
+        """Longest time between two steps (s) that is not a gap. Nothing is known about a gap."""
         return max(self.profile.stale_after, STEPS_MISSING * self.period)
 
     def name_of(self, object_id: int) -> str:

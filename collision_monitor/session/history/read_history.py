@@ -165,7 +165,7 @@ class _Gathered:
         return h
 
     def _status_of_replay(self, pipeline: Pipeline) -> MonitorStatus:
-        """Return the replay's status, with what the recorder dropped, because the replay lacks those messages too."""
+        """Return the replay's status, with the messages that the recorder dropped, which the replay lacks too."""
         status, recorded = decode_status(pipeline.status()), self._history.status
         if recorded is None:
             return status

@@ -67,7 +67,7 @@ class RecoveredRecord:
 
 @dataclass(frozen=True, slots=True)
 class Damage:
-    """A part of the file that is not as it was written. text: description, without what was lost by it."""
+    """A part of the file that is not as it was written. text: describes it, without its losses."""
 
     text: str
 

@@ -31,11 +31,9 @@ class Message(NamedTuple):
 
 
 class McapReader:
-    """Reader of one MCAP file.
+    """Reader of one MCAP file. Raises SessionError if the path is no MCAP file or cannot be read.
 
     damage: one sentence for each missing or broken part; position: bytes read; both of the last reading.
-
-    Raises SessionError if the path is no MCAP file or cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -60,7 +58,7 @@ class McapReader:
         return self.read()
 
     def read(self, begin: int = 0) -> Iterator[Any]:
-        """Yield the same. begin: offset of a record to jump to at the first message, behind the names of the topics."""
+        """Yield the same. begin: offset of a record; the records from the first message up to it are skipped."""
         self.damage = []
         with self.path.open("rb") as file:
             for start, opcode, payload in self._whole(file):

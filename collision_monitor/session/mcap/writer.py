@@ -1,7 +1,7 @@
 """Writes MCAP: messages in zstd chunks with their indexes, and a summary at the end.
 
-Source: the MCAP specification, version 0 (mcap.dev/spec). The library's mcap.writer costs too much: the recorder's
-thread shares Python's lock with the monitor, and mcap.writer holds it 5 µs for each message. Here NumPy does the work
+Source: the MCAP specification, version 0 (mcap.dev/spec). The library's mcap.writer is not used because it holds
+Python's lock, which the recorder's thread shares with the monitor, for 5 µs for each message. Here NumPy does the work
 of many messages at a time, and packing, checksums and writing need no lock.
 """
 
