@@ -1,6 +1,6 @@
-"""The messages of `collision_monitor_msgs` as CDR bytes and as arrays, without ROS.
+"""The messages of `collision_monitor_msgs` as CDR bytes and as arrays. Does not need ROS.
 
-The elements of the hot messages lie in the bytes exactly as `records` describes them, so they are seen, not converted.
+The elements of the hot messages have in the bytes exactly the layout of `records`, so decoding returns views of them.
 """
 
 from collision_monitor.codec.contacts import ContactArray, decode_contacts, encode_contacts

@@ -1,6 +1,6 @@
-"""Little-endian CDR (XCDR1, plain): the wire format of ROS 2, read with every bound checked, and written.
+"""Little-endian CDR (XCDR1, plain), the wire format of ROS 2: a reader that checks every bound, and a writer.
 
-Source: OMG DDS-XTypes 1.3, 7.4.1. The four encapsulation bytes come first; alignment counts from behind them.
+Source: OMG DDS-XTypes 1.3, 7.4.1. A message begins with four encapsulation bytes; alignment counts from behind them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from collision_monitor.errors import MessageError
 
 ENCAPSULATION = b"\x00\x01\x00\x00"
 PADDING = 3
-"""Most bytes that a middleware adds behind a message to round its size up to 4."""
+"""Most bytes that a middleware adds behind a message to round its size up to a multiple of 4."""
 
 Buffer = bytes | bytearray | memoryview
 Records = NDArray[np.void]
@@ -32,7 +32,7 @@ _SCALARS = {
 
 
 class Reader:
-    """Reads one message from its first byte on. Every method raises MessageError where the bytes do not fit."""
+    """Reads one message from its first byte on. Every method raises MessageError if the bytes do not fit."""
 
     def __init__(self, data: Buffer, message: str) -> None:
         self._data = memoryview(data).cast("B") if isinstance(data, memoryview) else memoryview(data)
@@ -47,16 +47,16 @@ class Reader:
             raise self.error(f"expected little-endian CDR (encapsulation 0x00010000), got {kind}")
 
     def error(self, text: str) -> MessageError:
-        """The error for this message, to be raised."""
+        """Return the error for this message, to be raised."""
         return MessageError(f"{self._message}: {text}")
 
     @property
     def remaining(self) -> int:
-        """Bytes not read yet."""
+        """Number of bytes that are not read yet."""
         return len(self._data) - self._at
 
     def _take(self, size: int, alignment: int, what: str) -> int:
-        """The offset of the next `size` bytes, which are skipped."""
+        """Skip the next `size` bytes, behind the alignment, and return their offset."""
         start = self._at + (4 - self._at) % alignment
         if size > len(self._data) - start:
             left = max(0, len(self._data) - start)
@@ -67,19 +67,19 @@ class Reader:
         return start
 
     def scalar(self, kind: str, what: str) -> Any:
-        """One number: u1, i4, u4, i8, u8 or f8."""
+        """Read one number: u1, i4, u4, i8, u8 or f8."""
         codec = _SCALARS[kind]
         return codec.unpack_from(self._data, self._take(codec.size, codec.size, what))[0]
 
     def boolean(self, what: str) -> bool:
-        """A byte that is 0 or 1."""
+        """Read a byte that is 0 or 1."""
         value = self.scalar("u1", what)
         if value > 1:
             raise self.error(f"{what}: expected 0 or 1 for a bool, got {value}")
         return bool(value)
 
     def string(self, what: str) -> str:
-        """UTF-8 text."""
+        """Read UTF-8 text."""
         length = _U4.unpack_from(self._data, self._take(4, 4, what))[0]
         if length == 0:  # some writers leave out the terminator of an empty string
             return ""
@@ -95,7 +95,7 @@ class Reader:
             raise self.error(f"{what}: expected UTF-8 text, got {raw[:40]!r}") from None
 
     def count(self, least: int, what: str) -> int:
-        """The length of a sequence whose elements have at least `least` bytes: never more than can be there."""
+        """Read the length of a sequence whose elements have at least `least` bytes, checked against the bytes left."""
         count: int = _U4.unpack_from(self._data, self._take(4, 4, what))[0]
         if count * least > self.remaining:
             raise self.error(
@@ -105,23 +105,23 @@ class Reader:
         return count
 
     def sequence(self, dtype: Any, alignment: int, what: str) -> NDArray[Any]:
-        """A sequence of fixed-size elements as a read-only view of the bytes, not copied."""
+        """Read a sequence of fixed-size elements as a read-only view of the bytes."""
         dtype = np.dtype(dtype)
         count = self.count(dtype.itemsize, what)
         if count == 0:
-            # An empty sequence has no alignment. rmw_fastrtps' serialize() sizes its buffer as if it had (and leaves
-            # what it did not write as garbage behind the message), so each may add one alignment to the end.
+            # An empty sequence has no alignment. rmw_fastrtps' serialize() sizes its buffer as if it had one and leaves
+            # the unused bytes as garbage behind the message. So each empty sequence may add one alignment to the end.
             self._padding += alignment if alignment > 4 else 0
             return np.empty(0, dtype)
         start = self._take(count * dtype.itemsize, alignment, what)
         return np.frombuffer(self._data.toreadonly(), dtype, count, start)
 
     def strings(self, what: str) -> list[str]:
-        """A sequence of texts."""
+        """Read a sequence of texts."""
         return [self.string(what) for _ in range(self.count(4, what))]
 
     def stamp_ns(self) -> int:
-        """builtin_interfaces/Time as integer nanoseconds."""
+        """Read a builtin_interfaces/Time as integer nanoseconds."""
         seconds = self.scalar("i4", "header.stamp.sec")
         nanoseconds = self.scalar("u4", "header.stamp.nanosec")
         if nanoseconds >= _NANOSECONDS:
@@ -129,13 +129,13 @@ class Reader:
         return int(seconds * _NANOSECONDS + nanoseconds)
 
     def finish(self) -> None:
-        """To be called when the message is complete: nothing but padding may follow."""
+        """Check that the message is complete: only padding may follow."""
         if self.remaining > self._padding:
             raise self.error(f"expected the end at offset {self._at}, got {self.remaining} more bytes: of another type")
 
 
 def _string(text: str) -> bytes:
-    """Length, bytes and terminator. Raises ValueError."""
+    """Return length, bytes and terminator. Raises ValueError."""
     raw = text.encode("utf-8")
     if 0 in raw:
         raise ValueError
@@ -144,7 +144,7 @@ def _string(text: str) -> bytes:
 
 @lru_cache(maxsize=65536)  # the same names are published at every step
 def _padded_string(text: str) -> bytes:
-    """The same, up to where the next string begins: a multiple of 4."""
+    """Return the same, padded to a multiple of 4, where the next string begins."""
     raw = _string(text)
     return raw + bytes(-len(raw) % 4)
 
@@ -158,11 +158,11 @@ class Writer:
         self._message = message
 
     def error(self, text: str) -> MessageError:
-        """The error for this message, to be raised."""
+        """Return the error for this message, to be raised."""
         return MessageError(f"{self._message}: {text}")
 
     def raw(self, data: bytes, alignment: int = 1) -> None:
-        """Bytes that are CDR already."""
+        """Append bytes that are CDR already."""
         padding = (4 - self._size) % alignment
         if padding:
             self._parts.append(bytes(padding))
@@ -170,7 +170,7 @@ class Writer:
         self._size += padding + len(data)
 
     def scalar(self, kind: str, value: float, what: str) -> None:
-        """One number: u1, i4, u4, i8, u8 or f8."""
+        """Write one number: u1, i4, u4, i8, u8 or f8."""
         codec = _SCALARS[kind]
         try:
             self.raw(codec.pack(value), codec.size)
@@ -178,14 +178,14 @@ class Writer:
             raise self.error(f"{what}: expected a number that {kind} can hold, got {value!r}") from None
 
     def string(self, text: str, what: str) -> None:
-        """Text, terminated."""
+        """Write text with its terminator."""
         try:
             self.raw(_string(text), 4)
         except ValueError:
             raise self.error(f"{what}: expected text that UTF-8 can hold, without zero bytes, got {text!r}") from None
 
     def sequence(self, array: NDArray[Any], dtype: Any, alignment: int) -> None:
-        """A sequence of fixed-size elements: a one-dimensional array of exactly this dtype, copied as it lies."""
+        """Write a sequence of fixed-size elements: a one-dimensional array of exactly this dtype, as in memory."""
         dtype = np.dtype(dtype)
         if array.dtype != dtype or array.ndim != 1:
             raise self.error(f"expected a one-dimensional array of {dtype}, got {array.dtype} of shape {array.shape}")
@@ -194,7 +194,7 @@ class Writer:
             self.raw(array.tobytes(), alignment)
 
     def strings(self, texts: list[str], what: str) -> None:
-        """A sequence of texts."""
+        """Write a sequence of texts."""
         self.scalar("u4", len(texts), what)
         try:
             self.raw(b"".join(map(_padded_string, texts[:-1])))
@@ -204,17 +204,17 @@ class Writer:
             self.string(text, what)
 
     def stamp_ns(self, stamp_ns: int) -> None:
-        """Integer nanoseconds as builtin_interfaces/Time."""
+        """Write integer nanoseconds as builtin_interfaces/Time."""
         seconds, nanoseconds = divmod(stamp_ns, _NANOSECONDS)
         self.scalar("i4", seconds, "header.stamp.sec")
         self.scalar("u4", nanoseconds, "header.stamp.nanosec")
 
     def finish(self) -> bytes:
-        """The message."""
+        """Return the message."""
         return b"".join(self._parts)
 
 
 def write_header(writer: Writer, stamp_ns: int, frame_id: str) -> None:
-    """std_msgs/Header."""
+    """Write a std_msgs/Header."""
     writer.stamp_ns(stamp_ns)
     writer.string(frame_id, "header.frame_id")

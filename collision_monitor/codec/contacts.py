@@ -1,4 +1,4 @@
-"""ContactArray: what touches after one step."""
+"""ContactArray: the contacts after one step."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collision_monitor.codec.cdr import Buffer, Ids, Reader, Records, Writer, wr
 
 @dataclass(frozen=True, eq=False)
 class ContactArray:
-    """contacts (n,) of records.CONTACT, a read-only view."""
+    """A ContactArray message. contacts (n,) of records.CONTACT, a read-only view."""
 
     stamp_ns: int
     frame_id: str
@@ -21,7 +21,7 @@ class ContactArray:
 
 
 def decode_contacts(data: Buffer) -> ContactArray:
-    """Raises MessageError."""
+    """Decode a ContactArray. Raises MessageError."""
     reader = Reader(data, "ContactArray")
     result = ContactArray(
         stamp_ns=reader.stamp_ns(),
@@ -36,7 +36,7 @@ def decode_contacts(data: Buffer) -> ContactArray:
 
 
 def encode_contacts(stamp_ns: int, frame_id: str, step: int, contacts: Records, ids: Ids, names: list[str]) -> bytes:
-    """Raises MessageError."""
+    """Encode a ContactArray. Raises MessageError."""
     writer = Writer("ContactArray")
     write_header(writer, stamp_ns, frame_id)
     writer.scalar("u8", step, "step")

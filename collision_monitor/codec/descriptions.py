@@ -1,4 +1,4 @@
-"""ObjectDescriptionArray: what the objects are."""
+"""ObjectDescriptionArray: the descriptions of the objects."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Change = ObjectDescription | Removal
 
 @dataclass(frozen=True, eq=False)
 class ObjectDescriptionArray:
-    """The changes that can be made, in order, and for each of the others its id and why not."""
+    """The changes that are possible, in order; and the id of each refused one, with the reason."""
 
     stamp_ns: int
     frame_id: str
@@ -42,7 +42,7 @@ class ObjectDescriptionArray:
 
 @dataclass(frozen=True, eq=False)
 class _Fields:
-    """An ObjectDescription as it stands in the message, before anything is made of it."""
+    """The fields of an ObjectDescription in the message, before they are checked."""
 
     object_id: int
     operation: int
@@ -66,7 +66,7 @@ _LEAST_DESCRIPTION = 111
 
 
 def decode_descriptions(data: Buffer) -> ObjectDescriptionArray:
-    """Raises MessageError for bytes that are no such message; an impossible object is only listed as refused."""
+    """Decode an ObjectDescriptionArray. Raises MessageError. An impossible object is only listed as refused."""
     reader = Reader(data, "ObjectDescriptionArray")
     stamp_ns, frame_id = reader.stamp_ns(), reader.string("header.frame_id")
     snapshot = reader.boolean("snapshot")
@@ -105,7 +105,7 @@ def _read_description(reader: Reader) -> _Fields:
 
 
 def _change(it: _Fields) -> Change:
-    """Raises ShapeError, PoseError or InputError."""
+    """Return the change that the fields describe. Raises ShapeError, PoseError or InputError."""
     if it.operation == _REMOVE:
         return Removal(it.object_id)
     if it.operation != _ADD:
@@ -123,27 +123,27 @@ def _change(it: _Fields) -> Change:
         mask=it.mask,
         allowed=tuple(it.allowed.tolist()),
         padding=it.padding,
-        model=it.model,  # type: ignore[arg-type]  # checked there
+        model=it.model,  # type: ignore[arg-type]  # ObjectDescription checks it
         max_linear_acceleration=it.max_linear_acceleration,
         max_angular_acceleration=it.max_angular_acceleration,
     )
 
 
 def _pose(row: Floats) -> Pose:
-    if row.tobytes() == _IDENTITY_BYTES:  # most shapes stand in their object's origin: one pose serves them all
+    if row.tobytes() == _IDENTITY_BYTES:  # most shapes lie in their object's origin and share this pose
         return _IDENTITY
     return Pose(row[:3], row[3:])
 
 
 def encode_descriptions(stamp_ns: int, frame_id: str, objects: Sequence[Change], *, snapshot: bool = False) -> bytes:
-    """The inverse of `decode_descriptions`. Raises MessageError."""
+    """Encode an ObjectDescriptionArray. Raises MessageError."""
     writer = Writer("ObjectDescriptionArray")
     write_header(writer, stamp_ns, frame_id)
     writer.scalar("u1", snapshot, "snapshot")
     writer.scalar("u4", len(objects), "objects")
     for each in objects:
         if isinstance(each, Removal):
-            it = ObjectDescription(each.object_id, Sphere(1.0))  # only the id is read of it
+            it = ObjectDescription(each.object_id, Sphere(1.0))  # receivers read only its id
             _write_description(writer, it, _REMOVE)
         else:
             _write_description(writer, each, _ADD)

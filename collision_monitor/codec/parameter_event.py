@@ -1,6 +1,6 @@
-"""rcl_interfaces/ParameterEvent: which parameters of a node changed, and to what: how a session holds new settings.
+"""rcl_interfaces/ParameterEvent: changed parameters of a node and their values. Sessions hold new settings in it.
 
-Of the kinds of values, those that settings have: bool, integer, double, string and an array of doubles.
+It is written only with the kinds of values that settings have: bool, integer, double, string and an array of doubles.
 """
 
 from __future__ import annotations
@@ -19,12 +19,15 @@ _BOOL, _INTEGER, _DOUBLE, _STRING, _DOUBLE_ARRAY = 1, 2, 3, 4, 8
 _KINDS: Final = {bool: _BOOL, int: _INTEGER, float: _DOUBLE, str: _STRING, list: _DOUBLE_ARRAY, tuple: _DOUBLE_ARRAY}
 
 _SHORTEST: Final = 40
-"""Bytes that a parameter takes at least."""
+"""Bytes of the shortest parameter."""
 
 
 @dataclass(frozen=True)
 class ParameterEvent:
-    """changed: the parameters that have a new value, by name, in order. New and deleted ones are left out."""
+    """A ParameterEvent message.
+
+    changed: the parameters that have a new value, by name, in order. New and deleted ones are left out.
+    """
 
     stamp_ns: int
     node: str
@@ -32,7 +35,7 @@ class ParameterEvent:
 
 
 def encode_parameter_event(stamp_ns: int, node: str, changed: Mapping[str, Any]) -> bytes:
-    """Raises MessageError for a value of another kind."""
+    """Encode a ParameterEvent. Raises MessageError for a value of another kind."""
     writer = Writer("ParameterEvent")
     writer.stamp_ns(stamp_ns)
     writer.string(node, "node")
@@ -45,7 +48,7 @@ def encode_parameter_event(stamp_ns: int, node: str, changed: Mapping[str, Any])
 
 
 def _write_value(writer: Writer, name: str, value: Any) -> None:
-    """ParameterValue: the kind, then a field for each kind, of which one counts."""
+    """Write a ParameterValue: the kind, then one field for each kind. Readers use only the field of the kind."""
     kind = _KINDS.get(type(value))
     if kind is None:
         raise writer.error(f"{name}: expected one of {', '.join(k.__name__ for k in _KINDS)}, got {value!r}")
@@ -61,7 +64,7 @@ def _write_value(writer: Writer, name: str, value: Any) -> None:
 
 
 def decode_parameter_event(data: Buffer) -> ParameterEvent:
-    """Raises MessageError."""
+    """Decode a ParameterEvent. Raises MessageError."""
     reader = Reader(data, "ParameterEvent")
     stamp_ns, node = reader.stamp_ns(), reader.string("node")
     lists = []

@@ -1,4 +1,4 @@
-"""PredictedCollisionArray: what is predicted to touch after one step."""
+"""PredictedCollisionArray: the collisions that are predicted after one step."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collision_monitor.codec.cdr import Buffer, Ids, Reader, Records, Writer, wr
 
 @dataclass(frozen=True, eq=False)
 class PredictedCollisionArray:
-    """predictions (n,) of records.PREDICTION, a read-only view."""
+    """A PredictedCollisionArray message. predictions (n,) of records.PREDICTION, a read-only view."""
 
     stamp_ns: int
     frame_id: str
@@ -22,7 +22,7 @@ class PredictedCollisionArray:
 
 
 def decode_predictions(data: Buffer) -> PredictedCollisionArray:
-    """Raises MessageError."""
+    """Decode a PredictedCollisionArray. Raises MessageError."""
     reader = Reader(data, "PredictedCollisionArray")
     result = PredictedCollisionArray(
         stamp_ns=reader.stamp_ns(),
@@ -40,7 +40,7 @@ def decode_predictions(data: Buffer) -> PredictedCollisionArray:
 def encode_predictions(
     stamp_ns: int, frame_id: str, step: int, horizon: float, predictions: Records, ids: Ids, names: list[str]
 ) -> bytes:
-    """Raises MessageError."""
+    """Encode a PredictedCollisionArray. Raises MessageError."""
     writer = Writer("PredictedCollisionArray")
     write_header(writer, stamp_ns, frame_id)
     writer.scalar("u8", step, "step")

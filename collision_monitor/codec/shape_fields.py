@@ -1,4 +1,4 @@
-"""Shape: the fields of the message and the shapes that they describe."""
+"""The message Shape: its fields, and the shapes that they describe."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ LEAST_SHAPE = 13
 
 
 def read_shape(reader: Reader) -> tuple[int, Floats, Floats, Ids]:
-    """type, dimensions (n,), vertices (n, 3), triangles (n,)"""
+    """Read type, dimensions (n,), vertices (n, 3), triangles (n,)."""
     return (
         reader.scalar("u1", "type"),
         reader.sequence("<f8", 8, "dimensions"),
@@ -51,7 +51,7 @@ _DIMENSIONS: dict[int, tuple[type[Shape], str]] = {
 
 
 def make_shape(kind: int, dimensions: Floats, vertices: Floats, triangles: Ids) -> Shape:
-    """Raises ShapeError."""
+    """Return the shape that the fields describe. Raises ShapeError."""
     if kind in _DIMENSIONS:
         make, names = _DIMENSIONS[kind]
         expected = names.count(",") + 1
@@ -76,7 +76,7 @@ def make_shape(kind: int, dimensions: Floats, vertices: Floats, triangles: Ids) 
 
 
 def write_shape(writer: Writer, shape: Shape) -> None:
-    """Raises MessageError for what is no shape."""
+    """Write a shape. Raises MessageError for any other object."""
     kind, dimensions, vertices, triangles = _shape_fields(shape)
     writer.scalar("u1", kind, "type")
     writer.sequence(np.array(dimensions, dtype="<f8"), "<f8", 8)
@@ -87,7 +87,7 @@ def write_shape(writer: Writer, shape: Shape) -> None:
 
 
 def _shape_fields(shape: Shape) -> tuple[ShapeType, tuple[float, ...], Floats, NDArray[Any]]:
-    """type, dimensions, vertices (n, 3), triangles (n, 3)"""
+    """Return type, dimensions, vertices (n, 3), triangles (n, 3)."""
     no_vertices, no_triangles = np.empty((0, 3)), np.empty((0, 3), np.uint32)
     match shape:
         case Sphere(radius):

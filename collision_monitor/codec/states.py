@@ -1,4 +1,4 @@
-"""ObjectStateArray: where the objects are and how they move."""
+"""ObjectStateArray: the poses and twists of the objects."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ COVARIANCE_SIZE = 12
 
 @dataclass(frozen=True, eq=False)
 class ObjectStateArray:
-    """states (n,) of records.STATE and covariance (0,) or (12 n,), both read-only views."""
+    """An ObjectStateArray message. states (n,) of records.STATE and covariance (0,) or (12 n,) are read-only views."""
 
     stamp_ns: int
     frame_id: str
@@ -25,7 +25,7 @@ class ObjectStateArray:
 
 
 def decode_states(data: Buffer) -> ObjectStateArray:
-    """Raises MessageError. The length of `covariance` is not compared with that of `states`."""
+    """Decode an ObjectStateArray. Raises MessageError. The length of `covariance` is not checked against `states`."""
     reader = Reader(data, "ObjectStateArray")
     result = ObjectStateArray(
         stamp_ns=reader.stamp_ns(),
@@ -41,7 +41,7 @@ def decode_states(data: Buffer) -> ObjectStateArray:
 def encode_states(
     stamp_ns: int, frame_id: str, sequence: int, states: Records, covariance: Floats | None = None
 ) -> bytes:
-    """The inverse. Raises MessageError."""
+    """Encode an ObjectStateArray. Raises MessageError."""
     writer = Writer("ObjectStateArray")
     write_header(writer, stamp_ns, frame_id)
     writer.scalar("u4", sequence, "sequence")

@@ -1,4 +1,4 @@
-"""MonitorStatus: what the monitor did and what it refused."""
+"""MonitorStatus: counters of what the monitor did and what it refused."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Text = Annotated[str, "string"]
 
 @dataclass(frozen=True)
 class MonitorStatus:
-    """The message, field by field in its order; the annotations are the wire types."""
+    """The fields of the message in their order; the annotations are the wire types."""
 
     stamp_ns: int = 0
     frame_id: str = ""
@@ -62,7 +62,7 @@ class MonitorStatus:
 
 
 LIVE_FIELDS = tuple(f.name for f in dataclasses.fields(MonitorStatus))[-10:]
-"""The fields of `MonitorStatus` that depend on the clock and the disk; the others are a function of the inputs."""
+"""The fields of `MonitorStatus` that depend on the clock and the disk; the others depend on the inputs alone."""
 
 _WIRE = {
     name: get_args(hint)[1]
@@ -72,7 +72,7 @@ _WIRE = {
 
 
 def decode_status(data: Buffer) -> MonitorStatus:
-    """Raises MessageError."""
+    """Decode a MonitorStatus. Raises MessageError."""
     reader = Reader(data, "MonitorStatus")
     values: dict[str, Any] = {"stamp_ns": reader.stamp_ns(), "frame_id": reader.string("header.frame_id")}
     for name, kind in _WIRE.items():
@@ -82,7 +82,7 @@ def decode_status(data: Buffer) -> MonitorStatus:
 
 
 def encode_status(status: MonitorStatus) -> bytes:
-    """Raises MessageError."""
+    """Encode a MonitorStatus. Raises MessageError."""
     writer = Writer("MonitorStatus")
     write_header(writer, status.stamp_ns, status.frame_id)
     for name, kind in _WIRE.items():

@@ -1,1 +1,1 @@
-"""Message bytes in, the monitor, message bytes out; without ROS."""
+"""The path from message bytes through the monitor to message bytes. Does not need ROS."""

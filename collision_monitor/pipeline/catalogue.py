@@ -1,4 +1,4 @@
-"""What the monitored objects are: the one place for what is described."""
+"""The catalogue: the one place that holds the descriptions of the monitored objects."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ class Catalogue:
     """The objects that the monitor accepted.
 
     descriptions: the last one of each object, by id. After a restart from a snapshot they are missing until an object
-    is described again. static: the ids of objects that do not move.
+    is described again. static: ids of the objects that do not move.
     """
 
     def __init__(self) -> None:
         self.descriptions: dict[int, ObjectDescription] = {}
         self.static: set[int] = set()
-        self._names: dict[int, str] = {}  # also of the removed ones
-        self._removed: set[int] = set()  # since the last step: their contacts end in the next one and need their names
+        self._names: dict[int, str] = {}  # of the removed objects too
+        self._removed: set[int] = set()  # since the last step: the next step ends their contacts and needs their names
 
     def changes(self, message: ObjectDescriptionArray) -> list[Change]:
-        """The changes that a message asks for, in order; a snapshot first removes each object that it does not mention.
+        """Return the changes that a message requests, in order.
 
-        An object that the message mentions and the codec refused stays as it was described before.
+        A snapshot first removes each object that it does not mention. An object that the message mentions and the codec
+        refused keeps its last description.
         """
         if not message.snapshot:
             return list(message.objects)
@@ -37,7 +38,7 @@ class Catalogue:
         return [*map(Removal, missing), *message.objects]
 
     def apply(self, change: Change) -> None:
-        """Take in a change that the monitor accepted."""
+        """Apply a change that the monitor accepted."""
         object_id = change.object_id
         if isinstance(change, Removal):
             self.descriptions.pop(object_id, None)
@@ -50,16 +51,16 @@ class Catalogue:
         self._removed.discard(object_id)
 
     def names(self, ids: NDArray[np.uint32]) -> list[str]:
-        """The names of these objects; those removed since the last step still have one."""
+        """Return the names of these objects. Objects removed since the last step still have one."""
         return list(map(self._names.__getitem__, ids.tolist()))
 
     def forget_removed(self) -> None:
-        """A step ended the contacts of the removed objects: their names are not needed any more."""
+        """Forget the names of the removed objects, once a step has ended their contacts."""
         while self._removed:
             del self._names[self._removed.pop()]
 
     def facts(self) -> dict[str, Any]:
-        """The state but for the descriptions, for a snapshot."""
+        """Return the state without the descriptions, for a snapshot."""
         return {
             "static": sorted(self.static),
             "names": {str(object_id): name for object_id, name in self._names.items()},
@@ -68,7 +69,7 @@ class Catalogue:
 
     @classmethod
     def restored(cls, facts: Mapping[str, Any]) -> Catalogue:
-        """The inverse of `facts`. Raises KeyError, TypeError, ValueError or AttributeError for other facts."""
+        """Restore a catalogue from `facts`. Raises KeyError, TypeError, ValueError or AttributeError for others."""
         catalogue = cls()
         catalogue.static, catalogue._removed = set(facts["static"]), set(facts["removed"])
         catalogue._names = {int(object_id): name for object_id, name in facts["names"].items()}

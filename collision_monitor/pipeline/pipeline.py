@@ -1,4 +1,4 @@
-"""Message bytes in, the monitor, message bytes out: the one path that the node and the replay share."""
+"""The path from message bytes through the monitor to message bytes, which the node and the replay share."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ _AS_THEY_WERE: Final[Mapping[str, Any]] = MappingProxyType({})
 
 @dataclass(frozen=True, eq=False)
 class Outputs:
-    """The answers of one step: complete CDR messages, and what they were made of.
+    """Answers of one step: complete CDR messages, and the result that they hold.
 
-    limit: where it is not None, the settings (ParameterEvent) without which a replay would not stop where the clock
-    stopped this step, to be recorded before the states.
+    limit: None, or the settings (ParameterEvent) with which a replay stops where the clock stopped this step. They have
+    to be recorded before the states.
     """
 
     contacts: bytes
@@ -60,10 +60,10 @@ class Outputs:
 
 
 class Pipeline:
-    """Feeds a Monitor with message bytes. No method raises for what a message holds: it is refused and counted.
+    """Feeds a Monitor with message bytes. No method raises for the content of a message: it is refused and counted.
 
-    catalogue: what is monitored, as it was described last. timed: whether a profile's budget counts; in a replay the
-    recorded settings say how far each step came. kept: settings that no recorded change alters.
+    catalogue: the monitored objects with their last descriptions. timed: whether a profile's budget applies; in a
+    replay the recorded settings determine how far each step comes. kept: settings that no recorded change alters.
     """
 
     def __init__(
@@ -79,12 +79,12 @@ class Pipeline:
         self.frame_id = frame_id
         self._lost = LostMessages()
         self._kept = frozenset(kept)
-        self._limit = self.monitor.profile.pairs_per_step  # as a replay knows it
+        self._limit = self.monitor.profile.pairs_per_step  # the value that a replay has
 
     # -- states: one step
 
     def on_states(self, data: bytes) -> Outputs | None:
-        """An ObjectStateArray: one step. None: the message was refused as a whole and there is no new answer."""
+        """Process an ObjectStateArray, which is one step. None: the message was refused and there is no new answer."""
         with self.monitor.clock:
             message = self._decode_states(data)
             if message is None:
@@ -94,7 +94,7 @@ class Pipeline:
             return self._encode(result) if result.accepted else None
 
     def _decode_states(self, data: bytes) -> ObjectStateArray | None:
-        """None: the message was refused."""
+        """Return the message; None if it was refused."""
         try:
             message = decode_states(data)
         except MessageError as error:
@@ -121,7 +121,7 @@ class Pipeline:
         return Outputs(contacts, predictions, result, self.monitor.digest, self._limit_of(result))
 
     def _mentioned(self, answers: Records) -> tuple[NDArray[np.uint32], list[str]]:
-        """The ids in `answers`, ascending, and their names."""
+        """Return the ids in `answers`, ascending, and their names."""
         ids = np.sort(np.concatenate([answers["id_a"], answers["id_b"]]))  # np.unique hashes, four times as slow
         is_first = np.ones(len(ids), np.bool_)
         np.not_equal(ids[1:], ids[:-1], out=is_first[1:])
@@ -138,7 +138,7 @@ class Pipeline:
     # -- shapes
 
     def on_shapes(self, data: bytes) -> list[Change]:
-        """An ObjectDescriptionArray: add, replace, remove. An object that cannot be is refused, the others not.
+        """Process an ObjectDescriptionArray: add, replace and remove objects. An impossible object alone is refused.
 
         Returns the changes that were made, in order, with the removals that a snapshot implies.
         """
@@ -154,21 +154,21 @@ class Pipeline:
         return [change for change in self.catalogue.changes(message) if self._apply(change)]
 
     def _apply(self, change: Change) -> bool:
-        """Change the monitor and then the catalogue; False: the monitor did not accept it."""
+        """Change the monitor and then the catalogue. Return False if the monitor did not accept the change."""
         try:
             if isinstance(change, Removal):
                 self.monitor.remove(change.object_id)
             else:
                 self.monitor.describe(change)
         except CollisionMonitorError as error:
-            if not isinstance(change, Removal):  # removing what is not there is no error: the sender's wish is met
+            if not isinstance(change, Removal):  # removing an unknown object is no error
                 self.monitor.refuse(Refusal.SHAPE, str(error))
             return False
         self.catalogue.apply(change)
         return True
 
     def _is_our_frame(self, frame_id: str, message: str) -> bool:
-        """An empty frame is taken for ours."""
+        """Return whether the frame is ours, else refuse the message. An empty frame counts as ours."""
         if frame_id in ("", self.frame_id):
             return True
         self.monitor.refuse(Refusal.FRAME, f"{message}: expected frame_id {self.frame_id!r}, got {frame_id!r}")
@@ -177,9 +177,9 @@ class Pipeline:
     # -- settings
 
     def on_settings(self, data: bytes) -> None:
-        """A ParameterEvent: settings that hold from here on, as `change_settings` gave it.
+        """Process a ParameterEvent from `change_settings`: settings that are in force from now on.
 
-        Objects keep their models until they are described again, as a session does behind it.
+        Objects keep their models until they are described again. A session holds those descriptions behind the event.
         """
         try:
             changes = {name: value for name, value in decode_settings(data).items() if name not in self._kept}
@@ -188,7 +188,7 @@ class Pipeline:
             self.monitor.refuse(Refusal.MALFORMED, str(error))
 
     def change_settings(self, profile: Profile, stamp_ns: int, node: str = "") -> SettingsChange:
-        """Go by this profile from here on; objects whose model it chooses otherwise are described again."""
+        """Use this profile from now on. Describe those objects again that get another model by it."""
         monitor = self.monitor
         changes = monitor.profile.differences(profile)
         objects = list(self.catalogue.descriptions.values())
@@ -204,9 +204,9 @@ class Pipeline:
     # -- status and metadata
 
     def status(self, *, silent: bool = False, **live: Any) -> bytes:
-        """A MonitorStatus: the last step's counters, and the fields of `codec.status.LIVE_FIELDS` from the caller.
+        """Return a MonitorStatus: the last step's counters, and the caller's fields of `codec.status.LIVE_FIELDS`.
 
-        silent: states no longer arrive, so every moving object that was seen counts as stale.
+        silent: no states arrive any more, so every moving object that was seen counts as stale.
         """
         monitor, last = self.monitor, self.monitor.last
         if last is not None:
@@ -232,17 +232,17 @@ class Pipeline:
         )
 
     def metadata(self, node: str = "") -> dict[str, str]:
-        """What a session needs to be replayed and compared: profile, frame, versions, determinism key."""
+        """Return what a replay and its comparison need: profile, frame, versions, determinism key."""
         return {**provenance(), "profile": self.settings(), "frame_id": self.frame_id, "node": node}
 
     def settings(self) -> str:
-        """The profile in force, as a session's metadata has it."""
+        """Return the profile in force as JSON, as a session's metadata holds it."""
         return json.dumps(self.monitor.profile.to_dict(), sort_keys=True)
 
     # -- snapshots
 
     def snapshot(self) -> Snapshot:
-        """All that later answers depend on, copied: 0.3 ms for 200 objects."""
+        """Return a copy of all state that later answers depend on. Takes 0.3 ms for 200 objects."""
         snapshot = self.monitor.snapshot()
         snapshot.facts[_PIPELINE] = {
             **self._lost.facts(),
@@ -253,9 +253,10 @@ class Pipeline:
 
     @classmethod
     def restored(cls, snapshot: Snapshot, frame_id: str, settings: Mapping[str, Any] = _AS_THEY_WERE) -> Pipeline:
-        """Goes on from there, without a clock, with the same answers; the catalogue has no descriptions at first.
+        """Return a pipeline that continues from the snapshot with the same answers, without a clock.
 
-        settings: in place of those that were in force, for good. Raises InputError where the snapshot cannot be used.
+        Its catalogue has no descriptions at first. settings: replace those in force, permanently. Raises InputError if
+        the snapshot cannot be used.
         """
         try:
             facts = snapshot.facts[_PIPELINE]

@@ -1,4 +1,4 @@
-"""What the answers depend on besides the inputs and the profile; a replay compares it before anything else."""
+"""What the answers depend on besides the inputs and the profile. A replay compares it first."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from collision_monitor._jit.imports import source_file, with_dependencies
 from collision_monitor._version import VERSION
 
 _ROOT: Final = "collision_monitor.pipeline.pipeline"
-"""The module that makes answers of inputs. What it does not import, also through others, has no part in them."""
+"""The module that computes answers from inputs. Modules that it does not import, even indirectly, have no effect."""
 
 
 @cache
 def provenance() -> dict[str, str]:
-    """Versions, processor, and `determinism_key`: where two of these are equal, equal inputs give equal bytes."""
+    """Return versions, processor and `determinism_key`. If two keys are equal, equal inputs give equal bytes."""
     facts = {
         "version": VERSION,
         "python": platform.python_version(),
@@ -39,9 +39,9 @@ def provenance() -> dict[str, str]:
 
 
 def _code(source: bytes) -> str:
-    """What a source file does: its bytecode, without comments, docstrings and line numbers.
+    """Return what a source file does: its bytecode, without comments, docstrings and line numbers.
 
-    Compiling takes a third of the time of `ast.dump`. Two results can be compared within one version of Python.
+    Compiling takes a third of the time of `ast.dump`. Results are comparable within one version of Python.
     """
     return _describe(compile(source, "", "exec", dont_inherit=True, optimize=2))
 
@@ -62,5 +62,5 @@ def _constant(value: object) -> str:
 
 
 def _is_line_number(value: object, code: CodeType) -> bool:
-    """Whether it is the line of a class, which Python 3.13 stores in the body of the class."""
+    """Return whether it is the line number of a class, which Python 3.13 stores in the body of the class."""
     return "__firstlineno__" in code.co_names and value == code.co_firstlineno

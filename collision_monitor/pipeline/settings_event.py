@@ -1,4 +1,4 @@
-"""Settings as a session holds them: a ParameterEvent with the parameters that changed."""
+"""Settings in a session: a ParameterEvent with the parameters that changed."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any, Final
 from collision_monitor.codec import decode_parameter_event, encode_parameter_event
 
 PROFILE: Final = "profile"
-"""The parameter that names the profile; as a field of `Profile` it is `name`."""
+"""The parameter that names the profile; the field of `Profile` is called `name`."""
 
 LIMIT: Final = "pairs_per_step"
-"""The setting by which a replay does as much in a step as the clock allowed."""
+"""The setting with which a replay does as much in a step as the clock allowed."""
 
 _PARAMETER: Final = {"name": PROFILE}
 _FIELD: Final = {PROFILE: "name"}
@@ -20,10 +20,10 @@ _FIELD: Final = {PROFILE: "name"}
 
 @dataclass(frozen=True)
 class SettingsChange:
-    """What a session needs where settings change, in this order: complete CDR messages.
+    """Complete CDR messages that a session needs if settings change, in this order.
 
     settings: the ParameterEvent. shapes: an ObjectDescriptionArray of the objects that have another model from now on;
-    None: there are none.
+    None if there are none.
     """
 
     settings: bytes
@@ -31,12 +31,12 @@ class SettingsChange:
 
 
 def encode_settings(stamp_ns: int, node: str, changes: Mapping[str, Any]) -> bytes:
-    """changes: fields of a profile and their new values. Raises MessageError."""
+    """Encode changed settings. changes: fields of a profile and their new values. Raises MessageError."""
     named = {_PARAMETER.get(field, field): value for field, value in changes.items()}
     return encode_parameter_event(stamp_ns, node, named)
 
 
 def decode_settings(data: bytes) -> dict[str, Any]:
-    """The inverse: fields of a profile and their new values. Raises MessageError."""
+    """Return the changed settings: fields of a profile and their new values. Raises MessageError."""
     changed = decode_parameter_event(data).changed
     return {_FIELD.get(parameter, parameter): value for parameter, value in changed.items()}

@@ -1,4 +1,4 @@
-"""A ROS domain of one's own, so that two sessions on one machine do not hear each other."""
+"""A free ROS domain, so that two sessions on one machine do not receive each other's messages."""
 
 from __future__ import annotations
 
@@ -8,11 +8,14 @@ import socket
 from collision_monitor.errors import InputError
 
 DOMAINS = range(1, 102)
-"""Beyond, DDS ports meet the ephemeral ports of Linux."""
+"""Beyond these, DDS ports overlap the ephemeral ports of Linux."""
 
 
 def free_domain() -> int:
-    """A domain that nobody on this machine uses: its first participant would hold this port (DDSI-RTPS 9.6.1)."""
+    """Return a domain that no process on this machine uses.
+
+    The first participant of a domain binds the port that is probed here (DDSI-RTPS 9.6.1).
+    """
     for domain in random.sample(DOMAINS, len(DOMAINS)):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             try:

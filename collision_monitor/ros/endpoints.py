@@ -1,4 +1,4 @@
-"""Publishers and subscriptions of the monitor's topics: message class and quality of service are the topic's."""
+"""Publishers and subscriptions of the monitor's topics, with the message class and quality of service of each topic."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from collision_monitor.pipeline.topics import Topic
 
 
 def quality_of(topic: Topic) -> QoSProfile:
-    """The quality of service, the same for the publisher and for every subscriber."""
+    """Return the quality of service, which is the same for the publisher and for every subscriber."""
     depth, reliability, durability = topic.quality
     return QoSProfile(
         depth=depth,
@@ -25,18 +25,18 @@ def quality_of(topic: Topic) -> QoSProfile:
 
 
 def message_class(topic: Topic) -> Any:
-    """The generated class of the topic's message."""
+    """Return the generated class of the topic's message."""
     package, _, name = topic.type_name.split("/")
     return getattr(import_module(f"{package}.msg"), name)
 
 
 def publisher(node: Node, topic: Topic, name: str | None = None) -> Publisher:
-    """name: the topic's full name; None: below the node's own."""
+    """Create a publisher. name: the topic's full name; None: below the node's own."""
     return node.create_publisher(message_class(topic), name or topic.private, quality_of(topic))
 
 
 def subscription(
     node: Node, topic: Topic, callback: Callable[[bytes], object], name: str | None = None
 ) -> Subscription:
-    """The callback gets the bytes of each message. name: the topic's full name; None: below the node's own."""
+    """Create a subscription whose callback gets the bytes of each message. name: as of `publisher`."""
     return node.create_subscription(message_class(topic), name or topic.private, callback, quality_of(topic), raw=True)

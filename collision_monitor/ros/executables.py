@@ -1,4 +1,4 @@
-"""The executables of `ros2 run collision_monitor …`. Signals are taken over before the slow imports."""
+"""The executables of `ros2 run collision_monitor …`. They install their signal handlers before the slow imports."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collision_monitor.errors import CollisionMonitorError
 from collision_monitor.ros.process import StopRequest, ros_context, spin, stay_on_this_machine
 
 BAD_INPUT = 2
-"""Exit code for parameters that cannot be."""
+"""Exit code for impossible parameters."""
 
 
 def monitor(args: Sequence[str] | None = None) -> int:

@@ -1,7 +1,7 @@
 """Settings that change while the monitor runs: `ros2 param set /object_monitor profile fast`.
 
-Setting `profile` sets the parameters of all that the profile names, so that what can be read is what is in force.
-Each change is checked as a whole before any of it holds.
+Setting `profile` sets the parameters of all settings in the profile, so that the parameters show the settings in force.
+Each change is checked as a whole before any part of it takes effect.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from collision_monitor.settings.profile import Profile
 
 
 class LiveSettings:
-    """Follows the node's parameters. change: called with the profile that holds from now on."""
+    """Follows the node's parameters. change: called with the profile that is in force from now on."""
 
     def __init__(self, node: Node, profile: Profile, change: Callable[[Profile], None]) -> None:
         self._profile = profile
@@ -30,14 +30,14 @@ class LiveSettings:
         node.add_post_set_parameters_callback(self._apply)
 
     def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
-        """With what the profile names; and a whole number where a decimal one is meant."""
+        """Add the parameters that a profile sets, and convert a whole number if the setting is a decimal one."""
         given = {each.name: self._as_meant(each) for each in parameters}
         named: dict[str, Parameter] = {}
         if isinstance(chosen := given[PROFILE].value if PROFILE in given else None, str):
             try:
                 changes = self._profile.differences(self._profile.switched(chosen))
             except ProfileError:
-                return parameters  # `_check` says why
+                return parameters  # `_check` reports the reason
             named = {name: Parameter(name, value=value) for name, value in changes.items() if name in self._settings}
         return list({**named, **given}.values())
 
@@ -61,7 +61,7 @@ class LiveSettings:
             self._change(profile)
 
     def _changed(self, parameters: list[Parameter]) -> Profile:
-        """The profile with these parameters. Raises ProfileError."""
+        """Return the profile with these parameters. Raises ProfileError."""
         values = {each.name: each.value for each in parameters}
         profile = self._profile.switched(values[PROFILE]) if PROFILE in values else self._profile
         settings = {name: plain(values[name], each) for name, each in self._settings.items() if name in values}

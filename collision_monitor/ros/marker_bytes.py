@@ -19,7 +19,7 @@ Color = tuple[float, float, float, float]
 
 
 class Kind(IntEnum):
-    """`Marker.type`."""
+    """Values of `Marker.type`."""
 
     LINE_LIST = 5
     SPHERE_LIST = 7
@@ -29,7 +29,7 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True)
 class Marker:
-    """What is drawn in one go: all points (n, 3) in the frame of the array, one colour."""
+    """One marker: all points (n, 3) in the frame of the array, one colour."""
 
     namespace: str
     kind: Kind
@@ -42,7 +42,7 @@ class Marker:
 
     @property
     def empty(self) -> bool:
-        """Nothing to draw."""
+        """Whether there is nothing to draw."""
         return not len(self.points) and not self.text
 
 
@@ -50,7 +50,7 @@ _ADD, _DELETE = 0, 2
 
 
 def encode(stamp_ns: int, frame_id: str, markers: list[Marker]) -> bytes:
-    """The array; a marker with nothing to draw is sent as a DELETE, so that what it showed before disappears."""
+    """Encode the array. A marker with nothing to draw becomes a DELETE, so that its last picture disappears."""
     writer = Writer("visualization_msgs/MarkerArray")
     writer.scalar("u4", len(markers), "markers")
     for marker in markers:

@@ -1,4 +1,4 @@
-"""A picture of a step for RViz or Foxglove: shapes by what happens to them, contacts, and impacts to come."""
+"""A picture of a step for RViz or Foxglove: shapes coloured by their state, contacts, and predicted impacts."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ _TOUCHING: Final[Color] = (0.85, 0.15, 0.15, 1.0)
 _CONTACT: Final[Color] = (1.0, 1.0, 1.0, 1.0)
 
 _NORMAL_LENGTH = 0.5
-"""m, of the line that shows a contact's normal."""
+"""Length of the line that shows a contact's normal (m)."""
 _LABELS = 10
-"""The soonest impacts are labelled with the time that is left."""
+"""Number of soonest impacts that are labelled with the time left."""
 
 Vertices = NDArray[np.float64]
 
 
 class MarkerView:
-    """Draws the objects of a catalogue where they were last; builds their surfaces only when asked to draw."""
+    """Draws the objects of a catalogue at their last poses. Builds their surfaces only when it draws."""
 
     def __init__(self, catalogue: Catalogue, frame_id: str) -> None:
         self._catalogue = catalogue
@@ -47,7 +47,7 @@ class MarkerView:
         self._poses: dict[int, NDArray[np.float64]] = {}
 
     def update(self, changes: Iterable[Change]) -> None:
-        """Take in which objects of the catalogue are new, changed or removed."""
+        """Note which objects of the catalogue are new, changed or removed."""
         self._changed = True
         for each in changes:
             if isinstance(each, Removal):
@@ -61,7 +61,7 @@ class MarkerView:
         self._unbuilt.discard(object_id)
 
     def _build(self) -> None:
-        """Surfaces of what changed since the last picture."""
+        """Build the surfaces of the objects that changed since the last picture."""
         for object_id in self._unbuilt:
             it = self._catalogue.descriptions[object_id]
             self._surfaces.pop(object_id, None)
@@ -80,7 +80,10 @@ class MarkerView:
         self._changed = False
 
     def draw(self, states: NDArray[np.void], result: StepResult) -> bytes:
-        """MarkerArray bytes; `states`: those of the step (records.STATE). Objects without a state are left out."""
+        """Return the bytes of a MarkerArray. Objects without a state are left out.
+
+        states (n,): those of the step (records.STATE).
+        """
         if self._changed:
             self._build()
         for state in states:

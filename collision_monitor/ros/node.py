@@ -1,4 +1,4 @@
-"""The monitor as a ROS 2 node: message bytes in, the pipeline, message bytes out, and all of it on record.
+"""The monitor as a ROS 2 node: passes message bytes through the pipeline, publishes the answers and records everything.
 
     ros2 run collision_monitor monitor --ros-args -p horizon:=1.0 -p record:=run.mcap
 """
@@ -30,20 +30,23 @@ from collision_monitor.ros.step_times import StepTimes
 from collision_monitor.settings.profile import Profile
 
 WATCHDOG_PERIOD: Final = 0.5
-"""s: without steps the status still comes at least this often, so that silence is never read as "clear"."""
+"""s: without steps the status is still published at least this often, so that silence never means "clear"."""
 
 MARKER_PERIOD: Final = 100_000_000
-"""ns between two pictures, and only while someone looks."""
+"""ns between two pictures. Without a subscriber there are none."""
 
 LOG_PERIOD: Final = 5_000_000_000
-"""ns between two lines for people."""
+"""ns between two status lines in the log."""
 
 COMPILER_PATIENCE: Final = 3.0
-"""s until people are told why nothing happens yet; compiled kernels are loaded well within it."""
+"""s until the log explains the wait. Loading compiled kernels takes much less."""
 
 
 class MonitorNode(Node):
-    """Subscribes to shapes and states, publishes contacts, predictions, status and markers. Raises ProfileError."""
+    """Subscribes to shapes and states, publishes contacts, predictions, status and markers.
+
+    Raises InputError or ProfileError for impossible parameters.
+    """
 
     def __init__(self, stop: StopRequest) -> None:
         super().__init__(NODE, automatically_declare_parameters_from_overrides=True)
@@ -70,7 +73,7 @@ class MonitorNode(Node):
             self, settings.record, lambda: self._pipeline.metadata(self._name), settings.splitting
         )
         self._live_settings = LiveSettings(self, settings.profile, self._on_settings)
-        # Shapes first: where both wait, the executor takes them in this order.
+        # Shapes first: if both wait, the executor takes them in this order.
         shapes = subscription(self, Topic.SHAPES, self._on_shapes)
         states = subscription(self, Topic.STATES, self._on_states)
         self.create_timer(WATCHDOG_PERIOD, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -82,7 +85,7 @@ class MonitorNode(Node):
         )
 
     def _warm_up(self, stop: StopRequest) -> None:
-        """Before anything arrives: a message that waits for the compiler is a message lost."""
+        """Load or compile the kernels before messages arrive, because messages that wait for the compiler are lost."""
         text = "compiling the kernels, once for this machine and version: this takes a minute or two"
         patience = threading.Timer(COMPILER_PATIENCE, self.get_logger().info, [text])
         patience.start()
@@ -95,7 +98,7 @@ class MonitorNode(Node):
     # -- states: one step
 
     def _on_states(self, data: bytes) -> None:
-        """Publish the answers, then record them; status, picture and snapshot come where they are due."""
+        """Publish the answers, then record them. Publish status and markers and record a snapshot if they are due."""
         began, received = time.monotonic_ns(), self._now()
         outputs = self._answer(data)
         ended = time.monotonic_ns()
@@ -110,16 +113,16 @@ class MonitorNode(Node):
         self._recording.write_snapshot_if_due(self._pipeline.snapshot)
 
     def _answer(self, states: bytes) -> Outputs | None:
-        """One step and its answers, all within the step's budget."""
+        """Take one step and publish its answers, all within the step's budget."""
         with self._pipeline.monitor.clock:
             outputs = self._pipeline.on_states(states)
             if outputs is not None:
-                self._predictions_out.publish(outputs.predictions)  # first: the earlier a warning, the more it is worth
+                self._predictions_out.publish(outputs.predictions)  # first: a warning is worth more if it is early
                 self._contacts_out.publish(outputs.contacts)
             return outputs
 
     def _record_step(self, states: bytes, outputs: Outputs, received: int) -> None:
-        """In the order that a replay needs: how far the step came, what went in, what came out."""
+        """Record a step in the order that a replay needs: how far the step came, the inputs, the answers."""
         stamp = outputs.result.stamp_ns
         begins = self._is_event_wanted and bool((outputs.result.contacts["phase"] == Phase.BEGIN).any())
         if outputs.limit is not None:
@@ -146,7 +149,7 @@ class MonitorNode(Node):
         self._publish_status_if_due(time.monotonic_ns())  # so that the sender learns when its shapes are known
 
     def _on_settings(self, profile: Profile) -> None:
-        """Between two steps, like all callbacks."""
+        """Change the settings. Like all callbacks, this runs between two steps."""
         now = self._now()
         change = self._pipeline.change_settings(profile, now, self._name)
         self._recording.write(Topic.SETTINGS, change.settings, now, now, settings=self._pipeline.settings())
@@ -156,7 +159,7 @@ class MonitorNode(Node):
         self.get_logger().info(f"settings changed, profile {profile.name}")
 
     def _record_shapes(self, data: bytes, received: int) -> None:
-        """An ObjectDescriptionArray that the pipeline has taken in, and all that is described since."""
+        """Record an ObjectDescriptionArray that the pipeline has processed, with all objects described since then."""
         objects = tuple(self._pipeline.catalogue.descriptions.values())
         self._recording.write(Topic.SHAPES, data, received, received, objects=objects)
 
@@ -174,7 +177,7 @@ class MonitorNode(Node):
             self.get_logger().info(status_line(codec.decode_status(self._publish_status())))
 
     def _is_silent(self, now: int) -> bool:
-        """Whether states came once and come no more, by the steady clock."""
+        """Return whether states once arrived and no longer arrive, by the steady clock."""
         return self._last_step is not None and now - self._last_step >= self._pipeline.monitor.profile.stale_after * 1e9
 
     def _log_silence(self, silent: bool) -> None:
@@ -210,6 +213,6 @@ class MonitorNode(Node):
 
 
 def _keep_from_collector() -> None:
-    """Let no later step wait while Python searches modules, kernels and descriptions for garbage: 0.1 s at times."""
+    """Keep modules, kernels and descriptions out of later garbage collections, which delay a step by up to 0.1 s."""
     gc.collect()
     gc.freeze()

@@ -1,4 +1,4 @@
-"""The recording of a node: its topics, and what people learn about it. The monitoring goes on where it fails."""
+"""The recording of a node: its topics, and its messages in the log. If it fails, the monitoring continues."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from collision_monitor.session import Recorder, Recording, Splitting
 class NodeRecording:
     """Records a node's messages under the topics' full names.
 
-    path: empty: nothing is recorded. A recording that cannot start is logged, and `status` tells of it.
+    path: empty for no recording. A recording that cannot start is logged, and `status` reports it.
     """
 
     def __init__(self, node: Node, path: str, metadata: Callable[[], dict[str, str]], splitting: Splitting) -> None:
         self._logger = node.get_logger()
         self._names = {topic: node.resolve_topic_name(topic.private) for topic in RECORDED}
         self._recorder: Recorder | None = None
-        self._last: dict[str, Any] = {}  # as `status` had it when it was logged last
+        self._last: dict[str, Any] = {}  # the status at the last call of `log_problems`
         if path:
             self._start(path, metadata(), splitting)
 
@@ -39,21 +39,21 @@ class NodeRecording:
         return f"recording to {self._recorder.path}" if self._recorder else "not recording"
 
     def write(self, topic: Topic, data: bytes, log_time: int, publish_time: int, **what: Any) -> None:
-        """As `Recorder.write`."""
+        """Record a message, as `Recorder.write` does."""
         if self._recorder is not None:
             self._recorder.write(self._names[topic], data, log_time, publish_time, **what)
 
     def write_snapshot_if_due(self, snapshot: Callable[[], Snapshot]) -> None:
-        """As `Recorder.write_snapshot`, where it is time for one."""
+        """Record a snapshot, as `Recorder.write_snapshot` does, if one is due."""
         if self._recorder is not None and self._recorder.snapshot_due:
             self._recorder.write_snapshot(snapshot())
 
     def status(self) -> dict[str, Any]:
-        """The recording fields of MonitorStatus."""
+        """Return the recording fields of MonitorStatus."""
         return self._last if self._recorder is None else self._recorder.status()
 
     def log_problems(self) -> None:
-        """Log that the recording failed or dropped messages since the last call, for those who read no status."""
+        """Log a failed recording or dropped messages since the last call, for people who read no status."""
         if self._recorder is None:
             return
         last, now = self._last, self._recorder.status()

@@ -1,7 +1,7 @@
-"""The parameters of our nodes: checked when a node starts, and where one may change later, then again.
+"""The parameters of the nodes, checked when a node starts, and again when one changes.
 
-The monitor's are generated from the profile's settings, and those may change while it runs; what a node is made with
-(frame, recording, executor) is read-only.
+Those of the monitor are generated from the profile's settings, which may change while it runs. The frame, the recording
+and the executor of a node are read-only.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ _TYPES = {str: "a text", int: "a whole number", float: "a number"}
 class ParameterReader:
     """Declares the parameters of a node and returns their values.
 
-    The node is made with `automatically_declare_parameters_from_overrides`: so a misspelt name is refused rather than
-    ignored, and a whole number is accepted where a decimal one is meant (`-p horizon:=1`). Raises InputError.
+    The node is made with `automatically_declare_parameters_from_overrides`, so that a misspelt name is refused rather
+    than ignored, and a whole number is accepted in place of a decimal one (`-p horizon:=1`). Raises InputError.
     """
 
     def __init__(self, node: Node, names: Sequence[str]) -> None:
@@ -44,7 +44,7 @@ class ParameterReader:
             raise InputError(f"parameter {name!r} is unknown: {hint}")
 
     def value(self, name: str, default: T) -> T:
-        """What was given, or the default, which also says the type."""
+        """Return the given value, or the default, which also determines the type."""
         value = self._given.get(name, default)
         if isinstance(default, float) and type(value) is int:
             value = float(value)
@@ -60,13 +60,13 @@ class ParameterReader:
         self._node.declare_parameter(name, value, descriptor, ignore_override=True)
 
     def read(self, name: str, default: T, description: str) -> T:
-        """`value` and `declare` in one."""
+        """Read a value and declare it."""
         value = self.value(name, default)
         self.declare(name, value, ParameterDescriptor(description=description, read_only=True))
         return value
 
     def given(self, name: str) -> Any:
-        """What was given, whatever it is; None: nothing."""
+        """Return the given value, whatever its type; None if there is none."""
         return self._given.get(name)
 
 
@@ -77,7 +77,7 @@ _RECORD = ("record", "record_mode", "record_before", "record_after", "record_spl
 
 @dataclass(frozen=True)
 class MonitorParameters:
-    """What the monitor was told."""
+    """The parameters of the monitor."""
 
     profile: Profile
     frame_id: str
@@ -87,7 +87,7 @@ class MonitorParameters:
 
 
 def read_monitor_parameters(node: Node) -> MonitorParameters:
-    """Raises InputError, ProfileError for a setting out of range."""
+    """Read the monitor's parameters. Raises InputError, ProfileError for a setting out of range."""
     settings = Profile.fields()
     reader = ParameterReader(node, [PROFILE, *(s.name for s in settings), "frame_id", *_RECORD, "executor"])
     name = reader.value(PROFILE, "balanced")
@@ -111,7 +111,7 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
 
 
 def _read_splitting(reader: ParameterReader) -> Splitting:
-    """Raises InputError."""
+    """Read the parameters of the recording. Raises InputError."""
     mode = reader.read("record_mode", RECORD_MODES[0], "always, or on_event: only what is around collisions.")
     before = reader.read("record_before", ONE_FILE.before, "on_event: how long before each collision is kept [s].")
     after = reader.read("record_after", ONE_FILE.after, "on_event: how long after each collision begins is kept [s].")
@@ -126,7 +126,7 @@ def _read_splitting(reader: ParameterReader) -> Splitting:
 
 
 def plain(value: Any, setting: Setting) -> Any:
-    """A parameter's value as a setting takes it: arrays as tuples."""
+    """Return a parameter's value as a setting takes it: arrays as tuples."""
     return tuple(value) if setting.type is tuple and not isinstance(value, str | int | float) else value
 
 

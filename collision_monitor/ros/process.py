@@ -1,7 +1,7 @@
-"""A ROS process that ends cleanly: signals ask it to stop, what runs is finished, exit code 0.
+"""A ROS process that ends cleanly: signals request a stop, the running work is finished, and the exit code is 0.
 
-rclpy's own handlers shut the context down under the feet of a running callback, so that its last answers could not
-be published nor its recording finished. Here a signal only sets a flag, which the spin loop reads.
+rclpy's own handlers shut the context down during a callback, so that it cannot publish its last answers nor finish its
+recording. Here a signal only sets a flag, which the spin loop reads.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
 WAKE_UP = 0.1
-"""s: how long a stop request can stay unseen while no message arrives."""
+"""Longest time (s) until a stop request is seen while no message arrives."""
 
 
 class StopRequest:
-    """Set by SIGINT or SIGTERM; further signals while shutting down change nothing."""
+    """Set by SIGINT or SIGTERM. Further signals during the shutdown change nothing."""
 
     def __init__(self) -> None:
         self.received = False
         self._ends = False
 
     def install(self) -> StopRequest:
-        """Take over both signals; call it before the slow imports so that an early Ctrl-C is clean as well."""
+        """Take over both signals. Call it before the slow imports, so that an early Ctrl-C is clean as well."""
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._on_signal)
         return self
@@ -44,9 +44,9 @@ class StopRequest:
 
     @contextmanager
     def ending(self) -> Iterator[None]:
-        """For long work with nothing to be finished: a signal ends the process, exit code 0.
+        """Let a signal end the process with exit code 0, during long work that needs no finishing.
 
-        A KeyboardInterrupt would not do: raised within a callback of the compiler it is printed and forgotten.
+        A KeyboardInterrupt would not do: if it is raised within a callback of the compiler, it is printed and ignored.
         """
         self._ends = True
         if self.received:
@@ -64,12 +64,13 @@ def _end() -> None:
 
 
 PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
-"""The environment variables by which Fast DDS is configured, before and since its version 3."""
+"""The environment variables that configure Fast DDS, before and since its version 3."""
 
 
 def stay_on_this_machine() -> None:
-    """Keep DDS on loopback unless the user chose a discovery range, with room for large messages unless the user chose
-    another configuration of Fast DDS. Both are read when the context is made.
+    """Keep DDS on loopback unless the user chose a discovery range, and give it room for large messages.
+
+    The room is not changed if the user chose another configuration of Fast DDS. Both are read when the context is made.
     """
     if os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST") != "LOCALHOST":
         return
@@ -79,9 +80,9 @@ def stay_on_this_machine() -> None:
 
 @contextmanager
 def ros_context(arguments: Sequence[str] | None = None) -> Iterator[None]:
-    """rclpy from init to shutdown, without its signal handlers. Raises InputError for arguments ROS does not take.
+    """Run rclpy from init to shutdown, without its signal handlers. Raises InputError for arguments that ROS refuses.
 
-    arguments: as sys.argv, also what is not for ROS.
+    arguments: as sys.argv, including those that are not for ROS.
     """
     import rclpy
     from rclpy.signals import SignalHandlerOptions
@@ -89,7 +90,7 @@ def ros_context(arguments: Sequence[str] | None = None) -> Iterator[None]:
     given = list(sys.argv if arguments is None else arguments)
     try:
         rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:  # rclpy's own errors are no public classes
+    except RuntimeError as error:  # rclpy's own error classes are not public
         raise InputError(f"expected ROS arguments (--ros-args -p name:=value …), got: {error}") from None
     try:
         yield
@@ -98,10 +99,10 @@ def ros_context(arguments: Sequence[str] | None = None) -> Iterator[None]:
 
 
 def spin(node: Node, stop: StopRequest, *, events: bool = False) -> None:
-    """Run the node's callbacks one after the other until a stop is asked for.
+    """Run the node's callbacks one after the other until a stop is requested.
 
-    `events`: use rclpy's EventsExecutor, which costs less CPU for each message. It is always driven with a timeout:
-    without one it was seen to run no callback and burn a core (rclpy 7.1).
+    events: use rclpy's EventsExecutor, which costs less CPU for each message. It always gets a timeout, because without
+    one it was seen to run no callback and to use a full core (rclpy 7.1).
     """
     from rclpy.executors import Executor, SingleThreadedExecutor
 

@@ -1,4 +1,4 @@
-"""A status in one line, for the log."""
+"""A status as one line for the log."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collision_monitor.session import Recording
 
 
 def status_line(status: MonitorStatus) -> str:
-    """How many objects there are, what happens to them, and what goes wrong."""
+    """Return the number of objects, their contacts and predictions, and the problems."""
     latency = "unknown" if math.isnan(status.latency) else f"{status.latency * 1e3:.1f} ms"
     line = (
         f"{status.objects} objects at {status.rate:.0f} Hz: {status.contacts} touching, "

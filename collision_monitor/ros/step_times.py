@@ -1,4 +1,4 @@
-"""How long steps take, how old their input is, and how many there are each second."""
+"""Duration of the steps, age of their input, and number of steps per second."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections import deque
 import numpy as np
 
 WINDOW = 1000
-"""Steps over which the 99th percentile is taken."""
+"""Number of steps for the 99th percentile."""
 
 CLOCK_TOLERANCE = 1e-3
-"""s: a stamp this far in the future is round-off and clock synchronisation; beyond it the clocks do not agree."""
+"""s: a stamp up to this far in the future is due to rounding and clock synchronisation, beyond it to another clock."""
 
 
 class StepTimes:
-    """All times in ns; the steady clock for durations and rate, ROS time for the latency."""
+    """Times of the last steps, in ns: the steady clock for durations and rate, ROS time for the latency."""
 
     def __init__(self, longest_latency: float) -> None:
-        """`longest_latency` (s): beyond it the stamps come from another clock, not from a slow network."""
+        """longest_latency (s): beyond it the stamps come from another clock, not from a slow network."""
         self.longest_latency = longest_latency
         self._durations = np.zeros(WINDOW)
         self._steps = 0
@@ -25,7 +25,7 @@ class StepTimes:
         self._latency = float("nan")
 
     def add(self, began: int, ended: int, latency: int) -> None:
-        """Note one step."""
+        """Add one step."""
         self._durations[self._steps % WINDOW] = (ended - began) * 1e-9
         self._steps += 1
         self._ends.append(ended)
@@ -35,7 +35,7 @@ class StepTimes:
         self._latency = max(seconds, 0.0) if agree else float("nan")
 
     def summary(self, now: int) -> dict[str, float]:
-        """The timing fields of MonitorStatus, in s and Hz; NaN before the first step."""
+        """Return the timing fields of MonitorStatus, in s and Hz; NaN before the first step."""
         self._forget(now)
         known = self._durations[: min(self._steps, WINDOW)]
         return {

@@ -1,4 +1,4 @@
-"""Shapes as triangles, coarse, to be looked at: never used to answer anything."""
+"""Coarse triangles of shapes, only for display. No answer depends on them."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ Triangles = NDArray[np.float64]
 """(n, 3, 3): triangle, corner, coordinate in m."""
 
 SIDES = 16
-"""Of what is round."""
+"""Number of sides of a round shape."""
 HALF_SPACE_EXTENT = 20.0
-"""m, the side of the square that stands for an endless plane."""
+"""Side of the square that represents an infinite plane (m)."""
 
 
 def surface_triangles(shape: Shape) -> Triangles:
-    """The surface of a shape in its own frame."""
+    """Return the surface of a shape in its own frame."""
     match shape:
         case Box():
             return _box(shape.corners)
@@ -61,7 +61,7 @@ def surface_triangles(shape: Shape) -> Triangles:
 
 
 def _revolve(radii: NDArray[np.float64], heights: NDArray[np.float64]) -> Triangles:
-    """The profile (radius, height), turned about z."""
+    """Rotate the profile (radius, height) about z."""
     turn = np.linspace(0.0, 2 * np.pi, SIDES + 1)
     ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     rings = np.empty((len(radii), SIDES + 1, 3))
@@ -85,7 +85,7 @@ def _hull(points: NDArray[np.float64]) -> Triangles:
 
 
 def _outline(points: NDArray[np.float64]) -> Triangles:
-    """A thin upright band along the boundary: right for concave polygons too."""
+    """Return a thin upright band along the boundary, which is right for concave polygons too."""
     a = np.c_[points, np.zeros(len(points))]
     b = np.roll(a, -1, axis=0)
     up = np.array([0.0, 0.0, 0.1])

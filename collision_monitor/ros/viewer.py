@@ -1,4 +1,4 @@
-"""A third party that only listens: keeps the newest contacts, predictions and status of a monitor, as bytes."""
+"""A subscriber that keeps the newest contacts, predictions and status of a monitor, as bytes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from collision_monitor.ros.endpoints import subscription
 
 
 class Viewer:
-    """Raw subscriptions: nothing is decoded before it is drawn. None: nothing heard yet."""
+    """Raw subscriptions, so that messages are not decoded before they are drawn. None: no message yet."""
 
     def __init__(self, monitor: str = NODE) -> None:
         self.contacts: bytes | None = None
@@ -29,11 +29,11 @@ class Viewer:
         return lambda data: setattr(self, name, data)
 
     def listen(self, until: float) -> None:
-        """Take what arrives until this time of the monotonic clock."""
+        """Receive messages until this time of the monotonic clock (s)."""
         while (left := until - time.monotonic()) > 0.0:
             self._executor.spin_once(timeout_sec=left)
 
     def close(self) -> None:
-        """Leave ROS."""
+        """Shut the executor down and destroy the node."""
         self._executor.shutdown()
         self._node.destroy_node()

@@ -1,4 +1,4 @@
-"""Plays a scene as a robot team would be heard: shapes once, latched, then states at a steady rate.
+"""Plays a scene like a team of robots: publishes the shapes once, latched, then states at a steady rate.
 
 ros2 run collision_monitor world --ros-args -p scene:=fleet -p objects:=200
 """
@@ -24,14 +24,14 @@ from collision_monitor.world import make_scene, scene_names
 PARAMETERS = ("scene", "objects", "rate", "duration", "seed", "path", "noise", "monitor", "frame_id")
 
 LISTENER_PATIENCE = 4.0
-"""s: on a busy machine DDS can lose its first announcement, and makes the next one 3 s later."""
+"""Longest wait for a subscriber (s): on a busy machine DDS can lose its first announcement and repeats it after 3 s."""
 
 SHAPES_PATIENCE = 10.0
-"""s for the monitor to take in the shapes; ten thousand take it a second."""
+"""Longest wait (s) for the monitor to process the shapes. Ten thousand take a second."""
 
 
 class WorldNode(Node):
-    """Publishes one scene to one monitor. Raises InputError for a scene that cannot be."""
+    """Publishes one scene to one monitor. Raises InputError for an impossible scene."""
 
     def __init__(self) -> None:
         super().__init__("world", automatically_declare_parameters_from_overrides=True)
@@ -68,10 +68,10 @@ class WorldNode(Node):
         self._frame_id = reader.read("frame_id", "world", "The frame of all poses.")
 
     def play(self, stop: StopRequest) -> None:
-        """Publish until the duration or the scene is over, or a stop is asked for.
+        """Publish until the duration or the scene ends, or a stop is requested.
 
-        Deadlines are counted from the start, so the rate does not drift, and stamps are those deadlines, so states
-        are exactly one period apart. Where the machine is too slow, whole periods are skipped and counted.
+        Deadlines are counted from the start, so the rate does not drift, and stamps are those deadlines, so states are
+        exactly one period apart. If the machine is too slow, whole periods are skipped and counted.
         """
         scene, period = self._scene, 1.0 / self._scene.rate
         self.get_logger().info(
@@ -102,15 +102,15 @@ class WorldNode(Node):
         )
 
     def _wait_for_listener(self, stop: StopRequest) -> None:
-        """So that a monitor that runs already sees the scene from its beginning; without one, play all the same."""
+        """Wait for a subscriber, so that a running monitor sees the scene from its beginning. Play without one too."""
         patience = time.monotonic() + LISTENER_PATIENCE
         while not self._states_out.get_subscription_count() and time.monotonic() < patience and not stop.received:
             time.sleep(0.01)
 
     def _wait_for_shapes_taken(self, stop: StopRequest) -> None:
-        """Until the monitor's status counts as many objects: states that come meanwhile would wait, and then be lost.
+        """Wait until the monitor's status counts as many objects. States sent before that would wait and be lost.
 
-        Without a monitor, or with one that refuses some of the objects, play all the same.
+        Play even without a monitor, or if it refuses some of the objects.
         """
         topic = Topic.STATUS.of(self._monitor)
         known: list[int] = []
@@ -128,7 +128,7 @@ class WorldNode(Node):
 
 
 def _sleep_until(deadline: float, stop: StopRequest) -> bool:
-    """False where a stop is asked for meanwhile; it is looked for every WAKE_UP seconds."""
+    """Sleep, and return False if a stop is requested meanwhile, which is checked every WAKE_UP seconds."""
     while not stop.received:
         left = deadline - time.monotonic()
         if left <= 0.0:

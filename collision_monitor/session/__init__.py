@@ -1,4 +1,4 @@
-"""Sessions: what the monitor saw and said, recorded, read again and replayed. Without ROS."""
+"""Sessions: the monitor's inputs and answers, recorded, read and replayed. Does not need ROS."""
 
 from collision_monitor.session.reader import Recorded, Session
 from collision_monitor.session.recording.recorder import Recorder, Recording

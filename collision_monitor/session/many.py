@@ -1,6 +1,6 @@
-"""One function over many sessions, on all cores or on a Ray cluster: results in order, each for itself.
+"""Runs one function over many sessions, on all cores or on a Ray cluster, and yields the results in order.
 
-What goes wrong with one, were it the end of its process, is that one's result and nobody else's.
+An error in one session, even the end of its process, affects the result of that session only.
 """
 
 from __future__ import annotations
@@ -29,7 +29,11 @@ ENDED: Final = "the process that worked on it was ended: by the system, if memor
 
 @dataclass(frozen=True)
 class Engine:
-    """Where the work is done. jobs: at a time, by default one for each core. address: of a Ray cluster; else local."""
+    """Where the work runs.
+
+    name: one of ENGINES. jobs: number of sessions at a time, by default one for each core. address: HOST:PORT of a Ray
+    cluster, by default a local one.
+    """
 
     name: str = "processes"
     jobs: int | None = None
@@ -40,9 +44,10 @@ ALL_CORES: Final = Engine()
 
 
 def find_sessions(names: Iterable[str]) -> list[Path]:
-    """Sessions: files as they are named, wildcards, and all in the folders below. Raises InputError where none.
+    """Return the sessions of the names, which are files, wildcards, and folders with sessions at any depth.
 
-    A folder that a recorder made is one session, whatever the number of its files.
+    A folder that a recorder made is one session, whatever the number of its files. Raises InputError for a folder
+    without any .mcap file.
     """
     found: list[Path] = []
     for name in names:
@@ -63,7 +68,7 @@ def _inside(folder: Path) -> Iterator[Path]:
         return
     yield from files
     for below in sorted(folder.iterdir()):
-        if below.is_dir() and not below.is_symlink() and below not in files:  # a link may lead round in a circle
+        if below.is_dir() and not below.is_symlink() and below not in files:  # links may form a cycle
             yield from _inside(below)
 
 
@@ -73,9 +78,9 @@ def for_each(
     failed: Callable[[Path, str], Result],
     engine: Engine = ALL_CORES,
 ) -> Iterator[Result]:
-    """function(path) of each, in order; failed(path, why) where it raises or its process ends.
+    """Yield function(path) for each path, in order; failed(path, reason) if it raises or its process ends.
 
-    Raises UnsupportedError where the engine is not there, InputError where it cannot be reached.
+    Raises UnsupportedError if the engine is not installed, InputError if it cannot be reached.
     """
     if engine.name == "ray":
         yield from _on_ray(function, paths, failed, engine)
@@ -92,14 +97,14 @@ def _guarded(function: Callable[[Path], Result], path: Path, failed: Callable[[P
         return function(path)
     except CollisionMonitorError as error:
         return failed(path, str(error))
-    except Exception as error:  # the others are still to be done
+    except Exception as error:  # the other sessions still have to run
         return failed(path, f"an error of collision_monitor itself: {error!r}")
 
 
 def _guarded_in(
     folder: Path, function: Callable[[Path], Result], path: Path, failed: Callable[[Path, str], Result]
 ) -> Result:
-    """In the folder that the path is relative to, so that errors name the path as it was given."""
+    """Run in the folder that the path is relative to, so that errors name the path as the caller gave it."""
     try:
         if not path.is_absolute():
             os.chdir(folder)
@@ -119,7 +124,7 @@ def _in_processes(
             for future in futures:
                 yield future.result()
                 todo.pop(0)
-        except BrokenProcessPool:  # by the one that was waited for, or another: that shows when it is alone
+        except BrokenProcessPool:  # this path or another one ended a process: run it alone
             yield _alone(function, todo.pop(0), failed)
         finally:
             pool.shutdown(cancel_futures=True)
@@ -134,7 +139,7 @@ def _alone(function: Callable[[Path], Result], path: Path, failed: Callable[[Pat
 
 
 def _pool(jobs: int) -> ProcessPoolExecutor:
-    """Spawned, because a fork of a process with threads may lock up; Ctrl-C ends them without a word."""
+    """Return a pool of spawned processes: a fork of a process with threads may deadlock. Ctrl-C ends them silently."""
     return ProcessPoolExecutor(
         jobs, mp_context=get_context("spawn"), initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_DFL)
     )
@@ -143,9 +148,9 @@ def _pool(jobs: int) -> ProcessPoolExecutor:
 def _on_ray(
     function: Callable[[Path], Result], paths: Sequence[Path], failed: Callable[[Path, str], Result], engine: Engine
 ) -> Iterator[Result]:
-    """On a cluster, whose machines have to see the files under the same paths and have collision_monitor installed."""
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # or Ray reports to its makers
-    os.environ.setdefault("RAY_worker_niceness", "0")  # or anything else on this machine comes first
+    """Run on a Ray cluster. Its machines need collision_monitor and the files under the same paths."""
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # else Ray reports to its developers
+    os.environ.setdefault("RAY_worker_niceness", "0")  # else Ray's workers run at a lower priority than other processes
     try:
         import ray
     except ImportError:
@@ -175,7 +180,7 @@ def _on_ray(
 
 
 def _reach(address: str) -> None:
-    """Raises InputError where nobody listens; Ray itself tries for two minutes."""
+    """Check that a cluster listens at the address. Raises InputError if not; Ray itself tries for two minutes."""
     host, colon, port = address.removeprefix("ray://").rpartition(":")
     if not colon or not port.isdecimal() or not 0 < int(port) < 1 << 16:
         raise InputError(f"address of the Ray cluster: expected HOST:PORT, got {address!r}")

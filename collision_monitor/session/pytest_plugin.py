@@ -1,4 +1,4 @@
-"""A pytest plugin: recorded sessions as fixtures, so that a team keeps them as tests.
+"""A pytest plugin that provides recorded sessions as fixtures, so that a team can keep them as tests.
 
     @pytest.mark.session("yard.mcap")
     def test_yard(session):
@@ -6,8 +6,8 @@
         assert all(each.lower > 0.5 for each in session.predictions("cart", "person_*"))
         session.check("expectations.yaml")
 
-The path is relative to the test's file. `replay=True` or `replay="fast"`: what this program answers to the inputs, with
-the recorded profile or that one, in place of what was recorded.
+The path is relative to the test's file. `replay=True` and `replay="fast"` replace the recorded answers by those of this
+program to the recorded inputs, with the recorded profile or with the named one.
 """
 
 from __future__ import annotations
@@ -26,7 +26,10 @@ _MARKER = "session(path, replay=False): the recorded session that the fixture `s
 
 
 class Prediction(NamedTuple):
-    """A predicted collision: the pair, when it was said (s), and in how many s it is due: not before `lower`."""
+    """A predicted collision of a pair.
+
+    time: when it was predicted (s from the first step). lower, upper: bounds of the time from then to the contact (s).
+    """
 
     pair: tuple[int, int]
     time: float
@@ -46,11 +49,14 @@ class RecordedSession:
         self.history: History = read_history(Session(path), again)
 
     def contacts(self, a: str | int = "*", b: str | int = "*") -> list[CollisionEvent]:
-        """The collisions between objects of such names, with wildcards, or ids. Raises InputError for unknown ones."""
+        """Return the collisions between objects with these names or ids. Names may hold wildcards.
+
+        Raises InputError for unknown ones.
+        """
         return self.history.collisions_of([a, b])
 
     def predictions(self, a: str | int = "*", b: str | int = "*") -> list[Prediction]:
-        """Every prediction of a collision between them, in the order in which they were made. Raises InputError."""
+        """Return every prediction of a collision between them, in the order of prediction. Raises InputError."""
         wanted = self.history.pairs_of([a, b])
         rows = zip(self.history.prediction_step.tolist(), self.history.predictions, strict=True)
         return [
@@ -60,13 +66,13 @@ class RecordedSession:
         ]
 
     def replay(self) -> str:
-        """`identical`, `not comparable` or `diverged`, and in which way: today's answers against the recorded ones."""
+        """Replay the session and return `identical`, `not comparable` or `diverged`, with the first difference."""
         from collision_monitor.session.history.check import replay_verdict
 
         return replay_verdict(self.path)
 
     def check(self, expectations: str | Path | dict[str, Any]) -> None:
-        """Assert what a YAML file, or a mapping like one, expects. A path is relative to the session's file."""
+        """Assert the expectations of a YAML file or of an equal mapping. A path is relative to the session's file."""
         from collision_monitor.session.history.expectations import evaluate, parse_expectations, read_expectations
 
         if isinstance(expectations, dict):
@@ -78,13 +84,13 @@ class RecordedSession:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Make the marker known."""
+    """Register the marker."""
     config.addinivalue_line("markers", _MARKER)
 
 
 @pytest.fixture
 def session(request: pytest.FixtureRequest) -> RecordedSession:
-    """The recorded session that the test's marker names."""
+    """Return the recorded session that the test's marker names."""
     marker = request.node.get_closest_marker("session")
     if marker is None or len(marker.args) != 1 or set(marker.kwargs) - {"replay"}:
         pytest.fail(f'expected a marker such as @pytest.mark.session("yard.mcap"): {_MARKER}', pytrace=False)

@@ -1,6 +1,6 @@
-"""Reads a session in the order in which it was written, also one whose end is missing or that was damaged.
+"""Reads a session in the order in which it was written, even if its end is missing or it is damaged.
 
-Only the order of the file is used, no index: a session that was cut off by a crash reads as far as it goes.
+The reader uses the order of the file and no index, so that it reads a session up to the place where a crash cut it off.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ _SNAPSHOT: Final = re.compile(re.escape(SNAPSHOT) + r"(\d{1,10})\.npz")
 
 
 class Recorded(NamedTuple):
-    """One message: its topic, the name of its type such as `ContactArray`, and its bytes. Times in ns.
+    """One message: its topic, the short name of its type such as `ContactArray`, and its bytes. Times in ns.
 
-    repeated: it only says again, at the start of a file, what the objects are.
+    repeated: the message only repeats the descriptions of the objects at the start of a file.
     """
 
     topic: str
@@ -56,7 +56,7 @@ class Recorded(NamedTuple):
 
 
 class RecordedSnapshot(NamedTuple):
-    """The monitor before message `sequence`, as `Snapshot.encode` has it. log_time: of the message before it (ns)."""
+    """The monitor's state before message `sequence`, from `Snapshot.encode`. log_time: of the message before (ns)."""
 
     data: bytes
     sequence: int
@@ -64,7 +64,7 @@ class RecordedSnapshot(NamedTuple):
 
 
 class SnapshotLocation(NamedTuple):
-    """Where a snapshot is: which of the session's files, and the byte; and when it was taken (ns)."""
+    """Position of a snapshot: index of the session's file and byte offset; its sequence number and log time (ns)."""
 
     file: int
     at: int
@@ -74,7 +74,7 @@ class SnapshotLocation(NamedTuple):
 
 @dataclass(frozen=True)
 class Timeline:
-    """Log times of the first and the last message (ns; 0: there is none), and the snapshots in between, in order."""
+    """Log times of the first and the last message (ns; 0 if there is none), and the snapshots in order."""
 
     begin: int
     end: int
@@ -84,11 +84,11 @@ class Timeline:
 class Session:
     """A recorded session: a file, or the folder of all files of one recording.
 
-    metadata, profile, frame_id: of the monitor that was recorded. foreign: another program recorded the monitor's
-    topics; then there is no metadata, the profile is `balanced`, and the messages are numbered as they come.
-    damage: what is missing or broken, one sentence each; complete when all messages have been read.
-    position, size: bytes that were read, and all.
-    Raises SessionError for what is no session, naming what it is.
+    metadata, profile, frame_id: those of the recorded monitor. foreign: another program recorded the monitor's topics;
+    then there is no metadata, the profile is `balanced`, and the messages are numbered in the order of reading.
+    damage: one sentence for each missing or broken part; complete when all messages have been read.
+    position, size: bytes read, and bytes in total.
+    Raises SessionError, with what was found, if the path holds no session.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -103,15 +103,15 @@ class Session:
 
     @property
     def position(self) -> int:
-        """Bytes that were read."""
+        """Bytes read so far."""
         return sum(file.records.position for file in self._files)
 
     def messages(self) -> Iterator[Recorded]:
-        """All messages whose bytes are whole, in recorded order. Raises SessionError for a foreign encoding."""
+        """Yield all undamaged messages in recorded order. Raises SessionError for an encoding other than CDR."""
         return (each for each in self.entries() if isinstance(each, Recorded))
 
     def entries(self, begin: SnapshotLocation | None = None) -> Iterator[Recorded | RecordedSnapshot]:
-        """The same with the snapshots between them; from the snapshot at `begin` on. Raises SessionError."""
+        """Yield the messages and the snapshots between them, from the snapshot at `begin` on. Raises SessionError."""
         self.damage = [f"{name} is not there" for name in _absent(self.path)]
         last: int | None = None
         count = 0
@@ -121,19 +121,19 @@ class Session:
             for each in file.entries(begin.at if begin is not None and number == begin.file else 0):
                 if isinstance(each, Recorded):
                     if each.repeated and each.sequence == last:
-                        continue  # it goes on where the last file ended
+                        continue  # the previous file already described these objects
                     last = each.sequence
                     if self.foreign:
                         each = each._replace(sequence=count)
                         count += 1
-                        if each.type == "ParameterEvent":  # of any node, and in no order that says when it took effect
+                        if each.type == "ParameterEvent":  # of any node, and its place may not show its time
                             each = each._replace(type=full_name(each.type))
                 yield each
             prefix = f"{file.records.path.name}: " if len(self._files) > 1 else ""
             self.damage += [prefix + text for text in file.damage]
 
     def timeline(self) -> Timeline:
-        """When it begins and ends and where its snapshots are, without unpacking any message."""
+        """Return begin, end and the positions of the snapshots, without unpacking any message."""
         times: list[int] = []  # of first and last messages; a chunk without any has 0 for both
         snapshots: list[SnapshotLocation] = []
         for number, file in enumerate(self._files):
@@ -171,12 +171,12 @@ class _RecordedFile:
         self.number = _number(self.metadata.get(NUMBER))
 
     def entries(self, begin: int) -> Iterator[Recorded | RecordedSnapshot]:
-        """As `Session.entries`; begin: the byte of the snapshot."""
+        """Yield what `Session.entries` yields. begin: byte offset of the snapshot."""
         self.damage = []
         schemas: dict[int, str] = {}
         channels: dict[int, tuple[str, str]] = {}  # topic and type
         inputs: dict[str, str] = {}
-        repeated = 0 if begin else self.repeated  # these come before the first snapshot
+        repeated = 0 if begin else self.repeated  # repeated messages come before the first snapshot
         for record in self.records.read(begin):
             if isinstance(record, Message):
                 if record.channel_id in channels:
@@ -197,7 +197,7 @@ class _RecordedFile:
         self.damage += self.records.damage
 
     def _read_metadata(self) -> dict[str, str]:
-        """The record at the file's start; of a foreign file, the frame of its inputs. Raises SessionError."""
+        """Return the metadata at the file's start; of a foreign file, the frame of its inputs. Raises SessionError."""
         topics: dict[int, str] = {}
         schemas: dict[int, str] = {}
         inputs: dict[int, str] = {}
@@ -207,7 +207,7 @@ class _RecordedFile:
             if isinstance(record, Metadata) and record.name == METADATA:
                 return dict(record.metadata)
             if isinstance(record, Header):
-                ours = record.library.startswith(LIBRARY)  # then what it lacks was lost
+                ours = record.library.startswith(LIBRARY)  # then missing metadata was lost
             elif isinstance(record, Schema):
                 schemas[record.id] = record.name
             elif isinstance(record, Channel):
@@ -233,7 +233,7 @@ class _RecordedFile:
         )
 
     def _check(self, channel: Channel, schemas: dict[int, str], inputs: dict[str, str]) -> None:
-        """Raises SessionError for another encoding, and for the inputs of two monitors in one foreign file."""
+        """Check a channel. Raises SessionError for another encoding, or another monitor's inputs in a foreign file."""
         name = _SHORT_NAMES.get(schemas.get(channel.schema_id, ""), "")
         if name and channel.message_encoding != "cdr":
             raise SessionError(
@@ -248,12 +248,12 @@ class _RecordedFile:
 
 
 def _number(text: str | None) -> int:
-    """Of our own metadata; what is no number was damaged, and 0 says the least."""
+    """Parse a number of our own metadata. A damaged number counts as 0."""
     return int(text) if text and text.isdecimal() else 0
 
 
 def _find(path: Path) -> list[Path]:
-    """The file, or the files of a folder in the order of the numbers in their names. Raises SessionError."""
+    """Return the file, or the files of a folder in the order of the numbers in their names. Raises SessionError."""
     if path.is_dir():
         files = [file for file in path.glob("*.mcap") if file.is_file()]
         if not files:
@@ -267,17 +267,17 @@ def _find(path: Path) -> list[Path]:
 
 
 def _absent(path: Path) -> list[str]:
-    """The files that a folder should hold, by its metadata.yaml, and does not."""
+    """Return the files that the folder's metadata.yaml lists and that are missing."""
     try:
         content = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
         names = content["rosbag2_bagfile_information"]["relative_file_paths"]
         return [str(name) for name in names if not (path / str(name)).exists()]
-    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError):  # it is not needed to read the session
+    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError):  # the file is not needed to read the session
         return []
 
 
 def _in_order(path: Path, files: list[_RecordedFile]) -> list[_RecordedFile]:
-    """The files of one recording. Raises SessionError where they are of several."""
+    """Return the files of one recording in order. Raises SessionError if they belong to several recordings."""
     recordings = {file.metadata.get(RECORDING, "") for file in files}
     kinds = {file.foreign for file in files}
     if len(files) > 1 and (len(recordings) > 1 or len(kinds) > 1 or (recordings == {""} and kinds == {False})):

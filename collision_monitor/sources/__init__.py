@@ -1,4 +1,4 @@
-"""Messages of other programs as those of this one: bags become sessions. Without ROS."""
+"""Conversion of other programs' messages: bags become sessions. Does not need ROS."""
 
 from collision_monitor.sources.importing import Imported, import_bag
 from collision_monitor.sources.mapping import Mapping, load_mapping

@@ -1,6 +1,7 @@
 """A rosbag2 recording of any program: an MCAP or SQLite file, or the folder that `ros2 bag record` makes.
 
-rosbags reads it: it knows every storage, compression and age of the format, and decodes by the definitions in the bag.
+The library rosbags reads it: it supports every storage, compression and version of the format, and decodes messages by
+the definitions in the bag.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from collision_monitor.errors import MessageError, SessionError
 
 
 class BagMessage(NamedTuple):
-    """A message as it lies in the bag; time in ns."""
+    """A message as the bag holds it. Time in ns."""
 
     topic: str
     type: str
@@ -24,7 +25,7 @@ class BagMessage(NamedTuple):
 
 
 class Bag:
-    """An open bag. topics: topic -> type, `nav_msgs/msg/Odometry`. Raises SessionError for what is none."""
+    """An open bag. topics: topic -> type, such as `nav_msgs/msg/Odometry`. Raises SessionError if there is no bag."""
 
     def __init__(self, path: Path) -> None:
         try:
@@ -42,7 +43,7 @@ class Bag:
         try:
             self._reader = Reader(path)
             self._reader.open()
-        except Exception as error:  # the library has one for each kind of damage, and lets others through
+        except Exception as error:  # the library raises one for each kind of damage, and lets others through
             raise self._broken(error) from None
         self.topics: dict[str, str] = {}
         for connection in self._reader.connections:
@@ -53,10 +54,10 @@ class Bag:
         self._types: Any = None
 
     def messages(self, topics: Iterable[str]) -> Iterator[BagMessage]:
-        """The messages of these topics by the time of their receipt. Raises SessionError where the bag is damaged."""
+        """Yield the messages of these topics by the time of receipt. Raises SessionError if the bag is damaged."""
         wanted = set(topics)
         connections = [c for c in self._reader.connections if c.topic in wanted]
-        if not connections:  # for rosbags, none is all
+        if not connections:  # rosbags takes an empty list for all of them
             return
         try:
             for connection, log_time, data in self._reader.messages(connections):
@@ -69,7 +70,7 @@ class Bag:
             raise self._broken(error) from None
 
     def decode(self, message: BagMessage) -> Any:
-        """The message with its fields as attributes. Raises MessageError."""
+        """Return the message with its fields as attributes. Raises MessageError."""
         if self._types is None:
             self._types = self._typestore()
         try:
@@ -79,14 +80,14 @@ class Bag:
             raise MessageError(f"{message.topic}: expected a {message.type}, cannot be decoded: {reason}") from None
 
     def _typestore(self) -> Any:
-        """The types of ROS 2 Jazzy, and in their place what the bag itself says of the types that it holds."""
+        """Return the types of ROS 2 Jazzy, replaced by the bag's own definitions of the types that it holds."""
         from rosbags.interfaces import MessageDefinitionFormat
         from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
         found: dict[Any, Any] = {}
         for connection in self._reader.connections:
             definition = connection.msgdef
-            with suppress(Exception):  # a bag may hold types that nobody can read; those we need are standard ones
+            with suppress(Exception):  # a bag may hold unreadable types; those needed here are standard ones
                 if definition.format == MessageDefinitionFormat.MSG:
                     found |= get_types_from_msg(definition.data, connection.msgtype)
                 elif definition.format == MessageDefinitionFormat.IDL:
@@ -96,7 +97,7 @@ class Bag:
         return store
 
     def close(self) -> None:
-        """Close its files."""
+        """Close the files of the bag."""
         with suppress(Exception):
             self._reader.close()
 

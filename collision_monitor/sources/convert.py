@@ -1,9 +1,9 @@
-"""Odometry, poses, transforms and markers as the inputs of the monitor.
+"""Converts odometry, poses, transforms and markers to inputs of the monitor.
 
-Each message of the bag becomes one message of states for each stamp in it, so the monitor takes steps as the bag did.
-What is wrong with a state (its quaternion, its numbers, its stamp) is the monitor's to refuse and count. Only Odometry
-tells a twist; for all else the monitor estimates it from successive poses, as `ObjectState.TWIST_UNKNOWN` asks it to.
-Covariances are not read: in bags they are more often placeholders than measurements.
+Each message of the bag becomes one message of states for each stamp in it, so the monitor takes the same steps as the
+bag. The monitor itself refuses and counts a wrong state (quaternion, numbers, stamp). Only Odometry holds a twist; for
+all other messages the monitor estimates it from successive poses (`ObjectState.TWIST_UNKNOWN`). Covariances are not
+read, because in bags they are more often placeholders than measurements.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from collision_monitor.sources.transforms import IDENTITY, Placement, TransformT
 
 
 class SourceType(StrEnum):
-    """The messages that can be mapped."""
+    """The message types that can be mapped."""
 
     ODOMETRY = "nav_msgs/msg/Odometry"
     POSE = "geometry_msgs/msg/PoseStamped"
@@ -40,7 +40,7 @@ class SourceType(StrEnum):
 
 
 class Input(NamedTuple):
-    """A message for the monitor; topic: STATES or SHAPES. Times in ns."""
+    """A message for the monitor. topic: STATES or SHAPES. Times in ns."""
 
     topic: Topic
     data: bytes
@@ -49,10 +49,10 @@ class Input(NamedTuple):
 
 
 class Converter:
-    """Follows a bag, message by message.
+    """Converts a bag, message by message.
 
-    states: of each object, how many were told. skipped: what was left out, and how often.
-    Raises SessionError for topics that are not in the bag or of another type, InputError for impossible objects.
+    states: number of states of each object. skipped: reasons why something was left out, with their counts.
+    Raises SessionError for a topic that is not in the bag or has another type, InputError for an impossible object.
     """
 
     def __init__(self, mapping: Mapping, topics: dict[str, str], tree: TransformTree) -> None:
@@ -67,7 +67,7 @@ class Converter:
                 _check_source(source, topics.get(topic), topics)
 
     def begin(self, log_time: int) -> Input:
-        """The objects that are known from the start. Raises InputError, SessionError."""
+        """Return the descriptions of the objects that are known from the start. Raises InputError, SessionError."""
         objects: list[Change] = []
         for source in self._mapping.sources:
             if source.marker is not None:
@@ -82,7 +82,7 @@ class Converter:
         return self._descriptions(log_time, objects, snapshot=True)
 
     def take(self, topic: str, kind: str, message: Any, log_time: int) -> Iterator[Input]:
-        """What a message of the bag says."""
+        """Yield the inputs that a message of the bag becomes."""
         if kind == SourceType.TRANSFORMS:
             yield from self._take_transforms(topic, message, log_time)
             return
@@ -155,9 +155,9 @@ class Converter:
     # -- frames and stamps
 
     def _placed(self, name: str, frame: str, where: Placement) -> Placement | None:
-        """A pose of the bag in the frame of the session; None where tf does not tell."""
+        """Return a pose of the bag in the frame of the session; None if tf does not connect the frames."""
         if frame == self._mapping.frame:
-            return where  # untouched, to its last bit
+            return where  # unchanged, to its last bit
         parent = self._tree.find(self._mapping.frame, frame)
         if parent is None:
             self._skip(name, self._mapping.frame, frame)
@@ -183,14 +183,14 @@ class Converter:
         return parent @ where
 
     def _stamp(self, header: Any, log_time: int) -> int:
-        """ns; a header without a stamp counts from when the bag got it."""
+        """Return the stamp (ns); the time of receipt if the header has none, or if the mapping selects it."""
         stamp = int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
         return stamp if stamp and self._mapping.stamps == HEADER else log_time
 
     # -- messages
 
     def _state(self, name: str, object_id: int, frame: str, pose: Placement, twist: Any) -> np.void | None:
-        """One row of records.STATE; Odometry's twist is along the axes of the body."""
+        """Return one row of records.STATE; None without a transform. Odometry's twist is in the axes of the body."""
         where = self._placed(name, frame, pose)
         if where is None:
             return None
@@ -207,7 +207,7 @@ class Converter:
         return row
 
     def _states_of(self, rows: list[tuple[int, np.void]], log_time: int) -> Iterator[Input]:
-        """One message for each stamp, the older ones first."""
+        """Yield one message for each stamp, the oldest first."""
         for stamp in sorted({stamp for stamp, _ in rows}):
             states = np.array([row for other, row in rows if other == stamp], records.STATE)
             yield Input(Topic.STATES, encode_states(stamp, self._mapping.frame, 0, states), log_time, stamp)
@@ -237,7 +237,10 @@ class Converter:
 
 
 def put_transform(tree: TransformTree, stamped: Any, *, static: bool) -> bool:
-    """A geometry_msgs/TransformStamped into the tree; one that has no finite numbers is left out."""
+    """Add a geometry_msgs/TransformStamped to the tree.
+
+    Return False, and leave it out, if its numbers are not finite or its quaternion is not of unit length.
+    """
     where = placement(stamped.transform)
     if not (np.isfinite(where.position).all() and np.isfinite(where.quaternion).all()):
         return False

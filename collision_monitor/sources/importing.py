@@ -1,4 +1,4 @@
-"""Makes a session of a bag: its messages become the monitor's inputs, and the monitor answers them."""
+"""Makes a session from a bag: its messages become the monitor's inputs, and the monitor answers them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _INPUTS: Final = (Topic.STATES, Topic.SHAPES)
 
 @dataclass
 class Imported:
-    """What came of a bag. states: of each object, how many were told; skipped, refused: what was left out, and why."""
+    """Result of an import. states: number of states of each object. skipped, refused: what was left out, by reason."""
 
     messages: int = 0
     steps: int = 0
@@ -37,7 +37,7 @@ class Imported:
 
     @property
     def unseen(self) -> list[str]:
-        """Moving objects of the mapping of which the bag tells nothing that could be used."""
+        """Moving objects of the mapping for which the bag holds no usable state."""
         return sorted(name for name, count in self.states.items() if not count)
 
     @property
@@ -58,8 +58,8 @@ def import_bag(
 ) -> Imported:
     """Write the session `target` from the bag `source`.
 
-    Without a mapping the bag must hold a monitor's inputs; node: whose, where there are several.
-    Raises SessionError, InputError; then there is no target.
+    Without a mapping the bag must hold a monitor's inputs; node: the monitor to use, if there are several.
+    Raises SessionError or InputError; then there is no target.
     """
     result = Imported()
     if target.exists() and source.exists() and target.samefile(source):
@@ -85,8 +85,8 @@ def _write(
     overwrite: bool,
     progress: Callable[[Imported], None] | None,
 ) -> None:
-    """Feed the inputs and record them with the answers; where that fails, there is no target."""
-    first = next(inputs, None)  # what is wrong with the bag shows before there is a file
+    """Feed the inputs and record them with the answers. If that fails, remove the target."""
+    first = next(inputs, None)  # read first, so that an unusable bag leaves no file
     if first is None:
         raise SessionError("expected messages of the mapped topics in the bag, got none")
     types = {topic.of(): topic.message for topic in RECORDED if topic is not Topic.SETTINGS}
@@ -114,7 +114,7 @@ def _feed(
     result: Imported,
     progress: Callable[[Imported], None] | None,
 ) -> None:
-    """Raises InputError where the first description is refused."""
+    """Feed the pipeline and record its inputs and answers. Raises InputError if the first description is refused."""
 
     def record(topic: Topic, data: bytes, publish_time: int) -> None:
         recorder.write(topic.of(), data, now, publish_time)
@@ -158,10 +158,10 @@ def _remove(target: Path) -> None:
 
 
 def _converter(bag: Bag, mapping: Mapping) -> Converter:
-    """With the static transforms of the whole bag: they hold from its start, whenever they were recorded."""
+    """Return a converter with the static transforms of the whole bag, which hold from its start."""
     tree = TransformTree()
     for raw in bag.messages(topic for topic in _transform_topics(bag) if topic.endswith(_STATIC)):
-        with suppress(MessageError):  # counted when its turn comes
+        with suppress(MessageError):  # if the topic is mapped, the conversion counts it
             for each in bag.decode(raw).transforms:
                 put_transform(tree, each, static=True)
     return Converter(mapping, bag.topics, tree)
@@ -191,7 +191,7 @@ def _transform_topics(bag: Bag) -> list[str]:
 
 
 def _recorded_inputs(bag: Bag, node: str | None) -> tuple[str, Iterator[Input]]:
-    """The frame of the states and the inputs, as they were recorded."""
+    """Return the frame of the states, and the inputs as they were recorded."""
     chosen: dict[str, Topic] = {}
     for topic in _INPUTS:
         found = [name for name, kind in bag.topics.items() if kind == topic.type_name]

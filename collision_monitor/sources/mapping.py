@@ -1,12 +1,12 @@
-"""The mapping file: which topic of a bag tells where which object is, and what shape that object has.
+"""The mapping file: for each object, the topic of a bag that holds its pose, and its shape.
 
-frame: map                               # of the session; poses in other frames are brought there by the bag's tf
-stamps: header                           # or `received`: the time at which the bag got the message
+frame: map                               # frame of the session; the bag's tf transforms poses from other frames
+stamps: header                           # or `received`: the time at which the bag received the message
 objects:
   cart:     {topic: /cart/odom, shape: {box: [1.2, 0.8, 0.5], at: [0, 0, 0.25]}}
   person_1: {topic: /tf, frame: person_1, shape: {capsule: [0.3, 1.1]}}
   crate:    {topic: /markers, marker: {ns: crates, id: 7}}      # the marker's own shape
-  walls:    {topic: /markers, marker: {ns: walls}, static: true}   # all of the namespace: walls_0, walls_1 …
+  walls:    {topic: /markers, marker: {ns: walls}, static: true}   # all markers of the namespace: walls_0, walls_1 …
   floor:    {static: true, shape: {half_space: [0, 0, 1, 0]}}
 """
 
@@ -39,9 +39,10 @@ _SHAPES: Final = tuple(kind.name.lower() for kind in ShapeType if kind is not Sh
 
 @dataclass(frozen=True)
 class Source:
-    """An object, and where the bag tells where it is. marker: its namespace and its id, None for all of them.
+    """An object, and the source of its pose in the bag.
 
-    shapes: empty where the marker has them. pose: of a static object, in `frame` (empty: the session's).
+    marker: namespace and id of its marker; id None: all markers of the namespace. shapes: empty if the marker holds
+    them. pose: of a static object, in `frame` (empty: the session's).
     """
 
     name: str
@@ -60,7 +61,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Mapping:
-    """What a mapping file says. stamps: HEADER or RECEIVED."""
+    """The content of a mapping file. stamps: HEADER or RECEIVED."""
 
     frame: str
     sources: tuple[Source, ...]
@@ -77,7 +78,7 @@ class Mapping:
 
 
 def load_mapping(path: Path) -> Mapping:
-    """Raises InputError for what cannot be used, with the object and the key."""
+    """Read a mapping file. Raises InputError, with the object and the key, if it cannot be used."""
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -93,7 +94,7 @@ def load_mapping(path: Path) -> Mapping:
 
 
 def make_mapping(content: Any) -> Mapping:
-    """The mapping of a file's content. Raises InputError."""
+    """Return the mapping of a file's content. Raises InputError."""
     top = _table(content, "the file", _TOP)
     frame = top.get("frame")
     if not isinstance(frame, str) or not frame:
@@ -115,7 +116,7 @@ def make_mapping(content: Any) -> Mapping:
 
 
 def _ids(tables: dict[str, dict[str, Any]]) -> dict[str, int]:
-    """The ids that are given, and the lowest free ones from 1 for the others."""
+    """Return the given ids, and the lowest free ones from 1 for the other objects."""
     given: dict[str, int] = {}
     for name, table in tables.items():
         if "id" in table:
@@ -203,7 +204,7 @@ def _shape(value: Any, name: str) -> tuple[Shape, Pose]:
 
 
 def _pose(value: Any, what: str) -> Pose:
-    """Three numbers, a position, or seven with a quaternion."""
+    """Return the pose of three numbers, a position, or of seven, with a quaternion."""
     numbers = _numbers(value, what)
     if numbers.shape not in ((3,), (7,)):
         raise InputError(f"{what}: expected [x, y, z] or [x, y, z, qx, qy, qz, qw], got {value!r}")

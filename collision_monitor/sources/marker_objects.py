@@ -1,4 +1,4 @@
-"""Markers as objects: which object a marker is, and the shape that it shows."""
+"""Markers as objects: the object that a marker represents, and its shape."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ DELETE, DELETE_ALL = 2, 3
 
 _CUBE, _SPHERE, _CYLINDER = 1, 2, 3
 _ROUND: Final = 1e-6
-"""Relative difference of two diameters that are meant to be the same: markers are often made from float32."""
+"""Relative difference up to which two diameters count as equal, because markers are often made from float32."""
 
 
 @dataclass
 class MarkerObject:
-    """An object that a marker tells of; described: what was last said of it, None before that."""
+    """An object that a marker represents. described: its last description, None before the first."""
 
     object_id: int
     name: str
@@ -34,7 +34,7 @@ class MarkerTable:
         self._objects: dict[tuple[str, str, int], MarkerObject] = {}
 
     def object_of(self, source: Source, marker: Any) -> MarkerObject:
-        """The object that this marker is."""
+        """Return the object that this marker represents."""
         key = (source.topic, marker.ns, marker.id)
         if key not in self._objects:
             if source.marker == (marker.ns, marker.id):
@@ -45,7 +45,7 @@ class MarkerTable:
         return self._objects[key]
 
     def delete(self, topic: str, marker: Any) -> list[int]:
-        """Forget what a DELETE or DELETEALL takes away; the ids of those that were described."""
+        """Forget the markers of a DELETE or DELETEALL. Return the ids of those that were described."""
         gone = [
             key
             for key in self._objects
@@ -56,13 +56,13 @@ class MarkerTable:
 
 
 def source_of(sources: Iterable[Source], marker: Any) -> Source | None:
-    """The first source that asks for this marker."""
+    """Return the first source that selects this marker; None if there is none."""
     wanted = ((marker.ns, marker.id), (marker.ns, None))
     return next((source for source in sources if source.marker in wanted), None)
 
 
 def marker_shape(marker: Any) -> Shape:
-    """The shape that the marker shows. Raises UnsupportedError for one that is none of ours, ShapeError."""
+    """Return the shape that the marker shows. Raises UnsupportedError for an unknown one, ShapeError."""
     x, y, z = marker.scale.x, marker.scale.y, marker.scale.z
     is_round = abs(x - y) <= _ROUND * abs(x)
     if marker.type == _CUBE:

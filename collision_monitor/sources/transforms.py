@@ -1,6 +1,6 @@
-"""The tree of frames that a bag tells by tf2: where one frame stands in another, as far as that was said.
+"""The tree of frames from a bag's tf2 messages: the pose of one frame in another, as far as it is known.
 
-A moving link is taken at its last transform, not interpolated: as a node sees it that does not wait.
+A moving link has its last transform, without interpolation, as in a node that does not wait.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """A frame in another: position (3,) in m, quaternion (4,), not checked to be of unit length."""
+    """The pose of a frame in another: position (3,) in m, quaternion (4,), not checked to be of unit length."""
 
     position: Floats
     quaternion: Floats
 
     def __matmul__(self, other: Placement) -> Placement:
-        """X_AB @ X_BC = X_AC."""
+        """Return X_AB @ X_BC = X_AC."""
         position = self.position + rotation_matrix(self.quaternion) @ other.position
         return Placement(position, multiply(self.quaternion, other.quaternion))
 
     def inverse(self) -> Placement:
-        """X_BA of X_AB."""
+        """Return X_BA of X_AB."""
         back = self.quaternion * (-1.0, -1.0, -1.0, 1.0)
         return Placement(-rotation_matrix(back) @ self.position, back)
 
@@ -39,14 +39,14 @@ IDENTITY: Final = Placement(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
 
 
 def placement(message: Any) -> Placement:
-    """Of a geometry_msgs Pose or Transform."""
+    """Return the placement of a geometry_msgs Pose or Transform."""
     p = message.translation if hasattr(message, "translation") else message.position
     q = message.rotation if hasattr(message, "rotation") else message.orientation
     return Placement(np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w]))
 
 
 def frame_name(name: str) -> str:
-    """tf's names, which may begin with a slash, as tf2's."""
+    """Return the tf2 name of a frame. tf's names may begin with a slash."""
     return name.removeprefix("/")
 
 
@@ -64,16 +64,16 @@ class TransformTree:
         self._links: dict[str, _Link] = {}
 
     def put(self, parent: str, child: str, where: Placement, *, static: bool) -> None:
-        """Where a frame stands in its parent from now on."""
+        """Set the pose of a frame in its parent from now on."""
         self._links[child] = _Link(parent, where, static)
 
     @property
     def frames(self) -> list[str]:
-        """All that were mentioned."""
+        """Names of all frames that were mentioned."""
         return sorted({*self._links, *(link.parent for link in self._links.values())})
 
     def find(self, target: str, source: str) -> Placement | None:
-        """X_target_source; None where no links join them."""
+        """Return X_target_source; None if no links connect them."""
         if target == source:
             return IDENTITY
         to_target = dict(self._upward(target))
@@ -83,7 +83,7 @@ class TransformTree:
         return None
 
     def nearest_moving(self, frame: str) -> str | None:
-        """The frame itself or the first above it whose link to its parent is no static one."""
+        """Return the frame itself, or the first above it, whose link to its parent is not static."""
         seen: set[str] = set()
         while frame in self._links and frame not in seen:
             seen.add(frame)
@@ -94,7 +94,7 @@ class TransformTree:
         return None
 
     def _upward(self, frame: str) -> Iterator[tuple[str, Placement]]:
-        """The frame and all above it, each with where the first one stands in it; a loop is walked once."""
+        """Yield the frame and all above it, each with the pose of the first one in it. A loop is walked once."""
         seen: set[str] = set()
         where = IDENTITY
         while frame not in seen:

@@ -1,4 +1,4 @@
-"""The codec against itself and against bytes that are not what they should be; against rclpy: ros/test_codec_…"""
+"""The codec against itself and against wrong bytes; against rclpy: ros/test_codec_against_rclpy.py."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ DECODERS = {
 
 
 def random_records(dtype: np.dtype, count: int, seed: int = 0) -> np.ndarray:
-    """Records with every byte random, except that floats are no NaN: they are compared."""
+    """Return records with random bytes, except that no float is NaN, because they are compared."""
     rows = np.zeros(count, dtype)
     generator = np.random.default_rng(seed)
     for name in dtype.names:
@@ -159,7 +159,7 @@ def test_status_comes_back() -> None:
 
 @pytest.mark.parametrize("name", DECODERS)
 def test_every_cut_is_refused(name: str) -> None:
-    """Also each single byte of the message is needed: no prefix passes as the whole."""
+    """Each single byte of the message is needed: no prefix passes as the whole."""
     for length in range(len(EXAMPLES[name])):
         with pytest.raises(MessageError, match="expected"):
             DECODERS[name](EXAMPLES[name][:length])
@@ -224,7 +224,7 @@ def test_values_that_do_not_fit_are_refused_when_writing() -> None:
 
 
 def test_only_the_impossible_object_is_refused() -> None:
-    """Each wrong byte below makes one object impossible; the one beside it is taken."""
+    """Each wrong byte below makes one object impossible; the object beside it is accepted."""
     good = ObjectDescription(1, ((Sphere(1.0), Pose()),))
     radius = 0.7071067811865476
 

@@ -1,4 +1,4 @@
-"""The catalogue: which changes a message asks for, and what is known of the objects afterwards."""
+"""The catalogue: the changes that a message requests, and the known facts of the objects afterwards."""
 
 from __future__ import annotations
 

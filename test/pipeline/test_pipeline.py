@@ -1,4 +1,4 @@
-"""The pipeline with the real monitor: what comes in as bytes, what is refused and counted, what goes out as bytes."""
+"""The pipeline with the real monitor: decoded input bytes, counted refusals, encoded answers."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def ball(object_id: int, **fields: Any) -> ObjectDescription:
 
 
 def rows(*at: tuple[int, float, float]) -> np.ndarray:
-    """States of (id, x, speed along x)."""
+    """Return states of (id, x, speed along x)."""
     states = np.zeros(len(at), records.STATE)
     states["quaternion"][:, 3] = 1.0
     for row, (object_id, x, speed) in zip(states, at, strict=True):
@@ -215,7 +215,7 @@ def test_a_refused_stamp_gives_no_new_answer() -> None:
 
 
 def approaching() -> np.ndarray:
-    """States of two balls that meet in 0.85 s if they are where they say, 0.6 m beside each other's path."""
+    """Return states of two balls that meet in 0.85 s by their states, with paths 0.6 m apart."""
     states = rows((1, 0, 0), (2, 2.5, -2))
     states["position"][1, 1] = 0.6
     return states
@@ -231,7 +231,7 @@ def test_unknown_standard_deviations_are_none() -> None:
 
 
 def test_a_covariance_takes_the_place_of_both_standard_deviations() -> None:
-    """Off along the path it decides when they meet, off across it whether they do."""
+    """Errors along the path determine when they meet, errors across it whether they meet."""
     probabilities = []
     for along, across in ((0.3, 0.0), (0.0, 0.3)):
         states = approaching()
@@ -242,7 +242,7 @@ def test_a_covariance_takes_the_place_of_both_standard_deviations() -> None:
         assert outputs is not None
         probabilities.append(float(outputs.result.predictions["probability"][0]))
     assert probabilities[0] == pytest.approx(1.0)
-    assert 0.8 < probabilities[1] < 0.95  # 0.4 m from where they would just touch: 1.33 standard deviations
+    assert 0.8 < probabilities[1] < 0.95  # 0.4 m away from just touching: 1.33 standard deviations
 
 
 @pytest.mark.parametrize(("value", "refused"), [(np.nan, 0), (np.inf, 1), (-4.0, 1), (1e308, 1)])
@@ -258,10 +258,10 @@ def test_covariances_that_are_none(value: float, refused: int) -> None:
         ([0, 0, 0], 0),  # a publisher that does not count
         ([1, 2, 3], 0),
         ([1, 3, 7], 4),
-        ([5, 5, 6], 0),  # twice the same
+        ([5, 5, 6], 0),  # the same number twice
         ([2**32 - 2, 2**32 - 1, 0, 1], 0),  # the counter's wrap
         ([2**32 - 2, 1], 2),
-        ([900, 901, 1, 2], 0),  # a publisher that starts anew
+        ([900, 901, 1, 2], 0),  # a publisher that restarts
         ([3_000_000_000, 0, 1], 0),
     ],
 )
@@ -293,7 +293,7 @@ def test_the_status_takes_the_live_fields_and_silence_makes_all_stale() -> None:
 
 @given(st.data())
 def test_no_message_makes_the_pipeline_raise(data: st.DataObject) -> None:
-    """Mutated messages into one pipeline; afterwards it still answers a good one."""
+    """Feed mutated messages to one pipeline; afterwards it still answers a good one."""
     run = Run(ball(1), ball(2))
     good = [
         encode_states(run.stamp, "world", 1, rows((1, 0, 0), (2, 3, -1)), np.arange(24.0)),
@@ -310,12 +310,12 @@ def test_no_message_makes_the_pipeline_raise(data: st.DataObject) -> None:
     run.describe(ball(1), ball(2), snapshot=True)
     run.stamp = max(run.stamp, run.status.stamp_ns)
     outputs = run.step(rows((1, 0, 0), (2, 0.5, 0)))
-    outputs = outputs or run.step(rows((1, 0, 0), (2, 0.5, 0)))  # the first one may be refused for its stamp
+    outputs = outputs or run.step(rows((1, 0, 0), (2, 0.5, 0)))  # the pipeline may refuse the first one for its stamp
     assert outputs is not None
 
 
 def test_a_profile_with_other_models_holds_for_what_is_described_already() -> None:
-    """Contacts persist, what chose a model itself keeps it, and whoever gets the recorded changes says the same."""
+    """Contacts persist, a model chosen by a description stays, and a replay of the changes gives the same answers."""
     boxes = [ObjectDescription(k, Box((1, 1, 1)), name=f"box {k}") for k in (1, 2)]
     own = ObjectDescription(3, Box((1, 1, 1)), model=Model.OBB)
     run, other = Run(*boxes, own), Run(*boxes, own)

@@ -17,7 +17,7 @@ PACKAGE = Path(provenance.__file__).parents[1]
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A copy of the package whose source files the key is made of."""
+    """Yield a copy of the package; the key is computed from its source files."""
     folder = tmp_path / "collision_monitor"
     shutil.copytree(PACKAGE, folder, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(imports, "_PACKAGE", folder)

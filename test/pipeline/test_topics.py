@@ -1,4 +1,4 @@
-"""Every topic's names, and that nobody else writes them down."""
+"""The names of every topic, and that no other module repeats them."""
 
 from __future__ import annotations
 
@@ -31,6 +31,6 @@ def test_a_picture_is_all_that_is_not_recorded() -> None:
 
 @pytest.mark.parametrize("name", [f'"{NODE}"', f'"/{NODE}', "~/objects", '"objects/s', '"~/'])
 def test_names_stand_in_one_place(name: str) -> None:
-    """Help texts may say them in words."""
+    """Help texts may contain them."""
     users = [path.relative_to(PACKAGE).as_posix() for path in PACKAGE.rglob("*.py") if name in path.read_text()]
     assert [user for user in users if user not in ("pipeline/topics.py", "cli/run.py")] == []

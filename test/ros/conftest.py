@@ -1,4 +1,4 @@
-"""A monitor in a process of its own and a robot team that talks to it over DDS."""
+"""A monitor in its own process, and a team of robots that talks to it over DDS."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Process:
         return self._process.wait(timeout)
 
     def stop(self, number: signal.Signals = signal.SIGINT) -> int:
-        """The exit code."""
+        """Return the exit code."""
         self.send(number)
         return self.wait(15.0)
 
@@ -66,7 +66,7 @@ class Process:
 
     @property
     def words(self) -> str:
-        """What it has printed so far, both streams."""
+        """The output so far, of both streams."""
         self._words.flush()
         return Path(self._words.name).read_text()
 
@@ -78,7 +78,7 @@ class Process:
 
 
 class Team:
-    """Publishes shapes and states, keeps every answer. Messages are read by rclpy itself, not by our codec."""
+    """Publishes shapes and states, and keeps every answer. rclpy itself reads the messages, not our codec."""
 
     def __init__(self) -> None:
         self._context = rclpy.Context()
@@ -102,7 +102,7 @@ class Team:
         self.node.create_subscription(message, f"/object_monitor/{topic}", kept.append, quality)
 
     def until(self, condition: Callable[[], Any], timeout: float = 10.0) -> None:
-        """Listen until the condition holds; the last status is shown where it does not."""
+        """Listen until the condition holds; otherwise fail and show the last status."""
         deadline = time.monotonic() + timeout
         while not condition():
             assert time.monotonic() < deadline, f"expected the condition to hold in time; {self.statuses[-1:]}"
@@ -114,7 +114,7 @@ class Team:
             self._executor.spin_once(timeout_sec=0.05)
 
     def meet(self) -> None:
-        """Until the monitor hears us and we hear it."""
+        """Wait until the monitor and the team have discovered each other."""
         self.until(
             lambda: (
                 self.statuses
@@ -123,7 +123,7 @@ class Team:
             ),
             START,
         )
-        self.listen(0.2)  # the monitor's side of the matching has no count that we could see
+        self.listen(0.2)  # the discovery by the monitor has no count that is visible here
 
     @property
     def now(self) -> int:
@@ -139,14 +139,14 @@ class Team:
         self._shapes_out.publish(data)
 
     def say(self, *rows: np.void, stamp: int | None = None, frame_id: str = "world") -> int:
-        """Publish states; their stamp."""
+        """Publish states and return their stamp."""
         stamp = self.now if stamp is None else stamp
         states = np.stack(rows) if rows else np.zeros(0, records.STATE)
         self._states_out.publish(codec.encode_states(stamp, frame_id, 0, states))
         return stamp
 
     def ask(self, *rows: np.void, stamp: int | None = None) -> tuple[Any, Any]:
-        """Publish states, wait for their answers: ContactArray and PredictedCollisionArray."""
+        """Publish states and return their answers: ContactArray and PredictedCollisionArray."""
         stamp = self.say(*rows, stamp=stamp)
         self.until(lambda: self._of(self.contacts, stamp) and self._of(self.predictions, stamp))
         return self._of(self.contacts, stamp)[0], self._of(self.predictions, stamp)[0]
@@ -156,7 +156,7 @@ class Team:
         return [m for m in messages if m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec == stamp]
 
     def status(self, condition: Callable[[Any], Any]) -> Any:
-        """The first status from now on for which the condition holds."""
+        """Return the first status from now on for which the condition holds."""
         self.until(lambda: self.statuses and condition(self.statuses[-1]))
         return self.statuses[-1]
 
@@ -168,7 +168,7 @@ class Team:
 
 @pytest.fixture
 def start(ros_domain_id: int, tmp_path: Path) -> Iterator[Callable[..., Process]]:
-    """Starts `collision-monitor` with these arguments, in an empty folder; killed at the end if need be."""
+    """Yield a function that starts `collision-monitor` in an empty folder. Kill the processes at the end."""
     started: list[Process] = []
 
     def start_process(*arguments: str) -> Process:

@@ -20,7 +20,7 @@ SEEDS = range(40)
 
 
 def random_value(kind: str, generator: np.random.Generator) -> Any:
-    """A random value of a field whose rclpy type is `kind`."""
+    """Return a random value for a field of the rclpy type `kind`."""
     if kind in ("boolean", "bool"):
         return bool(generator.integers(2))
     if kind in ("double", "float64"):
@@ -36,7 +36,7 @@ def random_value(kind: str, generator: np.random.Generator) -> Any:
 
 
 def random_message(kind: type, generator: np.random.Generator) -> Any:
-    """A message of this rclpy type with every field random, nested ones too."""
+    """Return a message of this rclpy type with random fields, nested ones included."""
     message = kind()
     for name, field in kind.get_fields_and_field_types().items():
         if field.startswith("sequence<"):
@@ -54,7 +54,7 @@ def random_message(kind: type, generator: np.random.Generator) -> Any:
 
 
 def flat(message: Any) -> list[Any]:
-    """The numbers, bools and texts of an rclpy message in wire order."""
+    """Return the numbers, bools and texts of an rclpy message in wire order."""
     if hasattr(message, "get_fields_and_field_types"):
         return [leaf for name in message.get_fields_and_field_types() for leaf in flat(getattr(message, name))]
     if hasattr(message, "__len__") and not isinstance(message, str | bytes):
@@ -63,7 +63,7 @@ def flat(message: Any) -> list[Any]:
 
 
 def flat_record(record: Any) -> list[Any]:
-    """The numbers of a structured record in order."""
+    """Return the numbers of a structured record in order."""
     return [leaf for name in record.dtype.names for leaf in np.ravel(record[name]).tolist()]
 
 
@@ -120,7 +120,7 @@ def test_status(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_descriptions_are_read_field_by_field(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Random descriptions are impossible objects, so the fields are compared before shapes are made of them."""
+    """Random descriptions are impossible objects, so the test compares the fields before shapes are made of them."""
     raw = []
 
     def spy(reader: Any) -> Any:
@@ -151,7 +151,7 @@ def points(vertices: Any) -> list[Point]:
 
 
 def test_descriptions_are_written_as_rclpy_writes_them() -> None:
-    """Every kind of shape, with names of every length modulo 8 before it so that all alignments occur."""
+    """Write every kind of shape behind names of every length modulo 8, so that all alignments occur."""
     tetrahedron = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
     shapes = [

@@ -1,4 +1,4 @@
-"""The node as a robot team meets it: another process, real DDS, messages read by rclpy."""
+"""The node as a team of robots uses it: another process, real DDS, messages read by rclpy."""
 
 import math
 import signal
@@ -44,9 +44,9 @@ def state(object_id, position, linear=(0, 0, 0)):
 APPROACHING = (state(1, (0, 0, 0), (1, 0, 0)), state(2, (2, 0, 0)))
 """Two balls with 1 m between them, closing at 1 m/s: they touch in 1 s."""
 OVERLAPPING = (state(3, (0, 10, 0)), state(4, (0.9, 10, 0)))
-"""Two balls, 0.1 m into each other."""
+"""Two balls that overlap by 0.1 m."""
 LYING = (state(5, (20, 0, 0)), state(6, (20.5, 0.5, 0.95)))
-"""Two cubes of 1 m, one 5 cm deep in the other's upper face, a quarter of which it covers."""
+"""Two cubes of 1 m. One is 5 cm deep in the upper face of the other and covers a quarter of it."""
 
 
 def call(team, kind, name, request):
@@ -58,7 +58,7 @@ def call(team, kind, name, request):
 
 
 def set_parameter(team, name, value):
-    """Why it was refused; empty: it was not."""
+    """Return why the parameter was refused; empty if it was not."""
     request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
     (result,) = call(team, SetParameters, "set_parameters", request).results
     return "" if result.successful else result.reason
@@ -121,7 +121,7 @@ def test_bad_input_is_counted_and_the_others_are_still_monitored(start, team):
         assert [(p.id_a, p.id_b) for p in predictions.predictions] == [(1, 2)]
         assert _refused(team, f"refused_{field}").last_refusal
 
-    # Not the empty message: Fast DDS itself never delivers it.
+    # The empty message is left out, because Fast DDS never delivers it.
     for garbage in (b"\x00", b"\x00\x01\x00\x00", b"\xff" * 7, bytes(range(256)) * 4):
         team.publish_states(garbage)
         team.publish_shapes(garbage)
@@ -178,7 +178,7 @@ def test_silence_is_never_clear(start, team):
 
 
 def test_simulated_time(start, team):
-    """An hour after the epoch on the simulated clock; the latency is by that clock."""
+    """The simulated clock starts an hour after the epoch, and the latency is by that clock."""
     start("run", "--ros-args", "-p", "use_sim_time:=true")
     team.meet()
     clock = team.node.create_publisher(Clock, "/clock", 10)
@@ -195,7 +195,7 @@ def test_simulated_time(start, team):
 
 @pytest.fixture
 def signals():
-    """Puts back the handlers that a main function takes over."""
+    """Restore the handlers that a main function takes over."""
     kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     yield
     for number, handler in kept.items():
@@ -283,7 +283,7 @@ def test_settings_change_while_it_runs_and_the_session_replays(start, team, tmp_
 def test_signals_end_it_cleanly_idle_and_under_load(start, team, tmp_path, number, executor):
     monitor = start("run", "--record", "run.mcap", "--ros-args", "-p", f"executor:={executor}")
     team.meet()
-    if executor == "single":  # load: messages go on arriving while it stops
+    if executor == "single":  # under load: messages keep arriving while it stops
         team.describe(ball(1), ball(2))
         timer = team.node.create_timer(0.001, lambda: team.say(*APPROACHING))
         team.status(lambda s: s.step > 20)
@@ -329,7 +329,7 @@ def test_a_signal_ends_it_while_the_kernels_compile(start, monkeypatch, tmp_path
 
 
 def test_a_budget_that_is_too_small_leaves_pairs_unresolved_and_none_clear(start, team, tmp_path):
-    """Every body takes another course in each message: a step takes milliseconds, and has 50 microseconds."""
+    """Every body takes another course in each message, so a step takes milliseconds; its budget is 50 microseconds."""
     monitor = start("run", "--record", "run.mcap", "--ros-args", "-p", "budget_ms:=0.05")
     scene, truth, random = make_scene("clutter", objects=300), ReferenceMonitor(), np.random.default_rng(6)
     for description in scene.descriptions:

@@ -1,4 +1,4 @@
-"""config/monitor.yaml shows every parameter, with the values that the code has."""
+"""config/monitor.yaml shows every parameter with the default of the code."""
 
 import re
 from pathlib import Path
@@ -18,7 +18,7 @@ CONFIG = Path(__file__).parents[2] / "config" / "monitor.yaml"
 
 @pytest.fixture
 def read(ros_domain_id):
-    """Reads the monitor's parameters as ROS hands them over."""
+    """Return a function that reads the monitor's parameters as ROS passes them."""
 
     def read_parameters(*arguments):
         context = rclpy.Context()

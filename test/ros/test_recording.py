@@ -1,4 +1,4 @@
-"""What the node records, and that the same answers come out of it without ROS."""
+"""The session that the node records, which gives the same answers again without ROS."""
 
 import resource
 
@@ -32,7 +32,7 @@ def test_a_recorded_session_replays_to_the_same_bytes(start, team, tmp_path):
     for step in range(60):
         team.say(*states(step))
         team.listen(0.02)
-    team.publish_states(b"\xff" * 100)  # what is refused is part of the session
+    team.publish_states(b"\xff" * 100)  # a refused message is part of the session
     status = team.status(lambda s: s.step == 60 and s.refused_malformed == 1 and s.recorded_messages > 180)
     assert status.recording == MonitorStatus.RECORDING_ON
     assert status.recording_path == "run.mcap"
@@ -87,7 +87,7 @@ def test_only_what_is_around_collisions_is_recorded(start, team, tmp_path):
     team.meet()
     team.describe(*(ObjectDescription(i, Box((1, 1, 1))) for i in range(1, 21)))
     team.status(lambda s: s.objects == 20)
-    for step in (*range(10), *range(30, 60), *range(10)):  # apart, touching from about step 40 on, apart
+    for step in (*range(10), *range(30, 60), *range(10)):  # apart, in contact from about step 40 on, apart
         team.say(*states(step))
         team.listen(0.03)
     team.listen(0.5)
@@ -101,7 +101,7 @@ def test_only_what_is_around_collisions_is_recorded(start, team, tmp_path):
     assert 0 < begins < len(steps) - 1 < 45
     assert messages[0].type == "ObjectDescriptionArray"
     assert len(decode_descriptions(messages[0].data).objects) == 20
-    replay = start("replay", "events")  # from the snapshot that it begins with
+    replay = start("replay", "events")  # from the snapshot at its begin
     assert replay.wait() == 0, replay.words
 
 

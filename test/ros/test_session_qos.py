@@ -1,4 +1,4 @@
-"""The quality of service that a session states is the one that the node offers."""
+"""The quality of service in a session is the one that the node offers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The benchmark through DDS: what it counts agrees with itself, and it says so when it cannot measure."""
+"""The benchmark through DDS: its counts agree with each other, and it reports when it cannot measure."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""The world node: what it publishes arrives, in time and without gaps, and the demo that is built on it."""
+"""The world node: its messages arrive, in time and without gaps; and the demo that uses it."""
 
 import re
 import signal
@@ -32,7 +32,7 @@ def test_a_scene_is_published_at_a_steady_rate(start, team):
     sequence = np.array([m.sequence for m in messages])
     stamps = np.array([m.stamp_ns for m in messages])
     assert (np.diff(sequence) >= 1).all()
-    periods = np.diff(stamps) / 20_000_000  # where the machine was too slow, whole periods are skipped
+    periods = np.diff(stamps) / 20_000_000  # if the machine was too slow, whole periods are skipped
     assert periods == pytest.approx(np.round(periods), abs=1e-6)
     late = np.array([received for received, _ in heard]) - stamps
     assert late.min() > 0
@@ -53,7 +53,7 @@ def test_messages_larger_than_the_default_shared_memory_of_fast_dds_arrive(start
     published = int(re.search(r"published (\d+) messages", world.words)[1])
     assert published > 5
     assert min(heard) > 1_680_000
-    assert len(heard) >= published - 1  # best effort; with the default segment one in twenty arrives
+    assert len(heard) >= published - 1  # best effort; with the default segment only one in twenty arrives
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""One function over many files: in order, whatever becomes of one of them."""
+"""One function over many files: results in order, even if one of the files fails."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def failed(path: Path, why: str) -> str:
 
 @pytest.fixture(autouse=True)
 def importable_by_processes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pytest's import mode leaves this module out of `sys.path`, and a spawned process looks for it there."""
+    """Put this module where a spawned process finds it; pytest's import mode leaves it out of `sys.path`."""
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     monkeypatch.setattr(work, "__module__", "test_many")
     monkeypatch.setattr(failed, "__module__", "test_many")
@@ -86,7 +86,7 @@ def test_sessions_are_found_by_name_wildcard_and_folder(tmp_path: Path) -> None:
         (tmp_path / name).touch()
     names = [p.name for p in find_sessions([f"{tmp_path}/*.mcap", str(tmp_path), f"{tmp_path}/a[1].mcap"])]
     assert names == ["a[1].mcap", "b.mcap", "c.mcap"]
-    assert find_sessions(["missing.mcap"]) == [Path("missing.mcap")]  # whoever opens it says so
+    assert find_sessions(["missing.mcap"]) == [Path("missing.mcap")]  # opening it reports the error
     (tmp_path / "in" / "split").mkdir()
     for part in ("split_0.mcap", "split_1.mcap"):
         (tmp_path / "in" / "split" / part).touch()

@@ -1,4 +1,4 @@
-"""The reader: whole sessions, cut ones, damaged ones and what is no session."""
+"""The reader: whole, cut and damaged sessions, and files that are no session."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_a_folder_with_one_file_is_read(tmp_path: Path, recorded: Path) -> None:
 
 
 def chunked(path: Path, messages: int = 60, per_chunk: int = 10) -> list[int]:
-    """A session with several chunks; where each ends in the file."""
+    """Write a session with several chunks. Return the end of each in the file."""
     from collision_monitor.session.mcap.layout import METADATA
 
     with path.open("wb") as file:

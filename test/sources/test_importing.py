@@ -1,4 +1,4 @@
-"""Bags of other programs become sessions: the answers are those of a monitor that is fed directly."""
+"""Bags of other programs become sessions with the answers of a monitor that gets the same inputs directly."""
 
 from __future__ import annotations
 
@@ -67,7 +67,10 @@ def rows_of(path: Path) -> np.ndarray:
 
 
 def scene(steps: int = 60) -> Iterator[tuple[str, int, tuple[str, Any]]]:
-    """A cart and a person that meet, and a drone over a static and a moving link. Only quarter turns: exact."""
+    """Yield messages of a cart and a person that meet, and of a drone behind a static and a moving link.
+
+    There are only quarter turns, so that the poses are exact.
+    """
     yield "/tf_static", START, transforms(START, ("/map", "hall", (1, 2, 0), (0, 0, 0, 1)))
     for k in range(steps):
         t, stamp = k * STEP / SECOND, START + k * STEP
@@ -77,7 +80,7 @@ def scene(steps: int = 60) -> Iterator[tuple[str, int, tuple[str, Any]]]:
 
 
 def direct(profile: str = "balanced", steps: int = 60) -> tuple[list[Any], Monitor]:
-    """The same scene, told to a monitor by hand."""
+    """Feed the same scene to a monitor directly."""
     monitor = Monitor(profile)
     monitor.add(1, HalfSpace((0, 0, 1), -5), name="floor", static=True, pose=Pose())
     monitor.add(2, Box((1.2, 0.8, 0.5)), name="cart")
@@ -125,7 +128,7 @@ def test_the_answers_are_those_of_a_monitor_that_is_fed_directly(
 
 
 def test_a_bag_of_foxgloves_writer_is_read_too(tmp_path: Path) -> None:
-    """As one file, without rosbag2's metadata, with the definitions of another library."""
+    """It is one file, without rosbag2's metadata, with the definitions of another library."""
     from mcap_ros2.writer import Writer
 
     definition = "float64 x\nfloat64 y\nfloat64 z"
@@ -152,7 +155,7 @@ def test_a_bag_of_foxgloves_writer_is_read_too(tmp_path: Path) -> None:
 
 
 def test_poses_and_twists_come_into_the_frame_of_the_session(tmp_path: Path) -> None:
-    """Against SciPy's rotations; the transforms are static, behind one that moves, and told late."""
+    """Compare with SciPy's rotations; the transforms are static, behind a moving one, and arrive late."""
     rng = np.random.default_rng(3)
     q_WH, q_HO, q_OB = (Rotation.random(random_state=k).as_quat() for k in (1, 2, 3))
     p_WH, p_HO, p_OB, v_B, w_B = rng.uniform(-3, 3, (5, 3))
@@ -173,7 +176,7 @@ def test_poses_and_twists_come_into_the_frame_of_the_session(tmp_path: Path) -> 
     np.testing.assert_allclose(Rotation.from_quat(row["quaternion"]).as_matrix(), R_WB.as_matrix(), atol=1e-12)
     np.testing.assert_allclose(row["linear"], R_WB.apply(v_B), atol=1e-12)
     np.testing.assert_allclose(row["angular"], R_WB.apply(w_B), atol=1e-12)
-    # against the tree: the frame of the session lies below that of the message
+    # down the tree: the frame of the session lies below that of the message
     content["frame"] = "odom"
     bag = write_bag(tmp_path / "other", [
         ("/tf_static", START, transforms(START, ("hall", "odom", p_HO, q_HO))),
@@ -242,7 +245,7 @@ def test_what_is_wrong_is_left_out_counted_and_named(tmp_path: Path, capsys: pyt
             ("/a", START + 2, pose_stamped("map", START + 2, (np.nan, 0, 0))),
             ("/a", later, pose_stamped("map", later, (0, 0, 0))),
             ("/a", later + 1, pose_stamped("map", later - STEP, (0, 0, 0))),  # older than the last one
-            ("/a", later + 2, pose_stamped("map", 0, (1, 0, 0))),  # no stamp: counts from its receipt
+            ("/a", later + 2, pose_stamped("map", 0, (1, 0, 0))),  # no stamp: the time of receipt counts
             ("/a", later + 3, pose_stamped("mars", later + 3, (0, 0, 0))),
             ("/a", later + 4, ("geometry_msgs/msg/PoseStamped", b"\0\1\0\0short")),
             ("/b", later + 5, pose_stamped("mars", later + 5, (0, 0, 0))),
@@ -350,7 +353,7 @@ def test_what_is_no_bag_is_named(tmp_path: Path) -> None:
 
 
 def monitor_bag(path: Path, *nodes: str) -> Path:
-    """What `ros2 bag record` takes of a monitor's inputs: no metadata of ours, no sequence numbers."""
+    """Write what `ros2 bag record` records of a monitor's inputs: no metadata of ours, no sequence numbers."""
     with path.open("wb") as file:
         writer = McapWriter(file)
         writer.start("ros2", "another recorder")
@@ -382,7 +385,7 @@ def test_recorded_inputs_of_a_monitor_need_no_mapping(tmp_path: Path) -> None:
 
 
 def test_recorded_inputs_of_a_monitor_replay_as_they_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Whatever the node was called, and without anything of ours but the topics."""
+    """Under any name of the node, and with nothing of ours but the topics."""
     session = Session(monitor_bag(tmp_path / "bag.mcap", "/hall/monitor"))
     assert (session.foreign, session.frame_id, session.profile.name) == (True, "world", "balanced")
     messages = list(session.messages())
@@ -402,7 +405,7 @@ def test_recorded_inputs_of_a_monitor_replay_as_they_are(tmp_path: Path, capsys:
 
 
 def test_answers_that_another_recorder_took_are_compared(tmp_path: Path) -> None:
-    """As `ros2 bag record -a` beside a monitor with the same settings: equal bytes are equal."""
+    """The bag is like that of `ros2 bag record -a` beside a monitor with the same settings."""
     recorded = tmp_path / "run.mcap"
     record(recorded)
     with (tmp_path / "bag.mcap").open("wb") as file:
@@ -432,7 +435,7 @@ def test_a_disk_that_is_full_leaves_no_half_of_a_session(tmp_path: Path, capsys:
     bag = write_bag(tmp_path / "bag", scene(60))
     (tmp_path / "map.yaml").write_text(yaml.safe_dump(MAPPING))
     command = ["import", str(bag), "--map", str(tmp_path / "map.yaml"), "-o"]
-    assert main([*command, str(tmp_path / "a.mcap")]) == 0  # with this, everything is compiled
+    assert main([*command, str(tmp_path / "a.mcap")]) == 0  # compiles everything
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     capsys.readouterr()
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))

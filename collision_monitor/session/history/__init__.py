@@ -1,1 +1,1 @@
-"""What happened in a session, and tests of it."""
+"""The history of a session: its events, and their checks and comparisons."""

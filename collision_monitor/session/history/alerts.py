@@ -1,4 +1,4 @@
-"""Alerts: the predictions of a pair without a break, and what became of them."""
+"""Alerts, which are unbroken runs of predictions of one pair, and their outcomes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from collision_monitor.session.history.history import CollisionEvent, Floats, Hi
 
 
 class AlertOutcome(Enum):
-    """What became of an alert."""
+    """Outcome of an alert."""
 
     CONTACT = "the pair touched when it was due"
     NOTHING = "it ended without a contact"
@@ -23,10 +23,10 @@ class AlertOutcome(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Alert:
-    """Predictions of one pair in steps that follow each other.
+    """Predictions of one pair in consecutive steps.
 
-    time (n,): s, when they were made. lower, upper (n,): s from then on, the stated interval of the first contact;
-    upper is infinite where none was stated. certain: at least one was a HIT.
+    time (n,): s, when each was made. lower, upper (n,): s from then on, the predicted interval of the first contact;
+    upper is infinite if no upper bound was predicted. certain: at least one was a HIT.
     """
 
     pair: Pair
@@ -38,19 +38,19 @@ class Alert:
 
     @property
     def begin(self) -> float:
-        """When it was raised, s."""
+        """Time of the first prediction (s)."""
         return float(self.time[0])
 
     @property
     def first_stated(self) -> tuple[float, float]:
-        """When they would touch, as it was stated first: from, to (s)."""
+        """Interval of the contact in the first prediction: from, to (s)."""
         return float(self.time[0] + self.lower[0]), float(self.time[0] + self.upper[0])
 
 
 def alerts_of(history: History) -> list[Alert]:
-    """All alerts of a history, by begin and pair."""
+    """Return all alerts of a history, sorted by begin and pair."""
     period, longest = history.period, history.longest_step
-    unseen = np.append(np.diff(history.times) > longest, True)  # (n,): nothing is known of what comes after the step
+    unseen = np.append(np.diff(history.times) > longest, True)  # (n,): a gap, or the end, follows the step
     rows, steps = history.predictions, history.prediction_step
     keys = pair_keys(rows)
     order = np.lexsort((steps, keys))
@@ -80,7 +80,7 @@ def alerts_of(history: History) -> list[Alert]:
 
 
 def alert_before(alerts: list[Alert], collision: CollisionEvent) -> Alert | None:
-    """The alert, of those of its pair, that went on until the collision began."""
+    """Return the pair's alert that lasted until the collision began; None if there is none."""
     if not collision.warned > 0.0:
         return None
     before = [alert for alert in alerts if alert.begin < collision.begin and alert.outcome is AlertOutcome.CONTACT]
@@ -88,9 +88,9 @@ def alert_before(alerts: list[Alert], collision: CollisionEvent) -> Alert | None
 
 
 def stated_error(alert: Alert, collision: CollisionEvent, period: float) -> NDArray[np.float64]:
-    """How far each stated interval is from the step in which the contact began, (n,) s; negative: too early.
+    """Return how far each predicted interval is from the step in which the contact began, (n,) s; negative: too early.
 
-    0 where they overlap: when within that step it began, nobody saw.
+    0 if they overlap, because the moment of the contact within that step is unknown.
     """
     low, high = alert.time + alert.lower, alert.time + alert.upper
     early = np.minimum(high - (collision.begin - period), 0.0)

@@ -1,4 +1,4 @@
-"""What changed between two histories: collisions, how early they were predicted, warnings in vain, and the cost."""
+"""Differences between two histories: collisions, how early they were predicted, false warnings, and the cost."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from collision_monitor.session.history.alerts import AlertOutcome, alerts_of
 from collision_monitor.session.history.history import NANOSECOND, History, Pair
 
 WITHIN: Final = 0.5
-"""s: two collisions of a pair whose begins are further apart are two events, not one that was shifted."""
+"""s: two collisions of a pair whose begins are further apart are two events, not one shifted event."""
 
 EXACT: Final = 1e-9
-"""s: times are differences of whole nanoseconds."""
+"""s: tolerance of times, which are differences of whole nanoseconds."""
 
 PairNames = tuple[str, str]
 
@@ -26,8 +26,8 @@ PairNames = tuple[str, str]
 class Event:
     """A collision, or a warning that no collision followed. Times in s from A's first step.
 
-    end: None where it went on to the end or a gap. warned: s before the begin; None where the session begins with it,
-    and for warnings. certain: not only that it could not be excluded.
+    end: None if it lasts to the end or to a gap. warned: s before the begin; None if the session begins with the
+    collision, and for warnings. certain: false if the collision only could not be excluded.
     """
 
     what: str
@@ -40,7 +40,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Change:
-    """An event of A, of B, or of both with what is not the same in it: fields of Event."""
+    """An event of A, of B, or of both. fields: the fields of Event in which they differ."""
 
     a: Event | None
     b: Event | None
@@ -48,7 +48,7 @@ class Change:
 
     @property
     def event(self) -> Event:
-        """The event, A's where both have it."""
+        """The event of A, or that of B if A has none."""
         event = self.a or self.b
         assert event is not None
         return event
@@ -56,7 +56,7 @@ class Change:
 
 @dataclass(frozen=True)
 class SessionSummary:
-    """One of the two, in numbers. contacts, predictions: pairs, counted at each step. Step times in s, NaN: unknown."""
+    """Figures of one session. contacts, predictions: pairs, counted at each step. Step times in s, NaN if unknown."""
 
     session: str
     profile: str
@@ -77,7 +77,7 @@ class SessionSummary:
 
 @dataclass(frozen=True)
 class Changes:
-    """The two sides and what changed, collisions first; by_stamps: else B's times count from its own first step."""
+    """The two sides and their changes, collisions first. by_stamps: false if B's times count from B's first step."""
 
     a: SessionSummary
     b: SessionSummary
@@ -86,14 +86,14 @@ class Changes:
 
     @property
     def known(self) -> bool:
-        """Whether all is known of both, so that no change means that there is none."""
+        """Whether both histories are complete, so that no change in the list means that there is none."""
         return not (self.a.problems or self.b.problems)
 
 
 def changes(a: History, b: History, tolerance: float = 0.0) -> Changes:
-    """What changed from a to b; times that differ by at most the tolerance (s) count as the same."""
+    """Return the changes from a to b. Times that differ by at most the tolerance (s) count as equal."""
     shift = (b.begin_ns - a.begin_ns) * NANOSECOND
-    by_stamps = -b.duration <= shift <= a.duration  # else they are of different times: compared from the start of each
+    by_stamps = -b.duration <= shift <= a.duration  # sessions of different times are compared from their starts
     names = _naming(a, b)
     found: list[Change] = []
     events_a, warnings_a = _events(a, 0.0, names)
@@ -110,7 +110,7 @@ def changes(a: History, b: History, tolerance: float = 0.0) -> Changes:
 
 
 def _naming(a: History, b: History) -> Callable[[History, Pair], PairNames]:
-    """How objects are called in both: by their names where they are unique, else with their ids."""
+    """Return a function that names the objects of a pair: by name if names are unique in both, else with their ids."""
     unique = all(len({o.name for o in h.objects.values()}) == len(h.objects) for h in (a, b))
 
     def names(history: History, pair: Pair) -> PairNames:
@@ -125,7 +125,7 @@ def _naming(a: History, b: History) -> Callable[[History, Pair], PairNames]:
 def _events(
     history: History, shift: float, names: Callable[[History, Pair], PairNames]
 ) -> tuple[list[Event], list[Event]]:
-    """Collisions, and warnings that no collision followed, by begin."""
+    """Return the collisions, and the warnings that no collision followed, sorted by begin."""
     collisions = [
         Event(
             what="collision",
@@ -156,7 +156,7 @@ _T = TypeVar("_T")
 
 
 def _matched(a: Sequence[_T], b: Sequence[_T], begin: Callable[[_T], float]) -> Iterable[tuple[_T | None, _T | None]]:
-    """Events of one pair, by begin, side by side where they begin within WITHIN of each other."""
+    """Yield the events of one pair in A and B, side by side if they begin within WITHIN of each other."""
     i = j = 0
     while i < len(a) or j < len(b):
         if i == len(a) or (j < len(b) and begin(b[j]) < begin(a[i]) - WITHIN):
@@ -181,7 +181,7 @@ def _summary(history: History) -> SessionSummary:
     problems = list(history.problems)
     if history.status is not None and history.status.recording_dropped:
         problems.append(f"{history.status.recording_dropped} messages could not be recorded")
-    # The first step of a replay compiles, or loads what was compiled.
+    # The first step of a replay compiles the kernels or loads them.
     durations = history.durations[1:] if history.replayed else history.durations
     return SessionSummary(
         session=history.name,

@@ -1,4 +1,4 @@
-"""Checks sessions against what is expected of them, and writes the outcomes as JUnit XML."""
+"""Checks sessions against expectations, and writes the outcomes as JUnit XML."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from collision_monitor.session.reader import Session
 from collision_monitor.session.replaying.replay import replay
 
 _NOT_XML: Final = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""What a name may hold and XML may not."""
+"""Characters that a name may hold and XML may not."""
 
 
 @dataclass(frozen=True)
 class Checked:
-    """A session and its outcomes, or why it could not be read."""
+    """A session and its outcomes, or the reason why it could not be read."""
 
     session: str
     outcomes: list[ExpectationResult] = field(default_factory=list)
@@ -30,14 +30,14 @@ class Checked:
 
     @property
     def holds(self) -> bool:
-        """Whether it was read and all expectations hold."""
+        """Whether the session was read and all expectations hold."""
         return not self.error and all(each.holds for each in self.outcomes)
 
 
 def check_session(path: Path, expectations: Any, with_profile: str | None = None) -> Checked:
-    """One session against what `read_expectations` gives. Raises SessionError, ProfileError.
+    """Check one session against the content from `read_expectations`. Raises SessionError, ProfileError.
 
-    with_profile: not what was answered then, but what today's program answers with that profile, or AS_RECORDED.
+    with_profile: check the answers of this program with that profile, or AS_RECORDED, instead of the recorded answers.
     """
     history = read_history(Session(path), with_profile)
     return Checked(str(path), evaluate(parse_expectations(expectations), history, lambda: replay_verdict(path)))
@@ -48,7 +48,7 @@ def _unread(path: Path, why: str) -> Checked:
 
 
 def replay_verdict(path: Path) -> str:
-    """What a replay comes to, in words: `identical`, or how it differs. Raises SessionError."""
+    """Replay the session and return the verdict in words: `identical`, or the difference. Raises SessionError."""
     report = replay(Session(path))
     text = report.verdict.name.lower().replace("_", " ")
     return text if report.first_difference is None else f"{text}: {report.first_difference}"
@@ -61,14 +61,14 @@ def check_sessions(
     with_profile: str | None = None,
     engine: Engine = ALL_CORES,
 ) -> Iterator[Checked]:
-    """The outcomes of each session, in order. Raises what `for_each` does."""
+    """Yield the outcomes of each session, in order. Raises the errors of `for_each`."""
     each = partial(check_session, expectations=expectations, with_profile=with_profile)
     for path, checked in zip(paths, for_each(each, paths, _unread, engine), strict=True):
-        yield replace(checked, session=str(path))  # as it was named here
+        yield replace(checked, session=str(path))  # the path as the caller gave it
 
 
 def junit_xml(results: Sequence[Checked]) -> str:
-    """The results as JUnit XML: a suite for each session, a case for each expectation."""
+    """Return the results as JUnit XML, with a suite for each session and a case for each expectation."""
     root = ElementTree.Element("testsuites", name="collision-monitor check")
     for each in results:
         failures = sum(not outcome.holds for outcome in each.outcomes)

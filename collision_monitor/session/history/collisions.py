@@ -1,4 +1,4 @@
-"""Finds the collisions of a session: unbroken runs of contacts of one pair."""
+"""Finds the collisions of a session, which are unbroken runs of contacts of one pair."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from collision_monitor.session.history.history import NANOSECOND, CollisionEvent
 
 
 def pair_keys(rows: Records) -> NDArray[np.uint64]:
-    """One number for the pair of each row."""
+    """Return one number for the pair of each row."""
     return (rows["id_a"].astype(np.uint64) << np.uint64(32)) | rows["id_b"].astype(np.uint64)
 
 
 def find_collisions(h: History) -> list[CollisionEvent]:
-    """Unbroken runs of contacts, by begin and pair."""
+    """Return the unbroken runs of contacts, sorted by begin and pair."""
     touching = h.contacts["phase"] != Phase.END
     rows, steps = h.contacts[touching], h.contact_step[touching]
     keys = pair_keys(rows)
@@ -23,8 +23,8 @@ def find_collisions(h: History) -> list[CollisionEvent]:
     predicted = _steps_by_pair(pair_keys(h.predictions), h.prediction_step)
     found = []
     time, longest = h.times[steps[order]], h.longest_step
-    begins = rows["phase"][order] == Phase.BEGIN  # also where one ends in the step in which the next begins
-    begins[1:] |= time[1:] - rows["duration"][order][1:] > time[:-1] + NANOSECOND  # unseen, while steps are missing
+    begins = rows["phase"][order] == Phase.BEGIN  # one may end where the next begins
+    begins[1:] |= time[1:] - rows["duration"][order][1:] > time[:-1] + NANOSECOND  # unseen, in missing steps
     breaks = np.flatnonzero((np.diff(keys[order]) != 0) | (np.diff(steps[order]) != 1) | begins[1:]) + 1
     for run in np.split(order, breaks) if len(order) else ():
         first, last = int(steps[run[0]]), int(steps[run[-1]])
@@ -46,14 +46,14 @@ def find_collisions(h: History) -> list[CollisionEvent]:
 
 
 def _steps_by_pair(keys: NDArray[np.uint64], steps: NDArray[np.int64]) -> dict[int, NDArray[np.int64]]:
-    """The steps of each pair, ascending."""
+    """Return the steps of each pair, ascending."""
     order = np.lexsort((steps, keys))
     breaks = np.flatnonzero(np.diff(keys[order]) != 0) + 1
     return {int(keys[run[0]]): steps[run] for run in np.split(order, breaks) if len(run)}
 
 
 def _warned(times: Floats, begin: int, steps: NDArray[np.int64], longest: float) -> float:
-    """s by which the unbroken run of predictions right before step `begin` came before it; longest: step, s."""
+    """Return how long (s) before step `begin` its unbroken run of predictions began. longest: longest step (s)."""
     if begin == 0:
         return float("nan")
     first = begin

@@ -1,4 +1,4 @@
-"""The conditions that an expectation can state: whether a history meets each, and what it holds instead."""
+"""The conditions that an expectation can state. Each returns whether a history meets it, and what was found."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from collision_monitor.session.history.history import ANY, History, Pair
 
 Condition = Callable[[History, Callable[[], str]], tuple[bool, str]]
-"""Takes a history and a function that replays the session and returns the verdict; returns whether the condition holds,
+"""Takes a history and a function that replays the session and returns the verdict. Returns whether the condition holds,
 and what the history holds."""
 
 PairSelector = str | list[str | int]
@@ -19,7 +19,7 @@ PairSelector = str | list[str | int]
 
 
 def _problems(history: History) -> str:
-    """Why something may be missing; empty where all is there."""
+    """Return why something may be missing; empty if nothing is."""
     if not history.problems:
         return ""
     more = len(history.problems) - 1
@@ -31,7 +31,7 @@ def _pair(history: History, pair: Pair) -> str:
 
 
 def first_contact_within(names: PairSelector, low: float, high: float) -> Condition:
-    """The first certain contact of these objects begins in this window (s)."""
+    """Require that the first certain contact of these objects begins in this window (s)."""
 
     def check(history: History, _: Callable[[], str]) -> tuple[bool, str]:
         collisions = [each for each in history.collisions_of(names) if each.certain]
@@ -44,7 +44,7 @@ def first_contact_within(names: PairSelector, low: float, high: float) -> Condit
 
 
 def no_contact(names: PairSelector) -> Condition:
-    """These objects have no contact, and no possible one."""
+    """Require that these objects have no contact, not even a possible one."""
 
     def check(history: History, _: Callable[[], str]) -> tuple[bool, str]:
         for each in history.collisions_of(names):
@@ -62,14 +62,14 @@ def no_contact(names: PairSelector) -> Condition:
 
 
 def _unseen(history: History, names: PairSelector) -> list[str]:
-    """PairSelector of the objects that are meant and that nothing was ever heard of."""
+    """Return the names of the selected objects that move and have no states."""
     ids = set(history.objects) if names == ANY else history.ids_of(names[0]) | history.ids_of(names[1])
     seen = set(history.states["id"].tolist())
     return sorted(history.name_of(i) for i in ids if i not in seen and not history.objects[i].static)
 
 
 def no_prediction_under(names: PairSelector, under: float) -> Condition:
-    """No collision of these objects is predicted to be due in less than `under` s."""
+    """Require that no collision of these objects is predicted to begin in less than `under` s."""
 
     def check(history: History, _: Callable[[], str]) -> tuple[bool, str]:
         wanted = history.pairs_of(names)
@@ -85,13 +85,13 @@ def no_prediction_under(names: PairSelector, under: float) -> Condition:
 
 
 def warned_before(names: PairSelector, before: float) -> Condition:
-    """Predictions of each collision of these objects begin at least `before` s earlier."""
+    """Require that predictions of each collision of these objects begin at least `before` s earlier."""
 
     def check(history: History, _: Callable[[], str]) -> tuple[bool, str]:
         collisions = history.collisions_of(names)
         least = math.inf
         for each in collisions:
-            # what was there from the start could not be warned of
+            # NaN passes: a contact at the session's begin could not be predicted
             if each.warned < before:
                 return False, f"warned {each.warned:.3f} s before {each.begin:.3f} s, {_pair(history, each.pair)}"
             least = min(least, each.warned)
@@ -104,7 +104,7 @@ def warned_before(names: PairSelector, before: float) -> Condition:
 
 
 def complete(history: History, _: Callable[[], str]) -> tuple[bool, str]:
-    """No input was refused or lost, and no message is missing."""
+    """Require that no input was refused or lost, and no message is missing."""
     if history.problems:
         return False, _problems(history)
     if history.status is None:
@@ -116,7 +116,7 @@ def complete(history: History, _: Callable[[], str]) -> tuple[bool, str]:
 
 
 def step_time_within(limit: float) -> Condition:
-    """The 99th percentile of the step times is at most `limit` s."""
+    """Require that the 99th percentile of the step times is at most `limit` s."""
 
     def check(history: History, _: Callable[[], str]) -> tuple[bool, str]:
         if not len(history.durations):

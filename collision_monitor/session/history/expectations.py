@@ -1,7 +1,7 @@
-"""What a team expects of a session, as YAML, and whether it is so: regression tests from recordings.
+"""A team's expectations of a session, as YAML, and their evaluation: regression tests from recordings.
 
-Nothing is taken as true that the session does not show: where inputs or answers are missing, what must not have
-happened counts as not known, and fails.
+Only what the session shows counts as true. If inputs or answers are missing, an expectation that something did not
+happen counts as not known, and fails.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from collision_monitor.session.history.history import ANY, History
 
 @dataclass(frozen=True)
 class ExpectationResult:
-    """One expectation: what it says, whether it holds, and what was there."""
+    """Result of one expectation: its text, whether it holds, and what was found."""
 
     expectation: str
     holds: bool
@@ -39,14 +39,17 @@ class ExpectationResult:
 
 @dataclass(frozen=True)
 class Expectation:
-    """The text of an expectation, and the condition that it states."""
+    """Text and condition of an expectation."""
 
     text: str
     condition: Condition
 
 
 def read_expectations(path: str | Path) -> Any:
-    """What a YAML file expects, for `parse_expectations`. Raises InputError, naming file, expectation and choices."""
+    """Return the content of a YAML file for `parse_expectations`.
+
+    Raises InputError with the file, the expectation and the choices.
+    """
     try:
         content = yaml.load(Path(path).read_text(encoding="utf-8"), _Loader)
     except OSError as error:
@@ -61,7 +64,7 @@ def read_expectations(path: str | Path) -> Any:
 
 
 class _Loader(yaml.SafeLoader):
-    """Refuses a key that is there twice, where YAML would forget the first: an expectation less."""
+    """Refuses a duplicate key. YAML would ignore the first one, and an expectation would be lost."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         keys = [key.value for key, _ in node.value]
@@ -71,7 +74,7 @@ class _Loader(yaml.SafeLoader):
 
 
 def parse_expectations(content: Any) -> list[Expectation]:
-    """The expectations of what `yaml.safe_load` gives. Raises InputError."""
+    """Return the expectations in the content from `yaml.safe_load`. Raises InputError."""
     if not isinstance(content, Mapping) or list(content) != ["expect"] or not isinstance(content["expect"], list):
         raise InputError(f"expected a list under the one key `expect`, got {content!r:.80}")
     if not content["expect"]:
@@ -80,7 +83,7 @@ def parse_expectations(content: Any) -> list[Expectation]:
 
 
 def evaluate(expectations: list[Expectation], history: History, replay: Callable[[], str]) -> list[ExpectationResult]:
-    """The outcome of each. replay: runs the session again and returns its verdict, where an expectation asks for it."""
+    """Return the result of each expectation. replay: replays the session and returns its verdict, if that is needed."""
     outcomes = []
     for each in expectations:
         try:

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from collision_monitor.session.history.history import Records
 
 _BLOCK: Final = 1 << 16
-"""Rows that are made room for at a time."""
+"""Rows that are allocated at a time."""
 
 
 class GrowingRows:
-    """Rows that grow message by message, each with the key of its message; a message is not kept."""
+    """Rows that grow message by message, each with the key of its message. The messages are not kept."""
 
     def __init__(self, dtype: np.dtype[np.void]) -> None:
         self.keys: list[int] = []
@@ -24,7 +24,7 @@ class GrowingRows:
         self._room = 0
 
     def append(self, key: int, rows: Records) -> None:
-        """A copy of the rows."""
+        """Append a copy of the rows."""
         self.keys.append(key)
         self._counts.append(len(rows))
         if len(rows) > self._room:
@@ -37,7 +37,7 @@ class GrowingRows:
         self._room -= len(rows)
 
     def joined(self) -> tuple[Records, NDArray[np.int64]]:
-        """All rows and their keys. Blocks are let go as they are copied: a long session is not there twice."""
+        """Return all rows and their keys. Blocks are freed once copied, so that memory never holds all rows twice."""
         self._close()
         keys = np.repeat(np.array(self.keys, np.int64), self._counts)
         joined = np.empty(len(keys), self._dtype)

@@ -1,6 +1,6 @@
-"""What happened in a session, gathered: who touched whom and when, what was predicted before, how long it took.
+"""The history of a session: its collisions, the predictions before them, and the step times.
 
-The one view of a session that checks, reports and comparisons are made from.
+Checks, reports and comparisons all work on it.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ Pair = tuple[int, int]
 NANOSECOND: Final = 1e-9
 
 STEPS_MISSING: Final = 5.0
-"""Steps of the usual length without one that are a gap, where that is longer than the profile's stale_after."""
+"""Number of median periods without a step that make a gap, if that is longer than the profile's stale_after."""
 
 ANY: Final = "any"
-"""In place of names: every pair."""
+"""Selects every pair, in place of names."""
 
 
 @dataclass(frozen=True)
 class CollisionEvent:
-    """Two objects in contact without a break. Times in s from the session's first step; step: index of the begin.
+    """Two objects in unbroken contact. Times in s from the session's first step; step: index of the begin.
 
-    end: None where it went on to the end of the session or to a gap; last: the last step in contact. deepest: least
-    signed distance (m). certain: they were known to touch at some time, not only not known to be apart. warned: how
-    long before the begin (s) the predictions of it began that were not interrupted any more; 0 where there was none,
-    NaN where the session begins with the contact.
+    end: None if it lasts to the end of the session or to a gap; last: the last step in contact. deepest: least signed
+    distance (m). certain: the objects certainly touched at some time; false if they only could not be shown to be
+    apart. warned: how long before the begin (s) the unbroken predictions of it began; 0 if there were none, NaN if the
+    session begins with the contact.
     """
 
     pair: Pair
@@ -56,13 +56,12 @@ class CollisionEvent:
 class History:
     """A session, from its first step to its last.
 
-    times (n,): s of each step from the first, never falling: where the clock was set back (restarts: how often) they
-    go on from where they were. contacts, predictions: of all steps, records.CONTACT (of several points the first) and
-    records.PREDICTION, and the step (index) of each row. states: of all messages, records.STATE, and the time (s).
-    objects: as they were described last; names: all that they had, and the ids of each. profile: of the start;
-    settings: what changed of it, and the time (s) of the first step that went by it. durations: s that steps took, as
-    far as they were reported or measured. status: the last one, or the replay's. problems: why some of it may be
-    unknown.
+    times (n,): s of each step from the first, never falling: they continue from the last value when the clock is set
+    back (restarts: how often). contacts, predictions: of all steps, records.CONTACT (only the first of several points)
+    and records.PREDICTION, with the step (index) of each row. states: of all messages, records.STATE, with the time
+    (s). objects: by id, as described last; names: all names that occurred, with their ids. profile: at the start;
+    settings: the changed ones, with the time (s) of the first step that used them. durations: step times (s), as far as
+    they were reported or measured. status: the last one, or the replay's. problems: why some of it may be unknown.
     """
 
     name: str
@@ -88,26 +87,26 @@ class History:
 
     @property
     def duration(self) -> float:
-        """s from the first step to the last."""
+        """Time from the first step to the last (s)."""
         return float(self.times[-1]) if len(self.times) else 0.0
 
     @property
     def period(self) -> float:
-        """s from one step to the next, the median; 0 where there are less than two."""
+        """Median time from one step to the next (s); 0 if there are less than two steps."""
         apart = np.diff(self.times)
         return float(np.median(apart[apart > 0.0])) if (apart > 0.0).any() else 0.0
 
     @property
     def longest_step(self) -> float:
-        """s: what is longer from one step to the next is a gap of which nothing is known."""
+        """Longest time between two steps (s) that is not a gap. Nothing is known about a gap."""
         return max(self.profile.stale_after, STEPS_MISSING * self.period)
 
     def name_of(self, object_id: int) -> str:
-        """The name of an object, or what stands for one that was never described."""
+        """Return the name of an object, or a substitute if it was never described."""
         return self.objects[object_id].name if object_id in self.objects else f"object_{object_id}"
 
     def ids_of(self, name: str | int) -> set[int]:
-        """The objects that have, or had, that name, with wildcards: `person_*`; or that id. Raises InputError."""
+        """Return the objects that have or had that name (wildcards as in `person_*`) or that id. Raises InputError."""
         if isinstance(name, int):
             found = {name} & set(self.objects)
         else:
@@ -118,13 +117,13 @@ class History:
         return found
 
     def pairs_of(self, names: str | Iterable[str | int]) -> Callable[[Pair], bool]:
-        """Whether a pair is one of those named: ANY, or two names, with wildcards. Raises InputError."""
+        """Return a test for the named pairs: ANY, or two names with wildcards. Raises InputError."""
         if names == ANY:
             return lambda pair: True
         a, b = (self.ids_of(name) for name in names)
         return lambda pair: (pair[0] in a and pair[1] in b) or (pair[0] in b and pair[1] in a)
 
     def collisions_of(self, names: str | Iterable[str | int] = ANY) -> list[CollisionEvent]:
-        """The collisions of the named pairs, by their begin. Raises InputError."""
+        """Return the collisions of the named pairs, sorted by begin. Raises InputError."""
         wanted = self.pairs_of(names)
         return [each for each in self.collisions if wanted(each.pair)]

@@ -1,4 +1,4 @@
-"""Reads a session into its history: every recorded message once, in order."""
+"""Reads a session into its history, each recorded message once and in order."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ from collision_monitor.session.reader import Recorded, Session
 from collision_monitor.settings.profile import Profile
 
 AS_RECORDED: Final = ""
-"""In place of a profile's name: the one that was recorded, and as it was changed."""
+"""In place of a profile's name: the recorded profile with its recorded changes."""
 
 
 def read_history(
     session: Session, replay_with: Profile | str | None = None, progress: Callable[[], None] = lambda: None
 ) -> History:
-    """Read a session whole; with a profile: not what was answered then, but what this program answers to the inputs.
+    """Read a whole session. With `replay_with`, replace the recorded answers by those of this program.
 
-    replay_with: a profile or its name, from the first step to the last; AS_RECORDED: the recorded one, and where it was
-    changed. progress: called after every message. Raises SessionError for a session without inputs, ProfileError.
+    replay_with: a profile or its name, for all steps; AS_RECORDED: the recorded profile with its recorded changes.
+    progress: called after every message. Raises SessionError for a session without inputs, ProfileError.
     """
     gathered = _Gathered(session, replay_with)
     for message in session.messages():
@@ -51,7 +51,7 @@ def read_history(
 
 
 class _Gathered:
-    """Lists that grow with the messages."""
+    """Collects the content of a session, message by message."""
 
     def __init__(self, session: Session, replay_with: Profile | str | None) -> None:
         self._changes = replay_with is None or replay_with == AS_RECORDED
@@ -65,10 +65,10 @@ class _Gathered:
         self._count = 0
         self._steps: list[int] = []  # stamps in ns
         self._step_of: dict[int, int] = {}
-        self._contacts = GrowingRows(records.CONTACT)  # the first point of each: all share the other fields
+        self._contacts = GrowingRows(records.CONTACT)  # only the first point of each: all share the other fields
         self._predictions = GrowingRows(records.PREDICTION)
         self._states = GrowingRows(records.STATE)
-        self._next_step: list[int] = []  # of each message of states, the index of the step that comes after it
+        self._next_step: list[int] = []  # index of the step after each message of states
         self._durations: list[float] = []
 
     def take(self, message: Recorded) -> None:
@@ -80,7 +80,7 @@ class _Gathered:
         try:
             self._read(message)
         except MessageError as error:
-            if message.type not in INPUT_TYPES:  # the monitor refuses those
+            if message.type not in INPUT_TYPES:  # the monitor refused these
                 self._history.problems.append(f"message {message.sequence} on {message.topic}: {error}")
 
     def _read(self, message: Recorded) -> None:
@@ -97,7 +97,7 @@ class _Gathered:
                 if self._pipeline is not None:
                     self._pipeline.on_settings(message.data)
                 changed = decode_parameter_event(message.data).changed
-                if changed.keys() != {LIMIT}:  # that is how far a step came, and no one's choice
+                if changed.keys() != {LIMIT}:  # that only records how far a step came
                     self._settings.append((len(self._steps), changed))
             case "ObjectStateArray":
                 if self._pipeline is not None:
@@ -132,7 +132,7 @@ class _Gathered:
         self._contacts.append(step, rows.compress(rows["point_index"] == 0))
 
     def _step(self, stamp_ns: int, number: int) -> int:
-        """Index of the step with this number; contacts and predictions of one step share it."""
+        """Return the index of the step with this number. Contacts and predictions of one step share it."""
         if number not in self._step_of:
             self._step_of[number] = len(self._steps)
             self._steps.append(stamp_ns)
@@ -147,7 +147,7 @@ class _Gathered:
         h.begin_ns = int(stamps[0]) if len(stamps) else self._states.keys[0]
         back = np.minimum(np.diff(stamps), 0)
         h.restarts = int(np.count_nonzero(back))
-        forward = np.concatenate([[0], -np.cumsum(back)])  # ns, by which each step's clock is behind the session's
+        forward = np.concatenate([[0], -np.cumsum(back)])  # ns by which each step's clock lags behind the session's
         h.times = np.asarray((stamps + forward[: len(stamps)] - h.begin_ns) * NANOSECOND, np.float64)
         h.contacts, h.contact_step = self._contacts.joined()
         h.predictions, h.prediction_step = self._predictions.joined()
@@ -165,7 +165,7 @@ class _Gathered:
         return h
 
     def _status_of_replay(self, pipeline: Pipeline) -> MonitorStatus:
-        """What was refused and lost, by the replay; what the recorder dropped is missing here too."""
+        """Return the replay's status, with the messages that the recorder dropped, which the replay lacks too."""
         status, recorded = decode_status(pipeline.status()), self._history.status
         if recorded is None:
             return status

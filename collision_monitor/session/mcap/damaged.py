@@ -1,8 +1,9 @@
 """Walks an MCAP file that was cut off, overwritten or has flipped bits, from one whole record to the next.
 
-The length of nearly every record follows from its content as well: where both agree, the record is one. A chunk counts
-by its checksum, whatever became of the record's head. All else is damage, and behind it the walk finds its way back.
-Every place is looked at a bounded number of times, and no length is believed before it was compared with the file's.
+The content of nearly every record also determines its length. The walk accepts a record if both lengths agree. It
+accepts a chunk if its checksum is right, even if the head of its record is damaged. Everything else is damage, behind
+which the walk searches for the next record. It examines each place a bounded number of times, and compares each length
+with the size of the file before it uses it.
 """
 
 from __future__ import annotations
@@ -24,39 +25,39 @@ from mcap.opcode import Opcode
 from collision_monitor.session.mcap.layout import CHUNK_HEAD, FIELDS, HEAD, LARGEST_CHUNK, MAGIC, MESSAGE, OPCODES
 
 _EFFORT: Final = 8
-"""How many times the file's size is spent at most on places that might be chunks and are none."""
+"""Bound of the work on places that might be chunks and are none, as a multiple of the file's size."""
 
 _PIECE: Final = 1 << 12
-"""Bytes that a chunk is unpacked by: what comes before damage in it is had to this."""
+"""Bytes of a chunk that are unpacked at a time: data before damage in it is recovered to this granularity."""
 
 _CANDIDATE: Final = re.compile(rb"[\x01-\x0f](?=.{5}\x00\x00\x00)", re.DOTALL)
-"""Where a record may begin: a known opcode, and a length below 2^40."""
+"""Start of a possible record: a known opcode, and a length below 2^40."""
 
 _MISTAKABLE: Final = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA_INDEX)
-"""What one flipped bit of the opcode makes a message of."""
+"""Opcodes that a flipped bit turns into the opcode of a message."""
 
 _IN_CHUNKS: Final = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 
 
 class Trust(IntEnum):
-    """How far a record can be believed."""
+    """How far a record can be trusted."""
 
-    NONE = 0  # in a chunk whose checksum is wrong
-    WHOLE = 1  # complete, and without a checksum: outside of chunks, or in one that is cut off or has none
-    CHECKED = 2  # in a chunk whose checksum is right
+    NONE = 0  # in a chunk with a wrong checksum
+    WHOLE = 1  # complete, but without a checksum: outside of chunks, or in a chunk that is cut off or has none
+    CHECKED = 2  # in a chunk with a right checksum
 
 
 class Section(IntEnum):
-    """Where a record stands."""
+    """The part of the file that holds a record."""
 
-    DATA = 0  # by itself
+    DATA = 0  # outside of chunks
     CHUNK = 1
     SUMMARY = 2  # behind the end of the data
 
 
 @dataclass(frozen=True, slots=True)
 class RecoveredRecord:
-    """A record of the file."""
+    """A record that was found in the file."""
 
     opcode: int
     payload: bytes
@@ -66,7 +67,7 @@ class RecoveredRecord:
 
 @dataclass(frozen=True, slots=True)
 class Damage:
-    """Something of the file is not as it was written; in words, without what it cost."""
+    """A part of the file that is not as it was written. text: describes it, without its losses."""
 
     text: str
 
@@ -79,7 +80,7 @@ class _RecordSpan:
 
 
 def walk(data: mmap.mmap) -> Iterator[RecoveredRecord | Damage]:
-    """All records that are whole, in the order of the file, those of chunks one by one, and what lies between them."""
+    """Yield all whole records in the order of the file, those of chunks one by one, and the damage between them."""
     at = len(MAGIC)
     if data[:at] != MAGIC:
         yield Damage(f"the file begins with {data[:at]!r}, not as an MCAP file does")
@@ -98,7 +99,7 @@ def walk(data: mmap.mmap) -> Iterator[RecoveredRecord | Damage]:
         if record is None or (record.opcode == Opcode.MESSAGE and not _is_message(data, record, chunked)):
             cut = _is_cut_chunk(data, at)
             following = len(data) if cut else _next_record(data, at + 1)
-            # a message whose successor is damaged is one; a damaged one ends where the next record begins, or before
+            # a message before damage is kept, unless its length reaches beyond the begin of the next record
             if record is None or record.end > following or not _only_a_message(data, record, chunked):
                 if not closed:
                     yield Damage(f"{following - at} bytes from byte {at} on are damaged or incomplete")
@@ -126,19 +127,19 @@ def walk(data: mmap.mmap) -> Iterator[RecoveredRecord | Damage]:
 
 
 def _record(data: mmap.mmap, at: int) -> _RecordSpan | None:
-    """The record at a place, if it is whole and its content agrees with its length."""
+    """Return the record at an offset if it is whole and its content agrees with its length."""
     if at + HEAD.size > len(data):
         return None
     opcode, length = HEAD.unpack_from(data, at)
     if opcode in OPCODES:
         return _known(data, at)
-    # of a kind that a newer or private writer knows: to be stepped over, if that leads anywhere
+    # a kind that only a newer or private writer knows: skip it if a known record follows
     end = at + HEAD.size + int(length)
     return _RecordSpan(opcode, at + HEAD.size, end) if opcode and end < len(data) and _known(data, end) else None
 
 
 def _known(data: mmap.mmap, at: int) -> _RecordSpan | None:
-    """The same for the kinds that are known."""
+    """Return the record at an offset if it is whole and of a known kind."""
     if at + HEAD.size > len(data):
         return None
     opcode, length = HEAD.unpack_from(data, at)
@@ -150,7 +151,7 @@ def _known(data: mmap.mmap, at: int) -> _RecordSpan | None:
 
 
 def _own_length(data: mmap.mmap, opcode: int, begin: int) -> int | None:
-    """Bytes of the record as its content has it; None where that is not in the file."""
+    """Return the length of the record by its content (bytes); None if it exceeds the file."""
     at = begin
     for size in FIELDS.get(opcode, (len(data),)):
         if size < 0:
@@ -164,18 +165,18 @@ def _own_length(data: mmap.mmap, opcode: int, begin: int) -> int | None:
 
 
 def _is_message(data: mmap.mmap, record: _RecordSpan, chunked: bool) -> bool:
-    """Whether what says so is a message, and leads to a next record."""
+    """Return whether a record with the opcode of a message is one and another record follows it."""
     return _only_a_message(data, record, chunked) and _leads_on(data, record.end, 0)
 
 
 def _only_a_message(data: mmap.mmap, record: _RecordSpan, chunked: bool) -> bool:
-    """Whether it is not another record whose opcode has a flipped bit."""
+    """Return whether it cannot be another record whose opcode has a flipped bit."""
     others = (*_MISTAKABLE, Opcode.MESSAGE_INDEX) if chunked else _MISTAKABLE
     return all(_own_length(data, other, record.begin) != record.end - record.begin for other in others)
 
 
 def _leads_on(data: mmap.mmap, at: int, steps: int) -> bool:
-    """Whether one record and so many more are here, or the end."""
+    """Return whether a record and `steps` more follow here, or the end of the file."""
     record = _known(data, at)
     if record is None:
         return at == len(data) or _is_end(data, at)
@@ -187,10 +188,10 @@ def _is_end(data: mmap.mmap, at: int) -> bool:
 
 
 def _next_record(data: mmap.mmap, at: int) -> int:
-    """The next place where a record begins that leads to others, or to the end; the end where there is none."""
+    """Return the next offset of a record that others or the end follow; the size of the file if there is none."""
     for match in _CANDIDATE.finditer(data, at):
         record = _known(data, match.start())
-        # a message has no length of its own that agrees: two more records have to follow it
+        # the content of a message does not show its length, so two more records have to follow it
         if record is not None and _leads_on(data, record.end, int(record.opcode == Opcode.MESSAGE)):
             return match.start()
     return len(data)
@@ -200,7 +201,7 @@ def _next_record(data: mmap.mmap, at: int) -> int:
 
 
 def _chunk_at(data: mmap.mmap, at: int) -> tuple[_RecordSpan | None, int]:
-    """A chunk whose checksum is right, whatever became of its opcode and one of its lengths; or the bytes spent."""
+    """Return the chunk here if its checksum is right, even if its opcode or a length is wrong; else the bytes spent."""
     begin = at + HEAD.size
     if begin + CHUNK_HEAD.size > len(data):
         return None, 0
@@ -214,7 +215,7 @@ def _chunk_at(data: mmap.mmap, at: int) -> tuple[_RecordSpan | None, int]:
 
 
 def _chunk(payload: bytes, at: int) -> Iterator[RecoveredRecord | Damage]:
-    """The records of a chunk."""
+    """Yield the records of a chunk."""
     records, trust = _unpacked(payload)
     if trust is Trust.NONE:
         found = list(_inner(records, trust))
@@ -229,7 +230,7 @@ def _chunk(payload: bytes, at: int) -> Iterator[RecoveredRecord | Damage]:
 
 
 def _is_cut_chunk(data: mmap.mmap, at: int) -> bool:
-    """Whether here begins a chunk, by both of its lengths, that the end of the file cuts off."""
+    """Return whether a chunk begins here that, by both of its lengths, the end of the file cuts off."""
     sizes = at + HEAD.size + CHUNK_HEAD.size
     if sizes + 4 > len(data) or data[at] != Opcode.CHUNK:
         return False
@@ -242,7 +243,7 @@ def _is_cut_chunk(data: mmap.mmap, at: int) -> bool:
 
 
 def _cut_chunk(data: mmap.mmap, at: int) -> Iterator[RecoveredRecord | Damage]:
-    """Its complete records: what is there is as it was written."""
+    """Yield the complete records of a cut chunk, because its remaining bytes are as they were written."""
     found = list(_inner(_unpacked(data[at + HEAD.size :])[0], Trust.WHOLE))
     messages = sum(each.opcode == Opcode.MESSAGE for each in found)
     if messages:
@@ -251,7 +252,7 @@ def _cut_chunk(data: mmap.mmap, at: int) -> Iterator[RecoveredRecord | Damage]:
 
 
 def _unpacked(payload: bytes) -> tuple[bytes, Trust]:
-    """A chunk's records as far as they can be unpacked, and how far they can be believed."""
+    """Return a chunk's records as far as they can be unpacked, and how far they can be trusted."""
     try:
         _, _, size, checksum = CHUNK_HEAD.unpack_from(payload)
         (name,) = struct.unpack_from("<I", payload, CHUNK_HEAD.size)
@@ -269,7 +270,7 @@ def _unpacked(payload: bytes) -> tuple[bytes, Trust]:
 
 
 def _decompressed(packed: bytes) -> tuple[bytes, bool]:
-    """As much as can be unpacked, by what the bytes say they are packed with; whether that was all and nothing else."""
+    """Unpack as much as possible, by the magic number of the bytes. Return also whether that was all of them."""
     unpacker: Any
     if packed.startswith(b"\x28\xb5\x2f\xfd"):
         unpacker = zstandard.ZstdDecompressor(max_window_size=LARGEST_CHUNK).decompressobj()
@@ -287,7 +288,7 @@ def _decompressed(packed: bytes) -> tuple[bytes, bool]:
 
 
 def _inner(records: bytes, trust: Trust) -> Iterator[RecoveredRecord]:
-    """The complete records in the bytes of a chunk."""
+    """Yield the complete records in the bytes of a chunk."""
     at = 0
     while at + HEAD.size <= len(records):
         opcode, length = HEAD.unpack_from(records, at)

@@ -1,4 +1,4 @@
-"""The text and the hash of a message type, as sessions carry them so that any reader can decode the messages."""
+"""Text and hash of a message type. Sessions hold them so that any reader can decode the messages."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _FIELD = re.compile(r"^\s*(?:([a-z]\w*)/)?([A-Z]\w*)(?:\[[^]]*\])?\s+[a-z]\w*", 
 
 
 def definition(type_name: str) -> str:
-    """The definition of `package/msg/Name`, then those of all types it is made of (rosbag2's `ros2msg`).
+    """Return the definition of `package/msg/Name`, then those of all nested types (rosbag2's `ros2msg`).
 
-    Raises SessionError where no ROS prefix or source tree holds one of them.
+    Raises SessionError if no ROS prefix or source tree holds one of them.
     """
     names = [type_name]
-    for name in names:  # grows while it is walked
+    for name in names:  # the loop appends to it
         package = name.split("/")[0]
         for other, nested in _FIELD.findall(_read(name, "msg")):
             full = f"{other or package}/msg/{nested}"
@@ -33,7 +33,7 @@ def definition(type_name: str) -> str:
 
 
 def type_hash(type_name: str) -> str:
-    """The RIHS01 hash from the installed type description; empty where only the sources are there."""
+    """Return the RIHS01 hash of the installed type description; empty if only the sources are there."""
     try:
         description = json.loads(_read(type_name, "json"))
     except (SessionError, ValueError):
@@ -58,7 +58,7 @@ def _read(type_name: str, suffix: str) -> str:
 
 @cache
 def _carried() -> dict[str, str]:
-    """The definitions that a session needs, by name, for a machine without ROS: a copy of what is installed with it."""
+    """Return the package's own copy of the definitions that a session needs, by name, for machines without ROS."""
     sections = (Path(__file__).with_name("definitions.txt")).read_text(encoding="utf-8").split(f"{_SEPARATOR}\nMSG: ")
     found = {}
     for section in sections[1:]:
@@ -69,7 +69,7 @@ def _carried() -> dict[str, str]:
 
 
 def _roots() -> Iterator[Path]:
-    """Where packages are installed, then the source tree of this one."""
+    """Yield the folders of installed packages, then the source tree of this one."""
     for prefix in [*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), sys.prefix]:
         if prefix:
             yield Path(prefix) / "share"

@@ -16,13 +16,13 @@ MAGIC: Final = b"\x89MCAP0\r\n"
 """The first and the last bytes of a file."""
 
 LARGEST_CHUNK: Final = 1 << 30
-"""Most bytes that a chunk is unpacked to, so that a damaged one cannot take all memory; rosbag2 writes under 1 MiB."""
+"""Limit of an unpacked chunk (bytes), so that a damaged one cannot take all memory. rosbag2 writes under 1 MiB."""
 
 SEQUENCE_MASK: Final = 0xFFFFFFFF
 """The sequence numbers of messages are uint32 and wrap."""
 
 SEQUENCE_HALF: Final = 1 << 31
-"""A sequence number that is farther ahead than this lies behind."""
+"""A sequence number that seems farther ahead than this lies behind."""
 
 # -- fixed fields
 
@@ -30,7 +30,7 @@ _HEAD_FIELDS: Final = (("opcode", "<u1"), ("length", "<u8"))
 _MESSAGE_FIELDS: Final = (("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8"))
 
 MESSAGE_HEAD: Final = np.dtype([*_HEAD_FIELDS, *_MESSAGE_FIELDS])
-"""All of a message's record before its data."""
+"""The record of a message up to its data."""
 
 
 def _struct(fields: tuple[tuple[str, str], ...]) -> struct.Struct:
@@ -39,22 +39,22 @@ def _struct(fields: tuple[tuple[str, str], ...]) -> struct.Struct:
 
 
 HEAD: Final = _struct(_HEAD_FIELDS)
-"""Of every record: opcode, length of the content that follows."""
+"""Head of every record: opcode, length of the content that follows."""
 
 MESSAGE: Final = _struct(_MESSAGE_FIELDS)
-"""Channel, sequence, log time, publish time; the data follows."""
+"""Fields of a message before its data: channel, sequence, log time, publish time."""
 
 LOG_TIME: Final = MESSAGE_HEAD.fields["log_time"][1] - HEAD.size  # type: ignore[index]
 """Offset of the log time in a message, and of the first log time in a message index."""
 
 TIMES: Final = struct.Struct("<QQ")
-"""Of a chunk: first and last log time. Of an attachment: log time and time of creation. ns."""
+"""First and last log time of a chunk, or log time and creation time of an attachment (ns)."""
 
 CHUNK_HEAD: Final = struct.Struct("<QQQI")
-"""The two times, unpacked size, checksum; the name of the compression and the packed records follow."""
+"""The two times, unpacked size, checksum. The name of the compression and the packed records follow."""
 
 SPAN: Final = struct.Struct("<QQ")
-"""Where a record is in the file: offset and length."""
+"""Offset and length of a record in the file."""
 
 STATISTICS: Final = struct.Struct("<QHIIIIQQ")
 """Numbers of messages, schemas, channels, attachments, metadata records and chunks; first and last log time."""
@@ -83,7 +83,7 @@ FIELDS: Final[dict[int, tuple[int, ...]]] = {
     Opcode.SUMMARY_OFFSET: (SUMMARY_OFFSET.size,),
     Opcode.DATA_END: (4,),
 }
-"""Bytes of each field; negative: a length of so many bytes, then what it counts. A message alone has no own length."""
+"""Bytes of each field; -n: an n-byte length, then as many bytes. Only a message does not show its own length."""
 
 OPCODES: Final = frozenset({*FIELDS, Opcode.MESSAGE})
 
@@ -96,11 +96,11 @@ METADATA: Final = "collision_monitor"
 """Name of the metadata record that makes an MCAP file a session."""
 
 RECORDING, NUMBER, REPEATED = "recording", "file", "repeated"
-"""Keys of that record: an id that the files of one recording share, its place among them from 0, and how many of its
-first messages only repeat what was in force when it begins."""
+"""Keys of that record: an id that the files of one recording share, the file's index among them from 0, and how many of
+its first messages only repeat the descriptions in force at its begin."""
 
 SNAPSHOT: Final = "snapshot_before_"
-"""How the names of the attachments with snapshots begin; the number of the message that follows comes next."""
+"""Prefix of the names of attachments with snapshots. The number of the message that follows comes next."""
 
 SALVAGE: Final = "collision_monitor_salvage"
-"""Name of the metadata record that says what is missing in a file that was salvaged."""
+"""Name of the metadata record that lists what is missing in a salvaged file."""

@@ -1,4 +1,4 @@
-"""The records of an MCAP file in the order of the file, also where its end is missing or it was damaged."""
+"""Reads the records of an MCAP file in the order of the file, even if its end is missing or it is damaged."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from collision_monitor.errors import SessionError
 from collision_monitor.session.mcap.layout import HEAD, LARGEST_CHUNK, MAGIC, MESSAGE
 
 _GLANCE: Final = 256
-"""Bytes of a record that show when it is from and what its name is."""
+"""Bytes of a record that hold its times and its name."""
 
 
 class Message(NamedTuple):
-    """Times in ns."""
+    """A message. Times in ns."""
 
     channel_id: int
     sequence: int
@@ -31,9 +31,9 @@ class Message(NamedTuple):
 
 
 class McapReader:
-    """A file. damage: what is missing or broken, one sentence each, and position: bytes read, of the last reading.
+    """Reader of one MCAP file. Raises SessionError if the path is no MCAP file or cannot be read.
 
-    Raises SessionError for what is no MCAP file, or cannot be read.
+    damage: one sentence for each missing or broken part; position: bytes read; both of the last reading.
     """
 
     def __init__(self, path: Path) -> None:
@@ -51,18 +51,18 @@ class McapReader:
             raise SessionError(f"{path}: expected an MCAP file, but {what}")
 
     def __iter__(self) -> Iterator[Any]:
-        """Header, schemas, channels, messages, metadata and attachments, from chunks as well, but for what is damaged.
+        """Yield header, schemas, channels, messages, metadata and attachments, also those in chunks.
 
-        That is noted.
+        Damaged records are left out and noted in `damage`.
         """
         return self.read()
 
     def read(self, begin: int = 0) -> Iterator[Any]:
-        """The same; begin: the byte where a record starts, before which only what names the topics is read."""
+        """Yield the same. begin: offset of a record; the records from the first message up to it are skipped."""
         self.damage = []
         with self.path.open("rb") as file:
             for start, opcode, payload in self._whole(file):
-                # Whatever the library raises for bytes that are not as they should be: that record is damaged.
+                # The library raises many kinds of errors for wrong bytes. Each means that the record is damaged.
                 try:
                     records = _unpack(opcode, payload)
                 except Exception as error:
@@ -76,7 +76,7 @@ class McapReader:
                     yield record
 
     def glance(self) -> Iterator[tuple[int, int, bytes]]:
-        """Where each record starts, its opcode and its first bytes, of all that is there and without unpacking it."""
+        """Yield offset, opcode and first bytes of each record in the file, without unpacking it."""
         self.damage = []
         with self.path.open("rb") as file:
             for start, opcode, length in self._heads(file):
@@ -84,12 +84,12 @@ class McapReader:
                 file.seek(start + HEAD.size + length)
 
     def _whole(self, file: BinaryIO) -> Iterator[tuple[int, int, bytes]]:
-        """Where each record starts, its opcode and its payload."""
+        """Yield offset, opcode and payload of each record."""
         for start, opcode, length in self._heads(file):
             yield start, opcode, file.read(length)
 
     def _heads(self, file: BinaryIO) -> Iterator[tuple[int, int, int]]:
-        """Where each record starts, its opcode and its length, up to the end of the data or of what is there."""
+        """Yield offset, opcode and length of each record, up to the end of the data or of the file."""
         file.seek(len(MAGIC))
         while True:
             self.position = start = file.tell()
@@ -110,7 +110,7 @@ class McapReader:
 
 
 def _unpack(opcode: int, payload: bytes) -> list[Any]:
-    """The records in the payload; raises anything where it is damaged."""
+    """Return the records in the payload. Any exception means that it is damaged."""
     if opcode == Opcode.MESSAGE:
         return [_message(payload, 0, len(payload))]
     stream = ReadDataStream(BytesIO(payload))
@@ -126,7 +126,7 @@ def _unpack(opcode: int, payload: bytes) -> list[Any]:
 
 
 def _in_chunk(data: bytes) -> list[Any]:
-    """Most of what is in a chunk are messages, so these are unpacked without the library, which takes longer."""
+    """Return the records of a chunk. Most are messages, which are unpacked here because the library takes longer."""
     records: list[Any] = []
     at = 0
     while at < len(data):

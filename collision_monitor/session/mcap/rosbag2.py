@@ -1,4 +1,4 @@
-"""The descriptions by which rosbag2 knows a recording: quality of service of each topic, and the file's metadata."""
+"""The metadata that rosbag2 expects of a recording: quality of service of each topic, and that of the file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from collision_monitor.pipeline.topics import Topic
 from collision_monitor.session.mcap.definitions import type_hash
 
 _METADATA_VERSION: Final = 9
-"""Of rosbag2's metadata, as Jazzy writes it."""
+"""Version of rosbag2's metadata that Jazzy writes."""
 
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 _TOPICS: Final = (Topic.STATES, Topic.SHAPES, Topic.CONTACTS, Topic.PREDICTIONS, Topic.STATUS, Topic.SETTINGS)
@@ -21,16 +21,16 @@ RECORDED_TYPES: Final = tuple(_QOS)
 """The message types that a session holds."""
 
 INPUT_TYPES: Final = (Topic.STATES.message, Topic.SHAPES.message)
-"""Those that the monitor subscribes to; all others are its answers and settings."""
+"""The types that the monitor subscribes to; all others are its answers and settings."""
 
 
 def full_name(name: str) -> str:
-    """`ContactArray` -> `collision_monitor_msgs/msg/ContactArray`."""
+    """Return the full name: `ContactArray` -> `collision_monitor_msgs/msg/ContactArray`."""
     return f"{'rcl_interfaces' if name == 'ParameterEvent' else 'collision_monitor_msgs'}/msg/{name}"
 
 
 def qos_profiles(name: str) -> list[dict[str, Any]]:
-    """The offered quality of service of a topic of this type."""
+    """Return the offered quality of service of a topic of this type."""
     depth, reliability, durability = _QOS[name]
     return [
         {
@@ -48,7 +48,7 @@ def qos_profiles(name: str) -> list[dict[str, Any]]:
 
 
 def channel_metadata(name: str) -> dict[str, str]:
-    """What rosbag2 writes beside each channel."""
+    """Return the metadata that rosbag2 writes for each channel."""
     return {
         "offered_qos_profiles": yaml.safe_dump(qos_profiles(name), sort_keys=False),
         "topic_type_hash": type_hash(full_name(name)),
@@ -57,7 +57,7 @@ def channel_metadata(name: str) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class FileInformation:
-    """When a recording begins and ends (ns) and the number of messages of each topic."""
+    """Begin and end of a recording (ns), and the number of messages of each topic."""
 
     begin: int
     end: int
@@ -65,12 +65,12 @@ class FileInformation:
 
     @property
     def count(self) -> int:
-        """Of all topics."""
+        """Number of messages of all topics."""
         return sum(self.counts.values())
 
 
 def file_metadata(files: Mapping[str, FileInformation], types: Mapping[str, str]) -> str:
-    """metadata.yaml; files: by name, in their order; types: topic -> name of its message."""
+    """Return the text of metadata.yaml. files: by name, in their order. types: topic -> message name."""
     filled = [information for information in files.values() if information.count]
     begin = min((information.begin for information in filled), default=0)
     end = max((information.end for information in filled), default=0)

@@ -1,7 +1,7 @@
-"""Recovers what is whole in an MCAP file that was cut off, overwritten or has flipped bits, and says what is not there.
+"""Recovers the whole records of an MCAP file that was cut off, overwritten or has flipped bits, and reports the losses.
 
-Nothing of the file is believed that cannot be checked: a chunk counts where its checksum is right. Of a chunk that the
-end of the file cuts, all complete messages count: what is there of it is as it was written.
+Nothing that cannot be checked is trusted: a chunk counts if its checksum is right. If the end of the file cuts a chunk,
+all of its complete messages count, because its remaining bytes are as they were written.
 """
 
 from __future__ import annotations
@@ -49,10 +49,10 @@ _DECODERS: Final[dict[int, Any]] = {
 
 @dataclass
 class Salvaged:
-    """What came of it.
+    """Result of a salvage.
 
-    losses: one sentence for each, in the order of the file; empty: everything is there. notes: the same for what cost
-    nothing. unverified: how many of the messages have no right checksum to show that they are as they were written.
+    losses: one sentence for each, in the order of the file; empty: nothing is lost. notes: the same for damage that
+    cost nothing. unverified: number of messages without a right checksum that would show them unchanged.
     """
 
     messages: int = 0
@@ -65,8 +65,8 @@ class Salvaged:
 def salvage(source: str | Path, target: str | Path, *, unverified: bool = False, overwrite: bool = False) -> Salvaged:
     """Copy every complete message of `source` into the new file `target`, with its topic, type, times and sequence.
 
-    unverified: also messages of chunks whose checksum is wrong; some of their bytes may be. Raises SessionError where
-    nothing can be recovered, or where `target` exists and is not to be overwritten.
+    unverified: also copy messages of chunks with a wrong checksum, which may hold wrong bytes. Raises SessionError if
+    nothing can be recovered, or if `target` exists and `overwrite` is false.
     """
     source, target = Path(source), Path(target)
     if not source.is_file():
@@ -94,7 +94,7 @@ def salvage(source: str | Path, target: str | Path, *, unverified: bool = False,
 
 
 def _write(data: mmap.mmap, source: Path, target: Path, unverified: bool) -> Salvaged:
-    """Into a file beside the target, which takes its place when it is finished."""
+    """Write into a file beside the target, and put it in the target's place when it is finished."""
     contents = _Contents(data)
     unfinished = target.with_name(f"{target.name}.part")
     try:
@@ -112,15 +112,15 @@ def _write(data: mmap.mmap, source: Path, target: Path, unverified: bool) -> Sal
 
 
 def _read(record: RecoveredRecord) -> Any:
-    """The record, or None where the bytes are not one."""
+    """Return the decoded record, or None if the bytes are not one."""
     try:
         return _DECODERS[record.opcode].read(ReadDataStream(BytesIO(record.payload)))
-    except Exception:  # whatever the library raises for bytes that are not as they should be
+    except Exception:  # the library raises many kinds of errors for wrong bytes
         return None
 
 
 class _Contents:
-    """What the messages need, wherever in the file it is, and what its summary says of it."""
+    """Header, schemas and channels from anywhere in the file, and the contents of its summary."""
 
     def __init__(self, data: mmap.mmap) -> None:
         self.profile = "ros2"
@@ -129,8 +129,8 @@ class _Contents:
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
         self.statistics: Statistics | None = None
-        self.names: list[str] = []  # of metadata and attachments, as the summary has them
-        trust: dict[tuple[int, int], Trust] = {}  # by opcode and id: the best copy counts
+        self.names: list[str] = []  # of metadata and attachments in the summary
+        trust: dict[tuple[int, int], Trust] = {}  # by opcode and id: the most trusted copy counts
         for each in walk(data):
             if isinstance(each, Damage) or each.opcode not in _DECODERS or each.opcode == Opcode.MESSAGE_INDEX:
                 continue
@@ -154,7 +154,7 @@ class _Contents:
 
 
 class _Copy:
-    """The new file, and the account of what did not get into it."""
+    """The new file, and the account of the losses."""
 
     def __init__(self, contents: _Contents, writer: Writer, unverified: bool) -> None:
         self._contents = contents
@@ -166,8 +166,8 @@ class _Copy:
         self._nameless = 0
         self._begin: int | None = None
         self._last: tuple[int, int] | None = None  # sequence and log time of the last message that was kept
-        self._indexed: Counter[int] = Counter()  # what the indexes of a damaged chunk say was in it, by channel
-        self._kept: Counter[int] = Counter()  # what was kept of it
+        self._indexed: Counter[int] = Counter()  # messages of a damaged chunk by its indexes, by channel
+        self._kept: Counter[int] = Counter()  # messages kept of it, by channel
         self._damaged = False
         self._stray = 0  # messages found among the damage
         self._doubt: list[tuple[int, int]] = []  # the first and the last of a run of messages without a checksum
@@ -182,7 +182,7 @@ class _Copy:
         }
 
     def run(self, data: mmap.mmap) -> Salvaged:
-        """Copy everything and settle the account."""
+        """Copy everything, determine the losses and return the result."""
         for each in walk(data):
             if isinstance(each, Damage):
                 self._settle_chunk()
@@ -200,7 +200,7 @@ class _Copy:
         return self._result
 
     def finish(self, source: str) -> None:
-        """Note the losses in the file, for whoever reads it, and close it."""
+        """Write the losses into the file for its readers, and close it."""
         if self._result.losses:
             self._writer.add_metadata(SALVAGE, {"source": source, "losses": "\n".join(self._result.losses)})
         self._writer.finish()  # type: ignore[no-untyped-call]
@@ -209,7 +209,7 @@ class _Copy:
         if isinstance(record, Metadata):
             self._writer.add_metadata(record.name, record.metadata)
         elif record is not None:
-            self._writer.flush()  # type: ignore[no-untyped-call]  # it stays behind the messages before it
+            self._writer.flush()  # type: ignore[no-untyped-call]  # keeps it behind the messages before it
             self._writer.add_attachment(
                 record.create_time, record.log_time, record.name, record.media_type, record.data
             )
@@ -217,7 +217,7 @@ class _Copy:
             self._names.append(record.name)
 
     def _message(self, each: RecoveredRecord) -> None:
-        # by itself, among the damage of a file that has its messages in chunks: the rest of a chunk
+        # outside of chunks, amid the damage of a file with chunks: the rest of a damaged chunk
         stray = each.section is Section.DATA and self._damaged and self._contents.chunked
         self._stray += stray
         if (stray or each.trust is Trust.NONE) and not self._unverified:
@@ -249,9 +249,9 @@ class _Copy:
         return f"{(log_time - (self._begin or 0)) * 1e-9:.3f} s"
 
     def _note_gap(self, sequence: int, log_time: int) -> None:
-        """What is not there between the last message and this one. A session numbers its messages through."""
+        """Note the messages missing between the last message and this one. A session numbers all of its messages."""
         if self._last is None and not self._result.losses:
-            return  # a later file of a recording in several
+            return  # a later file of a split recording
         first = 0 if self._last is None else self._last[0] + 1
         if self._contents.library.startswith(LIBRARY) and 0 < sequence - first < SEQUENCE_HALF:
             since = "the beginning" if self._last is None else self._seconds(self._last[1])
@@ -260,7 +260,7 @@ class _Copy:
             )
 
     def _settle_chunk(self) -> None:
-        """Say what was in a damaged chunk, from the indexes behind it."""
+        """Note the losses of a damaged chunk, by the indexes behind it."""
         if self._stray:
             self._result.losses.append(f"{self._stray} messages in it are complete and cannot be trusted")
         missing = self._indexed - self._kept
@@ -282,7 +282,7 @@ class _Copy:
         self._doubt = []
 
     def _settle(self) -> None:
-        """Hold what was found against the file's summary, which may also show that damage cost nothing."""
+        """Compare the result with the file's summary, which may also show that damage cost nothing."""
         self._settle_doubt()
         result, statistics = self._result, self._contents.statistics
         lost = []

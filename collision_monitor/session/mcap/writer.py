@@ -1,8 +1,8 @@
 """Writes MCAP: messages in zstd chunks with their indexes, and a summary at the end.
 
-Source: the MCAP specification, version 0 (mcap.dev/spec). Of our own because of what a message costs: the recorder's
-thread shares Python's lock with the monitor. mcap.writer holds it 5 µs for each message; here what is done for each
-message is done by NumPy for many at a time, and packing, checksums and writing need no lock.
+Source: the MCAP specification, version 0 (mcap.dev/spec). The library's mcap.writer is not used because it holds
+Python's lock, which the recorder's thread shares with the monitor, for 5 µs for each message. Here NumPy does the work
+of many messages at a time, and packing, checksums and writing need no lock.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from collision_monitor.session.mcap.layout import (
 )
 
 _CHUNK_BYTES: Final = 8 << 20
-"""Bytes of a chunk before it is packed. rosbag2 has 1 MiB; but each chunk takes Python's lock from the monitor several
-times, whatever its size, and a recorder that flushes four times a second ends most of them sooner."""
+"""Bytes of a chunk before it is packed. rosbag2 uses 1 MiB, but each chunk takes Python's lock from the monitor several
+times, independent of its size, and a recorder that flushes four times a second ends most chunks sooner."""
 
 _COMPRESSION: Final = "zstd"
 _LEVEL: Final = -1
-"""Of sessions: 1.7 to 2.2 times as fast as zstd's own choice, 3, for files 1 % larger."""
+"""Compression level: on sessions 1.7 to 2.2 times as fast as zstd's default, 3, for files 1 % larger."""
 
 Numbers = NDArray[Any]
 _NO_MESSAGES: Final = (np.empty(0, np.uint16), np.empty(0, np.uint64), np.empty(0, np.uint64))
@@ -45,7 +45,7 @@ _NO_MESSAGES: Final = (np.empty(0, np.uint16), np.empty(0, np.uint64), np.empty(
 
 @dataclass
 class _Chunk:
-    """Being filled. index: channels, log times and offsets of its messages."""
+    """A chunk being filled. index: channels, log times and offsets of its messages."""
 
     parts: list[bytes] = field(default_factory=list)
     size: int = 0
@@ -53,9 +53,9 @@ class _Chunk:
 
 
 class McapWriter:
-    """Raises OSError where the stream does.
+    """Writer of one MCAP file. Raises OSError if the stream fails.
 
-    counts, begin, end: messages of each channel, first and last log time (ns); of what was flushed.
+    counts: messages of each channel; begin, end: first and last log time (ns). They cover the flushed messages only.
     """
 
     def __init__(self, stream: BinaryIO, *, profile: str, library: str) -> None:
@@ -74,14 +74,14 @@ class McapWriter:
         self._put(_record(Opcode.HEADER, _text(profile), _text(library)))
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """A metadata record, behind all messages so far."""
+        """Write a metadata record behind all messages so far."""
         self._close_chunk()
         record = _record(Opcode.METADATA, _text(name), _text_map(values))
         self._metadata_indexes.append(_record(Opcode.METADATA_INDEX, SPAN.pack(self._at, len(record)), _text(name)))
         self._put(record)
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
-        """Its id."""
+        """Add a schema and return its id."""
         number = len(self._schemas) + 1
         parts = (struct.pack("<H", number), _text(name), _text(encoding), struct.pack("<I", len(data)), data)
         self._schemas.append(_record(Opcode.SCHEMA, *parts))
@@ -89,7 +89,7 @@ class McapWriter:
         return number
 
     def add_channel(self, topic: str, encoding: str, schema: int, metadata: Mapping[str, str]) -> int:
-        """Its id."""
+        """Add a channel and return its id."""
         number = len(self._channels)
         parts = (struct.pack("<HH", number, schema), _text(topic), _text(encoding), _text_map(metadata))
         self._channels.append(_record(Opcode.CHANNEL, *parts))
@@ -105,7 +105,7 @@ class McapWriter:
         publish_times: Sequence[int],
         sequences: Sequence[int],
     ) -> None:
-        """Messages, one of each sequence for each. Times in ns; log times must not decrease."""
+        """Add messages; each sequence has one element for each. Times in ns; log times must not decrease."""
         if not data:
             return
         heads = np.empty(len(data), MESSAGE_HEAD)
@@ -120,7 +120,7 @@ class McapWriter:
         ends = np.cumsum(sizes + MESSAGE_HEAD.itemsize)
         begins = np.concatenate([[0], ends[:-1]])
         done = 0
-        while done < len(data):  # each time as many as fill the chunk
+        while done < len(data):  # each pass takes as many messages as fill the chunk
             chunk, at = self._chunk, int(begins[done])
             stop = min(len(data), 1 + int(np.searchsorted(ends, at + _CHUNK_BYTES - chunk.size)))
             these = heads[done:stop]
@@ -133,9 +133,9 @@ class McapWriter:
             done = stop
 
     def add_attachment(self, name: str, media_type: str, data: bytes, log_time: int) -> None:
-        """A file within the file, behind all messages so far."""
+        """Write an attachment, which is a file within the file, behind all messages so far."""
         self._close_chunk()
-        times, size = TIMES.pack(log_time, 0), struct.pack("<Q", len(data))  # 0: when it was made is not known
+        times, size = TIMES.pack(log_time, 0), struct.pack("<Q", len(data))  # 0: the creation time is unknown
         names = _text(name) + _text(media_type)
         content = b"".join((times, names, size, data))
         record = _record(Opcode.ATTACHMENT, content, struct.pack("<I", zlib.crc32(content)))
@@ -198,7 +198,7 @@ class McapWriter:
         fields = b"".join((head, _text(_COMPRESSION), struct.pack("<Q", len(packed))))
         start = self._at
         self._put(HEAD.pack(Opcode.CHUNK, len(fields) + len(packed)) + fields)
-        self._put(packed)  # not joined with what comes before it: that would be a copy
+        self._put(packed)  # written apart from the fields, because joining them would copy it
         after = self._at
         if len(channels):
             self.begin = self.begin if any(self.counts.values()) else begin
@@ -239,6 +239,6 @@ def _text_map(values: Mapping[str, str]) -> bytes:
 
 
 def _number_map(pairs: list[tuple[int, int]]) -> bytes:
-    """uint16 -> uint64."""
+    """Encode a map uint16 -> uint64."""
     raw = b"".join(struct.pack("<HQ", *pair) for pair in pairs)
     return struct.pack("<I", len(raw)) + raw

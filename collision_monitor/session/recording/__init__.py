@@ -1,1 +1,1 @@
-"""From messages to session files."""
+"""Recording: writes messages into session files."""

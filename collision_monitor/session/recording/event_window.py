@@ -1,4 +1,4 @@
-"""Which messages of a recording are kept that is only made around events."""
+"""Selects the messages that a recording around events keeps."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from collision_monitor.session.recording.queue_entry import QueueEntry
 
 
 class EventWindow:
-    """Holds back what came last, to keep it if an event follows.
+    """Holds back the latest entries and keeps them if an event follows.
 
-    before, after: s around each event that are kept. limit: most bytes that are held back, for the oldest go first.
-    from_snapshots: what is kept begins with a snapshot, or where all began, so that it can be replayed: the last one
-    before those `before` seconds.
+    before, after: s that are kept around each event. limit: bytes that are held back at most; beyond it the oldest
+    entries are dropped. from_snapshots: what is kept begins with the last snapshot before those `before` seconds, or
+    with the start of the recording, so that it can be replayed.
     """
 
     def __init__(self, before: float, after: float, limit: int, *, from_snapshots: bool = False) -> None:
@@ -22,19 +22,19 @@ class EventWindow:
         self._limit = limit
         self._from_snapshots = from_snapshots
         self._held: deque[QueueEntry] = deque()
-        self._snapshots: deque[QueueEntry] = deque()  # of those held
+        self._snapshots: deque[QueueEntry] = deque()  # the snapshots in `_held`
         self._bytes = 0
         self._until = -1
 
     def take(self, entry: QueueEntry) -> Iterator[tuple[QueueEntry, bool]]:
-        """What is decided now, and whether it is kept: each entry comes out once, in order. Times never decrease."""
+        """Add an entry. Yield each entry once, in order, with whether it is kept. Times never decrease."""
         if entry.event:
             self._until = entry.log_time + self._after
         self._held.append(entry)
         self._bytes += entry.cost
         if entry.snapshot is not None:
             self._snapshots.append(entry)
-        # All messages of a step have its log time, so steps are kept or not kept as a whole.
+        # All messages of a step have its log time, so a step is kept or dropped as a whole.
         while self._is_past(entry.log_time - self._before):
             yield self._pop(), False
         while self._held and entry.log_time <= self._until:
@@ -43,7 +43,7 @@ class EventWindow:
             yield self._pop(), False
 
     def _is_past(self, oldest: int) -> bool:
-        """Whether the first entry held back is not needed for what begins at `oldest` or later."""
+        """Return whether the first entry held back is not needed for a window that begins at `oldest` (ns) or later."""
         first = self._held[0]
         if not self._from_snapshots:
             return first.log_time < oldest

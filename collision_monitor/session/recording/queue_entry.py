@@ -1,4 +1,4 @@
-"""A message, or a snapshot between two, on its way to the disk."""
+"""A message, or a snapshot between two messages, on its way to the disk."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 
 _OVERHEAD: Final = 128
-"""Bytes that a waiting message costs beside its data, so that empty ones are bounded too."""
+"""Bytes that a waiting message costs beside its data, so that the number of empty messages is bounded too."""
 
 
 class QueueEntry(NamedTuple):
-    """event: a collision begins in it. objects: all that are described once it was taken in, where it changed them.
+    """A message, or a snapshot, in the recorder's queue. Times in ns.
 
-    snapshot: then it is no message but the monitor as it is before message `sequence`. settings: the profile (JSON)
-    once it was taken in, where it changed it.
+    event: a collision begins in it. objects: all objects described after it, if it changes them. settings: the profile
+    (JSON) after it, if it changes it. snapshot: the monitor's state before message `sequence`, in place of a message.
     """
 
     topic: str
@@ -32,7 +32,7 @@ class QueueEntry(NamedTuple):
 
     @property
     def cost(self) -> int:
-        """Bytes of memory, about."""
+        """Approximate memory (bytes)."""
         return len(self.data) + _OVERHEAD + (self.snapshot.nbytes if self.snapshot else 0)
 
 
@@ -40,5 +40,5 @@ _MARKS: Final = tuple(itemgetter(QueueEntry._fields.index(name)) for name in ("o
 
 
 def are_messages_alone(entries: Sequence[QueueEntry]) -> bool:
-    """Whether none of them changes objects or settings, and none is a snapshot: 50 ns for each."""
+    """Return whether no entry changes objects or settings or is a snapshot. Takes 50 ns for each entry."""
     return all(list(map(get, entries)).count(None) == len(entries) for get in _MARKS)

@@ -1,4 +1,4 @@
-"""Writes a session as MCAP by rosbag2's conventions, on a thread of its own: the caller never waits and never fails."""
+"""Writes a session as MCAP by rosbag2's conventions, on a thread of its own. The caller never waits and never fails."""
 
 from __future__ import annotations
 
@@ -20,36 +20,36 @@ from collision_monitor.session.recording.recording_files import SNAPSHOT_PERIOD,
 from collision_monitor.session.recording.splitting import ONE_FILE, Splitting
 
 FLUSH_PERIOD: Final = 0.25
-"""s between two flushes: with the grace and the time that a flush takes, a killed process loses less than 0.5 s."""
+"""Period of the flushes (s). With the grace and the duration of a flush, a killed process loses less than 0.5 s."""
 
 QUEUE_BYTES: Final = 256 << 20
-"""Most bytes that wait for the disk; beyond, messages are dropped and counted."""
+"""Bytes that may wait for the disk. Beyond it, messages are dropped and counted."""
 
 _WAKE_BYTES: Final = 8 << 20
 """Waiting bytes that wake the thread before the next flush is due."""
 
 EVENT_SNAPSHOT_PERIODS: Final = (0.1, 1.0)
-"""s between two snapshots of a recording on events, at least and at most, and half of what is wanted before each event
-in between: they are held back and mostly dropped, and so much more than what is wanted is kept."""
+"""Least and largest period of the snapshots of a recording around events (s); in between it is half of the time wanted
+before each event. Snapshots are held back and mostly dropped, and up to one period more than wanted is kept."""
 
 _GRACE: Final = 0.1
-"""s that a flush which is due waits for another message: a caller hands messages over when a step is done, and what the
-thread does then falls between two steps."""
+"""s that a due flush waits for another message. A caller hands messages over at the end of a step, so the thread then
+works between two steps."""
 
 _TURN: Final = 1024
-"""Waiting messages that wake the thread, and after which (0.6 ms) it lets go of Python's lock: else a step may wait
-5 ms to get it back. Shorter turns take the lock more often: of 128 messages they cost a step twice as much."""
+"""Waiting messages that wake the thread, and messages after which (0.6 ms) it releases Python's lock. Otherwise a step
+may wait 5 ms for the lock. Shorter turns take the lock more often: turns of 128 messages cost a step twice as much."""
 
 _LARGE: Final = 24 << 20
-"""Bytes of one block, freed at once: from then on the C library keeps what is freed below that size. Else it hands the
-memory of each chunk back to the system and gets it anew page by page, half of what a message costs."""
+"""Bytes of one block that is allocated and freed at once. From then on the C library keeps freed blocks below that
+size. Otherwise it returns each chunk's memory to the system and gets it back page by page, half of a message's cost."""
 
 _PAUSE: Final = 20e-6
-"""s, long enough that a thread which waits for the lock wakes up and takes it."""
+"""s; long enough that a thread which waits for the lock wakes up and takes it."""
 
 
 class Recording(IntEnum):
-    """`MonitorStatus.recording`."""
+    """Values of `MonitorStatus.recording`."""
 
     OFF = 0
     ON = 1
@@ -57,13 +57,14 @@ class Recording(IntEnum):
 
 
 class Recorder:
-    """A session being written.
+    """Recorder of one session.
 
-    path: a new `.mcap` file, or a new folder of any other name (then with a metadata.yaml, as `ros2 bag record` does).
-    types: topic -> message name, such as `ContactArray`. metadata: what `Pipeline.metadata` says.
-    patient: `write` waits for the disk where the queue is full, instead of dropping: for a caller who has the time.
-    snapshots: the caller gives one whenever `snapshot_due`; a replay can begin there, and every file begins with one.
-    Raises SessionError where the file cannot be made or is there already (unless overwrite).
+    path: a new `.mcap` file, or a new folder with any other name (with a metadata.yaml, like that of `ros2 bag
+    record`).
+    types: topic -> message name, such as `ContactArray`. metadata: from `Pipeline.metadata`.
+    patient: `write` waits for the disk if the queue is full, instead of dropping the message.
+    snapshots: the caller writes one whenever `snapshot_due`. A replay can begin there, and every file begins with one.
+    Raises SessionError if the file cannot be made, or exists and `overwrite` is false.
     """
 
     def __init__(
@@ -87,7 +88,7 @@ class Recorder:
         self._patient = patient
         self._snapshots = snapshots
         self._snapshot_period = round(_snapshot_period(splitting) * 1e9)
-        self._last_snapshot: int | None = None  # when, or when the recording began
+        self._last_snapshot: int | None = None  # log time (ns) of the last one, or of the first message
         self._is_full = False
 
         self._wake = threading.Condition()
@@ -102,8 +103,8 @@ class Recorder:
         self._recorded = 0
         self._recorded_bytes = 0
         self._flush_due = time.monotonic() + FLUSH_PERIOD
-        self._taken = 0  # by the thread, written or not kept
-        self._unflushed = self._unflushed_written = 0  # taken, and written, since the last flush
+        self._taken = 0  # messages that the thread wrote or did not keep
+        self._unflushed = self._unflushed_written = 0  # the same, and the written ones, since the last flush
         bytes(_LARGE)
         self._files = _create(self.path, types, metadata, splitting, overwrite, snapshots)
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
@@ -122,13 +123,14 @@ class Recorder:
         objects: Sequence[ObjectDescription] | None = None,
         settings: str | None = None,
     ) -> None:
-        """Put one message on the queue. Messages are recorded in the order of these calls; times in ns.
+        """Put one message on the queue. Messages are recorded in the order of these calls. Times in ns.
 
-        event: a collision begins in it. objects: of a message that changes the objects, all that are described then;
-        they are repeated at the start of each further file. settings: of a message that changes settings, the profile
-        from then on, as `Pipeline.settings` says it.
-        A log time before the last one is raised to it. A message that finds the queue full is dropped and counted; its
-        sequence number stays unused, so that a replay knows. Raises KeyError for a topic that was not named.
+        event: a collision begins in it. objects: if the message changes the objects, all that are described afterwards;
+        each further file begins with them. settings: if the message changes settings, the profile afterwards, from
+        `Pipeline.settings`.
+
+        A log time before the last one is raised to it. A message that finds the queue full is dropped and counted. Its
+        sequence number stays unused, so that a replay notices. Raises KeyError for a topic that is not in `types`.
         """
         if topic not in self._topics:
             raise KeyError(topic)
@@ -138,7 +140,7 @@ class Recorder:
             if self._last_snapshot is None:
                 self._last_snapshot = self._last_log_time
             fields = topic, data, self._last_log_time, max(0, publish_time), sequence, event, objects, None, settings
-            entry = QueueEntry._make(fields)  # at a fourth of what its constructor takes
+            entry = QueueEntry._make(fields)  # four times as fast as the constructor
             cost = entry.cost
             while self._patient and self._state is Recording.ON and self._waiting + cost > self._queue_bytes:
                 self._wake.notify()
@@ -154,13 +156,13 @@ class Recorder:
 
     @property
     def snapshot_due(self) -> bool:
-        """Whether it is time for a snapshot: every 10 s, or where another file is to begin."""
+        """Whether a snapshot is due: every 10 s, more often around events, or if another file is to begin."""
         if not self._snapshots or self._last_snapshot is None:
             return False
         return self._is_full or self._last_log_time - self._last_snapshot >= self._snapshot_period
 
     def write_snapshot(self, snapshot: Snapshot) -> None:
-        """Put the monitor as it is after all messages so far on the queue; left out where that is full."""
+        """Put the monitor's state after all messages so far on the queue, or drop it if the queue is full."""
         with self._wake:
             self._last_snapshot = self._last_log_time
             self._is_full = False
@@ -171,7 +173,7 @@ class Recorder:
                 self._waiting += entry.cost
 
     def status(self) -> dict[str, int | str]:
-        """The recording fields of MonitorStatus. What is counted as recorded is with the operating system."""
+        """Return the recording fields of MonitorStatus. Recorded messages are those that the operating system has."""
         with self._wake:
             return {
                 "recording": int(self._state),
@@ -183,7 +185,7 @@ class Recorder:
             }
 
     def close(self) -> None:
-        """Write what waits and finish the file. What goes wrong is in `status()`."""
+        """Write the waiting messages and finish the file. Errors appear in `status()`."""
         with self._wake:
             self._closing = True
             self._wake.notify()
@@ -206,7 +208,7 @@ class Recorder:
             self._files.finish()
             with self._wake:
                 self._recorded_bytes = self._files.size
-        except Exception as error:  # whatever it is: the caller goes on, and the status says it
+        except Exception as error:  # no error may reach the caller; the status reports it
             reason = error.strerror if isinstance(error, OSError) and error.strerror else repr(error)
             with self._wake:
                 self._state = Recording.FAILED
@@ -217,7 +219,7 @@ class Recorder:
             self._files.close()
 
     def _write_what_waits(self) -> bool:
-        """Sleep until there is something to do, then write. False: the session is closed and nothing is left."""
+        """Sleep until there is work, then write. Return False if the session is closed and nothing is left."""
         with self._wake:
             if not self._closing and len(self._queue) < _TURN and self._waiting < _WAKE_BYTES:
                 self._wake.wait(max(0.0, self._flush_due + _GRACE - time.monotonic()))
@@ -265,7 +267,7 @@ def _create(
     overwrite: bool,
     snapshots: bool,
 ) -> RecordingFiles:
-    """The new file, in a new folder unless the path ends in `.mcap`. Raises SessionError."""
+    """Make the file, in a new folder unless the path ends in `.mcap`. Raises SessionError."""
     try:
         return RecordingFiles(path, types, metadata, splitting, overwrite=overwrite, snapshots=snapshots)
     except FileExistsError:

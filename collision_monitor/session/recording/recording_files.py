@@ -1,8 +1,8 @@
-"""The files of a recording: one, or a folder with as many as splitting and events make of it.
+"""The files of a recording: one file, or a folder of several if it is split or made around events.
 
-Each file can be read alone: its metadata says where in the recording it stands and which profile was in force, and the
-objects that were described before are in its first message again. Where snapshots come, it begins with one and can be
-replayed alone, too.
+Each file can be read alone: its metadata holds its place in the recording and the profile in force, and its first
+message repeats the descriptions of all objects described before. If there are snapshots, each file begins with one and
+can also be replayed alone.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from collision_monitor.session.recording.session_file import SessionFile
 from collision_monitor.session.recording.splitting import Splitting
 
 SNAPSHOT_PERIOD: Final = 10.0
-"""s between two snapshots in a file: a replay from the last one is 5 s away on average, at its own speed."""
+"""Period of the snapshots in a file (s): a replay has to process 5 s on average to reach a given time."""
 
 SNAPSHOT_SHARE: Final = 0.05
-"""Part of a file that may be snapshots: of quiet sessions they are rarer."""
+"""Largest share of the snapshots in a file. Quiet sessions have fewer snapshots."""
 
 HELD_BYTES: Final = 256 << 20
-"""Most bytes that wait for an event."""
+"""Bytes that may wait for an event."""
 
 
 class RecordingFiles:
-    """The file that is being written, and those before it. Raises SessionError, and OSError where the disk says no."""
+    """The file being written, and the finished ones. Raises SessionError, and OSError if writing fails."""
 
     def __init__(
         self,
@@ -54,8 +54,8 @@ class RecordingFiles:
         self._splits = bool(splitting.size or splitting.duration)
         self._overwrite = overwrite
         self._snapshots = snapshots
-        self._last_time = 0  # of what was put into a file
-        self._next_snapshot = (0, 0)  # log time and bytes of the file from which on it takes another
+        self._last_time = 0  # log time (ns) of the last message in a file
+        self._next_snapshot = (0, 0)  # log time (ns) and file size from which on another one is written
         self._definitions = {name: definition(full_name(name)).encode() for name in self._types.values()}
         self._inputs = {topic for topic, name in self._types.items() if name in INPUT_TYPES}
         self._shapes = next((topic for topic, name in self._types.items() if name == "ObjectDescriptionArray"), None)
@@ -86,11 +86,11 @@ class RecordingFiles:
 
     @property
     def is_full(self) -> bool:
-        """Whether another file is to follow, once there is a snapshot to begin it with."""
+        """Whether another file is to follow as soon as there is a snapshot to begin it with."""
         return self._splits and self._is_full(self._last_time)
 
     def write(self, entries: Sequence[QueueEntry]) -> int:
-        """Take in what comes next; how many messages were written for it, of those that came before too."""
+        """Process the next entries. Return the number of messages written, including earlier ones held back."""
         if self._window is None:
             return self._put(entries)
         written, kept = 0, list[QueueEntry]()
@@ -106,7 +106,7 @@ class RecordingFiles:
         return written + self._put(kept)
 
     def flush(self) -> None:
-        """Hand everything that is to be kept to the operating system."""
+        """Hand all messages that are kept to the operating system."""
         if self._file is not None:
             self._file.flush()
 
@@ -117,12 +117,12 @@ class RecordingFiles:
             self._write_metadata()
 
     def close(self) -> None:
-        """Close what is open, as it is."""
+        """Close the open file as it is."""
         if self._file is not None:
             self._file.close()
 
     def _put(self, entries: Sequence[QueueEntry]) -> int:
-        """Into as few calls as there are files and snapshots between them."""
+        """Write entries with one call for each run without a new file or snapshot."""
         if self._file is not None and not self._splits and are_messages_alone(entries):
             return self._put_run(entries)
         run: list[QueueEntry] = []
@@ -150,7 +150,7 @@ class RecordingFiles:
         return len(run)
 
     def _put_snapshot(self, entry: QueueEntry, snapshot: Snapshot) -> None:
-        """As the beginning of a file, or into the one there is, if that did not have one for long enough."""
+        """Begin a file with the snapshot, or write it into the open file if one is due there."""
         if self._file is None:
             self._open(entry)
             return
@@ -159,7 +159,7 @@ class RecordingFiles:
             self._write_snapshot(self._file, entry, snapshot)
 
     def _note(self, entry: QueueEntry) -> None:
-        """What is in force after the message, for the start of the next file."""
+        """Store the objects and settings in force after the message, for the start of the next file."""
         if entry.objects is not None:
             self._objects = entry.objects
         if entry.settings is not None:
@@ -180,7 +180,7 @@ class RecordingFiles:
         return bool(size and self._file.size >= size) or bool(duration and now - self._file.begin >= duration * 1e9)
 
     def _open(self, first: QueueEntry | None) -> None:
-        """The next file; first: the message or snapshot that it begins with, None for the first file of all."""
+        """Open the next file. first: the message or snapshot that it begins with; None for the first file of all."""
         if self._folder is None:
             self._file = SessionFile(
                 self._path, self._types, self._metadata, self._definitions, overwrite=self._overwrite
@@ -209,7 +209,7 @@ class RecordingFiles:
         self._finished_bytes += self._file.path.stat().st_size
         self._finished[self._file.path.name] = self._file.information
         self._file = None
-        if self._folder is not None:  # after each, as rosbag2: what is finished is a bag also if the rest is lost
+        if self._folder is not None:  # after each, as rosbag2 does: the finished files are a bag if the rest is lost
             self._write_metadata()
 
     def _write_metadata(self) -> None:
@@ -219,7 +219,7 @@ class RecordingFiles:
 
 
 def _make_folder(folder: Path, overwrite: bool) -> None:
-    """Raises OSError. Files of another recording of that name do not stay."""
+    """Make the folder, and remove the files of another recording with that name. Raises OSError."""
     folder.mkdir(exist_ok=overwrite)
     for path in [*folder.glob(f"{folder.name}_*.mcap"), folder / "metadata.yaml"]:
         path.unlink(missing_ok=True)

@@ -14,7 +14,7 @@ from collision_monitor.session.recording.queue_entry import QueueEntry
 
 
 class SessionFile:
-    """Being written. definitions: of each type in types.values(). Raises OSError, as all of its methods do."""
+    """A session file being written. definitions: text of each type in types.values(). All methods raise OSError."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class SessionFile:
 
     @property
     def information(self) -> FileInformation:
-        """What was flushed of it."""
+        """Begin, end and counts of the flushed messages."""
         counts = {topic: self._writer.counts[channel] for topic, channel in self._channels.items()}
         return FileInformation(self._writer.begin, self._writer.end, counts)
 
@@ -71,11 +71,11 @@ class SessionFile:
         self._writer.add_messages(channels, data, log_times, publish_times, sequences)
 
     def write_snapshot(self, data: bytes, sequence: int, log_time: int) -> None:
-        """Append the monitor before message `sequence`, as `Snapshot.encode` has it."""
+        """Append the monitor's state before message `sequence`, from `Snapshot.encode`."""
         self._writer.add_attachment(f"{SNAPSHOT}{sequence}.npz", "application/x-npz", data, log_time)
 
     def flush(self) -> None:
-        """Hand everything to the operating system, which keeps it when this process is killed."""
+        """Hand everything to the operating system, which keeps it if this process is killed."""
         self._writer.flush()
 
     def finish(self) -> None:
@@ -88,5 +88,5 @@ class SessionFile:
 
     def close(self) -> None:
         """Close the file as it is."""
-        with suppress(OSError):  # what could not be written has been reported already
+        with suppress(OSError):  # a failed write has been reported already
             self._stream.close()

@@ -1,4 +1,4 @@
-"""When a recording goes on in another file, and whether it is made around events only."""
+"""When a recording continues in another file, and whether it keeps only the time around events."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from collision_monitor.errors import SessionError
 
 @dataclass(frozen=True)
 class Splitting:
-    """When a recording goes on in another file, and whether it is made around events only.
+    """When a recording continues in another file, and whether it keeps only the time around events.
 
-    size: bytes from which on a file is followed by another; duration: the same in s; 0: never. on_event: only `before`
-    seconds before each collision begins and `after` seconds after it are kept. Raises SessionError.
+    size: bytes from which on another file follows; duration: the same in s; 0: never. on_event: keep only `before`
+    seconds before each collision begins and `after` seconds after its begin. Raises SessionError for a number that is
+    negative or infinite.
     """
 
     size: int = 0
@@ -30,7 +31,7 @@ class Splitting:
 
     @property
     def makes_files(self) -> bool:
-        """Whether there may be more than one."""
+        """Whether there may be more than one file."""
         return bool(self.size or self.duration or self.on_event)
 
 

@@ -1,1 +1,1 @@
-"""From session files to the same answers again."""
+"""Replay: computes the answers to recorded inputs again and compares them with the recorded ones."""

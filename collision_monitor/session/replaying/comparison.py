@@ -13,7 +13,7 @@ from collision_monitor.session.replaying.replay_report import ReplayReport
 
 
 class Comparison:
-    """Holds the answers of the last step until the recorded ones arrive. sequence: of the message that is compared."""
+    """Holds the answers of the last step until the recorded ones arrive. sequence: number of the compared message."""
 
     def __init__(self, report: ReplayReport) -> None:
         self.sequence = 0
@@ -23,13 +23,13 @@ class Comparison:
         self._last_differing_step = -1
 
     def expect(self, states: bytes, outputs: Outputs | None) -> None:
-        """Take the answers to these states; None: the pipeline refused them."""
+        """Store the answers to these states; None if the pipeline refused them."""
         self._states = states
         if outputs is not None:
             self._expected = {"ContactArray": outputs.contacts, "PredictedCollisionArray": outputs.predictions}
 
     def expect_nothing_more(self) -> None:
-        """All answers of the last step must have been in the session."""
+        """Report each answer of the last step that was not in the session."""
         for kind, data in self._expected.items():
             nothing = f"a {kind} of {len(data)} bytes"
             self._note(Difference(self._report.steps, kind, "the message", "presence", "nothing", nothing))
@@ -40,7 +40,7 @@ class Comparison:
         self._expected = {}
 
     def compare(self, message: Recorded) -> None:
-        """A recorded ContactArray or PredictedCollisionArray."""
+        """Compare a recorded ContactArray or PredictedCollisionArray."""
         self._report.compared += 1
         step, tolerance = self._report.steps, self._report.tolerance
         replayed = self._expected.pop(message.type, None)
@@ -55,7 +55,7 @@ class Comparison:
         self._note(difference)
 
     def compare_status(self, message: Recorded, replayed: bytes) -> None:
-        """A recorded MonitorStatus."""
+        """Compare a recorded MonitorStatus."""
         self._report.compared += 1
         self._note(compare_status(message.topic, self._report.steps, message.data, replayed))
 
@@ -73,7 +73,7 @@ class Comparison:
 
 
 def _states_in_words(data: bytes, pair: tuple[int, int] | None) -> list[str]:
-    """The states of the two objects in an ObjectStateArray; what is not there is left out."""
+    """Describe the states of the two objects in an ObjectStateArray. Missing ones are left out."""
     if pair is None or not data:
         return []
     try:

@@ -1,4 +1,4 @@
-"""The least of a session that still shows a difference: from the last snapshot before it, or from the start."""
+"""Cuts out the part of a session that shows a difference, from the last snapshot before it, or from the start."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ from collision_monitor.session.replaying.replay import replay
 def cut(
     session: Session, sequence: int, target: Path, *, tolerance: float | None = None, overwrite: bool = False
 ) -> int:
-    """Copy what shows the difference in message `sequence` into a new session; returns how many messages that takes.
+    """Copy the part that shows the difference in message `sequence` into a new session. Return its number of messages.
 
-    tolerance (m, s): that of the replay which found it.
-    Raises SessionError where the target cannot be written or is the session itself, or where there are no settings.
+    tolerance (m, s): that of the replay that found the difference.
+    Raises SessionError if the target exists and `overwrite` is false, is the session itself or cannot be written, or if
+    there are no settings.
     """
     if session.foreign:
         raise SessionError(f"{session.path}: expected a session with its settings in it, got another program's")
@@ -38,14 +39,14 @@ def cut(
             count = _write(session, found, start, target)
         except OSError as error:
             raise SessionError(f"{target}: expected to be able to write there, got: {error.strerror}") from None
-        # From the snapshot it may agree where from the start it does not: then what went wrong is older.
+        # If a replay from the snapshot does not show the difference, its cause is older.
         if start and replay(Session(target), tolerance=tolerance).first_message == sequence:
             break
     return count
 
 
 def _until(session: Session, sequence: int) -> Iterator[Recorded | RecordedSnapshot]:
-    """What a replay takes in up to that message."""
+    """Yield the entries that a replay reads up to that message."""
     for k, each in enumerate(session.entries()):
         if isinstance(each, RecordedSnapshot) or not each.repeated or k == 0:
             yield each
@@ -54,7 +55,7 @@ def _until(session: Session, sequence: int) -> Iterator[Recorded | RecordedSnaps
 
 
 def _write(session: Session, found: Sequence[Recorded | RecordedSnapshot], start: int, target: Path) -> int:
-    """From the snapshot at `start` on, behind a message that says what the objects are then; or all of it."""
+    """Write the entries from `start` on; if that is not 0, first a message that describes the objects at that time."""
     types = {each.topic: each.type for each in found if isinstance(each, Recorded) and each.type in RECORDED_TYPES}
     definitions = {name: definition(full_name(name)).encode() for name in types.values()}
     metadata = {**session.metadata, REPEATED: "1"} if start else session.metadata
@@ -76,7 +77,7 @@ def _write(session: Session, found: Sequence[Recorded | RecordedSnapshot], start
 
 
 def _objects(session: Session, before: Sequence[Recorded | RecordedSnapshot], types: dict[str, str]) -> QueueEntry:
-    """All that were described, in one message; there is a step that differs, so there is one that described them."""
+    """Return one message with all objects described so far. There are some, because a step differs."""
     pipeline = Pipeline(session.profile, session.frame_id)
     messages = [each for each in before if isinstance(each, Recorded)]
     for each in messages:

@@ -1,4 +1,4 @@
-"""Where two answers differ first, in words: which pair, which field, both values."""
+"""Finds the first difference of two answers and describes it in words: pair, field, both values."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Difference:
 
 
 def compare_answers(kind: str, topic: str, step: int, recorded: bytes, replayed: bytes) -> Difference | None:
-    """The first difference of two messages of type `kind`; None where all bytes are equal."""
+    """Return the first difference of two messages of type `kind`; None if all bytes are equal."""
     if recorded == replayed:
         return None
     rows = _DECODERS[kind][1]
@@ -55,7 +55,7 @@ def compare_answers(kind: str, topic: str, step: int, recorded: bytes, replayed:
 
 
 def _decoded(kind: str, topic: str, step: int, recorded: bytes, replayed: bytes) -> tuple[Any, Any] | Difference:
-    """Both messages; or that the recorded one cannot be read."""
+    """Return both messages, or a Difference if the recorded one cannot be read."""
     decode, _ = _DECODERS[kind]
     ours = decode(replayed)
     try:
@@ -65,15 +65,16 @@ def _decoded(kind: str, topic: str, step: int, recorded: bytes, replayed: bytes)
 
 
 _WITHIN: Final = {"contacts": ("signed_distance",), "predictions": ("lower", "upper")}
-"""The numbers (m, s) that answers of other versions are compared by: where flat faces touch, points may be anywhere."""
+"""The numbers (m, s) that are compared across versions. Points are not: those of flat faces may lie anywhere on
+them."""
 
 
 def compare_within(
     kind: str, topic: str, step: int, recorded: bytes, replayed: bytes, tolerance: float
 ) -> Difference | None:
-    """The first difference of two messages, pair by pair, that is more than the tolerance (m, s).
+    """Return the first difference of two messages, pair by pair, that exceeds the tolerance (m, s).
 
-    A contact that is no deeper, and a prediction no nearer to the horizon, may be there in one of them only.
+    One message may lack a contact of a depth, or a prediction of a distance from the horizon, within the tolerance.
     """
     rows = _DECODERS[kind][1]
     decoded = _decoded(kind, topic, step, recorded, replayed)
@@ -100,7 +101,7 @@ def compare_within(
 
 
 def compare_status(topic: str, step: int, recorded: bytes, replayed: bytes) -> Difference | None:
-    """The first difference of two MonitorStatus in what depends on the inputs alone."""
+    """Return the first difference of two MonitorStatus in the fields that depend on the inputs alone."""
     ours = decode_status(replayed)
     try:
         theirs = decode_status(recorded)
@@ -110,7 +111,7 @@ def compare_status(topic: str, step: int, recorded: bytes, replayed: bytes) -> D
         a, b = getattr(theirs, field.name), getattr(ours, field.name)
         if field.name not in _NOT_COMPARED and a != b:
             return Difference(step, topic, "the status", field.name, repr(a), repr(b))
-    # A watchdog that hears nothing calls every moving object stale: that is a matter of the clock.
+    # Without states, the watchdog counts every moving object as stale. That depends on the clock.
     silent = theirs.objects - theirs.objects_static - theirs.objects_unseen
     if theirs.objects_stale not in (ours.objects_stale, silent):
         return Difference(
@@ -146,7 +147,7 @@ def _field_difference(topic: str, step: int, theirs: Any, ours: Any, rows: str) 
 
 
 def _as_bytes(rows: NDArray[Any]) -> NDArray[Any]:
-    """Each row as one opaque value, so that NaN equals NaN and 0.0 is not -0.0."""
+    """Return each row as one opaque value, so that NaN equals NaN and 0.0 differs from -0.0."""
     return np.ascontiguousarray(rows).view(f"V{rows.dtype.itemsize}")
 
 

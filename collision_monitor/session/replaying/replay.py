@@ -26,12 +26,12 @@ def replay(
     start: float = 0.0,
     progress: Callable[[ReplayReport], None] | None = None,
 ) -> ReplayReport:
-    """Replay a session; threads: instead of the recorded number. progress: called after every message.
+    """Replay a session. threads: replaces the recorded number. progress: called after every message.
 
-    tolerance (m, s): answers of another version are compared by their distances and times, and status messages not.
+    tolerance (m, s): compare the answers of another version by their distances and times, and no status messages.
     start (s after the first message): begin with the last snapshot before it.
 
-    Raises SessionError where the session holds no inputs or cannot be read, InputError where it has no such time.
+    Raises SessionError if the session holds no inputs or cannot be read, InputError if `start` lies outside of it.
     """
     run = _Replay(session, {} if threads is None else {"threads": threads}, tolerance)
     report = run.report
@@ -78,11 +78,11 @@ def replay(
 
 
 class _Mode(Enum):
-    """What is known of the recorded monitor's state."""
+    """How much of the recorded monitor's state is known."""
 
     EXACT = 0  # all of it
-    ANEW = 1  # what it was given from some time on
-    STOPPED = 2  # not what it was given last
+    ANEW = 1  # its inputs from some time on
+    STOPPED = 2  # not its last inputs
 
 
 class _Replay:
@@ -95,12 +95,12 @@ class _Replay:
         self.report = ReplayReport(digest=self._pipeline.monitor.digest, tolerance=tolerance)
         self.comparison = Comparison(self.report)
         self._mode = _Mode.EXACT
-        self._next = 0  # sequence number of the message that comes next
+        self._next = 0  # sequence number of the next message
 
-    # -- where it begins and goes on
+    # -- snapshots and gaps
 
     def find_start(self, start: float) -> SnapshotLocation | None:
-        """The last snapshot before it (s); None: the start of the session. Raises InputError."""
+        """Return the last snapshot before `start` (s); None for the start of the session. Raises InputError."""
         timeline = self._session.timeline()
         length = (timeline.end - timeline.begin) * 1e-9
         if not 0 <= start <= length:
@@ -116,7 +116,7 @@ class _Replay:
         return before[-1]
 
     def meet(self, recorded: RecordedSnapshot) -> None:
-        """A snapshot: of no use where the state is known already."""
+        """Process a snapshot. It is not needed if the state is known already."""
         missing = (recorded.sequence - self._next) & SEQUENCE_MASK
         if self._mode is _Mode.EXACT and not 0 < missing < SEQUENCE_HALF:
             return
@@ -141,7 +141,7 @@ class _Replay:
         self.comparison.drop()
 
     def take(self, message: Recorded) -> bool:
-        """One recorded message; False: it was passed over, because what came before it is not known."""
+        """Process one recorded message. Return False if it is a repetition, or the state before it is unknown."""
         if message.repeated:
             if not self.report.messages and self._mode is _Mode.EXACT:
                 self._pipeline.on_shapes(message.data)
@@ -175,7 +175,7 @@ class _Replay:
     # -- messages
 
     def _feed(self, message: Recorded, *, compare: bool) -> None:
-        """An input is processed, an answer is compared."""
+        """Process an input, or compare an answer."""
         if not compare:
             self.comparison.drop()
         if message.type in INPUT_TYPES or message.type == "ParameterEvent":
@@ -197,7 +197,7 @@ class _Replay:
 
 
 def _provenance_differences(session: Session) -> str:
-    """What is not the same as here, in words."""
+    """Return the differences from this program, in words."""
     theirs, ours = session.metadata, provenance()
     differences = [
         f"{name} {theirs.get(name, 'unknown')} (here {ours[name]})"

@@ -1,4 +1,4 @@
-"""What a replay did and found."""
+"""The result of a replay."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collision_monitor.session.replaying.difference import Difference
 
 
 class Verdict(IntEnum):
-    """What a replay came to; the values are the exit codes of `collision-monitor replay`."""
+    """The verdict of a replay. The values are the exit codes of `collision-monitor replay`."""
 
     IDENTICAL = 0
     DIVERGED = 3
@@ -18,13 +18,13 @@ class Verdict(IntEnum):
 
 @dataclass
 class ReplayReport:
-    """What a replay did and found. Durations in s; digest: of all answers that the replay gave.
+    """The result of a replay. Durations in s; digest: of all answers of the replay.
 
     begin: s after the session's first message. foreign: another program recorded it. hole: messages are missing, and
-    behind them nothing could be compared up to the next snapshot. late: the session begins after its monitor, whose
-    state then is not in it, so up to the first snapshot the answers are given anew and not compared. within: answers
-    whose bytes differ by no more than the tolerance. inputs: of the first difference's step, its objects' states in
-    words; first_message: the sequence number of the message with it.
+    nothing behind them could be compared up to the next snapshot. late: the session begins after its monitor and does
+    not hold the monitor's state then, so up to the first snapshot the answers are computed anew and not compared.
+    within: number of answers whose bytes differ, but not beyond the tolerance. inputs: states of the first difference's
+    objects in its step, in words; first_message: sequence number of the message with it.
     """
 
     begin: float = 0.0
@@ -47,12 +47,12 @@ class ReplayReport:
 
     @property
     def verdict(self) -> Verdict:
-        """Equal bytes are equal wherever they come from; unequal ones say something only of the same program."""
+        """The verdict. Equal bytes count whichever program recorded them; unequal ones only for the same program."""
         if self.first_difference is not None:
             return Verdict.NOT_COMPARABLE if self.foreign and self.tolerance is None else Verdict.DIVERGED
         return Verdict.NOT_COMPARABLE if self.hole or self.late or not self.compared else Verdict.IDENTICAL
 
     @property
     def speed(self) -> float:
-        """Times real time."""
+        """Replay speed as a multiple of real time."""
         return self.recorded_duration / self.replay_duration if self.replay_duration > 0 else 0.0

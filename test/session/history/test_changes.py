@@ -1,4 +1,4 @@
-"""What `compare` says changed, between sessions in which it is known, and between two profiles."""
+"""The changes that `compare` reports, between sessions with known changes and between two profiles."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ STEP = 0.02
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Sessions: a drive, the same again, one that is slower, one that ends before the contact, and one cut off."""
+    """Return sessions: a drive, the same again, a slower one, one that ends before the contact, and one cut off."""
     path = tmp_path_factory.mktemp("changes")
     for name in ("a", "same"):
         record_drive(path / f"{name}.mcap", 2.0)
@@ -56,7 +56,7 @@ def test_what_only_one_has(folder: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert collision["b"] is None and set(collision["a"]["pair"]) == {NASTY, "post"}
     assert collision["a"]["begin"] == pytest.approx(1.5, abs=1.5 * STEP)
     (warning,) = (each for each in found["changes"] if each["a"] is None)
-    assert warning["b"]["what"] == "warning" and warning["b"]["end"] is None  # open where the session ends
+    assert warning["b"]["what"] == "warning" and warning["b"]["end"] is None  # open, because the session ends
     assert (found["a"]["collisions"], found["b"]["collisions"]) == (1, 0)
     assert main(["compare", str(folder / "short.mcap"), str(folder / "a.mcap"), "--limit", "1"]) == 3
     text = capsys.readouterr().out
@@ -82,7 +82,7 @@ def test_two_profiles_on_one_session(folder: Path, capsys: pytest.CaptureFixture
     assert (found["a"]["profile"], found["b"]["profile"]) == ("fast", "exact")
     assert found["a"]["replayed"] and found["b"]["replayed"]
     assert found["a"]["step_median"] > 0.0
-    # both see every collision in the same step; the fast profile warns of it earlier, for it allows for more error
+    # both find every collision in the same step; the fast profile warns earlier, because it allows for more error
     collisions = [each for each in found["changes"] if (each["a"] or each["b"])["what"] == "collision"]
     assert collisions
     for each in collisions:

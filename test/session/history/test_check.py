@@ -1,4 +1,4 @@
-"""Sessions as regression tests: what holds, what fails and why, what nobody can know, files that are broken."""
+"""Sessions as regression tests: expectations that hold, fail or cannot be known, and broken files."""
 
 from __future__ import annotations
 
@@ -39,7 +39,10 @@ STEP = 20_000_000
 
 
 def record_yard(path: Path, *, unseen: bool = False, close: bool = True) -> Path:
-    """A cart drives at 1 m/s from -3 m through a person of 0.25 m at the origin, touching from 2.25 s to 3.75 s."""
+    """Record a cart that drives at 1 m/s from -3 m through a person of 0.25 m at the origin.
+
+    They touch from 2.25 s to 3.75 s.
+    """
     pipeline = Pipeline("exact")
     recorder = Recorder(path, TYPES, pipeline.metadata(node=NODE))
     names = ["cart", "person_1", "person_2"] + ["ghost"] * unseen
@@ -66,7 +69,7 @@ def record_yard(path: Path, *, unseen: bool = False, close: bool = True) -> Path
     recorder.close()
     if not close:
         data = path.read_bytes()
-        path.write_bytes(data[: data.rindex(b"\x0f\x04\0\0\0\0\0\0\0") + 5])  # within the end of the data
+        path.write_bytes(data[: data.rindex(b"\x0f\x04\0\0\0\0\0\0\0") + 5])  # inside the data-end record
     return path
 
 
@@ -92,7 +95,7 @@ def test_the_history_is_what_happened(yard: Path) -> None:
     assert history.duration == pytest.approx(299 * 0.02)
     assert len(history.durations) == 6
     assert history.problems == []
-    # the same from today's answers to the inputs
+    # the same from the answers of a replay
     again = read_history(Session(yard), Session(yard).profile)
     assert again.collisions == history.collisions
     assert again.replayed and len(again.durations) == 300
@@ -229,7 +232,7 @@ def test_the_example_of_the_docs_is_what_it_prints(yard: Path, tmp_path: Path) -
 
 
 def test_objects_of_one_name_are_all_meant(yard: Path) -> None:
-    """Also under a name that an object had before."""
+    """A name that an object had before counts too."""
     history = read_history(Session(yard))
     history.names = {"cart": {1}, "person": {2, 3}, "visitor": {3}}
     assert not outcome(history, "{no_contact: [cart, person]}").holds
@@ -276,4 +279,4 @@ def test_with_a_profile_that_is_none(session):
     assert "no_contact: any: contact at 2.2" in answer.stdout
     assert "expected a marker such as" in answer.stdout
     assert "one of balanced, exact, fast" in answer.stdout
-    assert "history.py" not in answer.stdout  # no traceback of ours for a mistake of theirs
+    assert "history.py" not in answer.stdout  # no traceback of the plugin for a user's mistake

@@ -1,4 +1,4 @@
-"""The definitions in a session against readers of others and against the installed type descriptions."""
+"""The definitions in a session against other readers and against the installed type descriptions."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_the_hash_is_that_of_the_installed_type(name: str) -> None:
 
 
 def test_a_machine_without_ros_has_the_same_definitions(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The copy in the package is made anew with `python test/session/test_definitions.py`."""
+    """`python test/session/mcap/test_definitions.py` writes the copy in the package."""
     with_ros = {name: definitions.definition(full_name(name)) for name in RECORDED_TYPES}
     monkeypatch.setattr(definitions, "_roots", lambda: iter(()))
     assert {name: definitions.definition(full_name(name)) for name in RECORDED_TYPES} == with_ros

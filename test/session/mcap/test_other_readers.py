@@ -1,4 +1,4 @@
-"""What others make of a session: rosbags and mcap_ros2 decode every message of it."""
+"""Other readers of a session: rosbags and mcap_ros2 decode every message."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from collision_monitor.session import Recorder, Session
 
 
 def whole(recorded: Path, target: Path) -> Path:
-    """The session without the broken messages that it records on purpose: other readers raise for those."""
+    """Write the session without its deliberately broken messages, for which other readers raise."""
     session = Session(recorded)
     with Recorder(target, TYPES, session.metadata) as recorder:
         for message in session.messages():
@@ -43,7 +43,7 @@ def test_mcap_ros2_decodes_every_message(recorded: Path, tmp_path: Path) -> None
 
 
 def test_mcaps_streaming_reader_decodes_every_message(recorded: Path, tmp_path: Path) -> None:
-    """From a pipe: it can neither seek nor look at the index."""
+    """A pipe allows neither seeking nor the use of the index."""
     path = whole(recorded, tmp_path / "a.mcap")
     with subprocess.Popen(["cat", path], stdout=subprocess.PIPE) as cat:
         assert cat.stdout is not None
@@ -62,7 +62,7 @@ def test_rosbags_decodes_every_message(recorded: Path, tmp_path: Path, name: str
     seen = 0
     with AnyReader([path]) as reader:
         assert {c.topic for c in reader.connections} == set(TYPES)
-        if path.is_dir():  # of a lone file, rosbags does not read the hashes
+        if path.is_dir():  # rosbags does not read the hashes of a single file
             assert all(c.digest.startswith("RIHS01_") for c in reader.connections)
         for connection, _, raw in reader.messages():
             message = reader.deserialize(raw, connection.msgtype)

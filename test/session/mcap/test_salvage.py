@@ -1,4 +1,4 @@
-"""Salvage: every complete message of a file that was cut anywhere, zeroed or bit-flipped, and nothing else."""
+"""Salvage recovers every complete message of a file that was cut, zeroed or bit-flipped anywhere, and nothing else."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict
 
 STEP = 10_000_000
-"""ns between two messages."""
+"""Time between two messages (ns)."""
 PROGRAM = Path(sys.executable).with_name("collision-monitor")
 
 
 def write(
     path: Path, compression: CompressionType = CompressionType.ZSTD, chunked: bool = True, count: int = 12
 ) -> Path:
-    """A small file of small chunks, with two topics."""
+    """Write a small file of small chunks, with two topics."""
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=256, compression=compression, use_chunking=chunked)
         writer.start(profile="ros2", library="collision_monitor test")
@@ -75,7 +75,7 @@ def test_a_whole_file_is_copied(whole: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("kind", "step"), [("zstd", 1), ("lz4", 7), ("plain", 7), ("unchunked", 7)])
 def test_every_cut_point(kind: str, step: int, tmp_path: Path) -> None:
-    """Every one of the format that is recorded; the others differ in how a chunk is unpacked."""
+    """Every byte for the recorded format; the others differ only in how a chunk is unpacked."""
     whole = write(tmp_path / "whole.mcap", count=8, **FORMATS[kind])
     data, out = whole.read_bytes(), tmp_path / "out.mcap"
     all_messages = messages(whole)
@@ -92,7 +92,7 @@ def test_every_cut_point(kind: str, step: int, tmp_path: Path) -> None:
         assert result.losses or found == all_messages, size
         assert found == all_messages[: len(found)], size
         recovered.append(len(found))
-    assert recovered == sorted(recovered), "a longer file never gives less"
+    assert recovered == sorted(recovered), "a longer file never gives fewer messages"
     assert recovered[-1] == len(all_messages)
     assert recovered[len(recovered) // 2] > 0
 
@@ -110,7 +110,7 @@ def test_zero_filled_ranges_cost_only_what_they_cover(whole: Path, tmp_path: Pat
         if whole_is_checked:
             assert set(found) <= set(all_messages)
             assert len(found) >= len(all_messages) - 6, "two chunks at most"
-        else:  # nothing tells that a message is as it was, so none is called verified; two or three are hit
+        else:  # no checksum shows a message unchanged, so none counts as verified; two or three are hit
             assert len(set(found) - set(all_messages)) <= 3
             assert result.unverified == len(found)
         if len(found) < len(all_messages):
@@ -127,7 +127,7 @@ def test_a_flipped_bit_costs_its_chunk_at_most(tmp_path: Path, kind: str) -> Non
         hurt[bit // 8] ^= 1 << (bit % 8)
         (tmp_path / "hurt.mcap").write_bytes(hurt)
         result = salvage(tmp_path / "hurt.mcap", out, overwrite=True)
-        found = {(*each[1:],) for each in messages(out)}  # the name of a topic may be what was hit
+        found = {(*each[1:],) for each in messages(out)}  # the flip may have hit the name of a topic
         assert found <= {(*each[1:],) for each in all_messages}, bit
         assert len(found) >= len(all_messages) - 3, bit
         assert result.losses or len(found) == len(all_messages), bit
@@ -139,7 +139,7 @@ def test_a_flipped_bit_costs_its_chunk_at_most(tmp_path: Path, kind: str) -> Non
     st.lists(st.tuples(st.floats(0, 1), st.integers(0, 7)), min_size=1, max_size=6),
 )
 def test_flipped_bits_never_make_a_message(tmp_path_factory, kind, flips) -> None:
-    """In chunks with checksums. Without, a flipped bit of a message's bytes is beyond anybody's knowledge."""
+    """In chunks with checksums. Without them, nothing can reveal a flipped bit in a message's bytes."""
     folder = tmp_path_factory.mktemp("flip")
     whole = write(folder / "whole.mcap", **FORMATS[kind])
     hurt = bytearray(whole.read_bytes())
@@ -152,7 +152,7 @@ def test_flipped_bits_never_make_a_message(tmp_path_factory, kind, flips) -> Non
         return
     true = {each[1:]: each[0] for each in messages(whole)}
     found = messages(folder / "out.mcap")
-    # the name of a topic may be what was hit
+    # the flips may have hit the name of a topic
     assert all(each[1:] in true for each in found)
     if len(found) < len(true):
         assert result.losses
@@ -181,7 +181,7 @@ def test_what_cannot_be_trusted_is_left_out_unless_asked_for(tmp_path: Path) -> 
 
 
 def test_another_program_s_file_is_copied_as_it_is(tmp_path: Path) -> None:
-    """Its profile, its attachments, and sequence numbers that count by topic: nothing of that is a loss."""
+    """Its profile, its attachments, and sequence numbers that count by topic are no losses."""
     with (tmp_path / "whole.mcap").open("wb") as stream:
         writer = Writer(stream)
         writer.start(profile="other", library="other")
@@ -232,7 +232,7 @@ GARBAGE = {
 
 @pytest.mark.parametrize("kind", GARBAGE)
 def test_garbage_ends_in_time_that_grows_with_its_size(tmp_path: Path, kind: str) -> None:
-    """Each place that might begin a record claims half of the file: to look at that each time would take minutes."""
+    """Each possible start of a record claims half of the file. To examine that much each time would take minutes."""
     (tmp_path / "garbage.mcap").write_bytes(b"\x89MCAP0\r\n\xff" + GARBAGE[kind](8_000_000))
     begin = time.process_time()
     with pytest.raises(SessionError, match="found none that is whole"):

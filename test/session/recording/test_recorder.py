@@ -1,4 +1,4 @@
-"""The recorder: what it writes, and that nothing that happens to it reaches the caller."""
+"""The recorder: the files that it writes, and that no failure reaches the caller."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ BY_TIME = Splitting(duration=0.26)
 
 
 def files_of(folder: Path) -> list[Path]:
-    """In the order of metadata.yaml, which has to name them all."""
+    """Return the files in the order of metadata.yaml, which has to name them all."""
     text = (folder / "metadata.yaml").read_text()
     names = yaml.safe_load(text)["rosbag2_bagfile_information"]["relative_file_paths"]
     assert sorted(names) == sorted(path.name for path in folder.glob("*.mcap"))
@@ -33,7 +33,7 @@ def files_of(folder: Path) -> list[Path]:
 
 
 def begins(messages: list[Recorded]) -> list[int]:
-    """Log times of the steps in which a contact begins."""
+    """Return the log times of the steps in which a contact begins."""
     found = [m for m in messages if m.topic == CONTACTS]
     return [m.log_time for m in found if (decode_contacts(m.data).contacts["phase"] == Phase.BEGIN).any()]
 
@@ -68,14 +68,14 @@ def test_each_file_stands_alone_with_settings_and_objects(recorded: Path, tmp_pa
             continue
         assert (report.verdict, report.late, report.compared) == (Verdict.NOT_COMPARABLE, True, 0)
         assert "messages after its recording" in report.notes[0]
-        assert report.digest != 0, "it finds contacts among the objects that it has"
+        assert report.digest != 0, "the replay finds contacts among the file's objects"
         first, *others = session.messages()
         ids = [each.object_id for each in decode_descriptions(first.data).objects]
-        # what was described before: body 3 goes at step 20 and comes back at step 30
+        # the earlier descriptions: body 3 disappears at step 20 and returns at step 30
         assert ids == ([1, 2, 4, 5, 6, 9] if k == 1 else [1, 2, 4, 5, 6, 9, 3])
         assert decode_descriptions(first.data).snapshot
         assert others[0].sequence == first.sequence + 1
-        assert others[0].topic in (STATES, SHAPES), "answers stay with what they answer"
+        assert others[0].topic in (STATES, SHAPES), "answers stay in the file of their inputs"
 
 
 def test_rosbags_reads_the_folder(recorded: Path, tmp_path: Path) -> None:
@@ -129,7 +129,7 @@ def test_only_what_is_around_collisions_is_kept(recorded: Path, tmp_path: Path) 
         assert main(["replay", str(path)]) == 4
     session = Session(tmp_path / "run")
     assert replay(session).verdict is Verdict.NOT_COMPARABLE
-    # one after the other, each with the objects that it begins with
+    # one file after the other, each with the objects at its begin
     assert sum(m.topic == SHAPES for m in session.messages()) >= len(files)
 
 

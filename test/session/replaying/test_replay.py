@@ -25,7 +25,7 @@ def rewritten(
     change: Callable[[Recorded], bytes | None] = lambda message: message.data,
     **metadata: str,
 ) -> Path:
-    """A copy of a session, message by message; None leaves a message out and keeps the numbering without a gap."""
+    """Copy a session, message by message; None leaves a message out and keeps the numbering without a gap."""
     session = Session(source)
     with Recorder(target, TYPES, {**session.metadata, **metadata}) as recorder:
         for message in session.messages():
@@ -177,7 +177,7 @@ def test_dropped_messages_end_the_comparison(recorded: Path, tmp_path: Path) -> 
     recorder = Recorder(tmp_path / "a.mcap", TYPES, session.metadata)
     for message in session.messages():
         if message.sequence == 80:
-            recorder._next_sequence += 3  # as three messages that found the queue full
+            recorder._next_sequence += 3  # like three messages that were dropped
         recorder.write(message.topic, message.data, message.log_time, message.publish_time)
     recorder.close()
     report = replay(Session(tmp_path / "a.mcap"))
@@ -188,7 +188,7 @@ def test_dropped_messages_end_the_comparison(recorded: Path, tmp_path: Path) -> 
 
 @pytest.mark.parametrize("cut", [1, 100, 2000])
 def test_a_cut_session_compares_what_is_there_and_says_so(recorded: Path, tmp_path: Path, cut: int) -> None:
-    """The end of the data, without the summary behind it, is cut off as well."""
+    """The file has no summary, and its last bytes are cut off as well."""
     recorder = record(tmp_path / "a.mcap", close=False)
     import time
 
@@ -252,7 +252,7 @@ def test_the_command_names_the_verdict_and_exits_with_it(
 
 
 def nudged(recorded: Path, tmp_path: Path, by: float) -> Path:
-    """The session with each contact a little deeper."""
+    """Return the session with each contact a little deeper."""
 
     def change(message: Recorded) -> bytes:
         if message.topic != CONTACTS:
@@ -300,5 +300,5 @@ def test_a_difference_comes_with_its_inputs_and_can_be_cut_out(
     assert part.first_difference == whole.first_difference
     assert part.steps == 12
     assert part.messages == whole.first_message + 1
-    assert main(["replay", str(path), "--cut", str(out)]) == 1  # it is there already
+    assert main(["replay", str(path), "--cut", str(out)]) == 1  # the file exists already
     assert main(["replay", str(path), "--cut", str(out), "--force"]) == Verdict.DIVERGED

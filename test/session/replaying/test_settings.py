@@ -1,4 +1,4 @@
-"""A session in which the settings changed replays bit by bit, as a whole and in parts, and everything else reads it."""
+"""A session with changed settings replays bit by bit, as a whole and in parts, and all other tools read it."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_it_replays_bit_by_bit(switched: Path, threads: int | None) -> None:
 
 
 def test_the_changes_matter_to_the_answers(switched: Path) -> None:
-    """What a replay without them would say."""
+    """A replay without the changes gives other answers."""
     pipeline = Pipeline(Session(switched).profile)
     digest = 0
     for message in Session(switched).messages():

@@ -1,5 +1,6 @@
-"""Snapshots in a session: a replay from each of them gives the same bytes as one from the start, and so does each file
-of a recording in several."""
+"""Snapshots in a session: a replay from each of them, and of each file of a split recording, gives the same bytes as
+one from the start.
+"""
 
 from __future__ import annotations
 
@@ -29,12 +30,12 @@ from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict
 
 LENGTH = 0.54
-"""s: 50 steps and the messages between them that are none."""
+"""s: 50 steps and the other messages between them."""
 
 
 @pytest.fixture
 def often(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A snapshot every 0.1 s, however small the session."""
+    """Record a snapshot every 0.1 s, however small the session."""
     for module in (recording_files, recorder):
         monkeypatch.setattr(module, "SNAPSHOT_PERIOD", 0.1)
     monkeypatch.setattr(recorder, "EVENT_SNAPSHOT_PERIODS", (0.02, 0.02))
@@ -111,7 +112,7 @@ def test_quiet_sessions_have_few_snapshots(tmp_path: Path, often: None, monkeypa
     monkeypatch.setattr(recording_files, "SNAPSHOT_SHARE", 0.05)
     record(tmp_path / "run.mcap", snapshots=True)
     data = [each.data for each in Session(tmp_path / "run.mcap").entries() if isinstance(each, RecordedSnapshot)]
-    assert len(data) == 1, "the first comes at once"
+    assert len(data) == 1, "the first snapshot is written at once"
 
 
 @pytest.mark.parametrize("splitting", [Splitting(duration=0.2), Splitting(size=1)])
@@ -136,7 +137,7 @@ def test_each_file_of_a_recording_in_several_replays_alone(
     assert start.verdict is Verdict.IDENTICAL and start.begin > 0.1
     (tmp_path / "run" / files[1].name).unlink()
     gap = replay(Session(tmp_path / "run"))
-    assert gap.verdict is Verdict.IDENTICAL, "what is there was compared, and what is not is told"
+    assert gap.verdict is Verdict.IDENTICAL, "the messages that are there were compared, the missing ones reported"
     assert "messages are missing after step" in gap.notes[0] and f"{files[1].name} is not there" in gap.notes
 
 
@@ -177,7 +178,7 @@ def test_a_window_begins_with_a_snapshot_and_holds_no_more_than_it_must() -> Non
 def rewritten(
     source: Path, target: Path, without: range = range(0), spoil: int | None = None, by: float = 0.25
 ) -> None:
-    """The session without some messages, and with the distances of message `spoil` changed."""
+    """Write the session without some messages, and with changed distances in message `spoil`."""
     session = Session(source)
     entries = list(session.entries())
     types = {each.topic: each.type for each in entries if isinstance(each, Recorded)}
@@ -231,7 +232,7 @@ def test_a_difference_is_cut_out_from_the_last_snapshot_on(
     assert part.first_difference == whole.first_difference is not None
     assert part.messages == late + 1 - places[3].sequence
     first = next(Session(tmp_path / "cut.mcap").messages())
-    assert first.repeated and first.type == "ObjectDescriptionArray", "for readers that have no use for a snapshot"
+    assert first.repeated and first.type == "ObjectDescriptionArray", "for readers that do not use snapshots"
 
 
 def test_what_is_within_the_tolerance_is_no_difference_to_cut_out(
