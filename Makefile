@@ -1,8 +1,8 @@
-# The front door. Everything lives in .venv and build/; nothing needs to be exported or sourced.
+# The commands of a user and of CI. They install into .venv and build/; nothing has to be exported or sourced.
 
 BIN := .venv/bin
 
-# A sourced ROS 2 install finds our messages the way it finds any overlay. The wheels look into .venv by themselves.
+# A sourced ROS 2 install finds our messages as an overlay. The ROS 2 wheels look into .venv by themselves.
 ifdef AMENT_PREFIX_PATH
 export AMENT_PREFIX_PATH := $(CURDIR)/.venv:$(AMENT_PREFIX_PATH)
 export LD_LIBRARY_PATH := $(CURDIR)/.venv/lib$(if $(LD_LIBRARY_PATH),:$(LD_LIBRARY_PATH))
@@ -20,23 +20,23 @@ help: ## list the targets
 setup: ## set up what is missing: environment, ROS 2, messages, package, compiled kernels
 	@sh scripts/set_up/start.sh
 
-demo: setup ## watch the monitor at work, live
+demo: setup ## play a scene and show the monitor's answers, live in this terminal
 	@$(BIN)/collision-monitor demo
 
 test: ## set up, lint and run every test
 	@$(MAKE) --no-print-directory -j2 lint test-core
 	@$(BIN)/python -m pytest -n 3 --dist worksteal test/ros test/setup
 
-test-core: setup ## the tests of everything but the node and the set-up
+test-core: setup ## run the tests, except those of the node and of the set-up
 	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore=test/ros --ignore=test/setup
 
-lint: setup ## ruff and mypy --strict
+lint: setup ## run ruff and mypy --strict
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
 
 QUICK := $(findstring --quick,$(ARGS))
 
-bench: setup ## time full detection beside every installed peer, the event list, the node; ARGS=--quick takes 3 minutes
+bench: setup ## time full detection and every installed peer, the event list, the node; ARGS=--quick takes 3 minutes
 	@$(BIN)/python benchmarks/run.py $(ARGS)
 	@$(BIN)/python benchmarks/event_list.py $(if $(QUICK),--seconds 1)
 	@$(BIN)/python benchmarks/through_node.py $(if $(QUICK),--duration 10)
@@ -45,5 +45,5 @@ bench: setup ## time full detection beside every installed peer, the event list,
 bench-peers: ## install the systems that bench compares with
 	@sh benchmarks/install_peers.sh
 
-clean: ## remove everything that was set up or built
+clean: ## remove all files that the set-up or a build made
 	rm -rf .venv .venv-peers build install log .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info

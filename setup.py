@@ -1,7 +1,7 @@
-"""What colcon needs to find here: the files of a ROS 2 package and its executables. All else is in pyproject.toml.
+"""Metadata that colcon reads from setup.py: the files of a ROS 2 package and its executables.
 
-`python_requires` and `license` are here because colcon cannot read what setuptools makes of them there, and because
-setuptools 68 (Ubuntu 24.04) and 77 disagree on how a licence is written.
+The other metadata is in pyproject.toml. `python_requires` and `license` are here because colcon cannot read the form
+that setuptools gives them there, and because setuptools 68 (Ubuntu 24.04) and 77 disagree on how to write a licence.
 """
 
 from glob import glob

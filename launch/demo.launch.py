@@ -1,4 +1,4 @@
-"""A scene and the monitor that watches it.
+"""Start a scene and the monitor that watches it.
 
 ros2 launch collision_monitor demo.launch.py scene:=fleet
 """
@@ -15,7 +15,7 @@ def generate_launch_description() -> LaunchDescription:
     monitor = PathJoinSubstitution([FindPackageShare("collision_monitor"), "launch", "monitor.launch.py"])
     return LaunchDescription(
         [
-            DeclareLaunchArgument("scene", default_value="fleet", description="which scene to play"),
+            DeclareLaunchArgument("scene", default_value="fleet", description="name of the scene to play"),
             IncludeLaunchDescription(monitor),
             Node(
                 package="collision_monitor",

@@ -1,4 +1,4 @@
-"""The monitor alone, with the parameters of config/monitor.yaml.
+"""Start the monitor alone, with the parameters of config/monitor.yaml.
 
 ros2 launch collision_monitor monitor.launch.py record:=run.mcap
 """
@@ -15,8 +15,12 @@ def generate_launch_description() -> LaunchDescription:
     parameters = PathJoinSubstitution([FindPackageShare("collision_monitor"), "config", "monitor.yaml"])
     return LaunchDescription(
         [
-            DeclareLaunchArgument("params", default_value=parameters, description="parameters of the monitor (YAML)"),
-            DeclareLaunchArgument("record", default_value="", description="record the session to this .mcap file"),
+            DeclareLaunchArgument(
+                "params", default_value=parameters, description="YAML file with the parameters of the monitor"
+            ),
+            DeclareLaunchArgument(
+                "record", default_value="", description="path of the session to record: a .mcap file or a folder"
+            ),
             Node(
                 package="collision_monitor",
                 executable="monitor",

@@ -1,7 +1,7 @@
-"""The parameters of the nodes, checked when a node starts, and again when one changes.
+"""The parameters of our nodes, checked when a node starts.
 
-Those of the monitor are generated from the profile's settings, which may change while it runs. The frame, the recording
-and the executor of a node are read-only.
+The settings of the profile define most parameters of the monitor; these may change while it runs (`live_settings.py`).
+The frame, the recording and the executor are read-only.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ _TYPES = {str: "a text", int: "a whole number", float: "a number"}
 class ParameterReader:
     """Declares the parameters of a node and returns their values.
 
-    The node is made with `automatically_declare_parameters_from_overrides`, so that a misspelt name is refused rather
-    than ignored, and a whole number is accepted in place of a decimal one (`-p horizon:=1`). Raises InputError.
+    The node must have `automatically_declare_parameters_from_overrides`. Then this class can refuse a misspelt name,
+    which ROS would ignore, and accept a whole number for a decimal one (`-p horizon:=1`). Raises InputError.
     """
 
     def __init__(self, node: Node, names: Sequence[str]) -> None:
@@ -44,7 +44,7 @@ class ParameterReader:
             raise InputError(f"parameter {name!r} is unknown: {hint}")
 
     def value(self, name: str, default: T) -> T:
-        """Return the given value, or the default, which also determines the type."""
+        """Return the given value, or the default. The type of the default is the expected type. Raises InputError."""
         value = self._given.get(name, default)
         if isinstance(default, float) and type(value) is int:
             value = float(value)
@@ -54,19 +54,19 @@ class ParameterReader:
         return result
 
     def declare(self, name: str, value: Any, descriptor: ParameterDescriptor) -> None:
-        """Show the value to `ros2 param`, with its description and range."""
+        """Declare the parameter with its value, description and range, for `ros2 param`."""
         if self._node.has_parameter(name):
             self._node.undeclare_parameter(name)
         self._node.declare_parameter(name, value, descriptor, ignore_override=True)
 
     def read(self, name: str, default: T, description: str) -> T:
-        """Read a value and declare it."""
+        """Return the value and declare the parameter read-only."""
         value = self.value(name, default)
         self.declare(name, value, ParameterDescriptor(description=description, read_only=True))
         return value
 
     def given(self, name: str) -> Any:
-        """Return the given value, whatever its type; None if there is none."""
+        """Return the given value without a check of its type; None if none was given."""
         return self._given.get(name)
 
 
@@ -77,7 +77,7 @@ _RECORD = ("record", "record_mode", "record_before", "record_after", "record_spl
 
 @dataclass(frozen=True)
 class MonitorParameters:
-    """The parameters of the monitor."""
+    """The checked parameters of the monitor."""
 
     profile: Profile
     frame_id: str
@@ -87,22 +87,22 @@ class MonitorParameters:
 
 
 def read_monitor_parameters(node: Node) -> MonitorParameters:
-    """Read the monitor's parameters. Raises InputError, ProfileError for a setting out of range."""
+    """Read, check and declare the parameters. Raises InputError; ProfileError for a setting out of range."""
     settings = Profile.fields()
     reader = ParameterReader(node, [PROFILE, *(s.name for s in settings), "frame_id", *_RECORD, "executor"])
     name = reader.value(PROFILE, "balanced")
     profile = Profile.named(name)
     given = {s.name: plain(reader.given(s.name), s) for s in settings if reader.given(s.name) is not None}
     profile = profile.replace(**given)
-    choices = f"Where the settings start from: {', '.join(Profile.names())}, or the path of a .yaml file."
+    choices = f"Profile that the settings start from: {', '.join(Profile.names())}, or the path of a .yaml file."
     reader.declare(PROFILE, name, ParameterDescriptor(description=choices))
     for setting in settings:
         reader.declare(setting.name, getattr(profile, setting.name), _descriptor(setting))
 
-    frame_id = reader.read("frame_id", "world", "The frame of all poses; messages in another one are refused.")
+    frame_id = reader.read("frame_id", "world", "Frame of all poses; messages in another frame are refused.")
     record = reader.read("record", "", "Path of the session to write, a .mcap file or a folder; empty: no recording.")
     splitting = _read_splitting(reader)
-    executor = reader.read("executor", "single", f"The rclpy executor: {' or '.join(EXECUTORS)}.")
+    executor = reader.read("executor", "single", f"rclpy executor: {' or '.join(EXECUTORS)}.")
     if not frame_id:
         raise ProfileError("parameter frame_id: expected the name of a frame, got an empty text")
     if executor not in EXECUTORS:
@@ -111,12 +111,14 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
 
 
 def _read_splitting(reader: ParameterReader) -> Splitting:
-    """Read the parameters of the recording. Raises InputError."""
-    mode = reader.read("record_mode", RECORD_MODES[0], "always, or on_event: only what is around collisions.")
-    before = reader.read("record_before", ONE_FILE.before, "on_event: how long before each collision is kept [s].")
-    after = reader.read("record_after", ONE_FILE.after, "on_event: how long after each collision begins is kept [s].")
-    size = reader.read("record_split_size", ONE_FILE.size, "Size from which on another file follows [bytes]; 0: never.")
-    duration = reader.read("record_split_duration", ONE_FILE.duration, "The same by time [s]; 0: never.")
+    """Read the parameters of a recording in several files. Raises InputError."""
+    mode = reader.read("record_mode", RECORD_MODES[0], "always, or on_event: record only around collisions.")
+    before = reader.read("record_before", ONE_FILE.before, "on_event: time kept before each collision [s].")
+    after = reader.read("record_after", ONE_FILE.after, "on_event: time kept after the begin of each collision [s].")
+    size = reader.read("record_split_size", ONE_FILE.size, "Size at which a new file starts [bytes]; 0: never.")
+    duration = reader.read(
+        "record_split_duration", ONE_FILE.duration, "Duration after which a new file starts [s]; 0: never."
+    )
     if mode not in RECORD_MODES:
         raise InputError(f"parameter record_mode: expected {' or '.join(RECORD_MODES)}, got {mode!r}")
     try:
@@ -126,7 +128,7 @@ def _read_splitting(reader: ParameterReader) -> Splitting:
 
 
 def plain(value: Any, setting: Setting) -> Any:
-    """Return a parameter's value as a setting takes it: arrays as tuples."""
+    """Return a parameter's value in the form that a setting checks: an array as a tuple."""
     return tuple(value) if setting.type is tuple and not isinstance(value, str | int | float) else value
 
 

@@ -1,4 +1,4 @@
-"""Plays a scene like a team of robots: publishes the shapes once, latched, then states at a steady rate.
+"""Plays a scene as a robot team would publish it: shapes once, latched, then states at a steady rate.
 
 ros2 run collision_monitor world --ros-args -p scene:=fleet -p objects:=200
 """
@@ -24,14 +24,14 @@ from collision_monitor.world import make_scene, scene_names
 PARAMETERS = ("scene", "objects", "rate", "duration", "seed", "path", "noise", "monitor", "frame_id")
 
 LISTENER_PATIENCE = 4.0
-"""Longest wait for a subscriber (s): on a busy machine DDS can lose its first announcement and repeats it after 3 s."""
+"""s to wait for a monitor: on a busy machine DDS can lose its first announcement, and repeats it 3 s later."""
 
 SHAPES_PATIENCE = 10.0
-"""Longest wait (s) for the monitor to process the shapes. Ten thousand take a second."""
+"""s to wait until the monitor knows the shapes; ten thousand take it one second."""
 
 
 class WorldNode(Node):
-    """Publishes one scene to one monitor. Raises InputError for an impossible scene."""
+    """Publishes one scene to one monitor. Raises InputError for an impossible scene or parameter."""
 
     def __init__(self) -> None:
         super().__init__("world", automatically_declare_parameters_from_overrides=True)
@@ -52,26 +52,30 @@ class WorldNode(Node):
 
     def _read_parameters(self) -> None:
         reader = ParameterReader(self, PARAMETERS)
-        name = reader.read("scene", "fleet", f"One of {', '.join(scene_names())}.")
-        objects = reader.read("objects", 0, "How many move; 0: the scene's own number.")
+        name = reader.read("scene", "fleet", f"Scene to play: one of {', '.join(scene_names())}.")
+        objects = reader.read("objects", 0, "Number of moving objects; 0: the scene's own number.")
         rate = reader.read("rate", 0.0, "Messages per second [Hz]; 0: the scene's own rate.")
-        seed = reader.read("seed", 1, "Of the scene's random numbers.")
-        path = reader.read("path", "", "Recorded tracks, for the scene that plays them.")
-        noise = reader.read("noise", 0.0, "Standard deviation of the states [m, rad, m/s, rad/s], declared in them.")
+        seed = reader.read("seed", 1, "Seed of the scene's random numbers.")
+        path = reader.read("path", "", "Path of recorded tracks, for the scene that plays them.")
+        noise = reader.read(
+            "noise", 0.0, "Standard deviation of noise on the states [m, rad, m/s, rad/s]; the states declare it."
+        )
         self._scene = make_scene(
             name, objects=objects or None, seed=seed, rate=rate or None, path=path or None, noise=noise
         )
-        self._duration = reader.read("duration", 0.0, "After which it stops [s]; 0: the scene's own end, or endless.")
+        self._duration = reader.read(
+            "duration", 0.0, "Time after which it stops [s]; 0: at the scene's own end, or never."
+        )
         if not (self._duration >= 0.0 and math.isfinite(self._duration)):
             raise InputError(f"duration: expected a finite number of seconds, at least 0, got {self._duration}")
         self._monitor = reader.read("monitor", NODE, "Name of the monitor to publish to.").strip("/")
-        self._frame_id = reader.read("frame_id", "world", "The frame of all poses.")
+        self._frame_id = reader.read("frame_id", "world", "Frame of all poses.")
 
     def play(self, stop: StopRequest) -> None:
         """Publish until the duration or the scene ends, or a stop is requested.
 
-        Deadlines are counted from the start, so the rate does not drift, and stamps are those deadlines, so states are
-        exactly one period apart. If the machine is too slow, whole periods are skipped and counted.
+        Deadlines count from the start, so the rate does not drift. Stamps are those deadlines, so states are exactly
+        one period apart. If the machine is too slow, the node skips whole periods and counts them.
         """
         scene, period = self._scene, 1.0 / self._scene.rate
         self.get_logger().info(
@@ -102,15 +106,15 @@ class WorldNode(Node):
         )
 
     def _wait_for_listener(self, stop: StopRequest) -> None:
-        """Wait for a subscriber, so that a running monitor sees the scene from its beginning. Play without one too."""
+        """Wait for a running monitor, so that it gets all of the scene; give up after LISTENER_PATIENCE."""
         patience = time.monotonic() + LISTENER_PATIENCE
         while not self._states_out.get_subscription_count() and time.monotonic() < patience and not stop.received:
             time.sleep(0.01)
 
     def _wait_for_shapes_taken(self, stop: StopRequest) -> None:
-        """Wait until the monitor's status counts as many objects. States sent before that would wait and be lost.
+        """Wait until the monitor's status counts all objects: before that, states would queue up and be lost.
 
-        Play even without a monitor, or if it refuses some of the objects.
+        Return at once without a monitor, and after SHAPES_PATIENCE if it refuses some of the objects.
         """
         topic = Topic.STATUS.of(self._monitor)
         known: list[int] = []
@@ -128,7 +132,7 @@ class WorldNode(Node):
 
 
 def _sleep_until(deadline: float, stop: StopRequest) -> bool:
-    """Sleep, and return False if a stop is requested meanwhile, which is checked every WAKE_UP seconds."""
+    """Sleep until the deadline; return False if a stop was requested. Checks for it every WAKE_UP seconds."""
     while not stop.received:
         left = deadline - time.monotonic()
         if left <= 0.0:

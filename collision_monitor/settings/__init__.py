@@ -1,1 +1,1 @@
-"""The settings that trade speed for accuracy, and the profiles that name them."""
+"""The settings that trade speed for accuracy, and the profiles that set them."""

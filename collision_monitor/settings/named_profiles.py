@@ -1,4 +1,4 @@
-"""The profiles that come with the package, and those that a user keeps in YAML files."""
+"""The profiles that come with the package, and custom profiles in YAML files."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import yaml
 from collision_monitor.errors import ProfileError
 
 BASED_ON: Final = "based_on"
-"""In the file of a custom profile: the profile that it starts from."""
+"""Key in the file of a custom profile: the named profile that it starts from."""
 
 _TOLERANCES: Final = ("position_tolerance", "orientation_tolerance", "velocity_tolerance", "angular_velocity_tolerance")
 
@@ -25,7 +25,7 @@ NAMED_PROFILES: Final[dict[str, dict[str, Any]]] = {
     "fast": {
         "impact_tolerance": 1e-3,
         "impact_iterations": 64,
-        "uncertainty": False,  # of all that a step may do, sampling takes by far the longest
+        "uncertainty": False,  # sampling takes by far the longest of all parts of a step
         "uncertainty_samples": 128,
         "position_tolerance": 1e-2,
         "orientation_tolerance": 1e-2,
@@ -40,13 +40,13 @@ NAMED_PROFILES: Final[dict[str, dict[str, Any]]] = {
         **dict.fromkeys(_TOLERANCES, 1e-9),
     },
 }
-"""Each names the same settings, so that switching from one to another leaves nothing of the first."""
+"""All profiles name the same settings, so that a switch leaves no setting of the previous profile."""
 
 
 def profile_changes(name: str) -> dict[str, Any]:
-    """The settings that a profile names, by its name or by the path of its YAML file. Raises ProfileError.
+    """Return the settings that a profile names, given its name or the path of its YAML file. Raises ProfileError.
 
-    The values of a file are not checked here.
+    It does not check the values of a file.
     """
     if name in NAMED_PROFILES:
         return {"name": name, **NAMED_PROFILES[name]}

@@ -1,6 +1,6 @@
-"""The settings that trade speed for accuracy, each with its unit, range and meaning.
+"""The settings that trade speed for accuracy, each with its unit, range and description.
 
-ROS parameters, the command line's help and the recorded sessions are all generated from these fields.
+The fields of `Profile` define the ROS parameters, the profiles in YAML files and the settings in recorded sessions.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from collision_monitor.settings.named_profiles import NAMED_PROFILES, profile_ch
 from collision_monitor.settings.setting import EVERYWHERE, Setting, choice, number, settings_of, switch, vector
 
 NO_BUDGET: Final = 1e6
-"""ms, a quarter of an hour: a step has as long as it takes, and no clock is looked at."""
+"""ms, a quarter of an hour: with this value a step has no time limit and does not read the clock."""
 
 NO_LIMIT: Final = 1_000_000_000
-"""Pairs in a step: more than fit into memory."""
+"""Pairs in a step: more than fit into memory, so no limit."""
 
 _MODELS: Final = [model.name.lower() for model in Model if model is not Model.EXACT]
 
 
 @dataclass(frozen=True)
 class Profile:
-    """How far the monitor looks and how exact it is. Raises ProfileError for values that are, or go together, wrong."""
+    """The settings of a monitor, immutable. Raises ProfileError for a wrong value or a wrong combination of values."""
 
     name: str = "balanced"
     horizon: float = number(
@@ -39,7 +39,7 @@ class Profile:
         0.0, 0.0, 1e6, "m", "Pairs up to this far apart count as touching.", predictions=True
     )
     contact_points: int = number(
-        1, 1, MOST_POINTS, "1", "Most points of a contact; past 1, a row for each corner of faces that touch."
+        1, 1, MOST_POINTS, "1", "Largest number of points of a contact; above 1, touching faces have a row per corner."
     )
     impact_tolerance: float = number(
         1e-4, 1e-12, 1.0, "m", "Gap at which a predicted impact is settled.", predictions=True
@@ -49,7 +49,7 @@ class Profile:
         1,
         100000,
         "1",
-        "Most distance computations for one predicted impact; past it the pair is UNRESOLVED.",
+        "Largest number of distance computations for one predicted impact; beyond it the pair is UNRESOLVED.",
         predictions=True,
     )
     position_tolerance: float = number(
@@ -61,53 +61,80 @@ class Profile:
         predictions=True,
     )
     orientation_tolerance: float = number(
-        1e-3, 0.0, math.pi, "rad", "The same for its predicted orientation.", predictions=True
+        1e-3,
+        0.0,
+        math.pi,
+        "rad",
+        "An object this close to its predicted orientation needs no new prediction.",
+        predictions=True,
     )
-    velocity_tolerance: float = number(1e-3, 0.0, 1e3, "m/s", "The same for its linear velocity.", predictions=True)
+    velocity_tolerance: float = number(
+        1e-3,
+        0.0,
+        1e3,
+        "m/s",
+        "An object this close to its predicted linear velocity needs no new prediction.",
+        predictions=True,
+    )
     angular_velocity_tolerance: float = number(
-        1e-3, 0.0, 1e3, "rad/s", "The same for its angular velocity.", predictions=True
+        1e-3,
+        0.0,
+        1e3,
+        "rad/s",
+        "An object this close to its predicted angular velocity needs no new prediction.",
+        predictions=True,
     )
-    stale_after: float = number(0.5, 0.0, 1e6, "s", "Age of an object's last state from which answers are flagged.")
+    stale_after: float = number(
+        0.5, 0.0, 1e6, "s", "Age of an object's last state beyond which its predictions are flagged as stale."
+    )
     stale_acceleration: float = number(
-        1.0, 0.0, 1e4, "m/s^2", "How hard an object may accelerate while it is not heard of: widens its bounds."
+        1.0, 0.0, 1e4, "m/s^2", "Acceleration that an object may have since its last state; widens its bounds."
     )
     uncertainty: bool = switch(
-        True, "Whether it is told when and how likely pairs meet, where states declare it.", predictions=True
+        True, "Whether to compute when and how likely pairs meet, if states declare an uncertainty.", predictions=True
     )
     uncertainty_samples: int = number(
-        1024, 16, 4096, "1", "Samples of what is uncertain, for each pair that may meet, where states declare it."
+        1024, 16, 4096, "1", "Samples of the declared uncertainty, for each pair that may meet."
     )
-    confidence: float = number(
-        0.95, 0.5, 0.9999, "1", "At which the earliest and latest times are stated.", predictions=True
-    )
+    confidence: float = number(0.95, 0.5, 0.9999, "1", "Confidence of the earliest and latest times.", predictions=True)
     min_probability: float = number(
         0.01,
         1e-6,
         1.0,
         "1",
-        "From which on pairs are told that would meet only because of what is uncertain.",
+        "Smallest probability at which a pair is reported that may meet only because of its uncertainty.",
         predictions=True,
     )
-    max_time_step: float = number(10.0, 1e-3, 1e9, "s", "A stamp that jumps by more is refused unless the next agrees.")
+    max_time_step: float = number(
+        10.0, 1e-3, 1e9, "s", "A stamp that jumps by more is refused unless the next message confirms it."
+    )
     threads: int = number(1, 1, 64, "1", "Threads of the kernels; the answers are the same bytes for any number.")
     budget_ms: float = number(
-        NO_BUDGET, 0.05, NO_BUDGET, "ms", "Time for a step: the most urgent pairs first, the others are UNRESOLVED."
+        NO_BUDGET, 0.05, NO_BUDGET, "ms", "Time for a step: the most urgent pairs first; the others are UNRESOLVED."
     )
     pairs_per_step: int = number(
-        NO_LIMIT, 1, NO_LIMIT, "1", "Pairs for a step, the same way: answers that depend on no clock."
+        NO_LIMIT, 1, NO_LIMIT, "1", "Largest number of pairs examined in a step; a limit that depends on no clock."
     )
-    model_primitive: str = choice(_MODELS, "For boxes, capsules, cylinders and cones that choose none.")
-    model_hull: str = choice(_MODELS, "The same for convex hulls.")
-    model_mesh: str = choice(_MODELS, "The same for meshes; auto: the convex hull of concave ones.")
-    model_compound: str = choice(_MODELS, "The same for objects of several shapes.")
+    model_primitive: str = choice(_MODELS, "Model of boxes, capsules, cylinders and cones without one of their own.")
+    model_hull: str = choice(_MODELS, "Model of convex hulls without one of their own.")
+    model_mesh: str = choice(
+        _MODELS, "Model of meshes without one of their own; auto: the convex hull of concave meshes."
+    )
+    model_compound: str = choice(_MODELS, "Model of objects of several shapes without one of their own.")
     region_min: tuple[float, float, float] = vector(
-        (-EVERYWHERE, -EVERYWHERE, -EVERYWHERE), EVERYWHERE, "m", "Objects wholly outside of this box are left out."
+        (-EVERYWHERE, -EVERYWHERE, -EVERYWHERE),
+        EVERYWHERE,
+        "m",
+        "Lower corner of the region of interest; objects wholly outside of it are ignored.",
     )
     region_max: tuple[float, float, float] = vector(
-        (EVERYWHERE, EVERYWHERE, EVERYWHERE), EVERYWHERE, "m", "The other corner of that box."
+        (EVERYWHERE, EVERYWHERE, EVERYWHERE),
+        EVERYWHERE,
+        "m",
+        "Upper corner of the region of interest; objects wholly outside of it are ignored.",
     )
-    min_closing_speed: float = number(0.0, 0.0, 1e6, "m/s", "Predictions that close slower than this are left out.")
-    ignore_separating: bool = switch(False, "Predictions of pairs whose origins move apart now are left out.")
+    min_closing_speed: float = number(0.0, 0.0, 1e6, "m/s", "Predictions with a lower closing speed are left out.")
+    ignore_separating: bool = switch(False, "Leave out predictions of pairs with origins that move apart now.")
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -123,28 +150,28 @@ class Profile:
     @classmethod
     @cache
     def fields(cls) -> tuple[Setting, ...]:
-        """The settings in order, without the profile's name."""
+        """Return the settings in order, without the profile's name."""
         return tuple(settings_of(cls))
 
     @classmethod
     def changes_predictions(cls, changed: Collection[str]) -> bool:
-        """Whether predictions rest on one of the `changed` settings: then all predictions are made anew."""
+        """Whether predictions depend on one of the `changed` settings, so that all of them are computed anew."""
         return any(setting.predictions for setting in cls.fields() if setting.name in changed)
 
     @staticmethod
     def names() -> list[str]:
-        """The profiles that come with the package."""
+        """Return the names of the profiles that come with the package, sorted."""
         return sorted(NAMED_PROFILES)
 
     @classmethod
     def named(cls, name: str) -> Profile:
-        """A profile by its name, or from the YAML file of that path. Raises ProfileError."""
+        """Return a profile by its name or by the path of its YAML file. Raises ProfileError."""
         return cls().switched(name)
 
     def switched(self, name: str) -> Profile:
-        """The profile of that name, or of the YAML file of that path, on top of this one.
+        """Return this profile with the settings of another one, given by its name or by the path of its YAML file.
 
-        Settings that it does not name stay as they are. Raises ProfileError.
+        Settings that the other one does not name keep their values. Raises ProfileError.
         """
         changes = profile_changes(name)
         try:
@@ -153,13 +180,13 @@ class Profile:
             raise ProfileError(f"{Path(name)}: {error}") from None
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON and YAML."""
+        """Return plain values by name, for JSON and YAML."""
         values = dataclasses.asdict(self)
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Profile:
-        """From `to_dict`; missing settings take the defaults. Raises ProfileError for an unknown name."""
+        """Return the profile of `to_dict`, with defaults for missing settings. Raises ProfileError for unknown ones."""
         known = {f.name for f in dataclasses.fields(cls)}
         for name in values:
             if name not in known:
@@ -167,10 +194,10 @@ class Profile:
         return cls(**values)
 
     def replace(self, **changes: Any) -> Profile:
-        """A copy with some settings changed. Raises ProfileError."""
+        """Return a copy with some settings changed. Raises ProfileError."""
         return self.from_dict({**self.to_dict(), **changes})
 
     def differences(self, other: Profile) -> dict[str, Any]:
-        """The fields in which `other` is not the same, with its values; the name is one of them."""
+        """Return the fields that differ in `other`, with its values; the name counts as a field."""
         mine, theirs = self.to_dict(), other.to_dict()
         return {name: value for name, value in theirs.items() if value != mine[name]}

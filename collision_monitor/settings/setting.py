@@ -1,6 +1,6 @@
-"""What a setting may be: its kind, range, unit and meaning, and the check of a value.
+"""A setting: its kind, range, unit and description, and the check of a value.
 
-ROS parameters, custom profiles and recorded changes are all checked here, so that each refusal says the same.
+ROS parameters, custom profiles and recorded changes all pass this check, so that their errors have the same text.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Vector = tuple[float, float, float]
 Value = bool | int | float | str | Vector
 
 EVERYWHERE: Final = LARGEST_INPUT
-"""m: a region that reaches this far has no end there."""
+"""m: a region with this value as a bound is unbounded on that side."""
 
 _KINDS: dict[type, str] = {bool: "true or false", int: "a whole number", float: "a number", tuple: "three numbers"}
 
@@ -31,33 +31,33 @@ def number(
     *,
     predictions: bool = False,
 ) -> Any:
-    """A field of a profile: a number, whole where the default is."""
+    """Return a field of a profile: a number, whole if its default is whole."""
     metadata = {"minimum": minimum, "maximum": maximum, "unit": unit, "description": description}
     return field(default=default, metadata={**metadata, "predictions": predictions})
 
 
 def vector(default: Vector, largest: float, unit: str, description: str) -> Any:
-    """A field of a profile: x, y and z, each from -largest to largest."""
+    """Return a field of a profile: x, y and z, each from -largest to largest."""
     metadata = {"minimum": -largest, "maximum": largest, "unit": unit, "description": description}
     return field(default=default, metadata=metadata)
 
 
 def switch(default: bool, description: str, *, predictions: bool = False) -> Any:
-    """A field of a profile: on or off."""
+    """Return a field of a profile: on or off."""
     return field(default=default, metadata={"description": description, "predictions": predictions})
 
 
 def choice(choices: Iterable[str], description: str) -> Any:
-    """A field of a profile: one of some words, the first by default."""
+    """Return a field of a profile: one of some words, the first by default."""
     words = tuple(choices)
     return field(default=words[0], metadata={"choices": words, "description": description})
 
 
 @dataclass(frozen=True)
 class Setting:
-    """One field of a profile, as parameter declarations and help texts need it; minimum and maximum: of numbers.
+    """One field of a profile, for parameter declarations and checks. minimum and maximum apply to numbers only.
 
-    predictions: predictions rest on it, so that a change makes all of them anew.
+    predictions: whether predictions depend on it, so that a change computes all of them anew.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Setting:
     predictions: bool = False
 
     def checked(self, value: Any) -> Value:
-        """The value in the setting's own type. Raises ProfileError, naming setting, value and what was expected."""
+        """Return the value in the setting's type. Raises ProfileError, which names what was expected."""
         if self.choices:
             if value not in self.choices:
                 raise ProfileError(f"{self.name}: expected one of {', '.join(self.choices)}, got {value!r}")
@@ -104,7 +104,7 @@ class Setting:
 
 
 def settings_of(kind: type) -> list[Setting]:
-    """The settings among the fields of a dataclass, in order."""
+    """Return the settings among the fields of a dataclass, in order."""
     return [
         Setting(name=f.name, type=type(f.default), default=f.default, **f.metadata)
         for f in fields(kind)

@@ -1,4 +1,4 @@
-"""Tests of README.md: its examples run, its tables are complete, its files and targets exist."""
+"""The examples of README.md run, the parameter table is complete, and the linked files and make targets exist."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ def test_the_parameter_table_has_every_setting_with_its_default(setting: Profile
         bool: lambda: str(default).lower(),
         str: lambda: f"`{default}`",
     }.get(setting.type, lambda: f"{default:g}")()
-    assert f"| `{setting.name}` | {text} |" in README
+    assert f"| `{setting.name}` | {text} |" in (ROOT / "docs" / "node.md").read_text()
 
 
 def test_every_linked_file_exists() -> None:
-    for document in ("README.md", "CONTRIBUTING.md"):
-        for target in re.findall(r"\]\((?!http)([^)#]+)\)", (ROOT / document).read_text()):
-            assert (ROOT / target).exists(), f"{document} links to {target}"
+    for document in ("README.md", "CONTRIBUTING.md", "docs/node.md", "docs/architecture.md"):
+        for target in re.findall(r"\]\((?!http)([^)#]+)(?:#[^)]*)?\)", (ROOT / document).read_text()):
+            assert (ROOT / document).parent.joinpath(target).exists(), f"{document} links to {target}"
 
 
 def test_every_make_target_that_is_named_exists() -> None:
