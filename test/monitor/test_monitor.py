@@ -514,3 +514,15 @@ def test_states_that_are_handed_over_stay_as_they_are(flags: int) -> None:
         assert answer.contacts.tobytes() == other.contacts.tobytes()
         assert answer.predictions.tobytes() == other.predictions.tobytes()
         swarm.move(0.02)
+
+
+def test_covariances_leave_the_callers_states_as_they_are() -> None:
+    """They replace the standard deviations of the states in a copy."""
+    swarm, monitor = Swarm(20, seed=5), Monitor()
+    swarm.describe(monitor)
+    states = swarm.states()
+    states["position_stddev"] = 0.25
+    before = states.tobytes()
+    with_covariance = monitor.step(0, states, covariance=np.tile([4.0, 0, 0, 4.0, 0, 4.0], (20, 2)))
+    assert states.tobytes() == before
+    assert with_covariance.predictions["probability"].max() > 0.0, "the covariances count"
