@@ -38,6 +38,8 @@ PREFETCH_AHEAD: Final = 2
 
 Rows = NDArray[np.void]
 
+_NO_CONTACTS: Final = np.zeros(0, records.CONTACT)
+
 
 class Active(NamedTuple):
     """The active pairs (n,). The data of one pair have the same index in all columns."""
@@ -129,7 +131,7 @@ class ActivePairs(Stage):
 
     def take_orphans(self, now: float) -> Rows:
         """Return and forget the END (records.CONTACT) of each contact whose pair was removed."""
-        ended = np.zeros(len(self._orphans), records.CONTACT)
+        ended = np.zeros(len(self._orphans), records.CONTACT) if self._orphans else _NO_CONTACTS
         if len(ended):
             keys, since = zip(*self._orphans, strict=True)
             for name in ("signed_distance", "error_bound", "point_a", "point_b", "normal", "closing_speed"):

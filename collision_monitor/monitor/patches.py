@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import allocating_kernel
+from collision_monitor._jit import allocating_kernel, kernel
 from collision_monitor.geometry.shape_table import take
 from collision_monitor.monitor.active_pairs import Active
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
@@ -36,16 +36,16 @@ SHAPE_PAIR = np.dtype(
 )
 
 
-@allocating_kernel
-def _shape_pairs(multibody, active, now, found):
+@kernel
+def _shape_pairs(multibody, active, now, scratch, found):
     """Find the pairs of shapes of each settled contact whose bounding spheres are at least as near as the contact.
 
     Written into found (m,) SHAPE_PAIR; returns their number. If it exceeds m, the rest is only counted.
+    scratch: a quaternion (1, 4) and rotations (4, 3, 3).
     """
     table, parts, bodies = multibody
     pairs, _, results = active
-    q = np.empty((1, 4))
-    R = np.empty((4, 3, 3))
+    q, R = scratch
     n = 0
     for k in range(pairs.size):
         if pairs[k].touching == 0 or results[k, STATUS] != TOUCHING:
@@ -146,11 +146,12 @@ def with_patches(
     that is not settled keeps one point.
     """
     pairs, results = active.pairs, active.results
+    scratch = np.empty((1, 4)), np.empty((4, 3, 3))
     shapes = np.empty(2 * len(pairs), SHAPE_PAIR)
-    n = _shape_pairs(multibody, active, now, shapes)
+    n = _shape_pairs(multibody, active, now, scratch, shapes)
     if n > len(shapes):
         shapes = np.empty(n, SHAPE_PAIR)
-        _shape_pairs(multibody, active, now, shapes)
+        _shape_pairs(multibody, active, now, scratch, shapes)
     shapes = shapes[:n]
     of, tie = shapes["of"], shapes["tie"]
     position, rotation = shapes["position"].reshape(-1, 3), shapes["rotation"].reshape(-1, 3, 3)
