@@ -13,7 +13,7 @@ from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.monitor.active_pairs import ActivePairs
 from collision_monitor.monitor.answers import Answers, step_status
-from collision_monitor.monitor.budget import StepClock
+from collision_monitor.monitor.budget import PairBudget, StepClock
 from collision_monitor.monitor.candidates import Candidates
 from collision_monitor.monitor.event_list import EventList
 from collision_monitor.monitor.first_impacts import FirstImpacts
@@ -224,34 +224,14 @@ class Monitor:
     def _take_step(self, stamp_ns: int, states: NDArray[np.void], covariances: NDArray[np.float64]) -> StepResult:
         if not self._advance(stamp_ns):
             return self._answers.repeated()
-        roster, timeline, uncertain = self._roster, self._timeline, self._uncertain
-        self._intake.take(states, covariances, timeline.seconds(stamp_ns), roster, uncertain)
+        roster, timeline = self._roster, self._timeline
+        self._intake.take(states, covariances, timeline.seconds(stamp_ns), roster, self._uncertain)
         step = StepContext(roster, self._profile, self._settings, timeline.now, self._answers.step_count + 1)
         budget = self._time_critical.budget(self._profile)
-
-        outside = self._tracking.apply_region(step, self._candidates.grid)
-        if outside is not None:
-            self._active_pairs.end_of(outside)
         new = self._predict_moved(step, bounds_only=budget is not None)
-        is_due = new["lower"] <= step.now
-        due = joined([self._events.take_due(roster.bodies.version, step.now), new.compress(is_due)])
-        step.work.events_due = len(due)
-        self._active_pairs.unite(step, due)
-        pending = new.compress(~is_due)
-        if budget is None:
-            later = self._active_pairs.examine_all(step, self._first_impacts.scratch)
-            self._events.add(joined([pending, later]), roster.bodies.version)
-        else:
-            self._events.add(pending, roster.bodies.version)
-            self._time_critical.examine(step, self._active_pairs, self._events, self._first_impacts, budget)
-
+        self._examine_due(step, new, budget)
         contacts = self._answers.contacts(step, self._active_pairs)
-        predictions, slots = self._answers.predictions(step, self._active_pairs, self._events)
-        if uncertain.active:
-            with self.clock.aside():  # outside of the budget: reserving its time would leave none for the pairs
-                touching = self._active_pairs.touching_keys
-                predictions = uncertain.complete(step, predictions, slots, touching, self._first_impacts.pool)
-        predictions = self._answers.filtered(step, predictions)
+        predictions = self._predictions(step)
         status = step_status(step, self._active_pairs, self._events, contacts, predictions)
         self._time_critical.end_step(step)
         cut = budget.done if budget is not None and step.work.deferred else None
@@ -274,7 +254,10 @@ class Monitor:
         return True
 
     def _predict_moved(self, step: StepContext, *, bounds_only: bool) -> Events:
-        """Return first impacts (IMPACT) of the bodies whose predictions no longer hold or end too soon."""
+        """Stages 2 to 4: return first impacts (IMPACT) of bodies whose predictions no longer hold or end too soon."""
+        outside = self._tracking.apply_region(step, self._candidates.grid)
+        if outside is not None:
+            self._active_pairs.end_of(outside)
         moved, ending = self._tracking.find(step, self._uncertain)
         which = np.concatenate([moved, ending])
         if len(which) == 0:
@@ -286,6 +269,30 @@ class Monitor:
         new = self._events.first_of_pairs(new, step.roster.bodies, self._active_pairs.pairs)
         self._tracking.remember_cover(step, which)
         return new
+
+    def _examine_due(self, step: StepContext, new: Events, budget: PairBudget | None) -> None:
+        """Stages 5 and 6: examine the pairs that touch or are due; keep the other new impacts as events."""
+        version = step.roster.bodies.version
+        is_due = new["lower"] <= step.now
+        due = joined([self._events.take_due(version, step.now), new.compress(is_due)])
+        step.work.events_due = len(due)
+        self._active_pairs.unite(step, due)
+        pending = new.compress(~is_due)
+        if budget is None:
+            later = self._active_pairs.examine_all(step, self._first_impacts.scratch)
+            self._events.add(joined([pending, later]), version)
+        else:
+            self._events.add(pending, version)
+            self._time_critical.examine(step, self._active_pairs, self._events, self._first_impacts, budget)
+
+    def _predictions(self, step: StepContext) -> NDArray[np.void]:
+        """Stage 7: return the predictions (records.PREDICTION), with times and probabilities of uncertain states."""
+        predictions, slots = self._answers.predictions(step, self._active_pairs, self._events)
+        if self._uncertain.active:
+            with self.clock.aside():  # outside of the budget: reserving its time would leave none for the pairs
+                touching = self._active_pairs.touching_keys
+                predictions = self._uncertain.complete(step, predictions, slots, touching, self._first_impacts.pool)
+        return self._answers.filtered(step, predictions)
 
     # ------------------------------------------------------------------ snapshots
 
