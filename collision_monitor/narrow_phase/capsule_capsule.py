@@ -10,7 +10,7 @@ from collision_monitor.narrow_phase.contact_row import FEATURE_TYPE_A, FEATURE_T
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.segment import segment_segment
 from collision_monitor.narrow_phase.vector import across, column, cross, direction, dot, scaled
-from collision_monitor.tolerances import SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2, TOUCHING
+from collision_monitor.tolerances import GJK_TOUCHING, SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2
 
 
 @device
@@ -26,7 +26,7 @@ def capsule_capsule_contact(ra: float, la: float, rb: float, lb: float, pose: Pa
     w = (px + t * v[0] - s * u[0], py + t * v[1] - s * u[1], pz + t * v[2] - s * u[2])
     distance, n = direction(w)
     bound = SAT_ROUND_OFF * (distance + ra + rb + la + lb + abs(px) + abs(py) + abs(pz))
-    if (abs(s) < 1.0 and abs(t) < 1.0) or distance <= TOUCHING * (la + lb):
+    if (abs(s) < 1.0 and abs(t) < 1.0) or distance <= GJK_TOUCHING * (la + lb):
         c = cross(u, v)
         length2 = dot(c, c)
         if la > 0.0 and lb > 0.0 and length2 > SEGMENT_PARALLEL_SIN2 * (la * la) * (lb * lb):
@@ -35,7 +35,7 @@ def capsule_capsule_contact(ra: float, la: float, rb: float, lb: float, pose: Pa
             side = copysign(1.0, dot(c, w))
             n = (side * c[0] / length, side * c[1] / length, side * c[2] / length)
             distance = dot(n, w)
-        elif distance <= TOUCHING * (la + lb):
+        elif distance <= GJK_TOUCHING * (la + lb):
             n = across(axis_a if la >= lb else axis_b, w)
             distance = dot(n, w)
         if length2 <= SEGMENT_PARALLEL_SIN2 * (la * la) * (lb * lb) and length2 > 0.0:

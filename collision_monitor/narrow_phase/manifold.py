@@ -20,7 +20,7 @@ from collision_monitor.narrow_phase.pair_pose import PairPose, pair_pose
 from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus, opposite, rotate, scaled
 from collision_monitor.narrow_phase.work_memory import work_array
 from collision_monitor.records import MOST_POINTS
-from collision_monitor.tolerances import EPSILON, FEATURE_TIE, SAT_ROUND_OFF, TOUCHING
+from collision_monitor.tolerances import EPSILON, FEATURE_TIE, GJK_TOUCHING, SAT_ROUND_OFF
 
 CORNERS: Final = 512
 """Corners of one feature that are looked at; a face with more is cut down to its first ones."""
@@ -266,7 +266,7 @@ def manifold(table: Any, a: int, b: int, pose: PairPose, row: Any, out: Any, wor
     tie = FEATURE_TIE * size
     height_tie = tie
     core = row[DISTANCE] + table.margin[a] + table.margin[b]
-    if core > TOUCHING * size:
+    if core > GJK_TOUCHING * size:
         # GJK's normal of two hulls is no better than their round-off over their distance
         height_tie += 8.0 * EPSILON * size * size / core
     u, v = _basis(n)

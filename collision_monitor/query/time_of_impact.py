@@ -16,7 +16,7 @@ from collision_monitor.query.arguments import finite_number, whole_number
 from collision_monitor.query.contact import Compound, Contact, contact
 from collision_monitor.query.moving_pair import MotionQuery, MovingShape, first_impacts, lay_out_pair, make_moving_shape
 from collision_monitor.query.touching import follow
-from collision_monitor.tolerances import TOUCHING
+from collision_monitor.tolerances import GJK_TOUCHING
 
 ITERATIONS: Final = 1000
 """Distance queries for one pair of pieces; hardly any pair needs more than 20."""
@@ -65,7 +65,7 @@ def time_of_impact(
     start = contact(a.shapes, a.motion.pose, b.shapes, b.motion.pose)
     multibody = lay_out_pair(a, b, query.horizon)
     radii = multibody.bodies.motion["radius"]
-    round_off = TOUCHING * float(radii[np.isfinite(radii)].sum())
+    round_off = GJK_TOUCHING * float(radii[np.isfinite(radii)].sum())
     if start.signed_distance < query.separation - round_off:
         return Impact("hit", 0.0, 0.0, start)
     events = first_impacts(multibody, np.array([[0, 1]], np.int32), 0.0, query)

@@ -19,7 +19,7 @@ from collision_monitor.query.contact import Compound
 from collision_monitor.query.impact_rows import ImpactTimes, impacts_of_rows, impacts_of_spheres, normalise_states
 from collision_monitor.query.moving_pair import MotionQuery, MovingShape, lay_out_pair, make_moving_shape
 from collision_monitor.query.time_of_impact import ITERATIONS, check_bounded, check_query, time_of_impact
-from collision_monitor.tolerances import LARGEST_INPUT, TOUCHING, UNIT_QUATERNION
+from collision_monitor.tolerances import GJK_TOUCHING, LARGEST_INPUT, UNIT_QUATERNION
 
 Array = NDArray[np.float64]
 
@@ -131,7 +131,7 @@ def _solve(
         reach = float(radii.sum()) + query.separation
         impacts_of_spheres(states[0].T.copy(), states[1].T.copy(), reach, query.horizon, times)
         rows = np.flatnonzero(times.left)
-    deep = query.separation - TOUCHING * float(radii[np.isfinite(radii)].sum())
+    deep = query.separation - GJK_TOUCHING * float(radii[np.isfinite(radii)].sum())
     queries = tuple(ImpactQuery(margin, query.tolerance, query.iterations) for margin in (query.separation, deep))
     memory = (make_scratch(), np.zeros(1, IMPACT))
     impacts_of_rows(multibody, states, rows, query.horizon, queries, memory, times)
