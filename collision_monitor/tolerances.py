@@ -55,7 +55,7 @@ SEGMENT_PARALLEL_SIN2: Final = 1e-20
 The distance is then wrong by at most sin * length = 1e-10 of the size. Unlike in SAT, the formula holds far below
 PARALLEL_SIN2, because where the position is ill-conditioned, the distance hardly depends on it."""
 
-TOUCHING: Final = 1e-10
+GJK_TOUCHING: Final = 1e-10
 """GJK passes a pair to EPA if the cores are closer than this part of their size, because
 the direction of the difference vector is round-off below it, and a face normal is exact."""
 

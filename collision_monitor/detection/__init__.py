@@ -1,1 +1,1 @@
-"""Detection of all contacts of one frame, for objects that all have new poses."""
+"""Detection of all contacts of one frame in which every object has a new pose."""

@@ -36,7 +36,7 @@ def default_threads() -> int:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DetectedContacts:
-    """M contacts, sorted by pair. `table` holds a row for each; the fields are views of it."""
+    """M contacts, sorted by pair. `table` holds one row for each, and the other fields are views of it."""
 
     pairs: NDArray[np.int32]
     """(M, 2): indices of the two shapes A and B, the smaller first."""
@@ -56,7 +56,7 @@ class DetectedContacts:
 
     @property
     def error_bound(self) -> Array:
-        """(M,) m: how wrong the signed distance can be."""
+        """(M,) m: largest error of the signed distance."""
         return self._field("error_bound")
 
     @property
@@ -81,7 +81,7 @@ class DetectedContacts:
 
 
 class Detector:
-    """Finds every pair of shapes with a distance of at most `margin` (m).
+    """Detector of every pair of shapes with a distance of at most `margin` (m).
 
     shapes: one for each object. static: (N,) flags; pairs of two static objects are ignored.
     threads: largest number of threads for a frame; the result is the same to the bit for any number.

@@ -91,11 +91,11 @@ class Frame(NamedTuple):
 
 
 class CandidateTest(NamedTuple):
-    """What every candidate is tested by."""
+    """Parameters of the test of every candidate."""
 
     table: Any  # ShapeTable
     path: Any  # SPHERES, BOXES or ANY
-    limit: Any  # m: pairs that are farther apart are no contacts
+    limit: Any  # m: largest distance of a contact
 
 
 class Hits(NamedTuple):
@@ -342,7 +342,7 @@ def _write(positions: Any, frame: Any, hits: Any, total: int, pairs: Any, contac
             contacts[k, _POINT_B + c] = on_b
 
 
-# Where the arrays of each begin among those that a kernel is called with.
+# Index of the first array of each tuple in the argument `memory` of a kernel.
 _GRID: Final = len(ShapeTable._fields)
 _FRAME: Final = _GRID + len(Grid._fields)
 _HITS: Final = _FRAME + len(Frame._fields)

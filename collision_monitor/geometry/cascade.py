@@ -19,7 +19,7 @@ from collision_monitor.geometry.polyhedra import closed_mesh, edge_face, locate_
 
 
 class CascadeStage(Enum):
-    """CascadeStage of the cascade that decided the result."""
+    """Stage of the cascade that decided the result."""
 
     BOUNDING_VOLUMES = "bounding volumes"
     VERTICES = "vertices"

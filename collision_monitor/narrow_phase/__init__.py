@@ -1,1 +1,1 @@
-"""Tests of one pair of shapes: distance, depth, normal, witness points. `dispatch` is the table of them."""
+"""Tests of one pair of shapes: distance, depth, normal and witness points. `dispatch` holds the table of the tests."""

@@ -49,14 +49,14 @@ class BoxFeature(NamedTuple):
 
     half: Any  # (3,): half extents of the box
     R: Any  # (3, 3): rotation of the box to world axes
-    row: Any  # (6,): its centre from the box's centre, world axes; for each axis its side (-1, 1), or 0 for a free axis
+    row: Any  # (6,): its centre relative to the box's, world axes (m); the side (-1, 1) of each axis, 0 for a free axis
 
 
 @device
 def _edge(best: float, axis: int, sign: float, number: int, dot: float, radius: float, length2: float) -> Any:
-    """The better of `best` and the edge axis with projected offset `dot` and radii `radius`, both times its length."""
+    """Better of the best axis and an edge axis; its projected offset `dot` and radii `radius` are times its length."""
     gap = abs(dot) - radius
-    # compared as squares with the sign kept, so that only an axis that wins costs a root
+    # compare signed squares, so that only an axis that wins costs a root
     if length2 > PARALLEL_SIN2 and gap * abs(gap) > best * abs(best) * length2:
         return gap / sqrt(length2), number, copysign(1.0, dot)
     return best, axis, sign
@@ -64,10 +64,10 @@ def _edge(best: float, axis: int, sign: float, number: int, dot: float, radius: 
 
 @device
 def sat(a: Vector, b: Vector, pose: PairPose, limit: float) -> Any:
-    """Largest gap of the 15 axes (m), its axis and sign; a and b are half extents (3,).
+    """Largest gap of the 15 axes (m), its axis and sign; a and b are half extents (3,) in m.
 
-    A negative gap is minus the least translation that parts the boxes. Where a face axis has a gap over `limit` (m),
-    that is the answer: most pairs that are apart need no edge axis.
+    A negative gap is minus the shortest translation that parts the boxes. If the largest gap of the face axes exceeds
+    `limit` (m), it is returned with the sign 1, because most pairs that are apart need no edge axis.
     """
     RA, RB = pose.R_A, pose.R_B
     a0, a1, a2 = a
@@ -113,7 +113,7 @@ def sat(a: Vector, b: Vector, pose: PairPose, limit: float) -> Any:
     e00, e01, e02 = c00 * c00, c01 * c01, c02 * c02
     e10, e11, e12 = c10 * c10, c11 * c11, c12 * c12
     e20, e21, e22 = c20 * c20, c21 * c21, c22 * c22
-    # length2 as the sum of two squares, not as 1 - c^2: that cancels where the edges are nearly parallel
+    # length2 is a sum of two squares, because 1 - c^2 cancels for nearly parallel edges
     best, axis, sign = _edge(
         best, axis, sign, 6, t2 * c10 - t1 * c20, a1 * q20 + a2 * q10 + b1 * q02 + b2 * q01, e10 + e20
     )
@@ -160,7 +160,7 @@ def sat(a: Vector, b: Vector, pose: PairPose, limit: float) -> Any:
 
 @device
 def axis_direction(axis: int, sign: float, pose: PairPose) -> Vector:
-    """Unit vector of a SAT axis in world axes, times its sign."""
+    """Unit vector of a SAT axis in world axes, times the sign."""
     RA, RB = pose.R_A, pose.R_B
     if axis < 3:
         return sign * RA[0, axis], sign * RA[1, axis], sign * RA[2, axis]
@@ -177,7 +177,7 @@ def axis_direction(axis: int, sign: float, pose: PairPose) -> Vector:
 
 @device
 def box_box_separation(a: Vector, b: Vector, margin: float, pose: PairPose, out: Any) -> float:
-    """Largest SAT gap less the margins and the round-off (m); its direction in out[0:3]."""
+    """Largest SAT gap minus the margins and the round-off (m), with its unit direction in out[0:3]."""
     gap, axis, sign = sat(a, b, pose, inf)
     out[0], out[1], out[2] = axis_direction(axis, sign, pose)
     return gap - margin - SAT_ROUND_OFF * (abs(gap) + a[0] + a[1] + a[2] + b[0] + b[1] + b[2])
@@ -185,7 +185,7 @@ def box_box_separation(a: Vector, b: Vector, margin: float, pose: PairPose, out:
 
 @device
 def _find(feature: BoxFeature, n: Vector, tie: float) -> int:
-    """Fill the row of the feature that is extreme along n; the number of its free axes: 0 vertex, 1 edge, 2 face."""
+    """Fill the row of the feature that is extreme along n; return its number of free axes: 0 vertex, 1 edge, 2 face."""
     row, R = feature.row, feature.R
     row[0] = 0.0
     row[1] = 0.0
@@ -233,10 +233,10 @@ def _clip(work: Any, source: int, target: int, count: int, column: int, limit: f
 
 @device
 def _common_point(face: BoxFeature, other: BoxFeature, d: Vector, work: Any) -> Vector:
-    """Middle of what a face and another feature share, along the face.
+    """Middle of the common part of a face and another feature, as an offset (m) from the face's centre in its plane.
 
-    d = face's centre - the feature's centre. Returns the offset of the shared point from the face's centre;
-    where round-off leaves nothing shared, the feature's middle pulled into the face.
+    d = face's centre - feature's centre (m). If round-off leaves no common part, the feature's middle is clamped to
+    the face.
     """
     i = 0 if face.row[3] == 0.0 else 1
     j = 2 if face.row[5] == 0.0 else 1
@@ -270,7 +270,7 @@ def _common_point(face: BoxFeature, other: BoxFeature, d: Vector, work: Any) -> 
         ci = min(max(ui, -hi), hi)
         cj = min(max(uj, -hj), hj)
     elif line:
-        # clipping walks a segment there and back and repeats its ends: the middle of its extent, not of its points
+        # clipping traverses a segment there and back and repeats its ends, so take the middle of its extent
         low_i = high_i = work[start]
         low_j = high_j = work[start + 1]
         for m in range(1, count):
@@ -291,7 +291,7 @@ def _common_point(face: BoxFeature, other: BoxFeature, d: Vector, work: Any) -> 
 
 @device
 def _describe(row: Any, free: int, out: Any, at: int) -> None:
-    """Feature type and index: faces +x -x +y -y +z -z; vertices by their sides as bits; edges 4 axis + sides."""
+    """Write feature type and index: faces +x -x +y -y +z -z; vertices by their sides as bits; edges 4 axis + sides."""
     if free == 0:
         out[at] = VERTEX
         out[at + 1] = (1.0 if row[3] > 0.0 else 0.0) + (2.0 if row[4] > 0.0 else 0.0) + (4.0 if row[5] > 0.0 else 0.0)
@@ -311,9 +311,9 @@ def _describe(row: Any, free: int, out: Any, at: int) -> None:
 
 @device
 def touching_features(a: Any, b: Any, pose: PairPose, distance: float, n: Vector, out: Any, work: Any) -> None:
-    """Witness points and features of two boxes (half extents a, b) that would touch after a move along the normal n.
+    """Write the contact of two boxes (half extents a, b) with the given signed distance (m) and normal n.
 
-    Writes the whole contact with the given signed distance.
+    Its features are those that touch after a translation by the distance along n.
     """
     tie = FEATURE_TIE * max(max(a[0], a[1], a[2]), max(b[0], b[1], b[2]))
     A = BoxFeature(a, pose.R_A, work[_FEATURE_A : _FEATURE_A + 6])
@@ -351,9 +351,9 @@ def touching_features(a: Any, b: Any, pose: PairPose, distance: float, n: Vector
 
 @inlined
 def box_box_contact(table: Any, a: int, b: int, pose: PairPose, limit: float, out: Any, work: Any) -> bool:
-    """SAT, and GJK for the distance of boxes whose nearest features no SAT axis is at a right angle to.
+    """Write the contact, computed by SAT, or by GJK if no SAT axis is the direction of the distance.
 
-    Whole contact in out; False, and out undefined, where the distance is certified to be over `limit` (m).
+    Return False, with out undefined, if the distance is certified to exceed `limit` (m).
     """
     ha, hb = table.size[a], table.size[b]
     ma, mb = table.margin[a], table.margin[b]
@@ -369,11 +369,11 @@ def box_box_contact(table: Any, a: int, b: int, pose: PairPose, limit: float, ou
             return True
     n = axis_direction(axis, sign, pose)
     if gap > 0.0:
-        # where corners are nearest the gap can be as long as the distance to 1e-9, and they beside the axis by 1e-5
+        # if corners are nearest, gap and distance can agree to 1e-9 although the corners are beside the axis by 1e-5
         beside = cross((out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]), n)
         if gap * sqrt(dot(beside, beside)) > FEATURE_TIE * size:
             return True
-        # the SAT axis is the direction of the distance too, and has no noise however near the boxes are
+        # the SAT axis is also the direction of the distance, and has no noise however near the boxes are
     touching_features(ha, hb, pose, gap, n, out, work)
     if ma > 0.0 or mb > 0.0:
         out[DISTANCE] -= ma + mb

@@ -1,7 +1,7 @@
-"""The row in which a pair test writes a contact: its columns by name, for kernels and for NumPy.
+"""Row to which a pair test writes a contact, with the names of its columns for kernels and for NumPy.
 
-Every test works relative to A's origin, in world axes, with the normal from A to B. CONTACT_ROW is the layout; the
-constants below are the columns at which its fields begin.
+Every test works relative to A's origin, in world axes, with the normal from A to B. CONTACT_ROW is the layout. The
+constants below are the first columns of its fields.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ CONTACT_ROW: Final = np.dtype(
         ("point_a", np.float64, 3),  # witness on A (m)
         ("point_b", np.float64, 3),  # witness on B: the one on A + distance * normal
         ("bound", np.float64),  # error bound of the distance (m)
-        ("feature_type_a", np.float64),  # types of Contact.msg, below
+        ("feature_type_a", np.float64),  # a type of Contact.msg, see below
         ("feature_index_a", np.float64),
         ("feature_type_b", np.float64),
         ("feature_index_b", np.float64),
@@ -30,7 +30,7 @@ CONTACT_ROW: Final = np.dtype(
 
 
 def first_column(row: np.dtype[np.void], field: str) -> int:
-    """The column at which a field of a row of float64 begins."""
+    """First column of a field in a row of float64."""
     assert row.fields is not None
     return int(row.fields[field][1]) // 8
 
@@ -54,13 +54,13 @@ SURFACE: Final = 4.0
 
 
 def as_contacts(rows: NDArray[np.float64]) -> NDArray[np.void]:
-    """A view of rows (..., CONTACT_SIZE) as records (...,) of CONTACT_ROW."""
+    """View rows (..., CONTACT_SIZE) as records (...,) of CONTACT_ROW."""
     return rows.view(CONTACT_ROW)[..., 0]
 
 
 @inlined
 def write(out: Any, distance: float, normal: Vector, point_a: Vector, bound: float) -> None:
-    """Distance, normal, witness points and error bound; the features stay unknown."""
+    """Write distance, normal, witness points and error bound to a row; its features become UNKNOWN."""
     nx, ny, nz = normal
     ax, ay, az = point_a
     out[DISTANCE] = distance

@@ -20,7 +20,7 @@ from collision_monitor.narrow_phase.parallel_axes import axes_are_parallel, para
 from collision_monitor.narrow_phase.support_point import support_difference
 from collision_monitor.narrow_phase.vector import along, dot, opposite, rotate
 from collision_monitor.narrow_phase.work_memory import MAX_VERTICES, P_AB, R_AB, SPARE, WEIGHTS
-from collision_monitor.tolerances import EPA_CURVED, EPA_CURVED_POINTS, EPA_POLYTOPE, SAT_ROUND_OFF, TOUCHING
+from collision_monitor.tolerances import EPA_CURVED, EPA_CURVED_POINTS, EPA_POLYTOPE, GJK_TOUCHING, SAT_ROUND_OFF
 
 
 @device
@@ -85,12 +85,12 @@ def convex_contact(table: Any, a: int, b: int, pose: PairPose, limit: float, out
     elif axes_are_parallel(A, B, work):
         depth, normal, point_a = parallel_axes_depth(A, B, work, size)
         distance = -depth
-        bound = TOUCHING * size
+        bound = GJK_TOUCHING * size
     else:
         tolerance, most = (EPA_CURVED, EPA_CURVED_POINTS) if curved else (EPA_POLYTOPE, MAX_VERTICES)
         upper, lower, normal, point_a = epa(cores, work, size, count, tolerance, most)
         distance = -upper
-        bound = abs(upper - lower) + TOUCHING * size
+        bound = abs(upper - lower) + GJK_TOUCHING * size
     bound += SAT_ROUND_OFF * (size + abs(px) + abs(py) + abs(pz) + ra + rb)
     # grown by its radius, A's surface is that much farther along the normal
     point_a = along(point_a, ra, normal)

@@ -1,6 +1,6 @@
-"""A sphere, capsule or cylinder against a cylinder with the same axis direction: a box problem in (radius, height).
+"""Sphere, capsule or cylinder against a parallel cylinder, computed from boxes in (radius, height).
 
-The difference of two parallel cylinders is a cylinder again. This is the case that EPA does worst, as all directions
+The difference of two parallel cylinders is again a cylinder. EPA is at its worst in this case, because all directions
 around the common axis tie. Cylinders that are not parallel go to convex_convex.
 """
 
@@ -20,7 +20,7 @@ from collision_monitor.tolerances import SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2
 
 @inlined
 def is_parallel(table: Any, a: int, pose: PairPose) -> bool:
-    """Whether shape a, a sphere, capsule or cylinder, has the axis direction of B's frame (a sphere has any)."""
+    """Whether shape a, a sphere, capsule or cylinder, is parallel to the z axis of B's frame (a sphere always is)."""
     if table.kind[a] == SPHERE:
         return True
     c = cross(column(pose.R_A, 2), column(pose.R_B, 2))
@@ -29,9 +29,9 @@ def is_parallel(table: Any, a: int, pose: PairPose) -> bool:
 
 @device
 def parallel_cylinders_contact(table: Any, a: int, b: int, R: Any, p: Vector, out: Any) -> None:
-    """Contact of a with cylinder b (rotation R) where `is_parallel` holds.
+    """Write the contact of shape a and cylinder b, with rotation R (3, 3), for which `is_parallel` holds.
 
-    Touching faces meet in the middle of what they share.
+    The witness points of touching faces are in the middle of their common part.
     """
     kind = table.kind[a]
     round_a = rounding(table, a)

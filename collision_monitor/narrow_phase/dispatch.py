@@ -1,7 +1,7 @@
-"""The table of pair tests: which test answers for which two kinds of shape.
+"""Table of the pair tests: the test for each pair of kinds of shape.
 
-Pairs are brought into one order (by kind, then by slot) first, so that swapping A and B mirrors the answer bit by bit.
-The kernels below look the test up in the table; each test is a file of this folder, by its name.
+Pairs are first brought into a canonical order (by kind, then by slot), so that swapping A and B mirrors the result bit
+by bit. The kernels below look the test up in the table. Each test is in the file of this folder with its name.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ TEST_METHODS: Final = {
     "polygon_polygon": "SAT in the plane",
     "convex_convex": "GJK and EPA",
 }
-"""The tests, by file."""
+"""Methods of the tests; the keys are the names of their files."""
 
 (
     SPHERE_SPHERE,
@@ -118,17 +118,17 @@ PAIR_TESTS: Final = {
     (CIRCLE, POLYGON): POLYGON_POLYGON,
     (POLYGON, POLYGON): POLYGON_POLYGON,
 }
-"""The test of each pair of kinds, the smaller kind first. Shapes of the plane and solids never meet."""
+"""Test of each pair of kinds, the smaller kind first. Plane shapes and solids are never paired."""
 
 _TEST_OF: Final = np.full((POLYGON + 1, POLYGON + 1), CONVEX_CONVEX, np.uint8)
-"""The same for the kernels: a row for each kind of A, a column for each kind of B."""
+"""PAIR_TESTS for the kernels: a row for each kind of A, a column for each kind of B."""
 
 for _kinds, _test in PAIR_TESTS.items():
     _TEST_OF[_kinds] = _test
 
 
 def pair_test(kind_a: int, kind_b: int) -> str:
-    """The file of the test for two kinds, kind_a <= kind_b."""
+    """Name of the test of two kinds, kind_a <= kind_b, and of its file."""
     return tuple(TEST_METHODS)[_TEST_OF[kind_a, kind_b]]
 
 
@@ -143,8 +143,8 @@ def _is_swapped(table: Any, a: int, b: int) -> bool:
 def separation(table: Any, a: int, b: int, pose: PairPose, out: Any, work: Any) -> float:
     """Certified lower bound (m) of the distance of shapes a and b, with its unit direction from A to B in out[0:3].
 
-    <= 0 where they overlap or touch. Projected on the direction, the shapes are apart by this much. Exact for all pairs
-    but separated boxes, whose bound is the largest SAT gap.
+    The bound is <= 0 if the shapes overlap or touch. Their projections on the direction are apart by the bound. It is
+    exact for all pairs except separated boxes, whose bound is the largest SAT gap.
     """
     is_swapped = _is_swapped(table, a, b)
     if is_swapped:
@@ -171,7 +171,7 @@ def _separation(table: Any, a: int, b: int, pose: PairPose, out: Any, work: Any)
     if test == SPHERE_BOX:
         radius = table.size[a, 0] + (table.margin[a] + table.margin[b])
         return sphere_box_separation(radius, half_extents(table, b), pose.R_B, pose.p, out)
-    # the closed forms that are left: a contact costs little more than a distance
+    # the other closed forms, in which a contact costs little more than a distance
     answer = work[0:CONTACT_SIZE]
     if _closed_form(test, table, a, b, pose, answer):
         out[0] = answer[NORMAL]
@@ -185,7 +185,7 @@ def _separation(table: Any, a: int, b: int, pose: PairPose, out: Any, work: Any)
 def contact_within(table: Any, a: int, b: int, pose: PairPose, limit: float, out: Any, work: Any) -> bool:
     """Whether the signed distance is at most `limit` (m); only then `out` holds the contact (see contact_row.py).
 
-    Most pairs of a broad phase are apart: they cost as little as can prove it.
+    Most pairs of a broad phase are apart, so a test stops as soon as that is certain.
     """
     is_swapped = _is_swapped(table, a, b)
     p = pose.p
@@ -201,7 +201,7 @@ def contact_within(table: Any, a: int, b: int, pose: PairPose, limit: float, out
 
 @inlined
 def _mirror(out: Any, p: Vector) -> None:
-    """The contact of (b, a) from that of (a, b); p: B's origin from A's."""
+    """Turn the contact of the swapped pair (b, a) in out into that of (a, b); p: B's origin relative to A's (m)."""
     for i in range(3):
         by = p[0] if i == 0 else (p[1] if i == 1 else p[2])
         out[NORMAL + i] = -out[NORMAL + i]
@@ -216,7 +216,7 @@ def _mirror(out: Any, p: Vector) -> None:
 
 @inlined
 def pair_contact(table: Any, a: int, b: int, pose: PairPose, out: Any, work: Any) -> None:
-    """The contact of shapes a and b in `out` (see contact_row.py)."""
+    """Write the contact of shapes a and b to `out` (see contact_row.py)."""
     contact_within(table, a, b, pose, inf, out, work)
 
 
@@ -237,7 +237,7 @@ def _contact(table: Any, a: int, b: int, pose: PairPose, limit: float, out: Any,
 
 @inlined
 def _closed_form(test: int, table: Any, a: int, b: int, pose: PairPose, out: Any) -> bool:
-    """The contact into out, where the test is one formula; but not of the three tests that the callers look for."""
+    """Write the contact to out if the test is a closed form that the callers do not handle; return whether it is."""
     if test == HALF_SPACE_ANY:
         if table.kind[a] == HALF_SPACE:
             half_spaces_contact(table, a, b, pose, out)
@@ -265,7 +265,7 @@ def _closed_form(test: int, table: Any, a: int, b: int, pose: PairPose, out: Any
     return False
 
 
-# The loops are device functions: in a kernel each rotation[a] would count references (see _jit).
+# The loops are device functions, because in a kernel each rotation[a] would count references (see _jit).
 
 
 @device
@@ -295,7 +295,7 @@ def _separation_serial(table: Any, position: Any, rotation: Any, pairs: Any, out
 def contact_batch(
     table: Any, position: NDArray[np.float64], rotation: NDArray[np.float64], pairs: NDArray[np.int32]
 ) -> NDArray[np.float64]:
-    """Contacts (M, CONTACT_SIZE) of the pairs (M, 2) of slots at position (K, 3) and rotation (K, 3, 3), world axes."""
+    """Contacts (M, CONTACT_SIZE) of the pairs (M, 2) of slots; position (K, 3) m, rotation (K, 3, 3) to world axes."""
     out = np.zeros((len(pairs), CONTACT_SIZE))
     _contact_serial(table, position, rotation, pairs, out, np.zeros(WORK_SIZE))
     return out
@@ -304,7 +304,7 @@ def contact_batch(
 def separation_batch(
     table: Any, position: NDArray[np.float64], rotation: NDArray[np.float64], pairs: NDArray[np.int32]
 ) -> NDArray[np.float64]:
-    """Directions and certified lower bounds (M, 4) of the pairs; arguments as in `contact_batch`."""
+    """Unit directions and certified lower bounds (m) of the distances, (M, 4); arguments as in `contact_batch`."""
     out = np.zeros((len(pairs), 4))
     _separation_serial(table, position, rotation, pairs, out, np.zeros(WORK_SIZE))
     return out

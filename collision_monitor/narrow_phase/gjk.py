@@ -14,7 +14,7 @@ from collision_monitor.narrow_phase.core import CorePair
 from collision_monitor.narrow_phase.support_point import support_difference
 from collision_monitor.narrow_phase.vector import Vector, along, cross, direction, dot, minus, opposite, scaled
 from collision_monitor.narrow_phase.work_memory import NEW_WEIGHTS, ON_A, P_AB, SIMPLEX, SIMPLEX_ROW, WEIGHTS
-from collision_monitor.tolerances import EPSILON, FLAT, GJK_RELATIVE, THIN_SIN2, TOUCHING
+from collision_monitor.tolerances import EPSILON, FLAT, GJK_RELATIVE, GJK_TOUCHING, THIN_SIN2
 
 MAX_ITERATIONS: Final = 64
 
@@ -209,6 +209,6 @@ def gjk(cores: CorePair, work: Any, size: float, limit: float) -> tuple[int, flo
         toward = nearest
         squared = shorter
         length = sqrt(squared)
-        if length <= TOUCHING * size:
+        if length <= GJK_TOUCHING * size:
             return count, 0.0, (0.0, 0.0, 1.0)
     return count, lower, normal

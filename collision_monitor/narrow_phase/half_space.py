@@ -1,4 +1,4 @@
-"""A half-space against any convex shape: the shape's farthest point against the plane. And two half-spaces."""
+"""Half-space against any convex shape, by the distance of its deepest point from the plane; and two half-spaces."""
 
 from __future__ import annotations
 
@@ -33,7 +33,10 @@ def _normal(table: Any, slot: int, R: Any) -> Vector:
 
 @device
 def half_space_contact(table: Any, a: int, b: int, pose: PairPose, out: Any) -> None:
-    """Convex shape a, half-space b. The only way out of a half-space is along its normal, however deep a shape is."""
+    """Write the contact of convex shape a and half-space b.
+
+    The only way out of a half-space is along its normal, at any depth.
+    """
     offset = table.size[b, 3]
     n = _normal(table, b, pose.R_B)
     d = opposite(rotate_back(pose.R_A, n))
@@ -48,9 +51,9 @@ def half_space_contact(table: Any, a: int, b: int, pose: PairPose, out: Any) -> 
 
 @device
 def half_spaces_contact(table: Any, a: int, b: int, pose: PairPose, out: Any) -> None:
-    """Two half-spaces. Where they face each other they have a distance; else no translation parts them.
+    """Write the contact of two half-spaces, which have a distance only if they face each other.
 
-    Then the distance is -inf, and both witness points are one that both have.
+    Otherwise no translation parts them: the distance is -inf, and both witness points are one point inside both.
     """
     p = pose.p
     reach_a, reach_b = table.size[a, 3] + table.margin[a], table.size[b, 3] + table.margin[b]
@@ -60,7 +63,7 @@ def half_spaces_contact(table: Any, a: int, b: int, pose: PairPose, out: Any) ->
         scale = sum_of_sizes(p) + abs(reach_a) + abs(reach_b)
         write(out, distance, na, scaled(na, reach_a), SAT_ROUND_OFF * scale)
     else:
-        # from A's plane into B: along A's plane, or where both look the same way, to B's plane
+        # move a point of A's plane into B: within A's plane or, if the normals are equal, to B's plane
         point = scaled(na, reach_a)
         outside = dot(nb, minus(point, p)) - reach_b
         c = cross(na, nb)

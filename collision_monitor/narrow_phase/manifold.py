@@ -1,7 +1,7 @@
-"""Contact manifolds of polytopes and polygons: where a face or an edge lies on the other, as at most four points.
+"""Contact manifolds of polytopes and polygons: at most four points where a face or an edge lies on the other shape.
 
-The features that touch are the corners within FEATURE_TIE of the supporting planes across the contact's normal. Seen
-along it they are two convex polygons, and what these share is the patch; four of its corners stand for it.
+The touching features are the corners within FEATURE_TIE of the supporting planes across the contact's normal. Seen
+along the normal they are two convex polygons. The patch is their intersection, and four of its corners represent it.
 (Sutherland and Hodgman, 1974, for the clipping; Andrew, 1979, for the outline)
 """
 
@@ -20,27 +20,27 @@ from collision_monitor.narrow_phase.pair_pose import PairPose, pair_pose
 from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus, opposite, rotate, scaled
 from collision_monitor.narrow_phase.work_memory import work_array
 from collision_monitor.records import MOST_POINTS
-from collision_monitor.tolerances import EPSILON, FEATURE_TIE, SAT_ROUND_OFF, TOUCHING
+from collision_monitor.tolerances import EPSILON, FEATURE_TIE, GJK_TOUCHING, SAT_ROUND_OFF
 
 CORNERS: Final = 512
-"""Corners of one feature that are looked at; a face with more is cut down to its first ones."""
+"""Largest number of corners of one feature; of a face with more, only the first ones are examined."""
 
-# Where in the scratch memory polygons are, rows of (x, y): A's, B's, and two to work with. Clipping adds corners.
+# Sections of the scratch memory for polygons, rows of (x, y): A's, B's and two temporary ones. Clipping adds corners.
 _ROOM: Final = 8 * CORNERS + 16
 _A, _B, _C, _D = 0, _ROOM, 2 * _ROOM, 3 * _ROOM
 
 
 class View(NamedTuple):
-    """A look along a direction: unit vectors across it and across each other, and where the origin is seen."""
+    """View along a direction, with two unit vectors perpendicular to it and to each other."""
 
     along: Any
     u: Any
     v: Any
-    origin: Any  # (u, v)
+    origin: Any  # (u, v) of the shape's origin (m)
 
 
 class Line(NamedTuple):
-    """A line in the plane through a point, along a direction of any length."""
+    """Line in the plane through the point (x, y), along the direction (ux, uy) of any length."""
 
     x: Any
     y: Any
@@ -50,7 +50,7 @@ class Line(NamedTuple):
 
 @device
 def _basis(n: Vector) -> tuple[Vector, Vector]:
-    """Two unit vectors across n and each other, the same for n and -n."""
+    """Two unit vectors perpendicular to n and to each other, the same for n and -n."""
     nx, ny, nz = n
     if abs(nx) >= abs(ny) and abs(nx) >= abs(nz):
         sign = copysign(1.0, nx)
@@ -68,7 +68,7 @@ def _basis(n: Vector) -> tuple[Vector, Vector]:
 
 @device
 def _corner(table: Any, slot: int, k: int) -> Any:
-    """Corner k of a box, a hull or a polygon in its own frame."""
+    """Corner k of a box, a hull or a polygon in the shape's own frame (m)."""
     if table.kind[slot] == BOX:
         return (
             copysign(table.size[slot, 0], (k & 1) - 0.5),
@@ -81,9 +81,9 @@ def _corner(table: Any, slot: int, k: int) -> Any:
 
 @device
 def _outline(work: Any, at: int, count: int, tie: float) -> int:
-    """Put points (count rows of 2 at `at`) into their convex outline, counter-clockwise; how many there are.
+    """Replace points (count rows of 2 at `at`) by their convex outline, counter-clockwise, and return its size.
 
-    What stands out by `tie` (m) or less is left out. Andrew's monotone chain, sorted by insertion.
+    Corners that protrude by at most `tie` (m) are dropped. Andrew's monotone chain, with insertion sort.
     """
     for k in range(1, count):
         x, y = work[at + 2 * k], work[at + 2 * k + 1]
@@ -106,7 +106,7 @@ def _outline(work: Any, at: int, count: int, tie: float) -> int:
                 kept -= 1
             work[_C + 2 * kept], work[_C + 2 * kept + 1] = x, y
             kept += 1
-        kept -= 1  # the last one begins the other side
+        kept -= 1  # the last point is the first of the other side
     kept = max(kept, 1)
     if kept == 2 and max(abs(work[_C] - work[_C + 2]), abs(work[_C + 1] - work[_C + 3])) <= tie:
         kept = 1
@@ -117,7 +117,7 @@ def _outline(work: Any, at: int, count: int, tie: float) -> int:
 
 @device
 def _touching(table: Any, slot: int, R: Any, view: View, tie: float, work: Any, at: int) -> int:
-    """The corners within `tie` (m) of the farthest along the view as points of it, at `at`; how many."""
+    """Write the corners within `tie` (m) of the farthest along the view to `at`, as seen; return their number."""
     count = 8 if table.kind[slot] == BOX else int(table.vertex_count[slot])
     farthest = -inf
     kept = 0
@@ -139,7 +139,7 @@ def _touching(table: Any, slot: int, R: Any, view: View, tie: float, work: Any, 
 
 @device
 def _clip_to_edge(work: Any, source: int, target: int, count: int, line: Line, round_off: float) -> int:
-    """Of a polygon, what is left of the line or on it; its corners."""
+    """Clip a polygon to the left side of a line, the line included; return its size."""
     x, y, ux, uy = line
     kept = 0
     slack = round_off * sqrt(ux * ux + uy * uy)
@@ -160,7 +160,7 @@ def _clip_to_edge(work: Any, source: int, target: int, count: int, line: Line, r
 
 @device
 def _shared(work: Any, a: int, na: int, b: int, nb: int, round_off: float) -> int:
-    """What the polygon at a (na >= 3 corners) and the polygon or segment at b have in common, at b; its corners."""
+    """Intersect the polygon at a (na >= 3 corners) and the polygon or segment at b; write it to b, return its size."""
     source, target = b, _D
     for k in range(na):
         x, y = work[a + 2 * k], work[a + 2 * k + 1]
@@ -177,7 +177,7 @@ def _shared(work: Any, a: int, na: int, b: int, nb: int, round_off: float) -> in
 
 @device
 def _shared_line(work: Any, a: int, b: int, tie: float) -> int:
-    """What two segments on one line have in common, at b: 2, or 0 where they are not on one line."""
+    """Write the intersection of two segments on one line to b; return 2, or 0 if they are apart or not on one line."""
     ux, uy = work[a + 2] - work[a], work[a + 3] - work[a + 1]
     length = sqrt(ux * ux + uy * uy)
     ux, uy = ux / length, uy / length
@@ -197,9 +197,10 @@ def _shared_line(work: Any, a: int, b: int, tie: float) -> int:
 
 @device
 def _chosen(work: Any, at: int, count: int, tie: float, most: int) -> int:
-    """Put the corners that stand for a polygon first, in its order: at most `most` of 2 to 4. Of equals the first.
+    """Move the corners that represent a polygon to the front, in its order, and return their number.
 
-    The two farthest from each other, as found from the middle, and those farthest from their line on either side.
+    At most `most`, 2 to 4, are kept: the two farthest from each other, searched from the middle, and those farthest
+    from their line on either side. Of equal corners the first is taken.
     """
     if count <= most:
         return count
@@ -216,7 +217,7 @@ def _chosen(work: Any, at: int, count: int, tie: float, most: int) -> int:
     if most == 2:
         left = right = i
     elif most == 3:
-        x = work[at + 2 * left] + work[at + 2 * right] - 2.0 * ix  # the nearer one is left out
+        x = work[at + 2 * left] + work[at + 2 * right] - 2.0 * ix  # drop the nearer one
         y = work[at + 2 * left + 1] + work[at + 2 * right + 1] - 2.0 * iy
         if ux * y - uy * x >= -tie * sqrt(ux * ux + uy * uy):
             right = i
@@ -232,7 +233,7 @@ def _chosen(work: Any, at: int, count: int, tie: float, most: int) -> int:
 
 @device
 def _farthest(work: Any, at: int, count: int, line: Line, tie: float) -> int:
-    """The corner farthest to the left of a line, or where that has no direction, farthest from its point."""
+    """Index of the corner farthest to the left of a line or, if the line has no direction, farthest from its point."""
     x, y, ux, uy = line
     best, chosen = -inf, 0
     length = sqrt(ux * ux + uy * uy)
@@ -246,9 +247,10 @@ def _farthest(work: Any, at: int, count: int, line: Line, tie: float) -> int:
 
 @device
 def manifold(table: Any, a: int, b: int, pose: PairPose, row: Any, out: Any, work: Any) -> int:
-    """The points on A (4, 3) of a contact (`row`, see contact_row.py), about A's origin in world axes; how many.
+    """Write the points on A (4, 3) of a contact (`row`, see contact_row.py), relative to A's origin in world axes.
 
-    One, the witness, where no face or edge touches as a whole or one of the two is not a polytope.
+    Return their number. It is 1, the witness point, if no face or edge touches as a whole, if a shape is curved, or if
+    both are half-spaces.
     """
     for i in range(3):
         out[0, i] = row[POINT_A + i]
@@ -266,8 +268,8 @@ def manifold(table: Any, a: int, b: int, pose: PairPose, row: Any, out: Any, wor
     tie = FEATURE_TIE * size
     height_tie = tie
     core = row[DISTANCE] + table.margin[a] + table.margin[b]
-    if core > TOUCHING * size:
-        # GJK's normal of two hulls is no better than their round-off over their distance
+    if core > GJK_TOUCHING * size:
+        # the error of GJK's normal of two hulls is their round-off divided by their distance
         height_tie += 8.0 * EPSILON * size * size / core
     u, v = _basis(n)
     na = nb = 0
@@ -314,9 +316,9 @@ def _manifolds(
 
 @device
 def reduce_points(points: Any, count: int, n: Vector, tie: float, most: int, work: Any) -> int:
-    """Of the first `count` points (m, 3), all in one plane across n, put those that stand for their outline first.
+    """Move the points that represent the outline of the first `count` points (m, 3) to the front; return their number.
 
-    At most `most` of 2 to 4; how many.
+    The points lie in one plane across n. At most `most`, 2 to 4, are kept.
     """
     u, v = _basis(n)
     base = (points[0, 0], points[0, 1], points[0, 2])
@@ -344,9 +346,10 @@ def manifold_batch(
     pairs: NDArray[np.int32],
     contacts: NDArray[np.float64],
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Number of points (M,) and the points on A (M, 4, 3) of the contacts (M, 15) that `contact_batch` gave for pairs.
+    """Number of points (M,) and points on A (M, 4, 3) of the contacts (M, 15) that `contact_batch` gives for pairs.
 
-    About A's origin, in world axes; those on B are a signed distance along the normal away. Unused ones are zero.
+    The points are relative to A's origin, in world axes (m). The points on B are these plus the signed distance along
+    the normal. Unused points are zero.
     """
     count = np.zeros(len(pairs), np.int32)
     out = np.zeros((len(pairs), MOST_POINTS, 3))
@@ -355,7 +358,7 @@ def manifold_batch(
 
 
 def outline(points: NDArray[np.float64], normal: NDArray[np.float64], tie: float) -> NDArray[np.float64]:
-    """At most four points (k, 3) that stand for points (m, 3) of a plane across the normal: patches put together."""
+    """At most four points (k, 3) that represent the points (m, 3) of joined patches in one plane across the normal."""
     while len(points) > CORNERS:
         parts = np.array_split(points, len(points) // CORNERS + 1)
         points = np.concatenate([outline(part, normal, tie) for part in parts])

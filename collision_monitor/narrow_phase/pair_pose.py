@@ -1,4 +1,4 @@
-"""The poses of two shapes, as every pair test reads them."""
+"""Poses of two shapes, an argument of every pair test."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collision_monitor.narrow_phase.vector import opposite
 
 
 class PairPose(NamedTuple):
-    """Rotations (3, 3) of A and B to world axes, and p: B's origin from A's in world axes (m)."""
+    """Rotations (3, 3) of A and B to world axes, and p: B's origin relative to A's in world axes (m)."""
 
     R_A: Any
     R_B: Any
@@ -18,12 +18,12 @@ class PairPose(NamedTuple):
 
 @inlined
 def swapped(pose: PairPose) -> PairPose:
-    """The same with B in A's place."""
+    """Pose of the pair with A and B swapped."""
     return PairPose(pose.R_B, pose.R_A, opposite(pose.p))
 
 
 @inlined
 def pair_pose(position: Any, rotation: Any, a: int, b: int) -> PairPose:
-    """The pose of the pair of rows a and b of the positions (K, 3) and rotations (K, 3, 3)."""
+    """Pose of the pair of rows a and b of the positions (K, 3) and rotations (K, 3, 3)."""
     p = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
     return PairPose(rotation[a], rotation[b], p)

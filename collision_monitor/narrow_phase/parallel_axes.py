@@ -1,7 +1,8 @@
-"""Depth of two overlapping solids of revolution with parallel axes: a problem of two polygons in (radius, height).
+"""Depth of two overlapping solids of revolution with parallel axes, computed from two polygons in (radius, height).
 
-Their difference is a solid of revolution too, its profile the difference of their profiles: so the depth is the least
-over the few edge directions of the two profiles. EPA would approach whole circles of tied directions point by point.
+Their difference is again a solid of revolution, and its profile is the difference of their profiles. The depth is
+therefore the least over the few edge normals of the two profiles. EPA would approximate whole circles of tied
+directions point by point.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ def _is_of_revolution(core: Core) -> bool:
 
 @inlined
 def axes_are_parallel(A: Core, B: Core, work: Any) -> bool:
-    """Whether both are solids of revolution and B's axis, the last column of R_AB in work, lies along A's."""
+    """Whether both cores are solids of revolution with parallel axes; B's is the last column of R_AB in work."""
     if not _is_of_revolution(B) or not _is_of_revolution(A):
         return False
     x, y = work[R_AB + 2], work[R_AB + 5]
@@ -33,7 +34,7 @@ def axes_are_parallel(A: Core, B: Core, work: Any) -> bool:
 
 @inlined
 def _profile(core: Core) -> tuple[float, float, float]:
-    """The upper and lower half width and half height (m): (top, bottom, half height)."""
+    """Half widths of the profile at the top and at the bottom, and its half height (m)."""
     if core.kind == CYLINDER:
         return core.size[0], core.size[0], core.size[1]
     if core.kind == CONE:
@@ -43,13 +44,13 @@ def _profile(core: Core) -> tuple[float, float, float]:
 
 @device
 def _reach(top: float, bottom: float, half: float, r: float, z: float) -> float:
-    """How far a profile reaches along (r, z)."""
+    """Support value of a profile along (r, z)."""
     return max(abs(r) * top + z * half, abs(r) * bottom - z * half)
 
 
 @device
 def _touching(top: float, bottom: float, half: float, r: float, z: float, tie: float) -> Any:
-    """From where to where along (-z, r) the profile touches its supporting line across (r, z)."""
+    """Interval along (-z, r) in which the profile is within `tie` (m) of its supporting line across (r, z)."""
     reach = _reach(top, bottom, half, r, z) - tie
     least, most = inf, -inf
     for k in range(4):
@@ -66,9 +67,10 @@ def _touching(top: float, bottom: float, half: float, r: float, z: float, tie: f
 
 @device
 def parallel_axes_depth(A: Core, B: Core, work: Any, size: float) -> tuple[float, Vector, Vector]:
-    """Depth (m) of two overlapping cores for which `axes_are_parallel`, the unit normal, and the witness on A.
+    """Depth (m) of two overlapping cores with parallel axes, the unit normal, and the witness point on A (m).
 
-    In A's frame, in which work holds the pose of B. The witness is in the middle of what two faces share.
+    The results are in A's frame, and so is the pose of B in work. The witness point of touching faces is the middle of
+    their common part.
     """
     top_a, bottom_a, half_a = _profile(A)
     top_b, bottom_b, half_b = _profile(B)
@@ -83,7 +85,7 @@ def parallel_axes_depth(A: Core, B: Core, work: Any, size: float) -> tuple[float
     depth = inf
     r = z = 0.0
     for k in range(5):
-        # across the caps, the nearer one first; across the axes; across A's slope; across B's, seen from A
+        # normals of the caps, the nearer one first; of the sides; of A's slope; of B's slope, reversed
         cr, cz = 0.0, copysign(1.0, height)
         if k == 1:
             cz = -cz

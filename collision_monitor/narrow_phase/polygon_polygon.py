@@ -1,6 +1,6 @@
-"""Circles and convex polygons in the x-y plane: separating axes where they overlap, vertices against edges where not.
+"""Circles and convex polygons in the x-y plane: separating axes if they overlap, vertices against edges if not.
 
-A circle is one vertex grown by its radius, so that one test answers for every pair of the two.
+A circle is one vertex grown by its radius, so that one test covers every pair of the two kinds.
 (Slides "Separating Axis Theorem (SAT) - in 2D"; Ericson, Real-Time Collision Detection, 5.1.2)
 """
 
@@ -18,7 +18,7 @@ from collision_monitor.tolerances import FEATURE_TIE, SAT_ROUND_OFF
 
 @device
 def _corner(table: Any, slot: int, R: Any, k: int) -> Any:
-    """Vertex k (x, y) about the shape's origin, in world axes."""
+    """Vertex k (x, y) relative to the shape's origin, in world axes (m)."""
     if table.kind[slot] == CIRCLE:
         return 0.0, 0.0
     at = table.vertex_start[slot] + k
@@ -33,9 +33,9 @@ def _corners(table: Any, slot: int) -> int:
 
 @device
 def _widest_gap(table: Any, a: int, b: int, pose: PairPose, tie: float) -> Any:
-    """The edge of a along whose outward normal b is farthest off: gap, normal, and a touching point on that edge.
+    """Largest gap (m) of b along the outward normals of a's edges, with that normal and a touching point on that edge.
 
-    The point is about a's origin. The gap is -inf where a has no edge.
+    The point is relative to a's origin. The gap is -inf if a has no edge.
     """
     RA, RB = pose.R_A, pose.R_B
     px, py, _ = pose.p
@@ -53,7 +53,7 @@ def _widest_gap(table: Any, a: int, b: int, pose: PairPose, tie: float) -> Any:
             cx, cy = _corner(table, b, RB, j)
             gap = min(gap, ty * (px + cx - x0) - tx * (py + cy - y0))
         if gap > best:
-            # all corners of b that are as near: two where edges are parallel
+            # all corners of b that are equally near, two if the edges are parallel
             first, last = inf, -inf
             for j in range(m):
                 cx, cy = _corner(table, b, RB, j)
@@ -69,7 +69,7 @@ def _widest_gap(table: Any, a: int, b: int, pose: PairPose, tie: float) -> Any:
 
 @device
 def _nearest(table: Any, a: int, b: int, pose: PairPose) -> Any:
-    """The corner of a that is nearest to the boundary of b: squared distance, corner, and point on b, about a."""
+    """Corner of a nearest to the boundary of b: squared distance, corner, and point on b, relative to a's origin."""
     RA, RB = pose.R_A, pose.R_B
     px, py, _ = pose.p
     best, x, y, u, v = inf, 0.0, 0.0, 0.0, 0.0
@@ -95,7 +95,7 @@ def _nearest(table: Any, a: int, b: int, pose: PairPose) -> Any:
 
 @device
 def planar_contact(table: Any, a: int, b: int, pose: PairPose, out: Any) -> None:
-    """Contact of two shapes of the plane; only the x-y parts of the rotations and of p are looked at."""
+    """Write the contact of two plane shapes. Only the x-y parts of the rotations and of p are read."""
     px, py, _ = pose.p
     back = swapped(pose)
     ra, rb = table.margin[a], table.margin[b]
@@ -109,7 +109,7 @@ def planar_contact(table: Any, a: int, b: int, pose: PairPose, out: Any) -> None
     gap, nx, ny, x, y = _widest_gap(table, a, b, pose, tie)
     other, mx, my, u, v = _widest_gap(table, b, a, back, tie)
     if other > gap:
-        # from b's edge back to a: the point on a is the other one of the two
+        # the edge is b's: the point on a is the gap away from the point on the edge
         gap, nx, ny = other, -mx, -my
         x, y = u + px - gap * nx, v + py - gap * ny
     distance = gap
@@ -120,12 +120,12 @@ def planar_contact(table: Any, a: int, b: int, pose: PairPose, out: Any) -> None
         if other < squared:
             dx, dy, x0, y0 = u - x1, v - y1, x1 + px, y1 + py
         distance = sqrt(dx * dx + dy * dy)
-        # beside the edge's normal by more than round-off: a corner is nearest, though the gap may be as long to 1e-9
+        # more than round-off beside the edge's normal: a corner is nearest, even if gap and distance agree to 1e-9
         if distance > 0.0 and (gap == -inf or abs(dx * ny - dy * nx) > round_off):
             nx, ny, x, y = dx / distance, dy / distance, x0, y0
         elif gap > 0.0:
-            distance = gap  # the edge's normal is that of the distance, and has no noise however near they are
+            distance = gap  # the edge's normal is the direction of the distance, without its noise
         else:
-            distance, x, y = 0.0, x0, y0  # the centres of two circles coincide: every direction is as good
+            distance, x, y = 0.0, x0, y0  # the centres of two circles coincide: any direction is valid
     bound = round_off + SAT_ROUND_OFF * (ra + rb)
     write(out, distance - ra - rb, (nx, ny, 0.0), (x + ra * nx, y + ra * ny, 0.0), bound)

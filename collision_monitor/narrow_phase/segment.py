@@ -12,15 +12,16 @@ from collision_monitor.tolerances import SEGMENT_PARALLEL_SIN2
 
 @inlined
 def clamp(value: float) -> float:
-    """Into -1 ... 1."""
+    """Clamp to -1 ... 1."""
     return min(max(value, -1.0), 1.0)
 
 
 @inlined
 def segment_segment(u: Vector, v: Vector, p: Vector) -> tuple[float, float]:
-    """Parameters s, t in [-1, 1] of the closest points s u and p + t v (u, v: half segments; p: B's middle from A's).
+    """Parameters s, t in [-1, 1] of the closest points s u and p + t v.
 
-    Parallel segments answer with the middle of where they run beside each other.
+    u, v: half segments; p: B's middle relative to A's. For parallel segments, the closest points are in the middle of
+    the part in which they run side by side.
     """
     a = dot(u, u)
     e = dot(v, v)
@@ -31,11 +32,11 @@ def segment_segment(u: Vector, v: Vector, p: Vector) -> tuple[float, float]:
         return 0.0, clamp(-f / e) if e > 0.0 else 0.0
     if not e > 0.0:
         return clamp(c / a), 0.0
-    # |u x v|^2 from the product itself: a e - b^2 cancels
+    # |u x v|^2 from the product itself, because a e - b^2 cancels
     w = cross(u, v)
     cross2 = dot(w, w)
     if cross2 <= SEGMENT_PARALLEL_SIN2 * a * e:
-        # B covers [c - |b|, c + |b|] / a of A's parameter; the middle of the overlap, or the nearer end
+        # B covers [c - |b|, c + |b|] / a of A's parameter; take the middle of the overlap, or the nearer end
         low = max(-1.0, (c - abs(b)) / a)
         high = min(1.0, (c + abs(b)) / a)
         s = clamp(0.5 * (low + high))

@@ -1,4 +1,4 @@
-"""Sphere against box: the centre clamped to the box, or the nearest face where it is inside. (Ericson, 5.2.5)"""
+"""Sphere against box, by the centre clamped to the box, or by the nearest face if it is inside. (Ericson, 5.2.5)"""
 
 from __future__ import annotations
 
@@ -30,7 +30,10 @@ from collision_monitor.tolerances import EPSILON
 
 @inlined
 def sphere_box_separation(radius: float, half: Vector, R: Any, p: Vector, out: Any) -> float:
-    """Distance of the surfaces (m), negative where they overlap. half, R (3, 3): the box's; p = box - sphere."""
+    """Certified lower bound of the signed distance (m), its unit direction in out[0:3].
+
+    half (m) and R (3, 3) are the box's; radius includes the margins; p = box - sphere (m).
+    """
     q = opposite(rotate_back(R, p))
     x, y, z = _to_box(q, half)
     length = sqrt(x * x + y * y + z * z)
@@ -44,7 +47,7 @@ def sphere_box_separation(radius: float, half: Vector, R: Any, p: Vector, out: A
 
 @inlined
 def _to_box(q: Vector, half: Vector) -> Vector:
-    """From a point to the nearest point of the box."""
+    """Vector from a point to the nearest point of the box."""
     return (
         min(max(q[0], -half[0]), half[0]) - q[0],
         min(max(q[1], -half[1]), half[1]) - q[1],
@@ -54,7 +57,7 @@ def _to_box(q: Vector, half: Vector) -> Vector:
 
 @inlined
 def _nearest_face(q: Vector, half: Vector) -> tuple[float, Vector]:
-    """Minus the depth of a point in a box, and the direction against the face it is nearest to; x wins ties, then y."""
+    """Negative depth (m) of a point in a box, and the inward normal of its nearest face; x wins ties, then y."""
     dx = half[0] - abs(q[0])
     dy = half[1] - abs(q[1])
     dz = half[2] - abs(q[2])
@@ -67,7 +70,10 @@ def _nearest_face(q: Vector, half: Vector) -> tuple[float, Vector]:
 
 @inlined
 def sphere_box_contact(radius: float, half: Vector, margin: float, R: Any, p: Vector, out: Any) -> None:
-    """radius with the sphere's margin, `margin` of the box (m). Features of the box as in box_box."""
+    """Write the contact of a sphere (`radius` includes its margin) and a box with `margin` (m).
+
+    The features of the box are numbered as in box_box.
+    """
     q = opposite(rotate_back(R, p))
     qx, qy, qz = q
     outside = int(abs(qx) > half[0]) + int(abs(qy) > half[1]) + int(abs(qz) > half[2])

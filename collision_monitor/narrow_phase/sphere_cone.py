@@ -1,4 +1,4 @@
-"""Sphere against cone: a point against a triangle in the plane through the axis."""
+"""Sphere against cone, as a point against a triangle in the plane through the axis."""
 
 from __future__ import annotations
 
@@ -13,11 +13,14 @@ from collision_monitor.tolerances import SAT_ROUND_OFF
 
 @device
 def sphere_cone_contact(radius: float, r: float, h: float, margin: float, R: Any, p: Vector, out: Any) -> None:
-    """radius with the sphere's margin; base radius r, half height h and margin of the cone; R (3, 3) is the cone's."""
+    """Write the contact of a sphere (`radius` includes its margin) and a cone of base radius r and half height h (m).
+
+    margin (m) and R (3, 3) are the cone's; p: the cone's centre relative to the sphere's (m).
+    """
     px, py, pz = p
     axis = column(R, 2)
     zx, zy, zz = axis
-    # the sphere's centre from the cone's: v up the axis, u away from it
+    # the sphere's centre relative to the cone's: v along the axis, u away from it
     v = -dot(axis, p)
     x, y, z = -px - v * zx, -py - v * zy, -pz - v * zz
     u = sqrt(x * x + y * y + z * z)

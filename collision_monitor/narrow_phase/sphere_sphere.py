@@ -1,4 +1,4 @@
-"""Sphere against sphere: the distance of the centres. (Ericson, Real-Time Collision Detection, 4.3.1)"""
+"""Sphere against sphere, by the distance of the centres. (Ericson, Real-Time Collision Detection, 4.3.1)"""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from collision_monitor.tolerances import EPSILON
 
 @inlined
 def sphere_sphere_separation(ra: float, rb: float, p: Vector, out: Any) -> float:
-    """Distance of the surfaces (m), negative inside."""
+    """Certified lower bound of the signed distance (m), its unit direction in out[0:3]; radii include margins (m)."""
     length = sqrt(dot(p, p))
     if length > 0.0:
         out[0] = p[0] / length
@@ -28,7 +28,7 @@ def sphere_sphere_separation(ra: float, rb: float, p: Vector, out: Any) -> float
 
 @inlined
 def sphere_sphere_contact(ra: float, rb: float, p: Vector, out: Any) -> None:
-    """Spheres of radius ra and rb (m), margins included; concentric ones part along +z."""
+    """Write the contact of spheres with radii ra and rb (m), margins included; the normal of concentric ones is +z."""
     length, n = direction(p)
     write(out, length - (ra + rb), n, scaled(n, ra), 8.0 * EPSILON * (length + ra + rb))
     out[FEATURE_TYPE_A] = SURFACE

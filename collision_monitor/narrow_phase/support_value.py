@@ -1,4 +1,4 @@
-"""Support values: how far a core reaches along a direction, for bounds on how fast a gap closes."""
+"""Support value of a core along a direction, for bounds on the speed at which a gap closes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collision_monitor.geometry.shape_table import BOX, CAPSULE, CIRCLE, CONE, C
 
 @inlined
 def core_support(table: Any, slot: int, x: float, y: float, z: float) -> float:
-    """max of m . p over the points p of the core, for m = (x, y, z) of any length in the shape's own axes (m)."""
+    """Return max m . p over the points p of the core (m), for m = (x, y, z) of any length in the shape's own axes."""
     kind = table.kind[slot]
     s0 = table.size[slot, 0]
     s1 = table.size[slot, 1]

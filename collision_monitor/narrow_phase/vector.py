@@ -1,4 +1,4 @@
-"""Vectors of three numbers, as tuples: what the pair tests compute with."""
+"""Arithmetic of the pair tests for vectors of three numbers, which are tuples."""
 
 from __future__ import annotations
 
@@ -80,13 +80,13 @@ def column(R: Any, k: int) -> Vector:
 
 @inlined
 def sum_of_sizes(v: Vector) -> float:
-    """|x| + |y| + |z|: what round-off is measured by."""
+    """|x| + |y| + |z|, the scale of round-off."""
     return abs(v[0]) + abs(v[1]) + abs(v[2])
 
 
 @inlined
 def direction(v: Vector) -> tuple[float, Vector]:
-    """Length and unit vector; of a zero vector: 0 and +z. Safe from overflow and underflow."""
+    """Length and unit vector of v; 0 and +z for a zero vector. Safe from overflow and underflow."""
     x, y, z = v
     scale = max(abs(x), abs(y), abs(z))
     if not scale > 0.0:

@@ -1,7 +1,7 @@
-"""The farthest of a hull's vertices in a direction, eight at a time.
+"""Farthest vertex of a hull in a direction, computed for eight vertices at a time.
 
-LLVM does not vectorise an arg-max without `fastmath`, so the loop is written in its vector types here. The answer is
-the same on every processor: products and sums are rounded one by one, and of equal vertices the first wins.
+LLVM does not vectorise an arg-max without `fastmath`, so the loop is written in its vector types here. The result is
+the same on every processor, because products and sums are rounded one by one, and of equal vertices the first wins.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def _vector(constants: list[int]) -> Any:
 
 
 def _better(builder: Any, value: Any, index: Any, other_value: Any, other_index: Any) -> Any:
-    """The greater value with its index, lane by lane; of equal values the one with the smaller index."""
+    """Return the greater value with its index, lane by lane; of equal values the one with the smaller index."""
     farther = builder.fcmp_ordered(">", other_value, value)
     equal = builder.fcmp_ordered("==", other_value, value)
     take = builder.or_(farther, builder.and_(equal, builder.icmp_signed("<", other_index, index)))
@@ -35,9 +35,9 @@ def _better(builder: Any, value: Any, index: Any, other_value: Any, other_index:
 def farthest_vertex(
     typing_context: Any, vertices: Any, start: Any, count: Any, dx: Any, dy: Any, dz: Any
 ) -> Any:
-    """Index into vertices (3, V) of the first one of start ... start + count with the greatest d.v.
+    """Index of the first vertex with the greatest d.v among `count` columns of vertices (3, V) from `start` on.
 
-    count is a positive multiple of LANES, as the shape table pads it.
+    count is a positive multiple of LANES, to which the shape table pads it.
     """
     signature = types.int64(vertices, types.int64, types.int64, types.float64, types.float64, types.float64)
 

@@ -1,1 +1,1 @@
-"""Two shapes without a monitor: contact, overlap, features, time of impact."""
+"""Queries of two shapes without a monitor: contact, overlap, features and time of impact."""

@@ -1,4 +1,4 @@
-"""Numbers that a user hands over, as float and int: of another type, they would compile the kernels anew."""
+"""Conversion of a user's numbers to float and int, because other types would compile the kernels anew."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collision_monitor.errors import InputError
 
 
 def finite_number(name: str, value: Any, positive: bool = False) -> float:
-    """A finite number, at least 0, or above it. Raises InputError."""
+    """Return a finite float >= 0, or > 0 if `positive`. Raises InputError."""
     try:
         result = float(value)
     except (TypeError, ValueError, OverflowError):
@@ -22,7 +22,7 @@ def finite_number(name: str, value: Any, positive: bool = False) -> float:
 
 
 def whole_number(name: str, value: Any) -> int:
-    """A whole number from 1. Raises InputError."""
+    """Return a whole number >= 1, limited to 2^31. Raises InputError."""
     try:
         result = operator.index(value)
     except TypeError:

@@ -1,4 +1,4 @@
-"""`contact`: two shapes at two poses, whatever they are, with everything that is known about their contact."""
+"""`contact`: the contact of two shapes of any kind at two poses, with error bound and witness points."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Compound = Shape | Sequence[tuple[Shape, Pose]]
 _DIRECTIONS: Final = [sign * np.array(d) / np.linalg.norm(d) for d in KDOP_DIRECTIONS[26] for sign in (1.0, -1.0)]
 
 def _patch(found: NearestPieces, witness: Array) -> Array:
-    """The corners (k, 3) on A of all pieces that touch in the same plane: a floor of triangles is one face."""
+    """Corners (k, 3) on A of the patch of all pieces that touch in one plane; a floor of triangles is one face."""
     radius = found.table.radius[found.pair]
     tie = FEATURE_TIE * float(radius[np.isfinite(radius)].sum())
     patches = []
@@ -47,18 +47,18 @@ def _patch(found: NearestPieces, witness: Array) -> Array:
     patch = patches[0] if len(patches) == 1 else outline(np.concatenate(patches), best["normal"], tie)
     if len(patch) == 1:
         return witness[None]
-    # where A's origin is in the world
+    # from A's origin to the world
     return np.asarray(patch + (witness - best["point_a"] - found.position[found.pair[0]]))
 
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """How two shapes stand to each other, in the world frame, lengths in m.
+    """Contact of two shapes in the world frame, lengths in m.
 
-    signed_distance: negative where they overlap; -inf for two half-spaces that do not face each other, which no
-    translation parts (the points are then one that both have). error_bound: the true value is within it. normal: unit,
-    from A to B. point_a, point_b: the nearest points, or where they overlap the deepest ones; point_b - point_a is
-    signed_distance * normal. model_a, model_b: what answered for the shapes.
+    signed_distance: negative if they overlap; -inf for two half-spaces that do not face each other, which no
+    translation parts (both points are then one point inside both). error_bound: largest error of signed_distance.
+    normal: unit vector from A to B. point_a, point_b: the nearest points, or the deepest points of an overlap;
+    point_b - point_a is signed_distance * normal. model_a, model_b: the models that represent the shapes.
     """
 
     signed_distance: float
@@ -68,33 +68,33 @@ class Contact:
     point_b: Array
     model_a: Model
     model_b: Model
-    _found: NearestPieces | None = field(repr=False)  # what the patch is found from; None: the two points alone
+    _found: NearestPieces | None = field(repr=False)  # source of the patch; None: the two points alone
 
     @property
     def overlaps(self) -> bool:
-        """Whether they overlap or touch; where |signed_distance| <= error_bound, nobody can tell."""
+        """Whether they overlap or touch; uncertain if |signed_distance| <= error_bound."""
         return self.signed_distance <= 0.0
 
     @cached_property
     def points_a(self) -> Array:
-        """The corners (k, 3) of the patch where a face or an edge of polytopes lies on the other's, at most four.
+        """Corners (k, 3) of the patch where a face or an edge of a polytope lies on that of the other, at most four.
 
-        Else `point_a` alone. Found when first asked for.
+        Otherwise `point_a` alone. Computed on first access.
         """
         return self.point_a[None] if self._found is None else _patch(self._found, self.point_a)
 
     @cached_property
     def points_b(self) -> Array:
-        """The same points on B: a signed distance along the normal from those on A."""
+        """The same points on B: those on A plus the signed distance along the normal."""
         return self.point_b[None] if self._found is None else self.points_a + self.signed_distance * self.normal
 
 
 class _Posed(NamedTuple):
-    """One of the two objects at its pose, as what stands for it."""
+    """One of the two objects at its pose, with the pieces that represent it."""
 
     shapes: Sequence[tuple[Shape, Pose]]
     pose: Pose
-    rotation: Array  # (3, 3), the pose's
+    rotation: Array  # (3, 3), that of the pose
     pieces: PieceTable
     outline: Sequence[tuple[Shape, Pose]]  # shapes that reach as far as the pieces
     model: Model
@@ -104,11 +104,11 @@ class _Posed(NamedTuple):
 def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, model: Model | str = "exact") -> Contact:
     """Contact of two shapes, or compounds given as lists of (shape, pose), at two poses.
 
-    model: what stands for both, "exact" or one that contains them ("sphere", "aabb", "obb", "kdop14", "convex_hull",
-    …): coarser, and the error bound says by how much the answer may be off.
-    Where one of them is concave and they overlap, the depth is that of the deepest pair of their convex pieces, and the
-    bound reaches to a translation that certainly parts them.
-    Raises ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, or a model that is not offered.
+    model: model of both, "exact" or one that contains them ("sphere", "aabb", "obb", "kdop14", "convex_hull", …), which
+    is coarser; the error bound includes its error.
+    If one of them is concave and they overlap, the depth is that of the deepest pair of their convex pieces, and the
+    bound extends to a translation that certainly parts them.
+    Raises ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, or a model that is not available.
     """
     a, b = _posed(shape_a, pose_a, model, "A"), _posed(shape_b, pose_b, model, "B")
     planes = {is_planar(shape) for shape, _ in (*a.shapes, *b.shapes)}
@@ -128,16 +128,16 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
     normal = row[NORMAL : NORMAL + 3].copy()
     enclosed = distance > 0.0 and (_holds(a, b, offset) or _holds(b, a, -offset))
     if enclosed:
-        # no faces meet, but one is inside of the other, at least this deep
+        # no surfaces meet, but one object is inside the other, at least this deep
         distance, normal = -distance, -normal
     point = a.pose.position + (row[POINT_A : POINT_A + 3] + found.position[found.pair[0]])
     convex = len(a.pieces) == len(b.pieces) == 1
-    unbounded = distance == -np.inf  # a fact about the two, with no length to be wrong about
+    unbounded = distance == -np.inf  # exact: no length is involved that could be wrong
     if distance <= 0.0 and not convex and not unbounded:
         bound += max(_parting_translation(a, b, offset, normal) + distance, 0.0)
     excess = a.excess + b.excess
     if distance <= 0.0 and excess > 0.0 and not all(len(exact_piece_table(side.shapes)) == 1 for side in (a, b)):
-        bound -= distance  # the models may overlap deeply where the concave objects do not meet at all
+        bound -= distance  # the models may overlap deeply although the concave objects are apart
     return Contact(
         signed_distance=distance,
         error_bound=bound + excess,
@@ -167,7 +167,7 @@ def _check_in_plane(side: _Posed) -> None:
 
 
 def _holds(outer: _Posed, inner: _Posed, offset: Array) -> bool:
-    """Whether a closed mesh of `outer` holds a piece of `inner`, which is `offset` away; no surfaces meet."""
+    """Whether a closed mesh of `outer` contains a piece of `inner`, at `offset` (m) from it; no surfaces meet."""
     if outer.model is not Model.EXACT or len(outer.pieces) == 1:
         return False
     points = offset + inner.pieces.inner @ inner.rotation.T
@@ -184,7 +184,7 @@ def _holds(outer: _Posed, inner: _Posed, offset: Array) -> bool:
 
 
 def _parting_translation(a: _Posed, b: _Posed, offset: Array, normal: Array) -> float:
-    """Length (m) of the shortest of some translations that certainly part the two: along axes of either, and normal."""
+    """Length (m) of the shortest translation that certainly parts the two, along the normal or an axis of either."""
     axes = [side.rotation @ direction for side in (a, b) for direction in _DIRECTIONS]
     planes = [
         sign * side.rotation @ pose.rotation @ shape.normal

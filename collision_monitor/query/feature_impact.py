@@ -1,9 +1,9 @@
-"""`vertex_face_impact` and `edge_edge_impact`: do two features of meshes meet while their points move straight?
+"""`vertex_face_impact` and `edge_edge_impact`: first contact of two features of meshes whose points move straight.
 
-Both ask for the first root of F(t, u, w) = A(t) + u B(t) + w C(t), where A, B and C are linear in time: v - f0, f0 - f1
-and f0 - f2 for a vertex and a face, a0 - b0, a1 - a0 and b0 - b1 for two edges. Over a box of (t, u, w) each component
-of F is within the values at the corners of the box. Boxes that cannot hold a root are dropped and others are halved,
-the earlier half first. With a separation, the features first advance by their distance over their speed.
+Both find the first root of F(t, u, w) = A(t) + u B(t) + w C(t), where A, B and C are linear in time: v - f0, f0 - f1
+and f0 - f2 for a vertex and a face, a0 - b0, a1 - a0 and b0 - b1 for two edges. Over a box of (t, u, w), each component
+of F is within its values at the corners of the box. Boxes that cannot hold a root are dropped and others are halved,
+the earlier half first. With a separation, conservative advancement by distance over speed comes first.
 (Snyder, 1992; Wang, Ferguson, Schneider, Jiang, Attene and Panozzo, 2021)
 """
 
@@ -23,47 +23,47 @@ from collision_monitor.query.arguments import finite_number, whole_number
 from collision_monitor.tolerances import EPSILON, LARGEST_INPUT
 
 MOST_BOXES: Final = 8192
-"""Boxes for one query, below 1 ms in all; an easy query takes one, a hit about a hundred."""
+"""Largest number of boxes for one query, which take less than 1 ms; an easy query takes one, a hit about a hundred."""
 
 TOLERANCE: Final = 1e-6
-"""Part of the query's size to which a hit is settled where no tolerance is given."""
+"""Default tolerance of a hit, as a part of the query's size."""
 
 _CLEAR, _HIT, _UNRESOLVED = 0, 1, 2
 _NAMES: Final = np.array(["clear", "hit", "unresolved"])
 
 _AXES: Final = 6
-"""F is looked at along x, y, z and along a frame of the features, which tells coplanar and parallel ones apart."""
+"""Axes along which F is evaluated: x, y, z and a frame of the features, which separates coplanar and parallel ones."""
 
 _DEPTH: Final = 200
-"""Boxes that wait at most: one for each halving of one box, and no side is halved more than 50 times."""
+"""Largest number of waiting boxes: one for each halving of one box, and no side is halved more than 50 times."""
 
 _SHORTEST: Final = 2.0**-50
-"""Side of a box that is not halved any more: the ends of all boxes are exact numbers."""
+"""Side of a box that is not halved further, so that the ends of all boxes are exact numbers."""
 
 _STEPS: Final = 1000
-"""Most steps of conservative advancement, some 100 µs; what is not settled then is left to the boxes."""
+"""Largest number of steps of conservative advancement, about 100 µs; the boxes settle the rest."""
 
 _DISTANCE_ERROR: Final = 1e-9
-"""Part of the query's size that a computed distance may be too long by; it is 1e-11 where edges are nearly parallel."""
+"""Largest excess of a computed distance, as a part of the query's size; it is 1e-11 for nearly parallel edges."""
 
 _PARALLEL_SIN2: Final = 1e-22
-"""sin^2 between two edges below which the points nearest to each other are sought at their ends only: these are at most
-1e-11 of the size farther."""
+"""sin^2 between two edges below which the closest points are searched at the ends only, where they are at most 1e-11
+of the size farther apart."""
 
 _BORDER: Final = 1e-6
-"""Part of an edge by which a nearest point may lie beyond its end and still count: the distance is hardly too short."""
+"""Part of an edge by which a closest point may lie beyond its end; the distance is then hardly too short."""
 
 _ROUND_OFF: Final = 16 * EPSILON
-"""Error of one evaluation of F's component, as a part of the sum of its terms: a dozen roundings of half a unit."""
+"""Error of a computed component of F, as a part of the sum of its terms: a dozen roundings of half a unit."""
 
 
 @dataclass(frozen=True, eq=False)
 class FeatureImpact:
-    """Answers for queries of shape (...), as arrays of that shape, or as plain values for one query.
+    """Results of queries of shape (...), as arrays of that shape, or as plain values for one query.
 
     status: "hit": within [lower, upper] they come within separation + tolerance. "clear": they do not come within the
-    separation; the times are infinite. "unresolved": not before lower, the budget ran out; to be counted as a hit.
-    lower, upper: parts of the step, from 0 to 1; no contact before lower.
+    separation, and the times are infinite. "unresolved": the budget ran out, upper is infinite; treat it as a hit.
+    lower, upper: parts of the step, from 0 to 1. There is no contact before lower.
     """
 
     status: Any
@@ -76,8 +76,8 @@ def vertex_face_impact(
 ) -> FeatureImpact:
     """Whether a vertex meets a triangle. x (..., 8, 3): v, f0, f1, f2 at the start, then at the end of the step (m).
 
-    separation (m): nearer than this counts as contact. tolerance (m): how near a hit has to be, by default 1e-6 of the
-    largest difference of coordinates. budget: boxes for one query. No contact is missed whatever the round-off.
+    separation (m): distance below which they are in contact. tolerance (m): largest distance of a hit beyond that, by
+    default 1e-6 of the largest difference of coordinates. budget: boxes for one query. Round-off hides no contact.
     Raises InputError for another shape of the array, or for numbers that are not finite.
     """
     return _impacts(x, True, separation, tolerance, budget)
@@ -86,7 +86,7 @@ def vertex_face_impact(
 def edge_edge_impact(
     x: ArrayLike, separation: float = 0.0, tolerance: float | None = None, budget: int = MOST_BOXES
 ) -> FeatureImpact:
-    """Whether two edges meet. x (..., 8, 3): a0, a1, b0, b1 at the start, then at the end; the rest as for vertices."""
+    """Whether two edges meet. x (..., 8, 3): a0, a1, b0, b1 at the start, then at the end; see `vertex_face_impact`."""
     return _impacts(x, False, separation, tolerance, budget)
 
 
@@ -110,7 +110,7 @@ def _impacts(x: ArrayLike, face: bool, separation: float, tolerance: float | Non
     return FeatureImpact(_NAMES[status].reshape(leading), lower.reshape(leading), upper.reshape(leading))
 
 
-# In the kernels, terms is (_AXES, 7): A, B, C at the start and at the end along an axis, and the sum's round-off.
+# In the kernels, terms is (_AXES, 7): A, B, C at the start and at the end along an axis, and the round-off of F.
 
 
 @allocating_kernel
@@ -123,7 +123,7 @@ def _solve(x: Any, face: bool, separation: float, tolerance: float, most: int, a
         near = tolerance if tolerance > 0.0 else TOLERANCE * scale
         begin = 0.0
         if separation > 0.0:
-            # boxes all around the features come near at once: step by step it is quicker
+            # boxes all around the features come near at the same time, so advancement is faster
             begin, settled = _advance(terms, face, separation, near, scale)
             if begin > 1.0 or settled:
                 status[q] = _HIT if settled else _CLEAR
@@ -134,9 +134,9 @@ def _solve(x: Any, face: bool, separation: float, tolerance: float, most: int, a
 
 @device
 def _set_terms(x: Any, face: bool, separation: float, terms: Any) -> float:
-    """Fill the terms (_AXES, 7) of one query; returns the largest difference of its coordinates.
+    """Fill the terms (_AXES, 7) of one query; return the largest difference of its coordinates (m).
 
-    Differences of coordinates are rounded relative to themselves: far from the origin costs nothing.
+    Differences of coordinates are rounded relative to themselves, so a position far from the origin costs no accuracy.
     """
     scale = 0.0
     for k in range(3):
@@ -148,7 +148,7 @@ def _set_terms(x: Any, face: bool, separation: float, terms: Any) -> float:
                 a, b, c = p0 - p2, p1 - p0, p2 - p3
             terms[k, 3 * end], terms[k, 3 * end + 1], terms[k, 3 * end + 2] = a, b, c
             scale = max(scale, abs(a), abs(b), abs(c))
-    # a frame of the features half-way: along the longer of B and C, and across both
+    # frame of the features at half time: along the longer of B and C, and perpendicular to both
     b0, b1, b2 = terms[0, 1] + terms[0, 4], terms[1, 1] + terms[1, 4], terms[2, 1] + terms[2, 4]
     c0, c1, c2 = terms[0, 2] + terms[0, 5], terms[1, 2] + terms[1, 5], terms[2, 2] + terms[2, 5]
     b = math.sqrt(b0 * b0 + b1 * b1 + b2 * b2)
@@ -161,7 +161,7 @@ def _set_terms(x: Any, face: bool, separation: float, terms: Any) -> float:
         n0, n1, n2 = b1 * c2 - b2 * c1, b2 * c0 - b0 * c2, b0 * c1 - b1 * c0
         n = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
         if not n > 1e-6 * b:
-            # B and C are parallel: across them, towards where they are apart at the start
+            # B and C are parallel: perpendicular to them, towards their offset at the start
             a0, a1, a2 = terms[0, 0], terms[1, 0], terms[2, 0]
             along = a0 * b0 + a1 * b1 + a2 * b2
             n0, n1, n2 = a0 - along * b0, a1 - along * b1, a2 - along * b2
@@ -184,7 +184,7 @@ def _set_terms(x: Any, face: bool, separation: float, terms: Any) -> float:
             for m in range(6):
                 size += abs(terms[k, m])
         else:
-            size = 18.0 * scale  # what is projected is rounded relative to the vectors, not to what is left of them
+            size = 18.0 * scale  # a projection is rounded relative to the vectors, not to its own size
         terms[k, 6] = _ROUND_OFF * (size + separation) + 1e-300
     return scale
 
@@ -195,7 +195,7 @@ def _may_hold(terms: Any, face: bool, separation: float, t: Any, u: Any, w: Any)
     t0, t1 = t
     u0, u1 = u
     w0, w1 = w
-    if face:  # the corner beyond u + w = 1 is not of the triangle
+    if face:  # the corner beyond u + w = 1 is outside the triangle
         u1, w1 = min(u1, 1.0 - w0), min(w1, 1.0 - u0)
     squared, slack = 0.0, separation
     for k in range(_AXES):
@@ -218,7 +218,7 @@ def _may_hold(terms: Any, face: bool, separation: float, t: Any, u: Any, w: Any)
 
 @device
 def _first_root(terms: Any, boxes: Any, face: bool, separation: float, near: float, most: int, begin: float) -> Any:
-    """(status, lower, upper) of one query, which is known to have no root before `begin`."""
+    """Return (status, lower, upper) of one query, which has no root before `begin`."""
     along_t = along_u = along_w = 0.0
     for k in range(3):
         along_t = max(
@@ -236,10 +236,10 @@ def _first_root(terms: Any, boxes: Any, face: bool, separation: float, near: flo
         t0, t1 = boxes[waiting, 0], boxes[waiting, 1]
         u0, u1 = boxes[waiting, 2], boxes[waiting, 3]
         w0, w1 = boxes[waiting, 4], boxes[waiting, 5]
-        if t0 >= latest:  # hardly before the root that is known: to tell them apart would take as long again
+        if t0 >= latest:  # hardly before the known root: to separate the two would take as long again
             lower = min(lower, t0)
             continue
-        if t1 > latest:  # of this box, too, only what is clearly before it matters
+        if t1 > latest:  # only the part of the box clearly before the known root matters
             t1 = latest
             lower = min(lower, latest)
         if looked == most:
@@ -260,7 +260,7 @@ def _first_root(terms: Any, boxes: Any, face: bool, separation: float, near: flo
             lower, upper = min(lower, t0), min(upper, t1)
             latest = min(latest, t0 - (t1 - t0))
             continue
-        # the half that is looked at first is put on top: the earlier one
+        # the earlier half is examined first, so it goes on top
         for m in range(6):
             boxes[waiting + 1, m] = boxes[waiting, m]
         boxes[waiting, 1] = boxes[waiting + 1, 1] = t1
@@ -277,9 +277,9 @@ def _first_root(terms: Any, boxes: Any, face: bool, separation: float, near: flo
 
 @device
 def _advance(terms: Any, face: bool, separation: float, near: float, scale: float) -> Any:
-    """Conservative advancement: (t, whether they are within separation + near at t); none are nearer before t.
+    """Conservative advancement: return (t, whether they are within separation + near at t). No contact is before t.
 
-    t > 1: they are not in the whole step. (Mirtich, 1996; Li, Kaufman and Jiang, 2021)
+    t > 1: no contact in the whole step. (Mirtich, 1996; Li, Kaufman and Jiang, 2021)
     """
     fastest = 0.0
     for corner in range(3 if face else 4):
@@ -305,7 +305,7 @@ def _advance(terms: Any, face: bool, separation: float, near: float, scale: floa
 
 @device
 def _distance(terms: Any, face: bool, t: float) -> float:
-    """Least |F| at t: of the border, edge by edge, and of the inside where it has a lowest point."""
+    """Least |F| at t, over the border, edge by edge, and over the inside if F has a minimum there."""
     a = (terms[0, 0] + t * (terms[0, 3] - terms[0, 0]), terms[1, 0] + t * (terms[1, 3] - terms[1, 0]),
          terms[2, 0] + t * (terms[2, 3] - terms[2, 0]))  # fmt: skip
     b = (terms[0, 1] + t * (terms[0, 4] - terms[0, 1]), terms[1, 1] + t * (terms[1, 4] - terms[1, 1]),
@@ -331,7 +331,7 @@ def _distance(terms: Any, face: bool, t: float) -> float:
     n = cross(b, c)
     nn = dot(n, n)
     if nn > _PARALLEL_SIN2 * dot(b, b) * dot(c, c):
-        # from the border's point, not from a: what is left to go is small, and so is what the round-off of n does to it
+        # start at the border's point, not at a: the rest is short, and so is the effect of n's round-off on it
         f = (a[0] + u * b[0] + w * c[0], a[1] + u * b[1] + w * c[1], a[2] + u * b[2] + w * c[2])
         u -= dot(cross(f, c), n) / nn
         w += dot(cross(f, b), n) / nn
@@ -343,7 +343,7 @@ def _distance(terms: Any, face: bool, t: float) -> float:
 
 @inlined
 def _on_edge(a: Any, along: Any, fixed: float, across: Any) -> Any:
-    """Least squared distance of 0 from a + fixed across + s along for s in 0 … 1, and s."""
+    """Least squared distance of the origin from a + fixed across + s along for s in 0 … 1, and s."""
     x, y, z = a[0] + fixed * across[0], a[1] + fixed * across[1], a[2] + fixed * across[2]
     squared = dot(along, along)
     s = -(x * along[0] + y * along[1] + z * along[2]) / squared if squared > 0.0 else 0.0
@@ -354,7 +354,7 @@ def _on_edge(a: Any, along: Any, fixed: float, across: Any) -> Any:
 
 @device
 def _is_apart(terms: Any, separation: float, near: float, t: float, u: float, w: float) -> bool:
-    """Whether F is farther from 0 than the separation in the box about (t, u, w), in which it varies by near/2."""
+    """Whether |F| exceeds the separation in the whole box about (t, u, w), in which F varies by at most near / 2."""
     squared, slack = 0.0, 0.5 * near
     for k in range(3):
         a = terms[k, 0] + t * (terms[k, 3] - terms[k, 0])

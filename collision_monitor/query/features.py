@@ -1,4 +1,4 @@
-"""Which features of two polytopes a contact is between: "vertex 3 of A on face 7 of B"."""
+"""Features of two polytopes in contact: "vertex 3 of A on face 7 of B"."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from collision_monitor.query.contact import Contact
 
 Array = NDArray[np.float64]
 
-# Corners of a box by their sides as bits (x, y, z), and two triangles for each face: +x -x +y -y +z -z.
+# Corners of a unit box, numbered by their sides as bits (x, y, z); its faces +x -x +y -y +z -z, two triangles each.
 _SIDES: Final = np.array([[(k >> axis & 1) - 0.5 for axis in range(3)] for k in range(8)])
 _QUADS: Final = np.array([[1, 3, 7, 5], [0, 4, 6, 2], [2, 6, 7, 3], [0, 1, 5, 4], [4, 5, 7, 6], [0, 2, 3, 1]])
 _TRIANGLES: Final = _QUADS[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
 
 
 def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Shape, pose_b: Pose) -> FeatureContact:
-    """The features of A and of B at the witness points of their contact, for Box, ConvexHull and Mesh.
+    """Features of A and of B at the witness points of their contact, for Box, ConvexHull and Mesh.
 
-    A mesh's vertices and faces have its own numbers, a hull's vertices those of its points, and its faces those of
-    `convex_hull`. A box has its corners numbered by their sides (bit 0: +x, 1: +y, 2: +z) and its faces
+    A mesh keeps its own numbers of vertices and faces. A hull has the vertex numbers of its points and the face numbers
+    of `convex_hull`. A box numbers its corners by their sides (bit 0: +x, 1: +y, 2: +z) and its faces in the order
     +x -x +y -y +z -z. Raises UnsupportedError for other shapes.
     """
     return FeatureContact(

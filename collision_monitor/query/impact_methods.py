@@ -1,8 +1,9 @@
-"""The classical ways to a time of impact under their names, to be compared: benchmarks/impact_methods.py.
+"""Classical methods for the time of impact, which benchmarks/impact_methods.py compares.
 
 Each takes two convex shapes with N motions (states as in time_of_impact_batch.py, (N, 13)) and the horizon (s), and
-returns the times (N,) of the first impacts, infinite for none. Only conservative advancement holds for every motion and
-misses nothing; the others say here what they need, or what they miss. (Ericson, Real-Time Collision Detection, 5.5)
+returns the times (N,) of the first impacts (s), infinite for none. Only conservative advancement applies to every
+motion and misses nothing. The docstrings of the others state what they require or miss. (Ericson, Real-Time Collision
+Detection, 5.5)
 """
 
 from __future__ import annotations
@@ -35,10 +36,10 @@ Array = NDArray[np.float64]
 Method = Callable[[Shape, Array, Shape, Array, float], Array]
 
 STEP: Final = 1 / 60
-"""Step (s) of those that look at one time after the other: a frame."""
+"""Step (s) of the methods that test one time after the other: a frame."""
 
 HALVINGS: Final = 30
-"""Of the step in which they met: 2e-11 s are left."""
+"""Number of halvings of the step in which the shapes met; 2e-11 s remain."""
 
 
 def _convex_shapes(shape_a: Shape, shape_b: Shape) -> tuple[MovingShape, MovingShape]:
@@ -52,7 +53,7 @@ def _convex_shapes(shape_a: Shape, shape_b: Shape) -> tuple[MovingShape, MovingS
 def lay_out_motions(
     a: MovingShape, b: MovingShape, state_a: Array, state_b: Array, horizon: float
 ) -> tuple[Multibody, NDArray[np.int32]]:
-    """The states (N, 13) as N bodies like a and N like b, and the pairs (N, 2) of those in one row."""
+    """Lay out the states (N, 13) as N bodies like a and N like b, with the pairs (N, 2) of the bodies of one row."""
     count = len(state_a)
     two = lay_out_pair(a, b, horizon)
     bodies = make_bodies(2 * count)
@@ -71,7 +72,7 @@ def lay_out_motions(
 
 
 def closed_form(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float) -> Array:
-    """Two spheres, or a sphere and a half-space: the root of a quadratic or a linear equation. Exact."""
+    """Exact time for two spheres, or a sphere and a half-space: the root of a quadratic or a linear equation."""
     if not isinstance(shape_a, Sphere) or not isinstance(shape_b, Sphere | HalfSpace):
         raise UnsupportedError("closed_form: supported are Sphere with Sphere and Sphere with HalfSpace")
     if isinstance(shape_b, Sphere):
@@ -85,7 +86,7 @@ def closed_form(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: flo
 
 
 def swept_bounds(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float) -> Array:
-    """When the bounding spheres first meet: a lower bound, whatever turns inside of them."""
+    """Time at which the bounding spheres first meet: a lower bound for any rotation inside them."""
     multibody, pairs = lay_out_motions(*_convex_shapes(shape_a, shape_b), a, b, horizon)
     times = np.empty(len(a))
     _swept_bounds(multibody.bodies.motion, pairs, horizon, times)
@@ -93,9 +94,9 @@ def swept_bounds(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: fl
 
 
 def swept_sat(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float) -> Array:
-    """Boxes that do not turn: on each of the 15 axes of SAT they overlap for an interval; from when on do all? Exact.
+    """Exact time for boxes that do not rotate: the first at which they overlap on all 15 axes of SAT.
 
-    Rotation is left out: what turns is answered as it stands at the start. (Ericson, 5.5.8)
+    Rotation is ignored: a rotating box keeps its orientation of the start. (Ericson, 5.5.8)
     """
     if not (isinstance(shape_a, Box) and isinstance(shape_b, Box)):
         raise UnsupportedError("swept_sat: supported is Box with Box")
@@ -108,7 +109,7 @@ def swept_sat(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float
 def conservative_advancement(
     shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float, tolerance: float = 1e-6
 ) -> Array:
-    """The lower ends of what `time_of_impact` answers: never late, and early by what the tolerance (m) allows."""
+    """Lower ends of the intervals of `time_of_impact`: never late, and early by what the tolerance (m) allows."""
     multibody, pairs = lay_out_motions(*_convex_shapes(shape_a, shape_b), a, b, horizon)
     times = np.full(len(a), math.inf)
     events = first_impacts(multibody, pairs, 0.0, MotionQuery(horizon, tolerance, 0.0, ITERATIONS))
@@ -119,7 +120,7 @@ def conservative_advancement(
 def bisection(
     shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float, step: float = STEP, halvings: int = HALVINGS
 ) -> Array:
-    """Step by step until they overlap, then back up, halving the step. What comes and goes within a step is missed."""
+    """Step until the shapes overlap, then bisect the last step. Contacts that begin and end in one step are missed."""
     multibody, pairs = lay_out_motions(*_convex_shapes(shape_a, shape_b), a, b, horizon)
     times = np.empty(len(a))
     _bisect(multibody, pairs, horizon, step, halvings, times, make_scratch())
@@ -127,7 +128,7 @@ def bisection(
 
 
 def end_of_step(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float, step: float = STEP) -> Array:
-    """The end of the first step at which they overlap, without going back: late by up to a step, or missed."""
+    """End of the first step at which the shapes overlap, without bisection: late by up to a step, or missed."""
     return bisection(shape_a, a, shape_b, b, horizon, step, 0)
 
 

@@ -1,4 +1,4 @@
-"""First impacts of two bodies in many motions, one row of numbers for each: without laying them out as many bodies."""
+"""First impacts of two bodies in many motions, given as rows of numbers and not laid out as many bodies."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from collision_monitor.prediction.motion import quaternion_to_matrix
 from collision_monitor.tolerances import EPSILON, LARGEST_INPUT, UNIT_QUATERNION
 
 _SMALLEST: Final = 1e-240
-"""m^4/s^2, as in time_of_impact.py: below it products of lengths and speeds lose digits."""
+"""m^4/s^2, as in sphere_interval.py: products of squared lengths and speeds below it lose digits."""
 
 
 class ImpactTimes(NamedTuple):
-    """Answers for N motions."""
+    """Times of impact of N motions."""
 
     lower: Any  # (N,) s
     upper: Any  # (N,) s
-    left: Any  # (N,) bool: left open
+    left: Any  # (N,) bool: undecided
 
 
 @kernel
 def normalise_states(state):
     """Normalise the quaternions of states (N, 13) in place.
 
-    Returns the first row that is no state, -1 where all are; and the length of its quaternion if that is why, else -1.
+    Return the first row that is no valid state, or -1, and the length of its quaternion if that is the reason, else -1.
     """
     for k in range(len(state)):
         for column in range(13):
@@ -51,10 +51,11 @@ def _set_motion(motion, state, k):
 
 @kernel
 def impacts_of_rows(multibody, states, rows, horizon, queries, memory, times):
-    """First impacts of two bodies moving as in `rows` of the states, two arrays (N, 13); the rest of `times` stays.
+    """Compute the first impacts of two bodies that move as in `rows` of the states, two arrays (N, 13).
 
-    queries: the ImpactQuery, and the one for overlaps deeper than touching at the start, which are impacts at 0.
-    times.left: touches at the start and stays open. memory: Scratch, and a place for an IMPACT.
+    Other rows of `times` keep their values. queries: the ImpactQuery, and one that finds overlaps deeper than touching
+    at the start, which are impacts at 0. times.left marks motions that touch at the start, which stay undecided.
+    memory: Scratch, and an array of one IMPACT.
     """
     bodies = multibody.bodies
     state_a, state_b = states
@@ -87,11 +88,11 @@ def impacts_of_rows(multibody, states, rows, horizon, queries, memory, times):
 
 @kernel
 def impacts_of_spheres(a, b, reach, horizon, times):
-    """The same in closed form for spheres whose radii add up to `reach` (m); a, b: columns of the states, (13, N).
+    """Compute the first impacts of spheres with radii that add up to `reach` (m); a, b: states as columns (13, N).
 
-    As `sphere_interval`, but the same for all and without a branch, so that the processor does eight at once: the first
-    root c / (-b + sqrt(D)), rounded outward for the lower end and inward for the upper one. times.left: what touches
-    at the start, grazes or underflows, which this leaves open.
+    The closed form is that of `sphere_interval`, but without branches, so that the processor computes eight motions at
+    once: the first root c / (-b + sqrt(D)), rounded outward for lower and inward for upper. times.left marks motions
+    that touch at the start, graze or underflow, which stay undecided.
     """
     lower, upper, left = times
     certain = reach * (1.0 - 8.0 * EPSILON)  # the radii are rounded up by nearly as much

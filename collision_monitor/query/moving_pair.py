@@ -1,4 +1,4 @@
-"""Two moving compounds as the kernels of the monitor read them, and their first impact."""
+"""Two moving compounds in the arrays that the monitor's kernels read, and their first impact."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from collision_monitor.query.contact import Compound
 
 
 class MotionQuery(NamedTuple):
-    """A question about two moving shapes: when they first come within the separation."""
+    """Parameters of the search for the first time at which two moving shapes are within the separation."""
 
     horizon: float  # s
     tolerance: float  # m
     separation: float  # m
-    iterations: int  # most distance computations for a pair of convex pieces
+    iterations: int  # limit of distance queries for a pair of convex pieces
 
 
 class MovingShape(NamedTuple):
-    """One of the two: its shapes, and the convex pieces that they are tested as, with poses in its frame."""
+    """One of two moving objects: its shapes, and the convex pieces that represent them, with poses in its frame."""
 
     shapes: Sequence[tuple[Shape, Pose]]
     pieces: PosedShapes
@@ -42,7 +42,10 @@ class MovingShape(NamedTuple):
 
 
 def make_moving_shape(shape: Compound, motion: Motion, name: str) -> MovingShape:
-    """Check one of the two; in the plane, motions out of it are left out. Raises ShapeError, PoseError."""
+    """Check one of the two. Motion out of the plane of plane shapes is ignored.
+
+    Raises ShapeError, PoseError; UnsupportedError for a rotating HalfSpace.
+    """
     shapes = shape_pairs(shape, f"shape {name}")
     if not isinstance(motion, Motion):
         raise PoseError(f"motion {name}: expected a Motion, got {type(motion).__name__}")
@@ -57,9 +60,9 @@ def make_moving_shape(shape: Compound, motion: Motion, name: str) -> MovingShape
 
 
 def lay_out_pair(a: MovingShape, b: MovingShape, horizon: float, apart: bool = False) -> Multibody:
-    """The two with reference motions from 0 until the horizon; `apart`: each piece as a body of its own.
+    """Lay out both with reference motions from 0 to the horizon (s); `apart`: each piece is a body of its own.
 
-    The pieces of A stand first in the table, then those of B.
+    The pieces of A come first in the table, then those of B.
     """
     count = len(a.pieces) + len(b.pieces)
     builder = ShapeTableBuilder(slots=count)
@@ -89,9 +92,9 @@ def _set_reference_motion(bodies: Bodies, k: int, motion: Motion, horizon: float
 def first_impacts(
     multibody: Multibody, pairs: NDArray[np.int32], begin: float, query: MotionQuery, separation: float | None = None
 ) -> NDArray[np.void]:
-    """First impacts (IMPACT) of the pairs (P, 2) of bodies from `begin` on; pairs without one are left out.
+    """First impacts (IMPACT) of the pairs (P, 2) of bodies from `begin` (s) on; pairs without an impact are omitted.
 
-    separation (m): in place of the query's; below 0 for overlaps of a depth.
+    separation (m): replaces that of the query; it is negative to find overlaps of that depth.
     """
     events = np.zeros(len(pairs) + 1, IMPACT)
     wanted = query.separation if separation is None else separation

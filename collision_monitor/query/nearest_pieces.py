@@ -1,5 +1,5 @@
-"""Which two convex pieces of two objects are nearest: by their bounding spheres, and down two trees of spheres where
-there are many.
+"""Nearest pair of convex pieces of two objects, found by their bounding spheres, or by two trees of spheres if there
+are many pieces.
 
 (Slides "Bounding volume hierarchies"; Ericson, Real-Time Collision Detection, 6.3)
 """
@@ -21,24 +21,24 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 FIRST_BATCH: Final = 64
-"""Pairs of pieces that are looked at first; each further batch is twice as large."""
+"""Number of pairs of pieces in the first batch; each further batch is twice as large."""
 
 ALL_PAIRS: Final = 2048
-"""Pairs of pieces up to which all bounding spheres are compared: that is as fast as one way down the trees."""
+"""Number of pairs of pieces up to which all bounding spheres are compared, as fast as one descent of the trees."""
 
 PAIRS_AT_ONCE: Final = 1024
-"""Pairs of spheres that go down the trees together. Larger: more of them before anything near is known."""
+"""Number of pairs of spheres that descend the trees together. Larger: more descend before a near pair is known."""
 
 
 class NearestPieces:
-    """The search, and what it found: `best`, the contact (CONTACT_SIZE,) of the nearest or deepest, and `pair`.
+    """Search for the nearest or deepest pieces, with its result: their contact row `best` and their indices `pair`.
 
-    table, position, rotation: of the pieces of both, A's first, about one origin in the same axes. looked_at: all pairs
-    (m, 2) that were tested, in batches with their contacts (m, CONTACT_SIZE): those of all as near as the nearest.
+    table, position, rotation: the pieces of both, A's first, relative to one origin in the same axes. looked_at: all
+    tested pairs (m, 2), in batches with their contacts (m, CONTACT_SIZE), among them all that are as near as `best`.
     """
 
     def __init__(self, a: PieceTable, X_A: tuple[Array, Array], b: PieceTable, X_B: tuple[Array, Array]) -> None:
-        """X: rotation (3, 3) and position (3,) of each."""
+        """Search; X_A, X_B: rotation (3, 3) and position (3,) of each object."""
         self.table: ShapeTable = join([a.table, b.table])
         self.position = np.concatenate([a.position @ X_A[0].T + X_A[1], b.position @ X_B[0].T + X_B[1]])
         self.rotation = np.concatenate([X_A[0] @ a.rotation, X_B[0] @ b.rotation])
@@ -52,7 +52,7 @@ class NearestPieces:
             self._descend(a, X_A, b, X_B)
 
     def _look_at(self, i: Indices, j: Indices) -> None:
-        """Test the pieces i of A with j of B, in the order of their spheres' distances, while they can be nearest."""
+        """Test the pieces i of A with j of B in the order of their spheres' distances, while they can be nearest."""
         j = self._first_of_b + j
         radius = self.table.radius
         lower = np.linalg.norm(self.position[j] - self.position[i], axis=1) - (radius[i] + radius[j])
@@ -69,12 +69,12 @@ class NearestPieces:
             begin, size = begin + size, 2 * size
 
     def _descend(self, a: PieceTable, X_A: tuple[Array, Array], b: PieceTable, X_B: tuple[Array, Array]) -> None:
-        """From the whole of both to their halves, the nearest first; what is farther than what was found stays out."""
+        """Descend from both objects to their halves, nearest first, and skip pairs farther than the nearest found."""
         trees = a.spheres, b.spheres
         centers = [[c @ R.T + p for c in tree.center] for tree, (R, p) in zip(trees, (X_A, X_B), strict=True)]
         last = len(a.spheres.center) - 1, len(b.spheres.center) - 1
         stack = [((0, 0), np.zeros((2, 1), np.int64), np.full(1, -np.inf))]
-        farthest = np.inf  # some pair is as near as that
+        farthest = np.inf  # some pair is at most this far apart
         while stack:
             level, nodes, lower = stack.pop()
             farthest = min(farthest, self.best[DISTANCE])
@@ -100,7 +100,7 @@ class NearestPieces:
 
 
 def _leaves(trees: Any, nodes: Indices) -> tuple[Indices, Indices]:
-    """The pieces of A and those of B in each pair of spheres (2, n) of the last levels, each with each."""
+    """Every pair of a piece of A and a piece of B in the pairs of spheres (2, n) of the last levels."""
     i, owner = ranges(trees[0].first[nodes[0]], np.diff(trees[0].first)[nodes[0]])
     j = nodes[1, owner]
     j, again = ranges(trees[1].first[j], np.diff(trees[1].first)[j])

@@ -1,4 +1,4 @@
-"""`overlap`: do two shapes have a point in common, by the narrow phase that one chooses."""
+"""`overlap`: whether two shapes have a point in common, by a selectable test."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ TESTS: Final = ("contact", "cascade", "sat")
 def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, test: str = "contact") -> bool:
     """Whether two shapes, or compounds given as lists of (shape, pose), overlap or touch.
 
-    test: "contact", any shapes, by the sign of their distance; "cascade", polyhedra, by the lecture's ordered tests
-    (bounding volumes, vertices, edges against faces), exact for the corners as they are placed; "sat", convex ones, by
-    the separating axis test. Raises as `contact` does; UnsupportedError for a shape that the test is not for.
+    test: "contact" for any shapes, by the sign of their distance; "cascade" for polyhedra, by the lecture's ordered
+    tests (bounding volumes, vertices, edges against faces), exact for the placed corners; "sat" for convex polyhedra,
+    by the separating axis test. Raises as `contact` does, InputError for an unknown test, and UnsupportedError for a
+    shape that the test does not take.
     """
     if test == "contact":
         return contact(shape_a, pose_a, shape_b, pose_b).overlaps
@@ -38,7 +39,7 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
 
 
 def _solids(shape: Compound, pose: Pose, test: str, name: str) -> list[Hull]:
-    """The shapes' corners and faces in the world."""
+    """Corners and faces of the shapes in the world frame."""
     if not isinstance(pose, Pose):
         raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
     found = []

@@ -1,4 +1,4 @@
-"""The convex pieces of an object as arrays, and a tree of spheres around them: what `contact` searches."""
+"""Convex pieces of an object as arrays, and the tree of spheres around them that `contact` searches."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class SphereLevels:
-    """Level k has 2^k spheres, center[k] (2^k, 3) and radius[k], each around two of the next.
+    """Tree of spheres: level k has 2^k, center[k] (2^k, 3) and radius[k] (m), each around two of the next level.
 
-    Sphere m of the last level holds the pieces order[first[m]] … order[first[m + 1] - 1], one or two of them.
+    Sphere m of the last level holds one or two pieces, order[first[m]] … order[first[m + 1] - 1].
     """
 
     center: list[Array]
@@ -34,9 +34,9 @@ class SphereLevels:
 
 @dataclass(frozen=True, eq=False)
 class PieceTable:
-    """n convex pieces: a table of their shapes, and their poses in the object's frame.
+    """n convex pieces: a table of their shapes, and their poses (n, 3), (n, 3, 3) in the object's frame.
 
-    inner (m, 3): points of them, at least one of each connected part.
+    inner (m, 3): points of the pieces (m), at least one of each connected part.
     """
 
     table: ShapeTable
@@ -49,7 +49,7 @@ class PieceTable:
 
     @cached_property
     def spheres(self) -> SphereLevels:
-        """Bounding spheres of the pieces' own ones, halved by place. (Slides "Bounding volume hierarchies")"""
+        """Spheres around the pieces' bounding spheres, halved by position. (Slides "Bounding volume hierarchies")"""
         tree = aabb_tree(self.position, self.position)
         n = len(self.position)
         position, radius = self.position[tree.order], self.table.radius[tree.order]
@@ -65,7 +65,7 @@ class PieceTable:
 
 
 def exact_piece_table(shapes: Sequence[tuple[Shape, Pose]]) -> PieceTable:
-    """The pieces of an object as it is. They are remembered: a shape never changes."""
+    """Pieces of an object with its exact shapes. They are cached, because a shape never changes."""
     parts = []
     for shape, pose in shapes:
         own = _of_concave(shape) if isinstance(shape, Mesh | Polygon) else _of_convex(shape)
@@ -89,7 +89,8 @@ def _of_convex(shape: Shape) -> PieceTable:
 def _of_concave(shape: Mesh | Polygon) -> PieceTable:
     if isinstance(shape, Mesh) and not is_convex_mesh(shape):
         corners = shape.vertices[shape.faces]
-        centers = corners.mean(axis=1)  # about its own centre a triangle has a small bounding sphere, and its digits
+        # relative to its own centre, a triangle has a small bounding sphere and keeps its digits
+        centers = corners.mean(axis=1)
         rotation = np.tile(np.eye(3), (len(corners), 1, 1))
         inner = centers[_one_of_each_part(shape.faces, len(shape.vertices))]
         return PieceTable(triangle_table(corners - centers[:, None]), centers, rotation, inner)
@@ -97,7 +98,7 @@ def _of_concave(shape: Mesh | Polygon) -> PieceTable:
 
 
 def _one_of_each_part(faces: Indices, vertices: int) -> Indices:
-    """A face of each connected part of a mesh."""
+    """Index of one face of each connected part of a mesh."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -108,7 +109,7 @@ def _one_of_each_part(faces: Indices, vertices: int) -> Indices:
 
 
 def piece_table(pieces: Sequence[tuple[Shape, Pose]]) -> PieceTable:
-    """Convex shapes with their poses in the object's frame."""
+    """Table of convex shapes with their poses in the object's frame."""
     builder = ShapeTableBuilder(slots=len(pieces), vertices=0)
     for shape, _ in pieces:
         builder.append(shape)

@@ -1,4 +1,4 @@
-"""`time_of_impact`: when two moving shapes first meet, as an interval that holds the true time."""
+"""`time_of_impact`: interval that contains the time at which two moving shapes first meet."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from collision_monitor.query.arguments import finite_number, whole_number
 from collision_monitor.query.contact import Compound, Contact, contact
 from collision_monitor.query.moving_pair import MotionQuery, MovingShape, first_impacts, lay_out_pair, make_moving_shape
 from collision_monitor.query.touching import follow
-from collision_monitor.tolerances import TOUCHING
+from collision_monitor.tolerances import GJK_TOUCHING
 
 ITERATIONS: Final = 1000
-"""Distance queries for one pair of pieces; hardly any pair needs more than 20."""
+"""Default limit of distance queries for one pair of pieces; hardly any pair needs more than 20."""
 
 
 @dataclass(frozen=True, eq=False)
 class Impact:
-    """When two shapes first come within the wanted separation. Times in s from the poses that were given.
+    """First time at which two shapes are within the separation, in s from the given poses.
 
-    "hit": they do within [lower, upper]. "clear": they do not within the horizon; both times are infinite.
-    "unresolved": not before lower; they come so near that round-off or the budget leave open whether they meet. By
-    upper they have, and infinite says that they may pass. To be counted as a hit.
-    contact: how they stand to each other at upper, or at lower where that is infinite; None where clear.
+    "hit": it lies within [lower, upper]. "clear": there is none within the horizon; lower and upper are infinite.
+    "unresolved": there is none before lower, but the shapes come so near that round-off or the budget leaves open
+    whether they meet; upper is infinite. Treat it as a hit.
+    contact: the contact at upper, or at lower if upper is infinite; None if clear.
     """
 
     status: Literal["hit", "clear", "unresolved"]
@@ -53,10 +53,10 @@ def time_of_impact(
 ) -> Impact:
     """First time in [0, horizon] (s) at which two shapes or compounds are within `separation` (m) of each other.
 
-    Both move at constant linear and angular velocity. At lower they are within `tolerance` (m) of it and not before: by
-    conservative advancement along separating directions (Mirtich, 1996; van den Bergen, 2003, 4.5), in closed form for
-    spheres. `iterations`: most distance queries for a pair of convex pieces.
-    What overlaps at the start is a hit at 0; what only touches and then parts, slides, rolls or rests is none.
+    Both move at constant angular velocity and linear acceleration. At lower they are within `tolerance` (m) of it and
+    not before, by conservative advancement along separating directions (Mirtich, 1996; van den Bergen, 2003, 4.5) or,
+    for spheres, in closed form. `iterations`: limit of distance queries for a pair of convex pieces.
+    An overlap at the start is a hit at 0. Shapes that only touch and then part, slide, roll or rest have no impact.
     Raises InputError, ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, two HalfSpaces.
     """
     query = check_query(horizon, tolerance, separation, iterations)
@@ -65,7 +65,7 @@ def time_of_impact(
     start = contact(a.shapes, a.motion.pose, b.shapes, b.motion.pose)
     multibody = lay_out_pair(a, b, query.horizon)
     radii = multibody.bodies.motion["radius"]
-    round_off = TOUCHING * float(radii[np.isfinite(radii)].sum())
+    round_off = GJK_TOUCHING * float(radii[np.isfinite(radii)].sum())
     if start.signed_distance < query.separation - round_off:
         return Impact("hit", 0.0, 0.0, start)
     events = first_impacts(multibody, np.array([[0, 1]], np.int32), 0.0, query)
@@ -84,7 +84,7 @@ def time_of_impact(
 
 
 def check_query(horizon: float, tolerance: float, separation: float, iterations: int) -> MotionQuery:
-    """What is asked for, checked. Raises InputError."""
+    """Check the parameters of the query. Raises InputError."""
     return MotionQuery(
         horizon=finite_number("horizon", horizon),
         tolerance=finite_number("tolerance", tolerance, positive=True),
@@ -94,6 +94,6 @@ def check_query(horizon: float, tolerance: float, separation: float, iterations:
 
 
 def check_bounded(a: MovingShape, b: MovingShape) -> None:
-    """Raises UnsupportedError for two bodies without an end."""
+    """Raise UnsupportedError if both bodies are unbounded."""
     if all(any(isinstance(s, HalfSpace) for s, _ in body.shapes) for body in (a, b)):
         raise UnsupportedError("two HalfSpaces: expected one at most; every other shape meets a HalfSpace")

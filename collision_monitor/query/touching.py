@@ -1,8 +1,8 @@
-"""What becomes of two bodies that touch at the start: they part, slide, roll or rest, or they go deeper.
+"""First impact of two bodies that touch at the start: they part, slide, roll or rest, or they penetrate.
 
-Along a fixed direction in which two convex pieces do not overlap, the gap after a time t is at least a concave function
-of t (see time_of_impact.py), so that between two times it is above its values at both. Where that bound holds until
-they are apart, or for the whole horizon, touching was no impact.
+Along a fixed direction in which two convex pieces do not overlap, the gap after a time t has a lower bound that is
+concave in t (see prediction/advance.py). Between two times, the bound is at least the smaller of its values there. If
+it keeps the pieces from overlapping until they are apart, or for the whole horizon, touching is no impact.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from collision_monitor.query.moving_pair import MotionQuery, MovingShape, first_
 Array = NDArray[np.float64]
 
 PARTING_TIMES: Final = 80
-"""Times that are tried for the parting of shapes that touch: the horizon, half of it, …: down to 1e-24 of it."""
+"""Number of times tried for the parting of touching shapes: the horizon, half of it, …, down to 1e-24 of it."""
 
 DEEPENING_TIMES: Final = 40
-"""The same for their going deeper, which costs a distance query each: down to 1e-12 of the horizon."""
+"""Number of times tried for their penetration, a distance query each: down to 1e-12 of the horizon."""
 
 ALIGNED: Final = 1e-12
-"""Sine of an angle that counts as none: it moves a support value by that part of the size, below what touching is.
-Larger: comes near that. Smaller: a wheel whose axis is rounded no longer rolls."""
+"""Sine of an angle that counts as zero. It changes a support value by this part of the size, less than GJK_TOUCHING.
+Larger: the change comes near GJK_TOUCHING. Smaller: a wheel whose axis is rounded no longer rolls."""
 
 
 class ImpactInterval(NamedTuple):
-    """The first impact of bodies that touch at the start; no impact: lower is infinite, a doubtful one: upper is."""
+    """First impact (s) of bodies that touch at the start; lower is infinite for none, upper for an uncertain one."""
 
     lower: float
     upper: float
@@ -49,7 +49,7 @@ def _interval(event: np.void) -> ImpactInterval:
 
 
 def follow(a: MovingShape, b: MovingShape, query: MotionQuery, round_off: float) -> ImpactInterval:
-    """When two bodies that touch at the start, no deeper than `round_off` (m), come nearer to each other than that."""
+    """First impact of two bodies that touch at the start: the time at which they are deeper than `round_off` (m)."""
     multibody = lay_out_pair(a, b, query.horizon, apart=True)
     touching, later = _pairs(a, b, multibody, query)
     directions = [normal for _, _, normal in touching]
@@ -73,7 +73,7 @@ def follow(a: MovingShape, b: MovingShape, query: MotionQuery, round_off: float)
 def _pairs(
     a: MovingShape, b: MovingShape, multibody: Multibody, query: MotionQuery
 ) -> tuple[list[tuple[int, int, Array]], list[ImpactInterval]]:
-    """The pairs of pieces that touch, as (i, j, normal), and the impacts of the others."""
+    """Return the pairs of pieces that touch, as (i, j, normal), and the impacts of the other pairs."""
     n, m = len(a.pieces), len(b.pieces)
     rotation = np.stack([body.motion.pose.rotation @ pose.rotation for body in (a, b) for _, pose in body.pieces])
     offset = b.motion.pose.position - a.motion.pose.position
@@ -91,7 +91,7 @@ def _pairs(
 
 
 class _Piece:
-    """A convex piece of a moving body, in world axes at the start, about the body's origin."""
+    """Convex piece of a moving body at the start, in world axes, relative to the body's origin."""
 
     def __init__(self, body: MovingShape, index: int) -> None:
         self.shape, pose = body.pieces[index]
@@ -107,13 +107,13 @@ class _Piece:
         )
 
     def support(self, directions: Array) -> Array:
-        """max of d . x (n,) over the points x about the piece's own origin, for directions (n, 3) of any length."""
+        """Return max d . x (n,) over its points x about its own origin, for directions d (n, 3) of any length."""
         length = np.linalg.norm(directions, axis=1)
         unit = directions / length[:, None]
         return np.asarray(length * reach([(self.shape, Pose())], unit @ self.rotation))
 
     def advance(self, n: Array, times: Array) -> Array:
-        """Upper bounds (T,) on how much farther it reaches along n (3,) after the times (T,), by its turning."""
+        """Return upper bounds (T,) on the growth (m) of its reach along n (3,) by its rotation in the times (T,)."""
         if self.rate == 0.0:
             return np.zeros(len(times))
         axis = self.angular / self.rate
@@ -129,7 +129,7 @@ class _Piece:
         return np.asarray(farther)
 
     def _is_round_about(self, axis: Array) -> bool:
-        """Whether a turn about the axis (3,) through its own origin changes nothing."""
+        """Whether a rotation about the axis (3,) through its own origin leaves the piece unchanged."""
         own = isinstance(self.shape, Capsule | Cylinder | Cone)
         return isinstance(self.shape, Sphere | Circle) or (
             own and float(np.linalg.norm(np.cross(self.rotation[:, 2], axis))) <= ALIGNED
@@ -137,15 +137,16 @@ class _Piece:
 
 
 def _parting_time(a: _Piece, b: _Piece, n: Array, query: MotionQuery, round_off: float) -> float:
-    """A time until which they certainly go no deeper; they are apart then, or it is the horizon; 0 where none is."""
+    """Return a time until which they certainly get no deeper: one at which they are apart, or the horizon; else 0."""
     between = b.origin - a.origin + (b.offset - a.offset)
     gap = float(n @ between) - float(a.support(n[None])[0]) - float(b.support(-n[None])[0]) - query.separation
     if not gap >= -round_off:
         return 0.0
     times: Array = query.horizon * np.exp2(-np.arange(PARTING_TIMES, dtype=np.float64))
     least = gap + times * float(n @ (b.velocity - a.velocity)) - a.advance(n, times) - b.advance(-n, times)
-    # seen along the axes of SAT, boxes are half as far apart as they are at least: enough for a new start
-    least += 0.5 * times**2 * min(0.0, float(n @ (b.acceleration - a.acceleration)))  # so that it stays concave
+    # only an acceleration that closes the gap keeps the bound concave
+    least += 0.5 * times**2 * min(0.0, float(n @ (b.acceleration - a.acceleration)))
+    # twice the tolerance: the SAT gap of boxes is at least half of their distance, enough for a new start
     clear = np.flatnonzero(least > 2.0 * query.tolerance)
     if len(clear):
         return float(times[clear[0]])
@@ -155,7 +156,7 @@ def _parting_time(a: _Piece, b: _Piece, n: Array, query: MotionQuery, round_off:
 def _deep_by(
     a: MovingShape, b: MovingShape, multibody: Multibody, pairs: NDArray[np.int32], query: MotionQuery, round_off: float
 ) -> float:
-    """A time at which they are deeper than `round_off` for certain, early where that is easy; infinite: none found."""
+    """Return a time (s) at which they are certainly deeper than `round_off` (m), an early one if easy, or infinity."""
     wanted = query.separation - 2.0 * round_off
     events = first_impacts(multibody, pairs, 0.0, query, wanted)
     sure = [float(e["upper"]) for e in events if e["status"] == HIT and e["upper"] <= query.horizon]
