@@ -100,16 +100,16 @@ def _measurement(
     alarms = false_alarms = misses = compared = outside = 0
     errors, parts = [0.0], [0.0]
     for k, truth in zip(sampled, truths, strict=True):
-        told = contacts_by_pair(played.answers[k])
-        touching = {pair for pair, row in told.items() if row["signed_distance"] <= 0.0}
-        really = {pair for pair, distance in truth.items() if distance <= 0.0}
-        alarms, false_alarms = alarms + len(touching), false_alarms + len(touching - really)
-        misses += len(really - touching)
+        reported = contacts_by_pair(played.answers[k])
+        touching = {pair for pair, row in reported.items() if row["signed_distance"] <= 0.0}
+        actual = {pair for pair, distance in truth.items() if distance <= 0.0}
+        alarms, false_alarms = alarms + len(touching), false_alarms + len(touching - actual)
+        misses += len(actual - touching)
         # overlapping pairs are excluded, because the depths of a mesh and of its model are not comparable
-        for pair in told.keys() - really:
-            off = abs(float(told[pair]["signed_distance"]) - truth[pair])
+        for pair in reported.keys() - actual:
+            off = abs(float(reported[pair]["signed_distance"]) - truth[pair])
             compared += 1
-            outside += bool(off > told[pair]["error_bound"] + 1e-9)
+            outside += bool(off > reported[pair]["error_bound"] + 1e-9)
             errors.append(off)
             parts.append(off / min(sizes[each] for each in pair))
     return Measurement(

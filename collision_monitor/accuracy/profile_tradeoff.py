@@ -60,16 +60,16 @@ def _compare(scene: str, profile: Profile, objects: int, played: Played, truths:
     distances: list[float] = []
     times: list[float] = []
     for mine, truth in zip(played.answers, truths, strict=True):
-        touching, really = (contacts_by_pair(answer) for answer in (mine, truth))
+        touching, actual = (contacts_by_pair(answer) for answer in (mine, truth))
         stated, true = by_pair(_stated(mine)), by_pair(truth.predictions)
-        told = touching.keys() | stated.keys()
-        alarms += len(told)
-        false_alarms += len(told - really.keys() - true.keys())
-        misses += len(really.keys() - told)
+        reported = touching.keys() | stated.keys()
+        alarms += len(reported)
+        false_alarms += len(reported - actual.keys() - true.keys())
+        misses += len(actual.keys() - reported)
         edge = profile.horizon - 2.0 * profile.impact_tolerance
-        misses += sum(pair not in told and event["upper"] < edge for pair, event in true.items())
-        for pair in touching.keys() & really.keys():
-            distances.append(float(touching[pair]["signed_distance"] - really[pair]["signed_distance"]))
+        misses += sum(pair not in reported and event["upper"] < edge for pair, event in true.items())
+        for pair in touching.keys() & actual.keys():
+            distances.append(float(touching[pair]["signed_distance"] - actual[pair]["signed_distance"]))
         for pair in stated.keys() & true.keys():
             event = true[pair]
             if event["status"] == PredictionStatus.HIT:

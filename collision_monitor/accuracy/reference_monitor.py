@@ -57,8 +57,8 @@ def disagreements(mine: StepResult, reference: StepResult, horizon: float) -> li
         if answer is None:
             found.append(f"{pair} is missed: it collides in {truth['lower']:.6g} s")
         elif answer["lower"] > truth["upper"] or answer["upper"] < truth["lower"]:
-            told, really = [(float(each["lower"]), float(each["upper"])) for each in (answer, truth)]
-            found.append(f"{pair} is predicted in {told} s and collides in {really} s")
+            times, actual = [(float(each["lower"]), float(each["upper"])) for each in (answer, truth)]
+            found.append(f"{pair} is predicted in {times} s and collides in {actual} s")
     for pair, answer in stated.items():
         if answer["status"] == PredictionStatus.HIT and answer["upper"] < horizon and pair not in true:
             found.append(f"{pair} is certain to collide in {answer['lower']:.6g} s and never does")

@@ -1,7 +1,7 @@
-"""Any two convex shapes: GJK for the distance of the cores, EPA where they overlap, the radii on top.
+"""Any two convex shapes: GJK for the distance of the cores, EPA if they overlap, then the radii.
 
 Growing a convex core by a sphere moves its surface along the normal, so distance and depth of the grown shapes
-are those of the cores less the radii, exactly. (van den Bergen, 2003, 4.5)
+are exactly those of the cores minus the radii. (van den Bergen, 2003, 4.5)
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from collision_monitor.tolerances import EPA_CURVED, EPA_CURVED_POINTS, EPA_POLY
 
 @device
 def _place(pose: PairPose, work: Any) -> None:
-    """The pose of B in A's frame into the scratch memory."""
+    """Write the pose of B in A's frame to the scratch memory."""
     RA, RB = pose.R_A, pose.R_B
     px, py, pz = pose.p
     for i in range(3):
@@ -36,7 +36,7 @@ def _place(pose: PairPose, work: Any) -> None:
 
 @device
 def convex_separation(table: Any, a: int, b: int, pose: PairPose, limit: float, out: Any, work: Any) -> float:
-    """Certified lower bound of the distance (m), <= 0 where they overlap or touch; its direction in out[0:3].
+    """Certified lower bound of the distance (m), <= 0 if they overlap or touch; its direction is in out[0:3].
 
     The search ends as soon as the bound passes `limit` (m).
     """
@@ -52,7 +52,7 @@ def convex_separation(table: Any, a: int, b: int, pose: PairPose, limit: float, 
 
 @device
 def convex_contact(table: Any, a: int, b: int, pose: PairPose, limit: float, out: Any, work: Any) -> bool:
-    """Whole contact in out; False, and out undefined, as soon as the distance is certified to be over `limit` (m)."""
+    """Write the contact; False, with out undefined, as soon as the distance is certified to exceed `limit` (m)."""
     _place(pose, work)
     px, py, pz = pose.p
     cores = core_pair(table, a, b)
@@ -64,7 +64,7 @@ def convex_contact(table: Any, a: int, b: int, pose: PairPose, limit: float, out
         return False
     curved = A.kind == CYLINDER or A.kind == CONE or B.kind == CYLINDER or B.kind == CONE
     if lower > 0.0:
-        # the length of a point of B - A, a true upper bound where the simplex is too thin for its length to be one
+        # the length of a point of B - A: an upper bound even if the simplex is too thin for its own length to be one
         w = point_a = (0.0, 0.0, 0.0)
         for k in range(count):
             weight = work[WEIGHTS + k]
@@ -74,8 +74,8 @@ def convex_contact(table: Any, a: int, b: int, pose: PairPose, limit: float, out
         distance = max(length, lower)
         bound = distance - lower
         if curved and length > 0.0:
-            # On round surfaces the direction that proves the bound is not quite that between the points. Taken as the
-            # normal, it puts B's point beside its surface; the other one leaves a gap along it that is too short.
+            # On round surfaces, the direction that proves the bound differs a little from the one between the points.
+            # As normal, the first puts B's point beside B's surface; the second shortens the gap along the normal.
             x, y, z = normal
             beside = sqrt((w[0] - length * x) ** 2 + (w[1] - length * y) ** 2 + (w[2] - length * z) ** 2)
             between = (w[0] / length, w[1] / length, w[2] / length)
@@ -92,7 +92,7 @@ def convex_contact(table: Any, a: int, b: int, pose: PairPose, limit: float, out
         distance = -upper
         bound = abs(upper - lower) + GJK_TOUCHING * size
     bound += SAT_ROUND_OFF * (size + abs(px) + abs(py) + abs(pz) + ra + rb)
-    # grown by its radius, A's surface is that much farther along the normal
+    # the radius moves A's surface that much along the normal
     point_a = along(point_a, ra, normal)
     write(out, distance - ra - rb, rotate(pose.R_A, normal), rotate(pose.R_A, point_a), bound)
     return True

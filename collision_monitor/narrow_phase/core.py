@@ -1,4 +1,4 @@
-"""The core of a shape: the shape without the radius that rounds it, for which GJK and EPA answer.
+"""The core of a shape: the shape without the radius that rounds it, which GJK and EPA work on.
 
 A core is a point for a sphere, a segment for a capsule, else the shape itself.
 """
@@ -13,7 +13,7 @@ from collision_monitor.narrow_phase.vector import Vector
 
 
 class Core(NamedTuple):
-    """A slot of the shape table, as support points read it."""
+    """A slot of the shape table, in the form that support points read."""
 
     kind: Any
     size: Any  # three numbers, see ShapeTable
@@ -49,7 +49,7 @@ def core_pair(table: Any, a: int, b: int) -> CorePair:
 
 @inlined
 def core_radius(table: Any, slot: int) -> float:
-    """Radius (m) by which the core of a shape without margin is grown: 0 but for spheres and capsules."""
+    """Radius (m) by which the core of a shape without margin is grown: 0 except for spheres and capsules."""
     kind = table.kind[slot]
     return table.size[slot, 0] if kind == SPHERE or kind == CAPSULE else 0.0
 
@@ -62,7 +62,7 @@ def rounding(table: Any, slot: int) -> float:
 
 @inlined
 def core_length(table: Any, slot: int) -> float:
-    """Length (m) that the round-off of a core is measured by."""
+    """Scale (m) of the round-off of a core."""
     return table.radius[slot] - table.margin[slot]
 
 
@@ -74,7 +74,7 @@ def is_centred_box(kind: int) -> bool:
 
 @inlined
 def core_box(table: Any, slot: int) -> Vector:
-    """Half extents (m) of such a core."""
+    """Half extents (m) of a core that is a box about its origin."""
     if table.kind[slot] == BOX:
         return half_extents(table, slot)
     if table.kind[slot] == CAPSULE:

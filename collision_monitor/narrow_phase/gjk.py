@@ -1,7 +1,7 @@
 """Distance of two convex cores by GJK, with a certified lower bound.
 
 (Gilbert, Johnson, Keerthi, 1988; van den Bergen, 2003, chapter 4; closest points by Voronoi regions: Ericson, 5.1)
-The simplex stands in the scratch memory, in rows as `support_difference` writes them.
+The scratch memory stores the simplex in rows as `support_difference` writes them.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ def simplex_point(work: Any, k: int) -> Vector:
 
 @inlined
 def point_on_a(work: Any, k: int) -> Vector:
-    """The point on A that point k of the simplex was made of."""
+    """The point on A from which point k of the simplex was computed."""
     at = SIMPLEX + SIMPLEX_ROW * k + ON_A
     return work[at], work[at + 1], work[at + 2]
 
 
 @inlined
 def weighted(weights: Vector, a: Vector, b: Vector, c: Vector) -> Vector:
-    """The point of a triangle with these weights of its corners."""
+    """The weighted sum of the corners of a triangle."""
     wa, wb, wc = weights
     return (
         wa * a[0] + wb * b[0] + wc * c[0],
@@ -59,7 +59,7 @@ def _segment(a: Vector, b: Vector) -> float:
 
 @device
 def _triangle(a: Vector, b: Vector, c: Vector) -> tuple[Vector, bool]:
-    """Weights of a, b and the newest point c in the point closest to the origin; whether it lies inside the face."""
+    """Weights of a, b and the newest point c in the point closest to the origin; whether it is inside the face."""
     u, v = minus(b, a), minus(c, a)
     n = cross(u, v)
     # barycentric coordinates of the origin's projection, each as a triple product with the normal
@@ -69,7 +69,7 @@ def _triangle(a: Vector, b: Vector, c: Vector) -> tuple[Vector, bool]:
     if wa > 0.0 and wb > 0.0 and wc > 0.0 and dot(n, n) > 0.0:
         total = wa + wb + wc
         return (wa / total, wb / total, wc / total), True
-    # on an edge or a corner, which holds however thin the triangle is; edge ab is out, as it was not the nearest before
+    # on an edge or a corner, even if the triangle is thin; not on edge ab: it was not the nearest before
     t = _segment(a, c)
     on_ac = along(a, t, v)
     s = _segment(b, c)
@@ -81,7 +81,7 @@ def _triangle(a: Vector, b: Vector, c: Vector) -> tuple[Vector, bool]:
 
 @device
 def closest_on_triangle(a: Vector, b: Vector, c: Vector) -> Vector:
-    """Weights of a, b, c in the point of a triangle that is closest to the origin, whatever is known before."""
+    """Weights of a, b, c in the point of a triangle that is closest to the origin, without earlier steps."""
     weights, inside = _triangle(a, b, c)
     if inside:
         return weights
@@ -95,10 +95,9 @@ def closest_on_triangle(a: Vector, b: Vector, c: Vector) -> Vector:
 
 @device
 def _face_vector(a: Vector, b: Vector, c: Vector, weights: Vector) -> Vector:
-    """Projection of the origin on the plane of a triangle; of a thin one, the weighted point.
+    """Projection of the origin on the plane of a triangle, or the weighted point if the triangle is thin.
 
-    Near contact the plane's normal is exact in direction where the weighted sum is round-off; of a thin triangle
-    the normal is.
+    Near contact the plane's normal is accurate and the weighted sum is round-off; for a thin triangle, the reverse.
     """
     u, v = minus(b, a), minus(c, a)
     n = cross(u, v)
@@ -110,7 +109,7 @@ def _face_vector(a: Vector, b: Vector, c: Vector, weights: Vector) -> Vector:
 
 @device
 def _keep(work: Any, count: int) -> int:
-    """Take over the new weights and drop the simplex points of weight 0; returns how many are left."""
+    """Adopt the new weights and drop the simplex points of weight 0; returns the number of points left."""
     kept = 0
     for k in range(count):
         if work[NEW_WEIGHTS + k] > 0.0:
@@ -124,9 +123,9 @@ def _keep(work: Any, count: int) -> int:
 
 @device
 def _closest(work: Any, count: int, size: float) -> tuple[bool, Vector]:
-    """Whether the simplex holds the origin, and its closest point to it; its weights as new ones.
+    """Whether the simplex contains the origin, and its point closest to the origin; writes the weights of that point.
 
-    The last point is the newest; without it the origin was known to be nearest to the inside of the others.
+    The last point is the newest; before it, the closest point was inside the simplex of the others.
     """
     a, b = simplex_point(work, 0), simplex_point(work, 1)
     if count == 2:
@@ -148,13 +147,13 @@ def _closest(work: Any, count: int, size: float) -> tuple[bool, Vector]:
     nearest = (0.0, 0.0, 0.0)
     d = simplex_point(work, 3)
     for face in range(3):
-        # a, b and the newest point d; c is the one across
+        # a, b and the newest point d; c is opposite
         if face > 0:
             a, b, c = b, c, a
         n = cross(minus(a, d), minus(b, d))
         origin = -dot(n, d)
         height = dot(n, minus(c, d))
-        # a flat tetrahedron holds nothing: its sides are noise
+        # a flat tetrahedron contains nothing: its sides are noise
         if origin * height > 0.0 and height * height > flat2 * dot(n, n):
             continue
         weights, inside = _triangle(a, b, d)
@@ -175,7 +174,7 @@ def gjk(cores: CorePair, work: Any, size: float, limit: float) -> tuple[int, flo
     """Distance between two cores, with the pose of B in A's frame in the scratch memory.
 
     Returns (points in the simplex, certified lower bound (m), unit direction from A to B in A's frame that proves it).
-    0 points: the search ended early, because the lower bound passed `limit` (m). A lower bound <= 0 means that the
+    0 points: the search ended early because the lower bound passed `limit` (m). A lower bound <= 0 means that the
     cores overlap or touch within round-off.
     """
     _, toward = direction((work[P_AB], work[P_AB + 1], work[P_AB + 2]))
@@ -203,7 +202,7 @@ def gjk(cores: CorePair, work: Any, size: float, limit: float) -> tuple[int, flo
             return 4, 0.0, (0.0, 0.0, 1.0)
         shorter = dot(nearest, nearest)
         if inside or not shorter < squared:
-            # round-off: no more progress is possible, what is known stands with its bounds
+            # round-off: no more progress is possible; return the current bounds
             break
         count = _keep(work, count + 1)
         toward = nearest

@@ -43,7 +43,7 @@ def support_point(core: Core, vertices: Any, d: Vector) -> Vector:
 
 @inlined
 def support_difference(cores: CorePair, work: Any, d: Vector, at: int) -> Vector:
-    """Farthest point of B - A along d in A's frame; the pose of B in it stands in the scratch memory.
+    """Farthest point of B - A along d in A's frame; the scratch memory holds the pose of B in that frame.
 
     Writes a row of the simplex at work[at]: the difference and the point on A; returns the difference.
     """

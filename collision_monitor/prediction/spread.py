@@ -77,10 +77,10 @@ def take_spread(spread, slots, numbers, covariance, planar):
         for c in range(12):
             spread.covariance[i, c] = covariance[k, c] if covariance.shape[0] > 0 else 0.0
         for part in range(2):
-            told = False
+            has_covariance = False
             for c in range(6 * part, 6 * part + 6):
-                told |= spread.covariance[i, c] != 0.0
-            if not told:
+                has_covariance |= spread.covariance[i, c] != 0.0
+            if not has_covariance:
                 for c in _DIAGONAL:
                     spread.covariance[i, 6 * part + c] = spread.stddev[i, 2 * part] ** 2
             if planar:

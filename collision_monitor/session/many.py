@@ -23,16 +23,15 @@ from collision_monitor.errors import CollisionMonitorError, InputError, Unsuppor
 
 Result = TypeVar("Result")
 
-ENGINES: Final = ("processes", "ray")
-ENDED: Final = "the process that worked on it was ended: by the system, if memory ran out"
+ENDED: Final = "its process was killed, possibly for lack of memory"
 
 
 @dataclass(frozen=True)
 class Engine:
     """Where the work runs.
 
-    name: one of ENGINES. jobs: number of sessions at a time, by default one for each core. address: HOST:PORT of a Ray
-    cluster, by default a local one.
+    name: "processes" or "ray". jobs: number of sessions at a time, by default one for each core. address: HOST:PORT
+    of a Ray cluster, by default a local one.
     """
 
     name: str = "processes"

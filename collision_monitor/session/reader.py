@@ -73,7 +73,7 @@ class SnapshotLocation(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Timeline:
+class SessionSpan:
     """Log times of the first and the last message (ns; 0 if there is none), and the snapshots in order."""
 
     begin: int
@@ -132,7 +132,7 @@ class Session:
             prefix = f"{file.records.path.name}: " if len(self._files) > 1 else ""
             self.damage += [prefix + text for text in file.damage]
 
-    def timeline(self) -> Timeline:
+    def timeline(self) -> SessionSpan:
         """Return begin, end and the positions of the snapshots, without unpacking any message."""
         times: list[int] = []  # of first and last messages; a chunk without any has 0 for both
         snapshots: list[SnapshotLocation] = []
@@ -145,7 +145,7 @@ class Session:
                 elif opcode == Opcode.ATTACHMENT and (found := _SNAPSHOT.search(data.decode("latin-1"))):
                     snapshots.append(SnapshotLocation(number, at, int(found[1]), *TIMES.unpack_from(data)[:1]))
         begin, end = min(times, default=0), max(times, default=0)
-        return Timeline(begin, end, tuple(snapshots))
+        return SessionSpan(begin, end, tuple(snapshots))
 
     def _profile(self) -> Profile:
         try:

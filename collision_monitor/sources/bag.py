@@ -111,5 +111,5 @@ class Bag:
 
     def _broken(self, error: Exception) -> SessionError:
         reason = str(error) or type(error).__name__
-        hint = "" if self.path.suffix != ".mcap" else "; `collision-monitor salvage` recovers what is whole in it"
+        hint = "" if self.path.suffix != ".mcap" else "; `collision-monitor salvage` recovers its complete messages"
         return SessionError(f"{self.path}: expected a bag of rosbag2, cannot be read: {reason}{hint}")

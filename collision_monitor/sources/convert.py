@@ -166,7 +166,7 @@ class Converter:
 
     def _skip(self, name: str, target: str, source: str) -> None:
         frames = ", ".join(self._tree.frames) or "none"
-        self.skipped[f"{name}: no transform from {target!r} to {source!r}; tf has told of {frames}"] += 1
+        self.skipped[f"{name}: no transform from {target!r} to {source!r}; frames known from tf: {frames}"] += 1
 
     def _static_placement(self, source: Source) -> Placement:
         where = IDENTITY

@@ -98,10 +98,10 @@ def _write(
         _remove(target)
         raise
     recorder.close()
-    told = recorder.status()
-    if told["recording"] == Recording.FAILED:
+    status = recorder.status()
+    if status["recording"] == Recording.FAILED:
         _remove(target)
-        raise SessionError(str(told["recording_error"]))
+        raise SessionError(str(status["recording_error"]))
     result.refused = {reason.value: count for reason, count in pipeline.monitor.refused.items() if count}
     result.last_refusal = pipeline.monitor.last_refusal
 

@@ -32,7 +32,7 @@ def _particles(objects: int | None, seed: int, rate: float | None, _path: Path |
 _SCENES = {
     "fleet": _RegisteredScene(
         lambda objects, seed, rate, path: Fleet(objects, seed, rate),
-        "robots and people in a hall with racks, pillars and walls; they do run into each other",
+        "robots and people in a hall with racks, pillars and walls; some of them collide",
     ),
     "particles": _RegisteredScene(
         _particles,
@@ -44,11 +44,11 @@ _SCENES = {
     ),
     "crossing": _RegisteredScene(
         lambda objects, seed, rate, path: Crossing(objects, rate),
-        "nine pairs whose times of contact are known beforehand, every 8 s anew",
+        "nine pairs with known times of contact, repeated every 8 s",
     ),
     "swarm": _RegisteredScene(
         lambda objects, seed, rate, path: Swarm(objects, seed, rate),
-        "drones that circle through each other's space, nobody straight ahead",
+        "drones that circle through each other's space; none flies straight",
     ),
     "arm": _RegisteredScene(
         lambda objects, seed, rate, path: Arm(objects, rate),

@@ -44,7 +44,7 @@ class Trajectory(Scene):
 
     def __init__(self, objects: int | None, rate: float | None, path: Path | None) -> None:
         if objects is not None:
-            raise InputError(f"objects: the scene 'trajectory' plays who was recorded, leave it out (got {objects!r})")
+            raise InputError(f"objects: 'trajectory' plays the recorded objects; omit --objects (got {objects!r})")
         self.name = "trajectory"
         self.rate = positive_rate(rate, FRAME_RATE)
         self.descriptions = []

@@ -260,7 +260,7 @@ def test_what_is_wrong_is_left_out_counted_and_named(tmp_path: Path, capsys: pyt
     assert result["refused"] == {"quaternion": 1, "non_finite": 1, "old": 1}
     assert result["states"] == {"a": 6, "b": 0}
     assert {text.split(":")[0]: n for text, n in result["skipped"].items()} == {"a": 1, "/a": 1, "b": 1}
-    assert any("no transform from 'map' to 'mars'; tf has told of none" in text for text in result["skipped"])
+    assert any("no transform from 'map' to 'mars'; frames known from tf: none" in text for text in result["skipped"])
     assert main(command) == 1
     assert "expected a new file" in capsys.readouterr().err
     assert main([*command, "--force"]) == 3
@@ -333,7 +333,7 @@ def test_what_is_no_bag_is_named(tmp_path: Path) -> None:
     (tmp_path / "x.csv").write_text("1,2")
     for name, text in {
         "none.mcap": "expected a bag, got nothing there",
-        "text.mcap": "`collision-monitor salvage` recovers what is whole in it",
+        "text.mcap": "`collision-monitor salvage` recovers its complete messages",
         "folder": "without metadata.yaml",
         "x.csv": "expected a bag of rosbag2, cannot be read",
     }.items():

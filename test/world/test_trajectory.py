@@ -163,5 +163,5 @@ def test_no_path_and_wrong_paths_say_what_to_give(tmp_path):
     (tmp_path / "other.csv").write_text(PEOPLE)
     with pytest.raises(InputError, match=r"_ped\.csv or \*_veh\.csv"):
         make_scene("trajectory", path=tmp_path / "other.csv")
-    with pytest.raises(InputError, match="who was recorded"):
+    with pytest.raises(InputError, match="plays the recorded objects"):
         make_scene("trajectory", objects=3, path=tmp_path)

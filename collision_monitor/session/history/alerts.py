@@ -8,8 +8,8 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.prediction.impact_record import pair_keys
 from collision_monitor.records import PredictionStatus
-from collision_monitor.session.history.collisions import pair_keys
 from collision_monitor.session.history.history import CollisionEvent, Floats, History, Pair
 
 
@@ -52,7 +52,7 @@ def alerts_of(history: History) -> list[Alert]:
     period, longest = history.period, history.longest_step
     unseen = np.append(np.diff(history.times) > longest, True)  # (n,): a gap, or the end, follows the step
     rows, steps = history.predictions, history.prediction_step
-    keys = pair_keys(rows)
+    keys = pair_keys(rows["id_a"], rows["id_b"])
     order = np.lexsort((steps, keys))
     apart = (np.diff(steps[order]) != 1) | unseen[steps[order][:-1]]
     breaks = np.flatnonzero((np.diff(keys[order]) != 0) | apart) + 1

@@ -9,9 +9,10 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
+from collision_monitor.monitor.timeline import NANOSECOND
 from collision_monitor.records import Phase
 from collision_monitor.session.history.alerts import AlertOutcome, alerts_of
-from collision_monitor.session.history.history import NANOSECOND, History, Pair
+from collision_monitor.session.history.history import History, Pair
 
 WITHIN: Final = 0.5
 """s: two collisions of a pair whose begins are further apart are two events, not one shifted event."""

@@ -5,22 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.monitor.timeline import NANOSECOND
+from collision_monitor.prediction.impact_record import pair_keys
 from collision_monitor.records import ContactStatus, Phase
-from collision_monitor.session.history.history import NANOSECOND, CollisionEvent, Floats, History, Records
-
-
-def pair_keys(rows: Records) -> NDArray[np.uint64]:
-    """Return one number for the pair of each row."""
-    return (rows["id_a"].astype(np.uint64) << np.uint64(32)) | rows["id_b"].astype(np.uint64)
+from collision_monitor.session.history.history import CollisionEvent, Floats, History
 
 
 def find_collisions(h: History) -> list[CollisionEvent]:
     """Return the unbroken runs of contacts, sorted by begin and pair."""
     touching = h.contacts["phase"] != Phase.END
     rows, steps = h.contacts[touching], h.contact_step[touching]
-    keys = pair_keys(rows)
+    keys = pair_keys(rows["id_a"], rows["id_b"])
     order = np.lexsort((steps, keys))
-    predicted = _steps_by_pair(pair_keys(h.predictions), h.prediction_step)
+    predicted = _steps_by_pair(pair_keys(h.predictions["id_a"], h.predictions["id_b"]), h.prediction_step)
     found = []
     time, longest = h.times[steps[order]], h.longest_step
     begins = rows["phase"][order] == Phase.BEGIN  # one may end where the next begins

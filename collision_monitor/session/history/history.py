@@ -23,7 +23,6 @@ Floats = NDArray[np.float64]
 Records = NDArray[np.void]
 Pair = tuple[int, int]
 
-NANOSECOND: Final = 1e-9
 
 STEPS_MISSING: Final = 5.0
 """Number of median periods without a step that make a gap, if that is longer than the profile's stale_after."""

@@ -21,11 +21,12 @@ from collision_monitor.codec import (
     decode_status,
 )
 from collision_monitor.errors import MessageError, SessionError
+from collision_monitor.monitor.timeline import NANOSECOND
 from collision_monitor.pipeline.pipeline import Outputs, Pipeline
 from collision_monitor.pipeline.settings_event import LIMIT
 from collision_monitor.session.history.collisions import find_collisions
 from collision_monitor.session.history.growing_rows import GrowingRows
-from collision_monitor.session.history.history import NANOSECOND, History, Records
+from collision_monitor.session.history.history import History, Records
 from collision_monitor.session.mcap.layout import SEQUENCE_MASK
 from collision_monitor.session.mcap.rosbag2 import INPUT_TYPES
 from collision_monitor.session.reader import Recorded, Session
