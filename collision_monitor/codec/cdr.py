@@ -75,6 +75,10 @@ class Reader:
         codec = _SCALARS[kind]
         return codec.unpack_from(self._data, self._take(codec.size, codec.size, what))[0]
 
+    def floats(self, count: int, what: str) -> Floats:
+        """Read numbers f8 that follow each other, as a read-only view of the bytes."""
+        return np.frombuffer(self._data.toreadonly(), "<f8", count, self._take(8 * count, 8, what))
+
     def boolean(self, what: str) -> bool:
         """Read a byte that is 0 or 1."""
         value = self.scalar("u1", what)
