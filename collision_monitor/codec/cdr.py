@@ -6,17 +6,21 @@ Source: OMG DDS-XTypes 1.3, 7.4.1. A message begins with four encapsulation byte
 from __future__ import annotations
 
 import struct
-from functools import lru_cache
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import MessageError
+from collision_monitor.geometry.bounded_cache import bounded_cache
 
 ENCAPSULATION = b"\x00\x01\x00\x00"
 PADDING = 3
 """Most bytes that a middleware adds behind a message to round its size up to a multiple of 4."""
+
+REMEMBERED_STRINGS: Final = 16 << 20
+"""Bytes of encoded strings that are remembered: about 35,000 names of usual length. More: memory that hostile names can
+fill. Less: a step that mentions more objects encodes names again, 0.5 µs each."""
 
 Buffer = bytes | bytearray | memoryview
 Records = NDArray[np.void]
@@ -70,6 +74,10 @@ class Reader:
         """Read one number: u1, i4, u4, i8, u8 or f8."""
         codec = _SCALARS[kind]
         return codec.unpack_from(self._data, self._take(codec.size, codec.size, what))[0]
+
+    def floats(self, count: int, what: str) -> Floats:
+        """Read numbers f8 that follow each other, as a read-only view of the bytes."""
+        return np.frombuffer(self._data.toreadonly(), "<f8", count, self._take(8 * count, 8, what))
 
     def boolean(self, what: str) -> bool:
         """Read a byte that is 0 or 1."""
@@ -142,7 +150,11 @@ def _string(text: str) -> bytes:
     return _U4.pack(len(raw) + 1) + raw + b"\0"
 
 
-@lru_cache(maxsize=65536)  # the same names are published at every step
+def _memory(encoded: bytes, text: str) -> int:
+    return len(encoded) + 4 * len(text)  # Python needs up to 4 bytes for a character
+
+
+@bounded_cache(REMEMBERED_STRINGS, _memory)  # the same names are published at every step
 def _padded_string(text: str) -> bytes:
     """Return the same, padded to a multiple of 4, where the next string begins."""
     raw = _string(text)

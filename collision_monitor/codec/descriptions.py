@@ -93,7 +93,7 @@ def _read_description(reader: Reader) -> _Fields:
         shapes=[read_shape(reader) for _ in range(reader.count(LEAST_SHAPE, "shapes"))],
         shape_poses=reader.sequence(_POSE, 8, "shape_poses"),
         static=reader.boolean("is_static"),
-        pose=np.array([reader.scalar("f8", "pose") for _ in range(7)]),
+        pose=reader.floats(7, "pose"),
         group=reader.scalar("u4", "group"),
         mask=reader.scalar("u4", "mask"),
         allowed=reader.sequence("<u4", 4, "allowed"),

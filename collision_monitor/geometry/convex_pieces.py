@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.geometry.bounded_cache import bounded_cache
 from collision_monitor.geometry.polygons import is_convex
 from collision_monitor.geometry.polyhedra import is_closed
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.qhull import HEIGHTS_AT_ONCE
-from collision_monitor.geometry.shapes import ConvexHull, Mesh, Polygon, Shape, Triangle
+from collision_monitor.geometry.shapes import ConvexHull, Mesh, Polygon, Shape, Triangle, array_bytes
 from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.tolerances import HULL_DROP
 
+REMEMBERED_PIECES: Final = 64 << 20
+"""Bytes of pieces that are remembered: those of meshes of 45,000 faces in all. More: memory that hostile meshes can
+fill. Less: describing an object cuts its mesh several times."""
 
-@lru_cache(maxsize=64)
+PIECE_BYTES: Final = 1300
+"""Memory of a piece with its pose and the pose's rotation (measured with tracemalloc: 1,114 bytes for a triangle)."""
+
+
+def _memory(pieces: tuple[tuple[Shape, Pose], ...], shape: Shape) -> int:
+    return PIECE_BYTES * len(pieces) + array_bytes(shape)
+
+
+@bounded_cache(REMEMBERED_PIECES, _memory)
 def convex_pieces(shape: Shape) -> tuple[tuple[Shape, Pose], ...]:
     """Return the convex pieces of a shape, each with its pose in the shape's frame.
 

@@ -265,11 +265,39 @@ class ShapeTableBuilder:
     def _new_block(self, count: int) -> int:
         if self._free_blocks.get(count):
             return self._free_blocks[count].pop()
-        needed, capacity = self._vertices + count, len(self.table.vertex_index)
+        capacity = len(self.table.vertex_index)
+        if self._vertices + count > capacity and self._free_vertices > capacity // 2:
+            self._close_gaps()
+        needed = self._vertices + count
         if needed > capacity:
             self.table = _resized(self.table, len(self.table.kind), max(needed, 2 * capacity))
         self._vertices = needed
         return needed - count
+
+    @property
+    def _free_vertices(self) -> int:
+        """Number of vertices in free blocks."""
+        return sum(count * len(starts) for count, starts in self._free_blocks.items())
+
+    def _close_gaps(self) -> None:
+        """Move the blocks of vertices together. Otherwise hulls of ever other sizes would leave ever more gaps."""
+        table = self.table
+        starts = np.array(sorted(self._users), np.int32)
+        counts = np.array([self._blocks[self._users[start][0]][1] for start in starts.tolist()], np.int32)
+        ends = np.cumsum(counts, dtype=np.int32)
+        source = np.repeat(starts - (ends - counts), counts) + np.arange(counts.sum())
+        vertices, vertex_index = np.zeros_like(table.vertices), np.zeros_like(table.vertex_index)
+        vertices[:, : len(source)] = table.vertices[:, source]
+        vertex_index[: len(source)] = table.vertex_index[source]
+        used = table.vertex_count > 0
+        vertex_start = table.vertex_start.copy()
+        vertex_start[used] = (ends - counts)[np.searchsorted(starts, vertex_start[used])]
+        self.table = table._replace(vertices=vertices, vertex_index=vertex_index, vertex_start=vertex_start)
+        moved = dict(zip(starts.tolist(), (ends - counts).tolist(), strict=True))
+        self._blocks = {key: (moved[start], count) for key, (start, count) in self._blocks.items()}
+        self._users = {moved[start]: user for start, user in self._users.items()}
+        self._free_blocks.clear()
+        self._vertices = len(source)
 
 
 @device

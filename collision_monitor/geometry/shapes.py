@@ -46,6 +46,11 @@ class Shape:
     """Base class of all shapes. Shapes with arrays compare by identity, the others by their sizes."""
 
 
+def array_bytes(shape: Shape) -> int:
+    """Bytes of the arrays of a shape: its points and faces."""
+    return sum(value.nbytes for value in vars(shape).values() if isinstance(value, np.ndarray))
+
+
 @dataclass(frozen=True)
 class Sphere(Shape):
     """Sphere; radius in m."""

@@ -89,8 +89,10 @@ class ActivePairs(Stage):
     def end_unchecked(self, roster: Roster, i: int) -> None:
         """Remove the pairs of body i that are no longer checked."""
         of_body = self.of_body(i)
-        kept = [is_checked(roster, int(pair["i"]), int(pair["j"])) for pair in self.pairs[of_body]]
-        self.end(of_body[~np.array(kept, np.bool_)])
+        if len(of_body):
+            pairs = self.pairs[of_body]
+            others = np.where(pairs["i"] == i, pairs["j"], pairs["i"])
+            self.end(of_body[~is_checked(roster, i, others)])
 
     def end_of(self, is_out: NDArray[np.bool_]) -> None:
         """Remove the pairs of the marked bodies. is_out (N,): by slot."""

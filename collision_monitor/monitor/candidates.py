@@ -83,11 +83,16 @@ class Candidates(Stage):
         self.grid = regridded(boxes, max(top, len(self.grid.box)))
 
 
-def is_checked(roster: Roster, i: int, j: int) -> bool:
-    """Whether both bodies have a state and their pair is checked."""
-    slots = np.array([[i, j]], np.int32)
-    seen = roster.bodies.seen[slots].all()
-    return bool(seen) and keep_checked(roster.bodies, roster.allowed_keys, slots) == 1
+_NONE_ALLOWED: Final = np.zeros(0, np.uint64)
+
+
+def is_checked(roster: Roster, i: int, others: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Whether body i and each of these other bodies (n,) have a state and their pair is checked."""
+    bodies = roster.bodies
+    pairs = np.stack([np.full_like(others, i), others], axis=1)
+    kept = pairs[: keep_checked(bodies, _NONE_ALLOWED, pairs), 1]  # a query of all allowed pairs would sort them anew
+    allowed = [roster.allows(int(bodies.id[i]), object_id) for object_id in bodies.id[others].tolist()]
+    return bodies.seen[i] & bodies.seen[others] & np.isin(others, kept) & ~np.array(allowed, np.bool_)
 
 
 @device

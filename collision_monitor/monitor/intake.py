@@ -25,6 +25,10 @@ NON_FINITE: Final = 2
 QUATERNION: Final = 3
 OLD: Final = 4
 
+MOST_REFUSAL_TEXT: Final = 1000
+"""Longest text of a refusal that is kept (characters), because a text may quote a string of a message, and every status
+repeats the last one."""
+
 STATE_NUMBERS: Final = 20
 """float64 numbers at the front of a records.STATE; id and flags follow."""
 
@@ -67,7 +71,7 @@ class Intake(Stage):
     def refuse(self, reason: Refusal, text: str, count: int = 1) -> None:
         """Count refused inputs; `text` describes the last of these."""
         self.refused[reason] += count
-        self.last_refusal = text
+        self.last_refusal = text if len(text) <= MOST_REFUSAL_TEXT else f"{text[:MOST_REFUSAL_TEXT]}…"
 
     def states(
         self, ids: ArrayLike, poses: Any, twists: Any, covariance: Any

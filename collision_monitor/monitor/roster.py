@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from itertools import chain
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import CollisionMonitorError, InputError, UnsupportedError
 from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.shape_table import POLYGON, ShapeTable, ShapeTableBuilder
-from collision_monitor.geometry.shapes import HalfSpace
+from collision_monitor.geometry.shapes import HalfSpace, array_bytes
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import monitored_model
@@ -24,6 +25,25 @@ from collision_monitor.records import Model, ShapeType
 FIRST_CAPACITY = 64
 """Initial number of body slots; it is doubled when all are used."""
 
+MOST_MEMORY: Final = 512 << 20
+"""Memory that all described objects may need together (bytes, as `memory` estimates it): 160,000 objects of one shape,
+or hulls of 5,000,000 points. Descriptions beyond it are refused, because else a publisher could fill the machine."""
+
+OBJECT_BYTES: Final = 2600
+SHAPE_BYTES: Final = 700
+ALLOWED_BYTES: Final = 150
+"""Memory of an object, of each of its shapes without their arrays, and of each id in `allowed` (measured)."""
+
+COPIES: Final = 4
+"""How often the arrays of a shape are kept: in the description, in the table of shapes and in the key of its block; and
+the table has up to twice the room that it needs."""
+
+
+def memory(d: ObjectDescription) -> int:
+    """Return the memory that a described object needs (bytes), rounded up."""
+    shapes = sum(SHAPE_BYTES + COPIES * array_bytes(shape) for shape, _ in d.shapes)
+    return OBJECT_BYTES + shapes + ALLOWED_BYTES * len(d.allowed)
+
 
 class Roster(Stage):
     """The described objects. A body keeps its slot as long as its object is described.
@@ -34,9 +54,9 @@ class Roster(Stage):
 
     SAVED = (
         *("bodies", "parts", "top", "planar", "renewed"),
-        *("_shapes", "_slots", "_names", "_free", "_allowed", "_allowed_keys"),
+        *("_shapes", "_slots", "_names", "_memory", "_free", "_allowed"),
     )
-    CACHES = ("_last_ids", "_last_slots")
+    CACHES = ("_last_ids", "_last_slots", "_allowed_keys", "_all_memory")
 
     def __init__(self) -> None:
         self.bodies: Bodies = make_bodies(FIRST_CAPACITY)
@@ -47,9 +67,11 @@ class Roster(Stage):
         self._shapes = ShapeTableBuilder()
         self._slots: dict[int, int] = {}
         self._names: dict[int, str] = {}
+        self._memory: dict[int, int] = {}
+        self._all_memory = 0
         self._free: list[int] = []
         self._allowed: dict[int, frozenset[int]] = {}
-        self._allowed_keys = np.zeros(0, np.uint64)
+        self._allowed_keys: NDArray[np.uint64] | None = None  # None after a change
         self._last_ids, self._last_slots = np.zeros(0, np.uint32), np.zeros(0, np.int32)
 
     # ------------------------------------------------------------------ reading
@@ -66,8 +88,17 @@ class Roster(Stage):
 
     @property
     def allowed_keys(self) -> NDArray[np.uint64]:
-        """Keys of the pairs that are never checked, sorted."""
+        """Keys of the pairs that are never checked, sorted. Made when they are read, not at every description."""
+        if self._allowed_keys is None:
+            counts = [len(others) for others in self._allowed.values()]
+            a = np.repeat(np.fromiter(self._allowed, np.uint32, len(counts)), counts)
+            b = np.fromiter(chain.from_iterable(self._allowed.values()), np.uint32, sum(counts))
+            self._allowed_keys = np.unique(pair_keys(np.minimum(a, b), np.maximum(a, b)))
         return self._allowed_keys
+
+    def allows(self, id_a: int, id_b: int) -> bool:
+        """Whether the contact of two objects is expected, so that their pair is never checked."""
+        return id_b in self._allowed.get(id_a, ()) or id_a in self._allowed.get(id_b, ())
 
     @property
     def ids(self) -> list[int]:
@@ -116,8 +147,17 @@ class Roster(Stage):
     def describe(self, d: ObjectDescription, model: Model) -> int:
         """Add a new object, or replace the description of a known one and keep its state. Return its slot.
 
-        Raises InputError, ShapeError; UnsupportedError for an unsupported shape or model.
+        Raises InputError, also if all objects together would need more than MOST_MEMORY; ShapeError; UnsupportedError
+        for an unsupported shape or model.
         """
+        needed = memory(d)
+        all_memory = self._all_memory - self._memory.get(d.object_id, 0) + needed
+        if all_memory > MOST_MEMORY:
+            raise InputError(
+                f"object {d.object_id}: expected all objects together to need at most {MOST_MEMORY >> 20} MiB, got "
+                f"{all_memory / (1 << 20):.1f} MiB with {len(self) + (d.object_id not in self._slots)} objects; "
+                "remove objects, or describe them by simpler shapes"
+            )
         if not d.static and any(isinstance(shape, HalfSpace) for shape, _ in d.shapes):
             raise UnsupportedError(f"object {d.object_id}: a HalfSpace has no end and can only be static")
         planar = self._is_planar(d)
@@ -157,6 +197,7 @@ class Roster(Stage):
         bodies.static[i] = d.static
         bodies.version[i] += 1
         self._names[d.object_id] = d.name
+        self._memory[d.object_id], self._all_memory = needed, all_memory
         self._allow(d.object_id, frozenset(d.allowed))
         self.renewed.add(i)
         self._forget_ids()
@@ -170,7 +211,8 @@ class Roster(Stage):
         self.bodies.version[i] += 1
         self.renewed.discard(i)
         self._free.append(i)
-        del self._slots[object_id], self._names[object_id]
+        self._all_memory -= self._memory[object_id]
+        del self._slots[object_id], self._names[object_id], self._memory[object_id]
         self._allow(object_id, frozenset())
         self._forget_ids()
 
@@ -220,8 +262,7 @@ class Roster(Stage):
         self._allowed[object_id] = others
         if not others:
             del self._allowed[object_id]
-        pairs = {(min(a, b), max(a, b)) for a, others in self._allowed.items() for b in others}
-        self._allowed_keys = np.unique(pair_keys(*np.array(list(pairs), np.uint32).reshape(-1, 2).T))
+        self._allowed_keys = None
 
     def _forget_ids(self) -> None:
         self._last_ids = np.zeros(0, np.uint32)
@@ -242,6 +283,7 @@ class Roster(Stage):
         )
         facts |= {
             "names": {str(object_id): name for object_id, name in self._names.items()},
+            "memory": {str(object_id): size for object_id, size in self._memory.items()},
             "allowed": {str(object_id): sorted(others) for object_id, others in self._allowed.items()},
             "planar": self.planar,
             "renewed": sorted(self.renewed),
@@ -266,6 +308,9 @@ class Roster(Stage):
         used = self.used()
         self._slots = dict(zip(bodies.id[used].tolist(), used.tolist(), strict=True))
         self._names = {object_id: facts["names"][str(object_id)] for object_id in self._slots}
+        sizes = facts.get("memory", {})  # older sessions have none
+        self._memory = {object_id: int(sizes.get(str(object_id), OBJECT_BYTES)) for object_id in self._slots}
+        self._all_memory = sum(self._memory.values())
         for object_id, others in facts["allowed"].items():
             self._allow(int(object_id), frozenset(others))
         self.planar = facts["planar"]

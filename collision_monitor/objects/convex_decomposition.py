@@ -7,19 +7,19 @@ cover the mesh's surface, and computes the largest distance of a point of the pa
 
 from __future__ import annotations
 
-from functools import lru_cache
 from importlib import import_module
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
+from collision_monitor.geometry.bounded_cache import bounded_cache
 from collision_monitor.geometry.bounding_volumes import Hull, convex_hull
 from collision_monitor.geometry.coordinates import Array, Indices
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.point_triangle import closest_point_on_triangle
 from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
-from collision_monitor.geometry.shapes import ConvexHull, Mesh
+from collision_monitor.geometry.shapes import ConvexHull, Mesh, array_bytes
 
 CONCAVITY: Final = 0.05
 """CoACD's threshold, from 0.01 (many parts) to 1: concavity allowed in a part, relative to the mesh's size."""
@@ -54,7 +54,15 @@ class Decomposition(NamedTuple):
     volume_error: float
 
 
-@lru_cache(maxsize=64)
+REMEMBERED_DECOMPOSITIONS: Final = 32 << 20
+"""Bytes of meshes and their parts that are remembered. Less: a mesh that is described again is decomposed again."""
+
+
+def _memory(found: Decomposition, mesh: Mesh, *_: float) -> int:
+    return array_bytes(mesh) + sum(map(array_bytes, found.parts))
+
+
+@bounded_cache(REMEMBERED_DECOMPOSITIONS, _memory)
 def convex_decomposition(mesh: Mesh, concavity: float = CONCAVITY) -> Decomposition:
     """Decompose a closed mesh into convex parts; takes seconds. The result is cached for the mesh.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.compound import shape_pairs
@@ -13,6 +13,10 @@ from collision_monitor.records import Model
 
 ALL_GROUPS = 0xFFFFFFFF
 _UINT32_MAX = 0xFFFFFFFF
+
+MOST_NAME_BYTES: Final = 256
+"""Largest size of a name (bytes of UTF-8). A name is for people, and every answer that mentions its object repeats it.
+Longer names are refused, because cutting them could make two of them equal."""
 
 
 def _uint32(value: Any, what: str) -> int:
@@ -31,13 +35,30 @@ def _not_negative(value: Any, what: str, unit: str) -> float:
     return number
 
 
+def _name(value: Any, what: str) -> str:
+    name = str(value)
+    try:
+        encoded = name.encode("utf-8")
+    except UnicodeEncodeError:
+        encoded = b"\0"
+    if 0 in encoded:
+        raise InputError(f"{what}, name: expected text that UTF-8 can hold, without zero bytes, got {name[:40]!r}")
+    if len(encoded) > MOST_NAME_BYTES:
+        raise InputError(
+            f"{what}, name: expected at most {MOST_NAME_BYTES} bytes of UTF-8, got {len(encoded)} bytes: "
+            f"{name[:40]!r}…; use a shorter name"
+        )
+    return name
+
+
 @dataclass(frozen=True, eq=False)
 class ObjectDescription:
     """One object, as in `ObjectDescription.msg`; lengths in m, accelerations in m/s^2 and rad/s^2.
 
     `shapes` may be given as one shape and is stored as a tuple of (shape, pose in the object's frame). `pose` is the
-    pose of a static object in the world frame, None otherwise. Values that the message may omit get their defaults
-    here: an empty name, a group or mask of 0, an acceleration of NaN. Raises InputError; ShapeError for the shapes.
+    pose of a static object in the world frame, None otherwise. `name` has at most MOST_NAME_BYTES of UTF-8. Values that
+    the message may omit get their defaults here: an empty name, a group or mask of 0, an acceleration of NaN.
+    Raises InputError; ShapeError for the shapes.
     """
 
     object_id: int
@@ -69,7 +90,7 @@ class ObjectDescription:
         checked = {
             "object_id": object_id,
             "shapes": shape_pairs(self.shapes, what),
-            "name": str(self.name) or f"object_{object_id}",
+            "name": _name(self.name, what) or f"object_{object_id}",
             "static": bool(self.static),
             "group": _uint32(self.group, f"{what}, group") or 1,
             "mask": _uint32(self.mask, f"{what}, mask") or ALL_GROUPS,

@@ -24,6 +24,7 @@ class Catalogue:
         self.static: set[int] = set()
         self._names: dict[int, str] = {}  # of the removed objects too
         self._removed: set[int] = set()  # since the last step: the next step ends their contacts and needs their names
+        self._new: set[int] = set()  # since the last step: they have no contacts that could end
 
     def changes(self, message: ObjectDescriptionArray) -> list[Change]:
         """Return the changes that a message requests, in order.
@@ -43,19 +44,26 @@ class Catalogue:
         if isinstance(change, Removal):
             self.descriptions.pop(object_id, None)
             self.static.discard(object_id)
-            self._removed.add(object_id)
+            if object_id in self._new:  # else names would pile up while objects come and go and no step is taken
+                self._new.remove(object_id)
+                del self._names[object_id]
+            else:
+                self._removed.add(object_id)
             return
+        if object_id not in self._names:
+            self._new.add(object_id)
         self.descriptions[object_id] = change
         (self.static.add if change.static else self.static.discard)(object_id)
         self._names[object_id] = change.name
         self._removed.discard(object_id)
 
     def names(self, ids: NDArray[np.uint32]) -> list[str]:
-        """Return the names of these objects. Objects removed since the last step still have one."""
+        """Return the names of these objects. Those that the last step knew have one until the next step has ended."""
         return list(map(self._names.__getitem__, ids.tolist()))
 
-    def forget_removed(self) -> None:
-        """Forget the names of the removed objects, once a step has ended their contacts."""
+    def end_step(self) -> None:
+        """Forget the names of the removed objects, because the step has ended their contacts."""
+        self._new.clear()
         while self._removed:
             del self._names[self._removed.pop()]
 
@@ -65,6 +73,7 @@ class Catalogue:
             "static": sorted(self.static),
             "names": {str(object_id): name for object_id, name in self._names.items()},
             "removed": sorted(self._removed),
+            "new": sorted(self._new),
         }
 
     @classmethod
@@ -72,5 +81,6 @@ class Catalogue:
         """Restore a catalogue from `facts`. Raises KeyError, TypeError, ValueError or AttributeError for others."""
         catalogue = cls()
         catalogue.static, catalogue._removed = set(facts["static"]), set(facts["removed"])
+        catalogue._new = set(facts.get("new", ()))  # older sessions have none
         catalogue._names = {int(object_id): name for object_id, name in facts["names"].items()}
         return catalogue

@@ -117,7 +117,7 @@ class Pipeline:
         horizon = self.monitor.profile.horizon
         contacts = encode_contacts(*header, result.contacts, *self._mentioned(result.contacts))
         predictions = encode_predictions(*header, horizon, result.predictions, *self._mentioned(result.predictions))
-        self.catalogue.forget_removed()
+        self.catalogue.end_step()
         return Outputs(contacts, predictions, result, self.monitor.digest, self._limit_of(result))
 
     def _mentioned(self, answers: Records) -> tuple[NDArray[np.uint32], list[str]]:

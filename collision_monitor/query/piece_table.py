@@ -4,19 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.aabb_tree import aabb_tree
+from collision_monitor.geometry.bounded_cache import bounded_cache
 from collision_monitor.geometry.convex_pieces import convex_pieces, is_convex_mesh
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shape_table import ShapeTable, ShapeTableBuilder, join, triangle_table
-from collision_monitor.geometry.shapes import ConvexHull, HalfSpace, Mesh, Polygon, Shape
+from collision_monitor.geometry.shapes import ConvexHull, HalfSpace, Mesh, Polygon, Shape, array_bytes
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+
+REMEMBERED_CONVEX: Final = 16 << 20
+REMEMBERED_CONCAVE: Final = 256 << 20
+"""Bytes of the tables that are remembered: of concave meshes, 200,000 faces in all. Less: `contact` of meshes that take
+turns makes their tables at each call, 1 s for 100,000 faces."""
+
+TABLE_BYTES: Final = 5000
+ROW_BYTES: Final = 900
+"""Memory of a table beside its vertices and of each of its rows, with the spheres (measured with tracemalloc)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,12 +91,16 @@ def exact_piece_table(shapes: Sequence[tuple[Shape, Pose]]) -> PieceTable:
     return PieceTable(join([part.table for part in parts]), *map(np.concatenate, columns))
 
 
-@lru_cache(maxsize=1024)
+def _memory(table: PieceTable, shape: Shape) -> int:
+    return TABLE_BYTES + ROW_BYTES * len(table) + table.table.vertices.nbytes + array_bytes(shape)
+
+
+@bounded_cache(REMEMBERED_CONVEX, _memory)
 def _of_convex(shape: Shape) -> PieceTable:
     return piece_table(((shape, Pose()),))
 
 
-@lru_cache(maxsize=64)
+@bounded_cache(REMEMBERED_CONCAVE, _memory)
 def _of_concave(shape: Mesh | Polygon) -> PieceTable:
     if isinstance(shape, Mesh) and not is_convex_mesh(shape):
         corners = shape.vertices[shape.faces]

@@ -86,7 +86,7 @@ class MarkerView:
         """
         if self._changed:
             self._build()
-        for state in states:
+        for state in states[np.isin(states["id"], self._ids)]:  # refused states may have any id
             self._poses[int(state["id"])] = np.r_[state["position"], state["quaternion"]]
         contacts = result.contacts[result.contacts["phase"] != Phase.END]
         touching = np.isin(self._ids, [contacts["id_a"], contacts["id_b"]])

@@ -21,6 +21,9 @@ from collision_monitor.settings.setting import EVERYWHERE, Setting, choice, numb
 NO_BUDGET: Final = 1e6
 """ms, a quarter of an hour: with this value a step has no time limit and does not read the clock."""
 
+MOST_NAME: Final = 4096
+"""Longest name of a profile (characters), that of a path on Linux. The name may be a path; each status repeats it."""
+
 NO_LIMIT: Final = 1_000_000_000
 """Pairs in a step: more than fit into memory, so no limit."""
 
@@ -139,6 +142,8 @@ class Profile:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise ProfileError(f"profile, name: expected a text, got {self.name!r}")
+        if len(self.name) > MOST_NAME:
+            raise ProfileError(f"profile, name: expected at most {MOST_NAME} characters, got {len(self.name)}")
         for setting in self.fields():
             object.__setattr__(self, setting.name, setting.checked(getattr(self, setting.name)))
         for axis, low, high in zip("xyz", self.region_min, self.region_max, strict=True):

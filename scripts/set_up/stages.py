@@ -163,8 +163,36 @@ def _build_messages(ros: machine.RosInstall | None, log: IO[str]) -> None:
 # package -------------------------------------------------------------------------------------------------------------
 
 
+EXECUTABLES = ("monitor", "world", "replay", "collision-monitor")
+
+
+def ros_files() -> dict[Path, Path]:
+    """Files by which `ros2 run`, `ros2 launch` and ament_index find the package: each place, and what it links to.
+
+    The places and the files are those of a colcon build. pip installs none of them for an editable package.
+    """
+    share = VENV / "share"
+    data = [ROOT / "package.xml", *sorted(ROOT.glob("config/*.*")), *sorted(ROOT.glob("launch/*.py"))]
+    return {
+        share / "ament_index" / "resource_index" / "packages" / PACKAGE: ROOT / "resource" / PACKAGE,
+        **{share / PACKAGE / path.relative_to(ROOT): path for path in data},
+        **{VENV / "lib" / PACKAGE / name: VENV / "bin" / name for name in EXECUTABLES},
+    }
+
+
+def _link_ros_files() -> None:
+    """Make the links of `ros_files` anew, in real folders: `ros2 launch` does not look into linked ones."""
+    for folder in ("share", "lib"):
+        shutil.rmtree(VENV / folder / PACKAGE, ignore_errors=True)
+    for place, source in ros_files().items():
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.unlink(missing_ok=True)
+        place.symlink_to(source)
+
+
 def _package_inputs(ros: machine.RosInstall | None) -> str:
-    return _digest(files=[ROOT / "pyproject.toml", ROOT / "setup.py", ROOT / "setup.cfg"])
+    names = (str(path) for path in ros_files().values())
+    return _digest(*names, files=[ROOT / "pyproject.toml", ROOT / "setup.py", ROOT / "setup.cfg"])
 
 
 def _install_package(ros: machine.RosInstall | None, log: IO[str]) -> None:
@@ -172,6 +200,7 @@ def _install_package(ros: machine.RosInstall | None, log: IO[str]) -> None:
     # compat: a plain path instead of an import hook, because type checkers and editors understand it too.
     settings = ("--config-settings", "editable_mode=compat")
     _call(log, ros, *pip, "--no-deps", "--no-build-isolation", *settings, "--editable", ROOT)
+    _link_ros_files()
 
 
 # kernels -------------------------------------------------------------------------------------------------------------
@@ -261,6 +290,8 @@ def first_broken_stage(ros: machine.RosInstall | None) -> tuple[str, str] | None
         lines = answer.stderr.strip().splitlines() or [f"Python ended with {answer.returncode}"]
         stage = lines[-1].partition(":")[0]
         return (stage if stage in {"packages", "messages", "package"} else "environment"), lines[-1]
-    if not os.access(VENV / "bin" / "collision-monitor", os.X_OK):
-        return "package", "bin/collision-monitor is not there"
+    for place, source in ros_files().items():
+        wanted = os.X_OK if source.parent == VENV / "bin" else os.R_OK
+        if not os.access(place, wanted) or place.resolve() != source.resolve():
+            return "package", f"{place.relative_to(VENV)} is not there"
     return None

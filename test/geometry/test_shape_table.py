@@ -138,6 +138,36 @@ def test_identical_hulls_share_vertices_until_the_last_is_removed():
     assert len(builder) == 2
 
 
+def test_gaps_between_hulls_are_closed_and_every_shape_keeps_its_corners():
+    rng = np.random.default_rng(0)
+    builder = ShapeTableBuilder(slots=4, vertices=64)
+    kept: dict[int, np.ndarray] = {}
+    live = 0
+    for k in range(400):
+        points = rng.normal(size=(8 + 8 * (k % 40), 3))
+        points /= np.linalg.norm(points, axis=1, keepdims=True)  # all of them are corners
+        slot = builder.append(shapes.ConvexHull(points))
+        assert builder.append(shapes.ConvexHull(points)) != slot  # shares the block
+        kept[slot] = points
+        if len(kept) > 3:
+            gone = list(kept)[int(rng.integers(3))]
+            del kept[gone]
+            builder.remove(gone)  # the slot that shares its block still holds it
+            shared = [s for s in range(len(builder.used.kind)) if builder.used.kind[s] and s not in kept]
+            for s in shared[: max(0, len(shared) - 3)]:
+                builder.remove(s)
+        live = max(live, sum(int(c) for c in builder.used.vertex_count))
+        table = builder.used
+        for s, corners in kept.items():
+            block = slice(table.vertex_start[s], table.vertex_start[s] + table.vertex_count[s])
+            assert np.array_equal(np.unique(table.vertices[:, block].T, axis=0), np.unique(corners, axis=0))
+            assert np.array_equal(corners[table.vertex_index[block]], table.vertices[:, block].T)
+    assert len(builder.table.vertex_index) <= 4 * live
+    back = ShapeTableBuilder.restored(table, *builder.free)
+    assert back._blocks == builder._blocks
+    assert back._users == builder._users
+
+
 def test_local_pose_is_kept():
     builder = ShapeTableBuilder()
     pose = Pose((1, 2, 3), (0, 0, np.sin(0.5), np.cos(0.5)))

@@ -7,6 +7,7 @@ import pytest
 from collision_monitor.errors import InputError, ShapeError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Sphere
+from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ALL_GROUPS, ObjectDescription
 from collision_monitor.records import Model
 
@@ -37,6 +38,10 @@ def test_what_the_message_may_leave_out_is_filled_in():
         ({"object_id": 1.5}, "object id"),
         ({"object_id": True}, "object id"),
         ({"static": True}, "needs the pose"),
+        ({"name": "x" * 257}, "name: expected at most 256 bytes of UTF-8, got 257 bytes: 'xxxx"),
+        ({"name": "ü" * 129}, "got 258 bytes"),
+        ({"name": "a\0b"}, "without zero bytes, got 'a.x00b'"),
+        ({"name": "\ud800"}, "UTF-8 can hold"),
         ({"pose": (0, 0, 0)}, "expected a Pose"),
         ({"padding": -0.1}, "padding"),
         ({"padding": math.nan}, "padding"),
@@ -59,3 +64,15 @@ def test_bad_fields_are_refused_with_their_name(arguments, text):
 def test_bad_shapes_are_refused(shapes):
     with pytest.raises(ShapeError, match="expected"):
         ObjectDescription(1, shapes)
+
+
+@pytest.mark.parametrize("name", ["x" * 256, "ü" * 128, "\U0001f916" * 64])
+def test_a_name_may_have_256_bytes(name):
+    assert ObjectDescription(1, Sphere(1), name=name).name == name
+
+
+def test_a_monitor_refuses_a_long_name_and_stays_as_it_was():
+    monitor = Monitor()
+    with pytest.raises(InputError, match="object 3, name: expected at most 256 bytes"):
+        monitor.add(3, Sphere(1), name="x" * 1000)
+    assert monitor.ids == []

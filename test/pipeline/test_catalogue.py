@@ -53,12 +53,28 @@ def test_a_snapshot_removes_nothing_twice() -> None:
 
 def test_a_removed_object_has_its_name_until_the_step_is_over() -> None:
     catalogue = filled(ball(1, "a"), ball(2, "b", static=True))
+    catalogue.end_step()
     catalogue.apply(Removal(2))
     assert (list(catalogue.descriptions), catalogue.static) == ([1], set())
     assert names(catalogue, 1, 2) == ["a", "b"]
-    catalogue.forget_removed()
+    catalogue.end_step()
     with pytest.raises(KeyError):
         names(catalogue, 2)
+
+
+def test_an_object_that_no_step_knew_leaves_no_name() -> None:
+    catalogue = filled(ball(1, "a"))
+    catalogue.apply(Removal(1))
+    assert catalogue.facts() == {"static": [], "names": {}, "removed": [], "new": []}
+    assert catalogue.changes(message(snapshot=True)) == []
+
+
+def test_an_object_that_is_removed_and_described_again_keeps_a_name_for_the_end_of_its_contacts() -> None:
+    catalogue = filled(ball(1, "a"))
+    catalogue.end_step()
+    for change in (Removal(1), ball(1, "b"), Removal(1)):
+        catalogue.apply(change)
+    assert names(catalogue, 1) == ["b"]
 
 
 def test_an_object_that_is_described_again_keeps_its_place_and_takes_what_is_new() -> None:
@@ -72,12 +88,14 @@ def test_an_object_that_is_described_again_keeps_its_place_and_takes_what_is_new
 
 def test_it_is_restored_from_its_facts_without_descriptions() -> None:
     catalogue = filled(ball(1, "a", static=True), ball(2, "b"), ball(3, "c"))
+    catalogue.end_step()
     catalogue.apply(Removal(3))
+    catalogue.apply(ball(4, "d"))
     restored = Catalogue.restored(json.loads(json.dumps(catalogue.facts())))
     assert (
         restored.facts()
         == catalogue.facts()
-        == {"static": [1], "names": {"1": "a", "2": "b", "3": "c"}, "removed": [3]}
+        == {"static": [1], "names": {"1": "a", "2": "b", "3": "c", "4": "d"}, "removed": [3], "new": [4]}
     )
     assert restored.descriptions == {}
     assert restored.changes(message(ball(2), snapshot=True))[0] == Removal(1)

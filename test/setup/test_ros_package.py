@@ -13,7 +13,9 @@ import tomllib
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+import machine
 import pytest
+import stages
 
 from collision_monitor._version import VERSION
 
@@ -71,6 +73,85 @@ def test_the_package_is_in_the_ament_index(install: Path) -> None:
 def test_ros2_run_finds_every_executable(install: Path) -> None:
     folder = install / "collision_monitor" / "lib" / "collision_monitor"
     assert {path.name for path in folder.iterdir() if os.access(path, os.X_OK)} == EXECUTABLES
+
+
+def test_the_set_up_installs_what_colcon_does(install: Path) -> None:
+    """Without colcon, `make setup` links the same files into the environment."""
+    built = install / "collision_monitor"
+    share = built / "share" / "collision_monitor"
+    by_colcon = [
+        built / "share" / "ament_index" / "resource_index" / "packages" / "collision_monitor",
+        *(share / "package.xml", *(share / "config").iterdir(), *(share / "launch").iterdir()),
+        *(built / "lib" / "collision_monitor").iterdir(),
+    ]
+    linked = {place.relative_to(stages.VENV) for place in stages.ros_files()}
+    assert {path.relative_to(built) for path in by_colcon} == linked
+
+
+def ros2_finds(kind: str) -> dict[str, Path]:
+    """Files of the package in this environment, found by the rules of `ros2 run` and `ros2 launch`, by their names.
+
+    Those of ros2pkg.api.get_executable_paths and ros2launch.api.get_share_file_path_from_package. The commands
+    themselves are no wheels.
+    """
+    code = (
+        "import os\n"
+        "from ament_index_python.packages import get_package_prefix, get_package_share_directory\n"
+        "prefix = get_package_prefix('collision_monitor')\n"
+        "folders = {'run': os.path.join(prefix, 'lib', 'collision_monitor'),\n"
+        "           'launch': get_package_share_directory('collision_monitor')}\n"
+        f"for folder, _, files in os.walk(folders['{kind}']):\n"
+        "    for path in (os.path.join(folder, name) for name in files):\n"
+        f"        if os.access(path, os.X_OK if '{kind}' == 'run' else os.R_OK):\n"
+        "            print(path)\n"
+    )
+    command = f"source {shlex.quote(str(stages.VENV))}/local_setup.bash && exec {shlex.quote(sys.executable)} -c"
+    answer = subprocess.run(
+        ["bash", "-c", f"{command} {shlex.quote(code)}"], cwd="/", env=plain_shell(), capture_output=True, text=True
+    )
+    assert answer.returncode == 0, answer.stderr
+    return {path.name: path for path in map(Path, answer.stdout.splitlines())}
+
+
+def plain_shell() -> dict[str, str]:
+    """The variables of a shell in which nothing but a ROS 2 install, if there is one, is exported or sourced."""
+    if machine.ros_install(os.environ, stages.VENV):
+        return dict(os.environ)
+    ours = ("AMENT_", "COLCON_", "CMAKE_", "PYTHON", "LD_LIBRARY", "_ROS_WHEELS", "VIRTUAL_ENV")
+    return {key: value for key, value in os.environ.items() if not key.startswith(ours)}
+
+
+def test_after_the_set_up_ros2_finds_executables_launch_files_and_parameters_without_colcon() -> None:
+    run, launch = ros2_finds("run"), ros2_finds("launch")
+    assert run.keys() == EXECUTABLES
+    assert {"monitor.launch.py", "demo.launch.py", "monitor.yaml", "package.xml"} <= launch.keys()
+    for path in (*run.values(), *launch.values()):
+        assert path.is_relative_to(stages.VENV), "not what another workspace installed"
+    assert launch["monitor.yaml"].read_bytes() == (ROOT / "config" / "monitor.yaml").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["monitor", "world"])
+def test_after_the_set_up_ros2_run_starts_a_node(ros_domain_id: int, name: str) -> None:
+    path = ros2_finds("run")[name]
+    environment = plain_shell()  # `ros2 run` adds nothing to it
+    with subprocess.Popen(
+        [path, "--ros-args", "-r", f"__node:=started_{name}"],
+        env=environment, cwd="/", stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    ) as process:  # fmt: skip
+        assert process.stdout
+        first = process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        rest = process.stdout.read()
+        assert process.wait(30) == 0, first + rest
+    assert "Traceback" not in first + rest
+    assert f"[started_{name}]" in first
+
+
+def test_after_the_set_up_ros2_run_replays_help() -> None:
+    answer = subprocess.run(
+        [ros2_finds("run")["replay"], "--help"], env=plain_shell(), cwd="/", capture_output=True, text=True, timeout=60
+    )
+    assert answer.stdout.startswith("usage: collision-monitor replay"), answer.stderr
 
 
 def test_the_installed_copy_runs_not_the_source(install: Path) -> None:

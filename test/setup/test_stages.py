@@ -113,6 +113,60 @@ def test_a_package_of_another_clone_is_installed_again(
     assert pending() == ["package"]
 
 
+@pytest.fixture
+def links(stamps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The package's files for ROS 2, linked into an environment whose other parts are those of this one."""
+    environment = tmp_path / "environment"
+    environment.mkdir()
+    (environment / "bin").symlink_to(stages.VENV / "bin")
+    monkeypatch.setattr(stages, "VENV", environment)
+    (stamps / "environment").write_text(stages._environment_inputs(ROS))
+    (stamps / "package").write_text(stages._package_inputs(ROS))
+    stages._link_ros_files()
+    return environment
+
+
+@pytest.mark.parametrize(
+    "gone",
+    [
+        "share/ament_index/resource_index/packages/collision_monitor",
+        "share/collision_monitor/package.xml",
+        "share/collision_monitor/launch/monitor.launch.py",
+        "lib/collision_monitor/monitor",
+    ],
+)
+def test_a_missing_or_a_foreign_file_for_ros_is_linked_again(links: Path, gone: str) -> None:
+    assert pending() == []
+    (links / gone).unlink()
+    assert pending() == ["package"]
+    (links / gone).write_text("of another package")
+    assert pending() == ["package"]
+    stages._link_ros_files()
+    assert pending() == []
+
+
+def test_files_for_ros_that_are_no_more_are_removed(links: Path) -> None:
+    for folder in ("share/collision_monitor/launch", "lib/collision_monitor"):
+        (links / folder / "old").symlink_to(ROOT / "no_more")
+    stages._link_ros_files()
+    found = {path for folder in ("share", "lib") for path in (links / folder).rglob("*") if not path.is_dir()}
+    assert found == set(stages.ros_files())
+
+
+def test_a_new_launch_file_is_linked(links: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    root = tmp_path / "root"
+    for source in stages.ros_files().values():
+        if source.is_relative_to(ROOT) and not source.is_relative_to(ROOT / ".venv"):
+            (root / source.relative_to(ROOT)).parent.mkdir(parents=True, exist_ok=True)
+            (root / source.relative_to(ROOT)).write_text("")
+    for name in ("pyproject.toml", "setup.py", "setup.cfg"):
+        (root / name).write_text("")
+    monkeypatch.setattr(stages, "ROOT", root)
+    before = stages._package_inputs(ROS)
+    (root / "launch" / "new.launch.py").write_text("")
+    assert stages._package_inputs(ROS) != before
+
+
 def test_exported_variables_of_other_pythons_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     strays = ("PYTHONHOME", "VIRTUAL_ENV", "PIP_USER", "PIP_TARGET", "COLCON_DEFAULTS_FILE")
     for name in strays:
