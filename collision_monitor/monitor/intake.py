@@ -14,6 +14,7 @@ from collision_monitor.errors import InputError, Refusal
 from collision_monitor.geometry.planar import flat_states
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.timeline import Order
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.prediction.spread import worst_stddevs
 from collision_monitor.records import StateFlag
@@ -50,7 +51,7 @@ _VERDICTS: Final = {
     QUATERNION: (Refusal.QUATERNION, "object {id}: expected a unit quaternion within 1e-3, got {quaternion}"),
     OLD: (
         Refusal.OLD,
-        "object {id}: expected one state a message, newer than its last one, and none of a static object",
+        "object {id}: expected one state a message, newer than its last one, and none of a static object; {age}",
     ),
 }
 
@@ -58,13 +59,14 @@ States = NDArray[np.void]
 
 
 class Intake(Stage):
-    """Stores states in the roster, counts the refused inputs by reason, and keeps the text of the last refusal."""
+    """Stores states in the roster, counts the refused inputs by reason, and keeps the texts of the last refusals."""
 
-    SAVED = ("refused", "last_refusal")
+    SAVED = ("refused", "texts", "last_refusal")
     CACHES = ("_buffer",)
 
     def __init__(self) -> None:
         self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
+        self.texts: dict[Refusal, str] = dict.fromkeys(Refusal, "")
         self.last_refusal = ""
         self._buffer = np.empty(64, records.STATE)
 
@@ -72,6 +74,16 @@ class Intake(Stage):
         """Count refused inputs; `text` describes the last of these."""
         self.refused[reason] += count
         self.last_refusal = text if len(text) <= MOST_REFUSAL_TEXT else f"{text[:MOST_REFUSAL_TEXT]}…"
+        self.texts[reason] = self.last_refusal
+
+    def order(self, states: States, time: float, late: bool, roster: Roster) -> Order:
+        """Return how a message of these states stands to what the roster has. late: its `time` (s) is stale already."""
+        bodies, slots = roster.bodies, roster.slots_of(states["id"])
+        slots = slots[slots >= 0]
+        moving = slots[~bodies.static[slots]]
+        if (bodies.seen[moving] & (bodies.time[moving] > time)).any():
+            return Order.OLD
+        return Order.LATE if late and len(moving) else Order.IN_ORDER
 
     def states(
         self, ids: ArrayLike, poses: Any, twists: Any, covariance: Any
@@ -143,17 +155,28 @@ class Intake(Stage):
             if len(rows):
                 row = states[rows[0]]
                 values = {"id": int(row["id"]), "quaternion": row["quaternion"].tolist(), "row": row.item()[:-2]}
+                values["age"] = _age_text(roster, int(slots[rows[0]]), time) if verdict == OLD else ""
                 self.refuse(reason, text.format(**values), len(rows))
 
     def save(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
         facts["refused"] = {reason.value: count for reason, count in self.refused.items()}
+        facts["refusals"] = {reason.value: text for reason, text in self.texts.items()}
         facts["last_refusal"] = self.last_refusal
 
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
         self.refused = {reason: facts["refused"][reason.value] for reason in Refusal}
+        self.texts = {reason: facts["refusals"][reason.value] for reason in Refusal}
         self.last_refusal = facts["last_refusal"]
+
+
+def _age_text(roster: Roster, slot: int, time: float) -> str:
+    """Return what is wrong with an OLD state at `time` (s) of the body in this slot."""
+    if roster.bodies.static[slot]:
+        return "it is static"
+    age = float(roster.bodies.time[slot]) - time
+    return f"got one that is {age:.3f} s older" if age > 0.0 else "got another one with the same stamp"
 
 
 def _states(ids: NDArray[Any], poses: Any, twists: Any) -> States:

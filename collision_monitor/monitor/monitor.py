@@ -24,7 +24,7 @@ from collision_monitor.monitor.scene_plan import ScenePlan, scene_plan
 from collision_monitor.monitor.snapshot import Snapshot, Stage
 from collision_monitor.monitor.step_context import KernelSettings, StepContext
 from collision_monitor.monitor.time_critical import TimeCritical
-from collision_monitor.monitor.timeline import Progress, Timeline
+from collision_monitor.monitor.timeline import Order, Progress, Timeline
 from collision_monitor.monitor.tracking import Tracking
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.objects.description import ObjectDescription
@@ -35,6 +35,9 @@ from collision_monitor.settings.profile import Profile
 
 FACTS = "monitor"
 """Key of the monitor's entry in Snapshot.facts."""
+
+NAMED = 3
+"""Objects that the text of a refused message names."""
 
 Events = NDArray[np.void]
 
@@ -183,8 +186,25 @@ class Monitor:
 
     @property
     def last_refusal(self) -> str:
-        """Text of the last refusal."""
+        """Text of the last refusal, or of the last restart of the timeline, whichever came later."""
         return self._intake.last_refusal
+
+    @property
+    def refusal_texts(self) -> dict[Refusal, str]:
+        """Text of the last refusal by reason; empty: there was none. That of a restart is the one of TIME."""
+        return self._intake.texts
+
+    @property
+    def restarts(self) -> int:
+        """Number of times that the timeline restarted because time jumped."""
+        return self._timeline.restarts
+
+    @property
+    def stale_ids(self) -> list[int]:
+        """Ids of the objects that are stale at the latest time, ascending."""
+        if self._answers.last is None or not self._timeline.has_begun:
+            return []
+        return self._roster.stale_ids(self._timeline.now, self._profile.stale_after)
 
     def refuse(self, reason: Refusal, text: str, count: int = 1) -> None:
         """Count refused inputs, also those that the caller refuses."""
@@ -222,7 +242,7 @@ class Monitor:
             return self._take_step(int(stamp_ns), states, covariances)
 
     def _take_step(self, stamp_ns: int, states: NDArray[np.void], covariances: NDArray[np.float64]) -> StepResult:
-        if not self._advance(stamp_ns):
+        if not self._advance(stamp_ns, states):
             return self._answers.repeated()
         roster, timeline = self._roster, self._timeline
         self._intake.take(states, covariances, timeline.seconds(stamp_ns), roster, self._uncertain)
@@ -238,17 +258,28 @@ class Monitor:
         result = StepResult(timeline.now_ns, step.number, contacts, predictions, status, cut=cut)
         return self._answers.finish(result)
 
-    def _advance(self, stamp_ns: int) -> bool:
+    def _advance(self, stamp_ns: int, states: NDArray[np.void]) -> bool:
         """Move the timeline to the stamp. Return False if the stamp is refused."""
-        seconds = (stamp_ns - self._timeline.now_ns) * 1e-9
-        match self._timeline.advance(stamp_ns, self._profile.max_time_step):
+        p, timeline = self._profile, self._timeline
+        seconds = (stamp_ns - timeline.now_ns) * 1e-9
+        order = Order.IN_ORDER
+        if timeline.is_behind(stamp_ns):
+            is_late = -seconds > p.stale_after
+            order = self._intake.order(states, timeline.seconds(stamp_ns), is_late, self._roster)
+        match timeline.advance(stamp_ns, order, p.max_time_step, p.stale_after):
             case Progress.RESTARTS:
                 self._restart()
+                self.refuse(
+                    Refusal.TIME,
+                    f"time jumped by {seconds:+.3f} s, as a second message confirmed: the timeline restarts there, and "
+                    "every moving object is unseen until its next state",
+                    count=0,
+                )
             case Progress.REFUSED:
                 self.refuse(
                     Refusal.TIME,
-                    f"stamp: expected within {self._profile.max_time_step:g} s of the last one, got {seconds:+.3f} s; "
-                    "the next message restarts the clock there if it agrees",
+                    f"stamp{_of_objects(states)}: expected within {p.max_time_step:g} s of the last one, got "
+                    f"{seconds:+.3f} s; the next message restarts the clock there if it agrees",
                 )
                 return False
         return True
@@ -319,3 +350,9 @@ class Monitor:
                 raise
             raise InputError(f"snapshot: expected the state of a monitor of this version, got: {error!r}") from None
         return monitor
+
+
+def _of_objects(states: NDArray[np.void]) -> str:
+    """Return the ids of the first states of a message, for a text."""
+    ids = ", ".join(map(str, states["id"][:NAMED].tolist()))
+    return f" of object {ids}" + (", …" if len(states) > NAMED else "") if ids else ""

@@ -142,6 +142,12 @@ class Roster(Stage):
         """Slots of all described objects, ascending."""
         return np.flatnonzero(self.bodies.used[: self.top])
 
+    def stale_ids(self, now: float, stale_after: float) -> list[int]:
+        """Ids of the objects with a last state older than stale_after (s) at `now` (s), ascending."""
+        bodies, used = self.bodies, self.used()
+        is_stale = bodies.seen[used] & ~bodies.static[used] & (now - bodies.time[used] > stale_after)
+        return sorted(bodies.id[used[is_stale]].tolist())
+
     # ------------------------------------------------------------------ changing
 
     def describe(self, d: ObjectDescription, model: Model) -> int:

@@ -25,6 +25,7 @@ from collision_monitor.ros.markers import MarkerView
 from collision_monitor.ros.node_recording import NodeRecording
 from collision_monitor.ros.parameters import read_monitor_parameters
 from collision_monitor.ros.process import StopRequest
+from collision_monitor.ros.refusal_log import RefusalLog
 from collision_monitor.ros.status_line import status_line
 from collision_monitor.ros.step_times import StepTimes
 from collision_monitor.settings.profile import Profile
@@ -61,7 +62,8 @@ class MonitorNode(Node):
         self._times = StepTimes(settings.profile.max_time_step)
         self._markers = MarkerView(self._pipeline.catalogue, settings.frame_id)
         self._last_status = self._last_markers = self._last_log = time.monotonic_ns()
-        self._last_step: int | None = None
+        self._last_step: int | None = None  # when the monitor's time last changed
+        self._last_stamp: int | None = None
         self._was_silent = False
         self._is_event_wanted = settings.splitting.on_event
 
@@ -76,6 +78,8 @@ class MonitorNode(Node):
         # Shapes first: if both wait, the executor takes them in this order.
         shapes = subscription(self, Topic.SHAPES, self._on_shapes)
         states = subscription(self, Topic.STATES, self._on_states)
+        self._shapes_in, self._states_in = shapes.topic_name, states.topic_name
+        self._refusals = RefusalLog(self._pipeline.monitor, self.get_logger().warning)
         self.create_timer(WATCHDOG_PERIOD, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME))
         _keep_from_collector()
         self._publish_status()
@@ -102,10 +106,12 @@ class MonitorNode(Node):
         began, received = time.monotonic_ns(), self._now()
         outputs = self._answer(data)
         ended = time.monotonic_ns()
+        self._refusals.report(self._states_in, ended)
         if outputs is None:
             self._recording.write(Topic.STATES, data, received, received)
             return
-        self._last_step = ended
+        if outputs.result.stamp_ns != self._last_stamp:  # a stamp that stands still is no news, however often it comes
+            self._last_step, self._last_stamp = ended, outputs.result.stamp_ns
         self._times.add(began, ended, self._now() - outputs.result.stamp_ns)
         self._record_step(data, outputs, received)
         self._publish_status_if_due(ended)
@@ -142,6 +148,7 @@ class MonitorNode(Node):
     def _on_shapes(self, data: bytes) -> None:
         received = self._now()
         changes = self._pipeline.on_shapes(data)
+        self._refusals.report(self._shapes_in, time.monotonic_ns())
         self._record_shapes(data, received)
         if changes:
             self._markers.update(changes)
@@ -171,22 +178,24 @@ class MonitorNode(Node):
         silent = self._is_silent(now)
         if silent != self._was_silent:
             self._log_silence(silent)
+        if not silent:
+            self._refusals.report_stale(self._states_in, now)
+        self._refusals.catch_up(now)
         self._publish_status_if_due(now)
         if now - self._last_log >= LOG_PERIOD and not silent and self._last_step is not None:
             self._last_log = now
             self.get_logger().info(status_line(codec.decode_status(self._publish_status())))
 
     def _is_silent(self, now: int) -> bool:
-        """Return whether states once arrived and no longer arrive, by the steady clock."""
+        """Return whether newer states once arrived and no longer arrive, by the steady clock."""
         return self._last_step is not None and now - self._last_step >= self._pipeline.monitor.profile.stale_after * 1e9
 
     def _log_silence(self, silent: bool) -> None:
         self._was_silent = silent
         if silent:
-            states = self.resolve_topic_name(Topic.STATES.private)
-            self.get_logger().warning(f"no states on {states}: all moving objects are stale")
+            self.get_logger().warning(f"no newer states on {self._states_in}: all moving objects are stale")
         else:
-            self.get_logger().info("states arrive again")
+            self.get_logger().info("newer states arrive again")
 
     def _publish_status_if_due(self, now: int) -> None:
         if now - self._last_status >= STATUS_PERIOD:

@@ -58,8 +58,9 @@ class NodeRecording:
             return
         last, now = self._last, self._recorder.status()
         self._last = now
-        if now["recording"] == Recording.FAILED != last.get("recording"):
-            self._logger.error(f"the recording failed, the monitoring goes on: {now['recording_error']}")
+        if now["recording"] == Recording.FAILED:  # from then on every message counts as dropped
+            if last.get("recording") != Recording.FAILED:
+                self._logger.error(f"the recording failed, the monitoring goes on: {now['recording_error']}")
         elif now["recording_dropped"] != last.get("recording_dropped", 0):
             self._logger.warning(
                 f"the disk is too slow for the recording: {now['recording_dropped']} messages dropped so far"

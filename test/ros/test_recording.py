@@ -1,6 +1,7 @@
 """The session that the node records, which gives the same answers again without ROS."""
 
 import resource
+import shutil
 
 import numpy as np
 import pytest
@@ -105,6 +106,25 @@ def test_only_what_is_around_collisions_is_recorded(start, team, tmp_path):
     assert replay.wait() == 0, replay.words
 
 
+def test_a_removed_folder_fails_the_recording_once_and_the_monitoring_goes_on(start, team, tmp_path):
+    monitor = start("run", "--record", "runs")
+    team.meet()
+    team.describe(*(ObjectDescription(i, Box((1, 1, 1))) for i in range(1, 21)))
+    team.status(lambda s: s.objects == 20 and s.recorded_messages > 0)
+    shutil.rmtree(tmp_path / "runs")
+    team.ask(*states(0))
+    status = team.status(lambda s: s.recording == MonitorStatus.RECORDING_FAILED)
+    assert status.recording_error.endswith(": the file was removed or renamed during the recording")
+    for step in range(1, 4):
+        _, predictions = team.ask(*states(0.1 * step))
+        assert len(predictions.predictions) == 10
+        team.listen(0.6)  # longer than the period of the watchdog, which logs
+    assert monitor.stop() == 0
+    assert monitor.words.count("the recording failed, the monitoring goes on: ") == 1
+    assert "too slow" not in monitor.words
+    assert not (tmp_path / "runs").exists()
+
+
 def test_a_full_disk_is_told_and_does_not_stop_the_monitor(start, team, tmp_path):
     """RLIMIT_FSIZE makes the kernel refuse to grow the file, as a full disk does."""
     monitor = start("run", "--record", "run.mcap")
@@ -128,5 +148,6 @@ def test_a_full_disk_is_told_and_does_not_stop_the_monitor(start, team, tmp_path
     assert monitor.running
     assert monitor.stop() == 0
     assert "the recording failed, the monitoring goes on: run.mcap: File too large" in monitor.words
+    assert "too slow" not in monitor.words
     assert 0 < (tmp_path / "run.mcap").stat().st_size <= limit
     assert len(list(Session(tmp_path / "run.mcap").messages())) >= status.recorded_messages > 3

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -75,8 +77,13 @@ class SessionFile:
         self._writer.add_attachment(f"{SNAPSHOT}{sequence}.npz", "application/x-npz", data, log_time)
 
     def flush(self) -> None:
-        """Hand everything to the operating system, which keeps it if this process is killed."""
+        """Hand everything to the operating system, which keeps it if this process is killed.
+
+        Raises FileNotFoundError if the file was removed or renamed: the system goes on taking what nobody can read.
+        """
         self._writer.flush()
+        if os.fstat(self._stream.fileno()).st_nlink == 0 or not self.path.exists():
+            raise FileNotFoundError(errno.ENOENT, "the file was removed or renamed during the recording")
 
     def finish(self) -> None:
         """Write the summary, with rosbag2's metadata as a record, and close the file."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -167,6 +169,33 @@ def test_a_full_disk_fails_the_recording_and_not_the_caller(tmp_path: Path) -> N
     assert len(list(session.messages())) >= int(recorded) > 0
     assert "cut off" in session.damage[0]
     assert int(dropped) > 0
+
+
+@pytest.mark.parametrize("name", ["a.mcap", "split"])
+def test_a_removed_recording_fails_once_and_not_the_caller(tmp_path: Path, name: str) -> None:
+    """The system keeps on taking what is written to a removed file, so no write fails."""
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    with Recorder(folder / name, TYPES, METADATA) as recorder:
+        recorder.write("/m/status", DATA, 1, 1)
+        _until(lambda: recorder.status()["recorded_messages"] == 1)
+        assert recorder.status()["recording"] == Recording.ON
+        shutil.rmtree(folder)
+        recorder.write("/m/status", DATA, 2, 2)
+        _until(lambda: recorder.status()["recording"] == Recording.FAILED)
+        error = f"{folder / name}: the file was removed or renamed during the recording"
+        assert recorder.status()["recording_error"] == error
+        recorder.write("/m/status", DATA, 3, 3)
+    status = recorder.status()
+    assert (status["recorded_messages"], status["recording_dropped"], status["recording_error"]) == (1, 2, error)
+    assert not folder.exists()
+
+
+def _until(condition: Callable[[], bool], timeout: float = 10.0) -> None:
+    deadline = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
 
 
 KILLED = """

@@ -1,0 +1,86 @@
+"""Refused input in the node's log: a line when a kind of refusal first happens, then at most one every 10 s."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from collision_monitor.errors import Refusal
+from collision_monitor.monitor.monitor import Monitor
+
+PERIOD: Final = 10_000_000_000
+"""ns between two lines about the same problem: a flood of wrong messages must not become a flood of lines."""
+
+NAMED: Final = 5
+"""Stale objects that a line names."""
+
+
+@dataclass
+class _Problem:
+    """What happened since the last line about a problem. text: that of the last time."""
+
+    text: str = ""
+    count: int = 0
+    last_line: int | None = None  # ns
+
+
+class RefusalLog:
+    """Warns of refused input, of restarts of the timeline and of stale objects. All times in ns of a steady clock."""
+
+    def __init__(self, monitor: Monitor, warn: Callable[[str], object]) -> None:
+        self._monitor = monitor
+        self._warn = warn
+        self._refused = dict(monitor.refused)
+        self._restarts = monitor.restarts
+        self._problems: dict[tuple[str, str], _Problem] = {}  # by topic and kind
+
+    def report(self, topic: str, now: int) -> None:
+        """Log what the monitor refused in a message of this topic, and whether the message restarted the timeline."""
+        monitor = self._monitor
+        if monitor.restarts != self._restarts:
+            self._restarts = monitor.restarts
+            self._note(topic, "restart", monitor.refusal_texts[Refusal.TIME], 1, now)
+        if monitor.refused == self._refused:
+            return
+        for reason, count in monitor.refused.items():
+            new = count - self._refused[reason]
+            if new:
+                self._note(topic, reason.value, monitor.refusal_texts[reason], new, now)
+        self._refused = dict(monitor.refused)
+
+    def report_stale(self, topic: str, now: int) -> None:
+        """Log which objects are stale while others get new states."""
+        ids = self._monitor.stale_ids
+        if not ids:
+            return
+        named = ", ".join(f"{object_id} ({self._monitor.name(object_id)!r})" for object_id in ids[:NAMED])
+        more = f" and {len(ids) - NAMED} more" if len(ids) > NAMED else ""
+        problem = self._problems.setdefault((topic, "stale"), _Problem())
+        problem.count = 0  # one line is about all of them, however often they were found stale
+        self._note(topic, "stale", f"no usable new state of object {named}{more}: stale", 1, now)
+
+    def catch_up(self, now: int) -> None:
+        """Log what has waited for its line. Call it regularly."""
+        for (topic, _), problem in self._problems.items():
+            self._log_if_due(topic, problem, now)
+
+    def _note(self, topic: str, kind: str, text: str, count: int, now: int) -> None:
+        problem = self._problems.setdefault((topic, kind), _Problem())
+        problem.text = text
+        problem.count += count
+        self._log_if_due(topic, problem, now)
+
+    def _log_if_due(self, topic: str, problem: _Problem, now: int) -> None:
+        last = problem.last_line
+        if problem.count == 0 or (last is not None and now - last < PERIOD):
+            return
+        since = "" if last is None else " since the last line"
+        times = f" ({problem.count} times{since})" if problem.count > 1 else ""
+        problem.last_line, problem.count = now, 0
+        self._warn(_printable(f"{topic}: {problem.text}{times}"))
+
+
+def _printable(text: str) -> str:
+    """Return the text as one line that a terminal shows as it is; a text may quote the input."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
