@@ -116,7 +116,7 @@ def test_a_package_of_another_clone_is_installed_again(
 @pytest.fixture
 def links(stamps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The package's files for ROS 2, linked into an environment whose other parts are those of this one."""
-    environment = tmp_path / "environment"
+    environment = tmp_path / "another"  # the stamps are beside it
     environment.mkdir()
     (environment / "bin").symlink_to(stages.VENV / "bin")
     monkeypatch.setattr(stages, "VENV", environment)
