@@ -190,6 +190,15 @@ def _link_ros_files() -> None:
         place.symlink_to(source)
 
 
+def missing_ros_file() -> Path | None:
+    """Return the first place of `ros_files` without its file; None if all are there."""
+    for place, source in ros_files().items():
+        wanted = os.X_OK if source.parent == VENV / "bin" else os.R_OK
+        if not os.access(place, wanted) or place.resolve() != source.resolve():
+            return place
+    return None
+
+
 def _package_inputs(ros: machine.RosInstall | None) -> str:
     names = (str(path) for path in ros_files().values())
     return _digest(*names, files=[ROOT / "pyproject.toml", ROOT / "setup.py", ROOT / "setup.cfg"])
@@ -290,8 +299,6 @@ def first_broken_stage(ros: machine.RosInstall | None) -> tuple[str, str] | None
         lines = answer.stderr.strip().splitlines() or [f"Python ended with {answer.returncode}"]
         stage = lines[-1].partition(":")[0]
         return (stage if stage in {"packages", "messages", "package"} else "environment"), lines[-1]
-    for place, source in ros_files().items():
-        wanted = os.X_OK if source.parent == VENV / "bin" else os.R_OK
-        if not os.access(place, wanted) or place.resolve() != source.resolve():
-            return "package", f"{place.relative_to(VENV)} is not there"
+    if (place := missing_ros_file()) is not None:
+        return "package", f"{place.relative_to(VENV)} is not there"
     return None

@@ -116,7 +116,7 @@ def test_a_package_of_another_clone_is_installed_again(
 @pytest.fixture
 def links(stamps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The package's files for ROS 2, linked into an environment whose other parts are those of this one."""
-    environment = tmp_path / "environment"
+    environment = tmp_path / "another"  # the stamps are beside it
     environment.mkdir()
     (environment / "bin").symlink_to(stages.VENV / "bin")
     monkeypatch.setattr(stages, "VENV", environment)
@@ -126,23 +126,28 @@ def links(stamps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
     return environment
 
 
-@pytest.mark.parametrize(
-    "gone",
-    [
+def test_a_missing_file_for_ros_installs_the_package_again(links: Path) -> None:
+    (links / "lib" / "collision_monitor" / "monitor").unlink()
+    assert pending() == ["package"]
+    stages._link_ros_files()
+    assert pending() == []
+
+
+def test_each_missing_or_foreign_file_for_ros_is_noticed(links: Path) -> None:
+    places = {str(place.relative_to(links)) for place in stages.ros_files()}
+    assert {
         "share/ament_index/resource_index/packages/collision_monitor",
         "share/collision_monitor/package.xml",
         "share/collision_monitor/launch/monitor.launch.py",
         "lib/collision_monitor/monitor",
-    ],
-)
-def test_a_missing_or_a_foreign_file_for_ros_is_linked_again(links: Path, gone: str) -> None:
-    assert pending() == []
-    (links / gone).unlink()
-    assert pending() == ["package"]
-    (links / gone).write_text("of another package")
-    assert pending() == ["package"]
-    stages._link_ros_files()
-    assert pending() == []
+    } <= places
+    for gone in sorted(places):
+        assert stages.missing_ros_file() is None
+        (links / gone).unlink()
+        assert stages.missing_ros_file() == links / gone
+        (links / gone).write_text("of another package")
+        assert stages.missing_ros_file() == links / gone
+        stages._link_ros_files()
 
 
 def test_files_for_ros_that_are_no_more_are_removed(links: Path) -> None:
