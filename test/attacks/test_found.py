@@ -11,12 +11,13 @@ from collision_monitor.codec import decode_status, encode_descriptions, encode_s
 from collision_monitor.codec.descriptions import decode_descriptions
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
-from collision_monitor.geometry.shapes import ConvexHull, Mesh, Sphere
+from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Sphere
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.settings_event import LIMIT, encode_settings
 from collision_monitor.records import STATE, Model
+from collision_monitor.settings.profile import Profile
 
 SIDES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
 
@@ -83,3 +84,22 @@ def test_a_snapshot_between_a_setting_and_the_next_step_holds_the_setting() -> N
     assert first is not None and second is not None
     assert first.result.status.deferred > 0, "the limit has an effect"
     assert first.digest == second.digest
+
+
+def test_a_snapshot_of_a_monitor_with_a_limit_of_pairs_goes_on_with_the_sphere_trees() -> None:
+    """Long bodies side by side: their bounding spheres meet, and only their sphere trees show that they do not."""
+    pipeline = Pipeline(Profile(pairs_per_step=1), timed=False)
+    planks = [ObjectDescription(k, Box((4.0, 0.1, 0.1))) for k in range(6)]
+    pipeline.on_shapes(encode_descriptions(0, "world", planks))
+    rows = np.zeros(6, STATE)
+    rows["id"], rows["quaternion"][:, 3] = np.arange(6), 1.0
+    rows["position"][:, 1] = 1.5 * np.arange(6)
+    rows["angular"][:, 2] = 0.1 * np.arange(6)
+    pipeline.on_states(encode_states(1, "world", 1, rows))
+    restored = Pipeline.restored(Snapshot.decode(pipeline.snapshot().encode()), "world")
+    for step in range(2, 5):
+        rows["linear"][:, 1] = step % 2  # all are predicted anew
+        first, second = (each.on_states(encode_states(step, "world", step, rows)) for each in (pipeline, restored))
+        assert first is not None and second is not None
+        assert first.result.status == second.result.status
+        assert first.digest == second.digest
