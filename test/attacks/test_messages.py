@@ -14,6 +14,7 @@ import known_scene
 import numpy as np
 import pytest
 from campaign import OPEN, START, Campaign, Failure, is_broken_by
+from dice import Allowed
 from message_fuzzer import hostile_message
 
 from collision_monitor.codec import ContactArray, PredictedCollisionArray, decode_contacts, decode_predictions
@@ -23,7 +24,7 @@ from collision_monitor.records import CONTACT
 
 SEEDS = range(1, 9)
 MESSAGES = 2_500
-PREFIX = 400
+PREFIX = 200
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -31,7 +32,7 @@ def test_no_message_breaks_the_pipeline_or_the_answers_to_a_known_scene(seed: in
     summary = Campaign(seed).run(MESSAGES)
     assert [f"{each.index}: {each.problem}" for each in summary.failures] == []
     assert summary.messages == MESSAGES
-    assert summary.accepted > 0.4 * MESSAGES, "the known scene was asked"
+    assert summary.accepted > 0.3 * MESSAGES, "the known scene was asked"
     assert summary.restarts == MESSAGES // 1_250
     assert all(summary.refused[reason] > 0 for reason in summary.refused), "every reason for a refusal occurred"
 
@@ -47,13 +48,17 @@ def test_the_same_seed_gives_the_same_messages_and_the_same_digest() -> None:
 def test_the_fuzzer_makes_valid_and_invalid_content_of_every_kind() -> None:
     """Most messages are accepted, so that hostile ones meet a monitor at work; and the kinds that are open are left out."""
     campaign = Campaign(1)
-    campaign.run(1000)
-    assert campaign.summary.steps > 800
+    campaign.run(500)
+    assert campaign.summary.steps > 400
     assert any(each.static for each in campaign.pipeline.catalogue.descriptions.values())
-    everything = replace(OPEN, tiny=True, decomposition=True, long_names=True, large=True)
-    sizes = [len(hostile_message(1, index, START, everything).data) for index in range(3000)]
-    assert max(sizes) > 250_000
-    assert max(len(hostile_message(1, index, START, OPEN).data) for index in range(3000)) < max(sizes)
+    sizes = [_largest_shapes(allowed) for allowed in (replace(OPEN, large=False), Allowed())]
+    assert sizes[0] < 50_000
+    assert sizes[1] > 250_000
+
+
+def _largest_shapes(allowed: Allowed) -> int:
+    messages = [hostile_message(1, index, START, allowed) for index in range(2000)]
+    return max(len(message.data) for message in messages if message.topic is Topic.SHAPES)
 
 
 # -- the checks themselves find what they should

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.codec import ContactArray, PredictedCollisionArray
 from collision_monitor.records import ContactStatus, Phase, PredictionStatus
+
+PHASES: Final = len(Phase)
+STATUSES: Final = len(ContactStatus)
+PREDICTION_STATUSES: Final = len(PredictionStatus)
+END: Final = int(Phase.END)
 
 
 def faults_of_contacts(message: ContactArray) -> list[str]:
@@ -18,8 +25,8 @@ def faults_of_contacts(message: ContactArray) -> list[str]:
     keys = rows[["id_a", "id_b", "phase", "point_index"]].tolist()
     if sorted(keys, key=_end_first) != keys:
         found.append("contacts are not sorted")
-    now = rows[rows["phase"] != Phase.END]
-    if rows["phase"].max() > max(Phase) or rows["status"].max() > max(ContactStatus):
+    now = rows[rows["phase"] != END]
+    if rows["phase"].max() >= PHASES or rows["status"].max() >= STATUSES:
         found.append("a contact has an unknown phase or status")
     if np.isnan(now["signed_distance"]).any() or not (now["error_bound"] >= 0.0).all():
         found.append(f"a contact has no distance or bound: {now[['id_a', 'id_b', 'signed_distance', 'error_bound']][:4]}")
@@ -33,7 +40,7 @@ def faults_of_contacts(message: ContactArray) -> list[str]:
 
 def _end_first(key: tuple[int, int, int, int]) -> tuple[int, int, bool, int]:
     id_a, id_b, phase, point = key
-    return id_a, id_b, phase != Phase.END, point
+    return id_a, id_b, phase != END, point
 
 
 def faults_of_predictions(message: PredictedCollisionArray) -> list[str]:
@@ -45,7 +52,7 @@ def faults_of_predictions(message: PredictedCollisionArray) -> list[str]:
     keys = rows[["lower", "id_a", "id_b"]].tolist()
     if sorted(keys) != keys:
         found.append("predictions are not sorted")
-    if rows["status"].max() > max(PredictionStatus):
+    if rows["status"].max() >= PREDICTION_STATUSES:
         found.append("a prediction has an unknown status")
     if not ((rows["lower"] >= 0.0) & (rows["upper"] >= rows["lower"])).all():
         found.append(f"a time of impact is no interval: {rows[['id_a', 'id_b', 'lower', 'upper']][:4]}")
