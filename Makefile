@@ -11,7 +11,7 @@ unexport PYTHONPATH
 endif
 unexport PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup demo test test-core lint bench bench-peers clean
+.PHONY: help setup demo test test-core lint fuzz soak bench bench-peers clean
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -33,6 +33,12 @@ test-core: setup ## run the tests, except those of the node and of the set-up
 lint: setup ## run ruff and mypy --strict
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
+
+fuzz: setup ## attack the monitor with hostile messages; ARGS="--messages 1000000 --seed 7", --dds for a node
+	@$(BIN)/python test/attacks/fuzz_messages.py $(ARGS)
+
+soak: setup ## simulate 24 h of objects that come, change and go, and compare with plain recomputation; ARGS="--hours 1"
+	@$(BIN)/python benchmarks/soak.py $(ARGS)
 
 QUICK := $(findstring --quick,$(ARGS))
 

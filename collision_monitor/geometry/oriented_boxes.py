@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Final
 
 import numpy as np
@@ -91,13 +92,19 @@ def _flat(points: Array) -> Obb:
 
 
 def _turned(vertices: Array, edges: Array, normal: Array) -> tuple[float, Array]:
-    """Volume and axes of the smallest box with one axis along `normal` and a side along a projected edge."""
+    """Volume and axes of the smallest box with one axis along `normal` and a side along a projected edge.
+
+    If no edge leaves the normal, as in a needle along it, the volume is infinite.
+    """
     height = float(np.ptp(vertices @ normal))
     if len(edges) > OUTLINE:
         vertices, edges = _outline(vertices, edges, normal)
     sides = edges - (edges @ normal)[:, None] * normal
     length = np.linalg.norm(sides, axis=1, keepdims=True)
-    sides = sides[length[:, 0] > DISTINCT] / length[length[:, 0] > DISTINCT]
+    kept = length[:, 0] > DISTINCT * np.linalg.norm(edges, axis=1).max()
+    if not kept.any():
+        return inf, np.eye(3)
+    sides = sides[kept] / length[kept]
     across = np.cross(normal, sides)
     area = np.ptp(sides @ vertices.T, axis=1) * np.ptp(across @ vertices.T, axis=1)
     best = int(area.argmin())

@@ -22,6 +22,7 @@ class MotionSettings(NamedTuple):
     orientation_tolerance: float  # rad
     velocity_tolerance: float  # m/s
     angular_velocity_tolerance: float  # rad/s
+    stale_after: float  # s
 
 
 class KernelSettings(NamedTuple):
@@ -45,6 +46,7 @@ class KernelSettings(NamedTuple):
                 p.orientation_tolerance,
                 p.velocity_tolerance,
                 p.angular_velocity_tolerance,
+                p.stale_after,
             ),
         )
 

@@ -196,6 +196,7 @@ class TimeCritical(Stage):
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
         self._deferred = int(facts["deferred"])
+        self._tree_of, self._trees = {}, None  # `prepare` has made those of a monitor without objects
 
 
 @kernel

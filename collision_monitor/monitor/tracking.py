@@ -192,6 +192,9 @@ def find_moved(bodies, uncertainty, count, now, settings, columns, found):
                 bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
             moved[n] = i
             n += 1
+        elif _is_wide_without_need(bodies, i, age, settings):
+            moved[n] = i
+            n += 1
         elif sigmas > 0.0 and not _is_covered(bodies, uncertainty, i, now, settings):
             moved[n] = i
             n += 1
@@ -200,6 +203,18 @@ def find_moved(bodies, uncertainty, count, now, settings, columns, found):
             ending[n_ending] = i
             n_ending += 1
     return n, n_ending
+
+
+@device
+def _is_wide_without_need(bodies, i, age, settings):
+    """Whether body i was stale when its motion started, and is not stale now.
+
+    A tube as wide as a long silence required would hold for ever, and with it UNRESOLVED pairs. Tubes of shorter
+    silences are kept, because objects of a slow publisher would otherwise be predicted anew at each of their states.
+    """
+    narrow = settings.velocity_tolerance + bodies.spin_radius[i] * settings.angular_velocity_tolerance
+    widest = narrow + 2.0 * settings.stale_acceleration * settings.stale_after
+    return age <= settings.stale_after and bodies.motion[i].tube_1 > widest
 
 
 @kernel

@@ -10,6 +10,7 @@ from collision_monitor.errors import InputError
 from collision_monitor.geometry.compound import shape_pairs
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.records import Model
+from collision_monitor.tolerances import LARGEST_INPUT
 
 ALL_GROUPS = 0xFFFFFFFF
 _UINT32_MAX = 0xFFFFFFFF
@@ -30,8 +31,8 @@ def _not_negative(value: Any, what: str, unit: str) -> float:
         number = float(value)
     except (TypeError, ValueError):
         raise InputError(f"{what}: expected a number of {unit}, got {value!r}") from None
-    if not (number >= 0.0 and math.isfinite(number)):
-        raise InputError(f"{what}: expected a finite number of {unit}, at least 0, got {number!r}")
+    if not 0.0 <= number <= LARGEST_INPUT:
+        raise InputError(f"{what}: expected a finite number of {unit} from 0 to {LARGEST_INPUT:g}, got {number!r}")
     return number
 
 

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.errors import InputError, UnsupportedError
+from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.geometry.bounding_spheres import minimal_sphere
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
 from collision_monitor.geometry.convex_pieces import convex_pieces
@@ -228,6 +228,8 @@ def _kdop(pieces: PosedShapes, k: int) -> tuple[Shape, Pose]:
     centre = (far[:3] - far[k // 2 : k // 2 + 3]) / 2  # middle of the slabs along x, y and z
     distance = far - normals @ centre
     size = float(distance.max())
+    if not size > 0.0:
+        raise ShapeError(f"model kdop{k}: expected an object with an extent, got points in one place")
     # Qhull needs some space around the centre, which a flat object does not leave, and its result is rounded
     distance = np.maximum(distance, 1e-9 * size) + 1e-9 * size
     points = HalfspaceIntersection(np.column_stack([normals, -distance / size]), np.zeros(3)).intersections * size

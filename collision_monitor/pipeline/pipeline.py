@@ -184,6 +184,7 @@ class Pipeline:
         try:
             changes = {name: value for name, value in decode_settings(data).items() if name not in self._kept}
             self.monitor.profile = self.monitor.profile.replace(**changes)
+            self._limit = changes.get(LIMIT, self._limit)
         except (MessageError, ProfileError) as error:
             self.monitor.refuse(Refusal.MALFORMED, str(error))
 

@@ -1,0 +1,105 @@
+"""Defects that the fuzzers found, each with its smallest input."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from collision_monitor.codec import decode_status, encode_descriptions, encode_states
+from collision_monitor.codec.descriptions import decode_descriptions
+from collision_monitor.errors import InputError
+from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
+from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Sphere
+from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.pipeline.pipeline import Pipeline
+from collision_monitor.pipeline.settings_event import LIMIT, encode_settings
+from collision_monitor.records import STATE, Model
+from collision_monitor.settings.profile import Profile
+
+SIDES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+
+
+@pytest.mark.parametrize("model", [m for m in Model if m is not Model.CONVEX_DECOMPOSITION])
+def test_a_mesh_of_one_point_is_refused_or_monitored(model: Model) -> None:
+    pipeline = Pipeline()
+    mesh = Mesh(np.full((4, 3), -0.5), SIDES)
+    changes = pipeline.on_shapes(encode_descriptions(0, "world", [ObjectDescription(1, mesh, model=model)]))
+    refused = decode_status(pipeline.status()).refused_shape
+    assert len(changes) + refused == 1
+    assert pipeline.monitor.ids == [change.object_id for change in changes]
+
+
+@pytest.mark.parametrize("model", [m for m in Model if m is not Model.CONVEX_DECOMPOSITION])
+def test_a_needle_is_refused_or_monitored(model: Model) -> None:
+    pipeline = Pipeline()
+    needle = Mesh([[0, 0, 0], [1, 0, 0], [0, 1e-13, 0], [0, 0, 1e-13]], SIDES)
+    changes = pipeline.on_shapes(encode_descriptions(0, "world", [ObjectDescription(1, needle, model=model)]))
+    assert len(changes) + decode_status(pipeline.status()).refused_shape == 1
+
+
+@pytest.mark.parametrize("size", [1e-12, 1e-9, 1e-3, 1.0, 1e9])
+def test_the_smallest_box_does_not_depend_on_the_unit(size: float) -> None:
+    points = np.random.default_rng(1).normal(size=(130, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    box, unit = obb_minimum_volume(points * size), obb_minimum_volume(points)
+    np.testing.assert_allclose(box.half_extents / size, unit.half_extents, rtol=1e-6)
+
+
+BEYOND: dict[str, dict[str, Any]] = {
+    "padding": {"shapes": Sphere(1.0), "padding": 1e308},
+    "max_linear_acceleration": {"shapes": Sphere(1.0), "max_linear_acceleration": 1e300},
+    "max_angular_acceleration": {"shapes": Sphere(1.0), "max_angular_acceleration": 1e19},
+}
+
+
+@pytest.mark.parametrize("what", BEYOND)
+def test_numbers_of_a_description_have_the_limit_of_those_of_a_state(what: str) -> None:
+    with pytest.raises(InputError, match=f"object 1.*{what}.*1e\\+18"):
+        ObjectDescription(1, **BEYOND[what])
+
+
+def test_a_description_beyond_the_limit_is_refused_alone() -> None:
+    good = ObjectDescription(2, Sphere(1.0), padding=0.25)
+    data = encode_descriptions(0, "world", [ObjectDescription(1, Sphere(1.0), padding=0.125), good])
+    changed = data.replace(np.float64(0.125).tobytes(), np.float64(1e300).tobytes())
+    assert changed != data
+    message = decode_descriptions(changed)
+    assert [each.object_id for each in message.objects] == [2]
+    assert [object_id for object_id, _ in message.refused] == [1]
+
+
+def test_a_snapshot_between_a_setting_and_the_next_step_holds_the_setting() -> None:
+    hull = ConvexHull(np.random.default_rng(1).normal(size=(8, 3)))
+    pipeline = Pipeline(timed=False)
+    pipeline.on_shapes(encode_descriptions(0, "world", [ObjectDescription(k, hull) for k in range(40)]))
+    rows = np.zeros(40, STATE)
+    rows["id"], rows["quaternion"][:, 3] = np.arange(40), 1.0
+    rows["position"][:, 0], rows["linear"][:, 1] = np.arange(40), np.arange(40) % 3
+    pipeline.on_settings(encode_settings(0, "", {LIMIT: 1}))
+    restored = Pipeline.restored(Snapshot.decode(pipeline.snapshot().encode()), "world")
+    first, second = (each.on_states(encode_states(1, "world", 1, rows)) for each in (pipeline, restored))
+    assert first is not None and second is not None
+    assert first.result.status.deferred > 0, "the limit has an effect"
+    assert first.digest == second.digest
+
+
+def test_a_snapshot_of_a_monitor_with_a_limit_of_pairs_goes_on_with_the_sphere_trees() -> None:
+    """Long bodies side by side: their bounding spheres meet, and only their sphere trees show that they do not."""
+    pipeline = Pipeline(Profile(pairs_per_step=1), timed=False)
+    planks = [ObjectDescription(k, Box((4.0, 0.1, 0.1))) for k in range(6)]
+    pipeline.on_shapes(encode_descriptions(0, "world", planks))
+    rows = np.zeros(6, STATE)
+    rows["id"], rows["quaternion"][:, 3] = np.arange(6), 1.0
+    rows["position"][:, 1] = 1.5 * np.arange(6)
+    rows["angular"][:, 2] = 0.1 * np.arange(6)
+    pipeline.on_states(encode_states(1, "world", 1, rows))
+    restored = Pipeline.restored(Snapshot.decode(pipeline.snapshot().encode()), "world")
+    for step in range(2, 5):
+        rows["linear"][:, 1] = step % 2  # all are predicted anew
+        first, second = (each.on_states(encode_states(step, "world", step, rows)) for each in (pipeline, restored))
+        assert first is not None and second is not None
+        assert first.result.status == second.result.status
+        assert first.digest == second.digest
