@@ -149,7 +149,9 @@ class Attacker:
         deadline = time.monotonic() + START_PATIENCE
         while not all(out.get_subscription_count() for out in self._out.values()):
             if not monitor.running() or time.monotonic() > deadline:
-                raise ProcessError(f"collision-monitor run: expected a subscriber within {START_PATIENCE:g} s, got none")
+                raise ProcessError(
+                    f"collision-monitor run: expected a subscriber within {START_PATIENCE:g} s, got none"
+                )
             time.sleep(0.1)
         self.settle()
 
@@ -171,7 +173,9 @@ class Attacker:
         self._node.destroy_node()
 
 
-def measure(attacks: Sequence[str], count: int, rounds: int, seed: int, *, pauses: bool, stall: bool) -> list[dict[str, Any]]:
+def measure(
+    attacks: Sequence[str], count: int, rounds: int, seed: int, *, pauses: bool, stall: bool
+) -> list[dict[str, Any]]:
     """Return the memory (MB) at the start and after each attack. Raises ProcessError if the node fails."""
     random = np.random.default_rng(seed)
     with Child("run") as monitor, ros_context([]):

@@ -50,7 +50,7 @@ HOUR: Final = 3600 * RATE
 ARENA: Final = 9.0
 """m: objects beyond this distance from the middle turn back."""
 STEERING: Final = 0.8
-"""m/s^2: largest acceleration. Less than `stale_acceleration`, by which the monitor widens the bounds of silent ones."""
+"""m/s^2: largest acceleration. Less than `stale_acceleration`, which widens the bounds of silent objects."""
 SPEED: Final = 1.5
 """m/s: speed above which objects brake."""
 
@@ -73,9 +73,26 @@ FAILED: Final = 3
 """Exit code if something is wrong."""
 
 _NOTCHED: Final = Mesh(  # a cube with one corner pushed in: monitored as its convex hull
-    [[x, y, z] if (x, y, z) != (0.5, 0.5, 0.5) else [0.1] * 3 for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)],
-    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4]]
-    + [[1, 5, 7], [1, 7, 3]],
+    [
+        [x, y, z] if (x, y, z) != (0.5, 0.5, 0.5) else [0.1] * 3
+        for x in (-0.5, 0.5)
+        for y in (-0.5, 0.5)
+        for z in (-0.5, 0.5)
+    ],
+    [
+        [0, 1, 3],
+        [0, 3, 2],
+        [4, 6, 7],
+        [4, 7, 5],
+        [0, 4, 5],
+        [0, 5, 1],
+        [2, 3, 7],
+        [2, 7, 6],
+        [0, 2, 6],
+        [0, 6, 4],
+        [1, 5, 7],
+        [1, 7, 3],
+    ],
 )
 
 
@@ -294,7 +311,11 @@ def missed(mine: StepResult, truth: StepResult) -> list[str]:
     told |= {(int(r["id_a"]), int(r["id_b"])) for r in mine.predictions}
     rows = truth.contacts[truth.contacts["phase"] != Phase.END]
     true = {(int(r["id_a"]), int(r["id_b"])): float(r["signed_distance"]) for r in rows}
-    return [f"{pair} overlaps by {-depth:.3f} m and is not reported" for pair, depth in true.items() if depth < -DEEP and pair not in told]
+    return [
+        f"{pair} overlaps by {-depth:.3f} m and is not reported"
+        for pair, depth in true.items()
+        if depth < -DEEP and pair not in told
+    ]
 
 
 def run(args: argparse.Namespace) -> tuple[Report, float]:
@@ -339,10 +360,11 @@ def main() -> int:
     else:
         verdict = "agree" if not report.problems else f"{len(report.problems)} problems"
         print(
-            f"{report.steps:,} steps in {seconds:.0f} s, {report.compared:,} compared and {report.silent_compared:,} with "
-            f"silent objects: {verdict}; {report.came:,} objects came and went, {report.changed:,} changed, settings "
-            f"switched {report.switched:,} times, {report.restored} snapshots, {report.contacts / max(1, report.steps):.1f} "
-            f"contacts and {report.predictions / max(1, report.steps):.1f} predictions a step"
+            f"{report.steps:,} steps in {seconds:.0f} s, {report.compared:,} compared and {report.silent_compared:,} "
+            f"with silent objects: {verdict}; {report.came:,} objects came and went, {report.changed:,} changed, "
+            f"settings switched {report.switched:,} times, {report.restored} snapshots, "
+            f"{report.contacts / max(1, report.steps):.1f} contacts and "
+            f"{report.predictions / max(1, report.steps):.1f} predictions a step"
         )
         print("\n".join(report.problems[:20]), end="\n" if report.problems else "")
     return FAILED if report.problems else 0

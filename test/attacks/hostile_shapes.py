@@ -19,8 +19,20 @@ LARGE: Final = 12_000
 
 _CORNERS: Final = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 _CUBE: Final = np.array(
-    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4]]
-    + [[1, 5, 7], [1, 7, 3]]
+    [
+        [0, 1, 3],
+        [0, 3, 2],
+        [4, 6, 7],
+        [4, 7, 5],
+        [0, 4, 5],
+        [0, 5, 1],
+        [2, 3, 7],
+        [2, 7, 6],
+        [0, 2, 6],
+        [0, 6, 4],
+        [1, 5, 7],
+        [1, 7, 3],
+    ]
 )
 _TETRAHEDRON: Final = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 _SIDES: Final = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
@@ -97,7 +109,7 @@ def _degenerate(dice: Dice, points: Vertices) -> Vertices:
     if kind == 2:
         return points * size
     if kind == 3:
-        return points + [size, 0.0, -size]
+        return [*points, size, 0.0, -size]
     if kind == 4:
         return np.repeat(points[:1], len(points), axis=0)
     return np.concatenate([points, points])  # each point twice

@@ -85,7 +85,13 @@ def states(step: int, place: int, stamp_ns: int) -> bytes:
     rows["quaternion"][:, 3] = 1.0
     rows["flags"] = StateFlag.DISCONTINUITY
     y = Y + MOVED * (place % 2)
-    rows["position"] = [(ball_x(step), y, 0), (-20, y, 0), (-20 + 1 - DEPTH, y + 0.2, 0), (-60, y + 2, 0), (-60, y - 2, 0)]
+    rows["position"] = [
+        (ball_x(step), y, 0),
+        (-20, y, 0),
+        (-20 + 1 - DEPTH, y + 0.2, 0),
+        (-60, y + 2, 0),
+        (-60, y - 2, 0),
+    ]
     rows["linear"][:, 0] = SPEED, 0, 0, 1, -1
     return encode_states(stamp_ns, "world", 0, rows)
 
@@ -99,10 +105,16 @@ def wrong(step: int, contacts: ContactArray, predictions: PredictedCollisionArra
     if contact is None:
         found.append("the two cubes overlap and are not reported")
     elif not abs(contact["signed_distance"] + DEPTH) <= DISTANCE_TOLERANCE + contact["error_bound"] <= 1e-3:
-        found.append(f"the two cubes: expected -{DEPTH} m, got {contact['signed_distance']} +- {contact['error_bound']}")
+        found.append(
+            f"the two cubes: expected -{DEPTH} m, got {contact['signed_distance']} +- {contact['error_bound']}"
+        )
     impact, truth = predicted.pop((BALL, WALL), None), time_of_impact(step)
     if impact is None:
-        found.append(f"the ball meets the wall in {truth:.4f} s and is not reported" if truth < predictions.horizon - TIME_TOLERANCE else "")
+        found.append(
+            f"the ball meets the wall in {truth:.4f} s and is not reported"
+            if truth < predictions.horizon - TIME_TOLERANCE
+            else ""
+        )
     elif not impact["lower"] - TIME_TOLERANCE <= truth <= impact["upper"] + TIME_TOLERANCE:
         found.append(f"the ball: expected {truth} s, got {impact['lower']} to {impact['upper']} s")
     elif impact["status"] != PredictionStatus.HIT or impact["stale"]:
