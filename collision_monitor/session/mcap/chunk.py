@@ -62,16 +62,16 @@ class Unpacker:
         if not packed.startswith((_ZSTD, _LZ4)):
             return packed, True
         whole = self._at_once(packed) if packed.startswith(_ZSTD) else None
-        records, complete = (whole, True) if whole is not None else self._in_pieces(packed)
-        self._left -= len(records)
-        return records, complete
+        return (whole, True) if whole is not None else self._in_pieces(packed)
 
     def _at_once(self, packed: bytes) -> bytes | None:
         """Unpack a frame that states a size within the limits; None for any other, and for a damaged one."""
         with suppress(zstandard.ZstdError):
-            if zstandard.frame_content_size(packed) in range(min(CHUNK_BYTES, self._left) + 1):
+            if zstandard.frame_content_size(packed) in range(max(min(CHUNK_BYTES, self._left), -1) + 1):
                 unpacker = zstandard.ZstdDecompressor(max_window_size=_WINDOW)
-                return unpacker.decompress(packed, allow_extra_data=False)
+                whole = unpacker.decompress(packed, allow_extra_data=False)
+                self._left -= len(whole)
+                return whole
         return None
 
     def _in_pieces(self, packed: bytes) -> tuple[bytes, bool]:
@@ -85,10 +85,11 @@ class Unpacker:
         limit = CHUNK_BYTES
         with suppress(zstandard.ZstdError, RuntimeError, EOFError):
             while end < len(packed) and not unpacker.eof:
-                out += unpacker.decompress(packed[end : end + _PIECE])
+                piece = unpacker.decompress(packed[end : end + _PIECE])
+                out += piece
                 end += _PIECE
-                if len(out) > self._left:
-                    self._left = 0
+                self._left -= len(piece)
+                if self._left < 0:
                     raise ChunkLimitError(f"the chunks of the file unpack to more than {self._all} bytes")
                 if len(out) > limit:
                     limit = _limit(out, len(packed))

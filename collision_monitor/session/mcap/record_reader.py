@@ -14,6 +14,7 @@ from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
 from collision_monitor.errors import SessionError
 from collision_monitor.session.mcap.chunk import LARGEST_CHUNK, Unpacker, records
+from collision_monitor.session.mcap.definitions_in_force import LARGEST_DEFINITION, DefinitionsInForce
 from collision_monitor.session.mcap.layout import CHUNK_HEAD, HEAD, MAGIC, MESSAGE
 from collision_monitor.session.mcap.sentences import add_sentence
 
@@ -26,16 +27,13 @@ _LARGEST: Final[dict[int, int]] = {
     Opcode.ATTACHMENT: 64 << 20,  # a snapshot of 10,000 objects has 3 MB
     Opcode.METADATA: 4 << 20,  # the longest are rosbag2's copy of metadata.yaml and the losses of a salvage
     Opcode.HEADER: 1 << 20,
-    Opcode.SCHEMA: 1 << 20,  # a definition with all of its nested types: the longest of ROS 2 has 30 kB
-    Opcode.CHANNEL: 1 << 20,
+    Opcode.SCHEMA: LARGEST_DEFINITION,
+    Opcode.CHANNEL: LARGEST_DEFINITION,
 }
 """Bytes of a record that is read; longer ones are damage. Records of other kinds are skipped unread."""
 
 _DEFINITIONS: Final = 1 << 17
 """Schemas and channels in one chunk: there are 2^16 ids of each."""
-
-_DEFINITION_BYTES: Final = 64 << 20
-"""Bytes of all schemas and channels of a file, as far as they are in force."""
 
 
 class Message(NamedTuple):
@@ -59,8 +57,7 @@ class McapReader:
         self.damage: list[str] = []
         self.position = 0
         self._unpacker = Unpacker(0)
-        self._defined: dict[tuple[int, int], int] = {}  # bytes of a definition by opcode and id
-        self._defined_bytes = 0
+        self._in_force = DefinitionsInForce()
         try:
             self.size = path.stat().st_size
             with path.open("rb") as file:
@@ -82,7 +79,7 @@ class McapReader:
         """Yield the same. begin: offset of a record; the records from the first message up to it are skipped."""
         self.damage = []
         self._unpacker = Unpacker(self.size)
-        self._defined, self._defined_bytes = {}, 0
+        self._in_force = DefinitionsInForce()
         with self.path.open("rb") as file:
             for start, opcode, length in self._heads(file):
                 limit = _LARGEST.get(opcode, 0)
@@ -149,7 +146,7 @@ class McapReader:
                 raise ValueError("its checksum is wrong")
         record = _DECODERS[opcode](ReadDataStream(BytesIO(payload)))
         if opcode in _DEFINED:
-            self._define(opcode, record.id, len(payload))
+            self._in_force.add(opcode, record.id, len(payload))
         return [record]
 
     def _unpack_chunk(self, payload: bytes) -> tuple[bytes, int]:
@@ -193,13 +190,6 @@ class McapReader:
                 yield _message(data, begin, end)
             elif begin in definitions:
                 yield definitions[begin]
-
-    def _define(self, opcode: int, number: int, size: int) -> None:
-        """Account for a schema or channel, which replaces the one of the same id."""
-        self._defined_bytes += size - self._defined.get((opcode, number), 0)
-        self._defined[opcode, number] = size
-        if self._defined_bytes > _DEFINITION_BYTES:
-            raise ValueError(f"the schemas and channels of the file have more than {_DEFINITION_BYTES} bytes")
 
 
 def _message(data: bytes, begin: int, end: int) -> Message:

@@ -32,6 +32,7 @@ from mcap.writer import Writer
 from collision_monitor._version import VERSION
 from collision_monitor.errors import SessionError
 from collision_monitor.session.mcap.damaged import Damage, RecoveredRecord, Section, Trust, walk
+from collision_monitor.session.mcap.definitions_in_force import DefinitionsInForce
 from collision_monitor.session.mcap.layout import LIBRARY, MESSAGE, SALVAGE, SEQUENCE_HALF
 from collision_monitor.session.mcap.sentences import add_sentence
 
@@ -132,6 +133,7 @@ class _Contents:
         self.statistics: Statistics | None = None
         self.names: list[str] = []  # of metadata and attachments in the summary
         trust: dict[tuple[int, int], Trust] = {}  # by opcode and id: the most trusted copy counts
+        in_force = DefinitionsInForce()
         for each in walk(data):
             if isinstance(each, Damage) or each.opcode not in _DECODERS or each.opcode == Opcode.MESSAGE_INDEX:
                 continue
@@ -141,6 +143,10 @@ class _Contents:
                     self.profile = header.profile
                     self.library = header.library
                 case (Schema() | Channel()) as record if each.trust > trust.get((each.opcode, record.id), -1):
+                    try:
+                        in_force.add(each.opcode, record.id, len(each.payload))
+                    except ValueError:
+                        continue
                     if isinstance(record, Schema) and record.name and record.id:
                         self.schemas[record.id] = record
                     elif isinstance(record, Channel) and record.topic and record.message_encoding:
