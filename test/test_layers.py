@@ -31,6 +31,7 @@ FLOORS: Final = (
 
 SIDEWAYS: Final = {
     ("sources.importing", "session"): "what a bag is imported into is a session",
+    ("sources.bag_limits", "session"): "the chunks of a bag have the limits of those of a session",
 }
 """Allowed imports of a module from another folder of the same floor, with the reason."""
 

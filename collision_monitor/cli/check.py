@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.engines import add_engine, engine_of
+from collision_monitor.cli.error_line import print_error
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.output_file import writing
 from collision_monitor.cli.progress import progress_bar
@@ -88,7 +88,7 @@ def check_command(args: argparse.Namespace) -> int:
         if args.replay:
             Profile.named(args.replay)
     except InputError as error:
-        print(f"collision-monitor: error: {error}", file=sys.stderr)
+        print_error(error)
         return ExitCode.USAGE
     paths = find_sessions(args.sessions)
     if args.junit is not None:

@@ -11,6 +11,7 @@ from keyword import iskeyword
 from typing import Final
 
 from collision_monitor._version import VERSION
+from collision_monitor.cli.error_line import print_error
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.errors import CollisionMonitorError
 
@@ -79,10 +80,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return code
     except CollisionMonitorError as error:
-        print(f"collision-monitor: error: {error}", file=sys.stderr)
+        print_error(error)
         return ExitCode.ERROR
     except MemoryError as error:
-        print(f"collision-monitor: error: there is not enough memory for that: {error}", file=sys.stderr)
+        print_error(f"there is not enough memory for that: {error}")
         return ExitCode.ERROR
     except KeyboardInterrupt:
         return ExitCode.INTERRUPTED

@@ -4,22 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import yaml
-
 from collision_monitor.errors import InputError
 from collision_monitor.pipeline.topics import NODE, PARAMETER_SECTION
+from collision_monitor.settings.yaml_file import read_yaml
 
 
 def check_parameter_file(path: Path) -> None:
     """Raise InputError if the file cannot be read, is not YAML, or holds no parameters for the monitor."""
     try:
-        content = yaml.safe_load(path.read_text())
-    except OSError as error:
-        raise InputError(f"--params: expected a YAML file, cannot read {path}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        where = getattr(error, "problem_mark", None)
-        line = f" (line {where.line + 1})" if where else ""
-        raise InputError(f"--params: expected YAML, {path} is none{line}") from None
+        content = read_yaml(path)
+    except InputError as error:
+        raise InputError(f"--params: {error}") from None
     nodes = [name for name, value in content.items() if _holds_parameters(value)] if isinstance(content, dict) else []
     if not any(str(name).rstrip("*").rstrip("/") == "" or str(name).rsplit("/", 1)[-1] == NODE for name in nodes):
         found = f"there are settings for {', '.join(map(str, nodes))}" if nodes else "there are none"

@@ -7,8 +7,8 @@ file, which NumPy opens anywhere. It contains no code, and data that does not fi
 from __future__ import annotations
 
 import json
+import math
 import zipfile
-import zlib
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from io import BytesIO
@@ -20,6 +20,12 @@ from numpy.typing import NDArray
 from collision_monitor.errors import InputError
 
 _FACTS: Final = "facts"
+
+LARGEST: Final = 128 << 20
+"""Unpacked bytes of a snapshot that is read. One of 10,000 objects has 9 MB."""
+
+_ENTRIES: Final = 1000
+"""Arrays of a snapshot that is read. The monitor writes 50."""
 
 Facts = dict[str, Any]
 """JSON values by name."""
@@ -48,10 +54,11 @@ class Snapshot:
     def decode(cls, data: bytes) -> Snapshot:
         """Decode the bytes of `encode`. Raises InputError for other bytes."""
         try:
+            _check_sizes(data)
             with np.load(BytesIO(data), allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
             facts = json.loads(arrays.pop(_FACTS).tobytes())
-        except (OSError, ValueError, KeyError, EOFError, MemoryError, zipfile.BadZipFile, zlib.error) as error:
+        except Exception as error:  # the libraries raise many kinds of errors for wrong bytes
             raise InputError(f"snapshot: expected an .npz file with facts and arrays, got: {error!r}") from None
         return cls(arrays, facts)
 
@@ -80,6 +87,26 @@ class Snapshot:
         for shape in ("shape_i", "shape_j"):
             if shape in (rows.dtype.names or ()):
                 np.clip(rows[shape], 0, max(shapes - 1, 0), out=rows[shape])
+
+
+def _check_sizes(data: bytes) -> None:
+    """Compare what an .npz file would unpack to with the limits, before anything is unpacked. Raises ValueError.
+
+    `zipfile` unpacks no more of an entry than its entry in the directory states.
+    """
+    with zipfile.ZipFile(BytesIO(data)) as file:
+        entries = file.infolist()
+        if any(entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for entry in entries):
+            raise ValueError("a compression that it is not written with")
+        if len(entries) > _ENTRIES or sum(entry.file_size for entry in entries) > LARGEST:
+            raise ValueError(f"more than {LARGEST} unpacked bytes or {_ENTRIES} arrays")
+        for entry in entries:
+            with file.open(entry) as stream:
+                version = np.lib.format.read_magic(stream)
+                read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+                shape, _, dtype = read(stream)
+                if math.prod(shape) * dtype.itemsize > entry.file_size or dtype.hasobject:
+                    raise ValueError(f"the array {entry.filename!r:.80} is longer than its bytes")
 
 
 def check_range(name: str, values: NDArray[Any], low: int, high: int) -> None:

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
 
-import yaml
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
 from collision_monitor.codec import ObjectDescriptionArray, ObjectStateArray, decode_descriptions, decode_states
-from collision_monitor.errors import MessageError, ProfileError, SessionError
+from collision_monitor.errors import InputError, MessageError, ProfileError, SessionError
 from collision_monitor.session.mcap.layout import (
     LIBRARY,
     LOG_TIME,
@@ -32,6 +31,7 @@ from collision_monitor.session.mcap.layout import (
 from collision_monitor.session.mcap.record_reader import McapReader, Message
 from collision_monitor.session.mcap.rosbag2 import INPUT_TYPES, RECORDED_TYPES, full_name
 from collision_monitor.settings.profile import Profile
+from collision_monitor.settings.yaml_file import read_yaml
 
 _SHORT_NAMES: Final = {full_name(name): name for name in RECORDED_TYPES}
 _INPUT_DECODERS: Final[dict[str, Callable[[bytes], ObjectStateArray | ObjectDescriptionArray]]] = dict(
@@ -155,7 +155,7 @@ class Session:
             return Profile.from_dict(values)
         except KeyError:
             raise SessionError(f"{self.path}: expected a profile in the session's metadata, got none") from None
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, RecursionError) as error:
             raise SessionError(f"{self.path}: the profile in the session's metadata cannot be used: {error}") from None
 
 
@@ -269,10 +269,10 @@ def _find(path: Path) -> list[Path]:
 def _absent(path: Path) -> list[str]:
     """Return the files that the folder's metadata.yaml lists and that are missing."""
     try:
-        content = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
+        content = read_yaml(path / "metadata.yaml", aliases=True)
         names = content["rosbag2_bagfile_information"]["relative_file_paths"]
         return [str(name) for name in names if not (path / str(name)).exists()]
-    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError):  # the file is not needed to read the session
+    except (InputError, OSError, ValueError, TypeError, KeyError):  # the file is not needed to read the session
         return []
 
 

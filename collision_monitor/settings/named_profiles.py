@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Final
 
-import yaml
-
-from collision_monitor.errors import ProfileError
+from collision_monitor.errors import InputError, ProfileError
+from collision_monitor.settings.yaml_file import read_yaml
 
 BASED_ON: Final = "based_on"
 """Key in the file of a custom profile: the named profile that it starts from."""
@@ -57,16 +56,14 @@ def profile_changes(name: str) -> dict[str, Any]:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ProfileError(f"profile: expected a file that can be read, got {path}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ProfileError(f"profile {path}: expected YAML, got: {' '.join(str(error).split())}") from None
+        content = read_yaml(path)
+    except InputError as error:
+        raise ProfileError(f"profile {error}") from None
     if not isinstance(content, dict) or not content:
-        raise ProfileError(f"profile {path}: expected settings, as `horizon: 3.0`, got {content!r}")
+        raise ProfileError(f"profile {path}: expected settings, as `horizon: 3.0`, got {content!r:.80}")
     base = content.pop(BASED_ON, "balanced")
-    if base not in NAMED_PROFILES:
-        raise ProfileError(f"profile {path}, {BASED_ON}: expected one of {_names()}, got {base!r}")
+    if not isinstance(base, str) or base not in NAMED_PROFILES:
+        raise ProfileError(f"profile {path}, {BASED_ON}: expected one of {_names()}, got {base!r:.80}")
     return {**NAMED_PROFILES[base], "name": path.stem, **content}
 
 

@@ -13,6 +13,7 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 from collision_monitor.errors import MessageError, SessionError
+from collision_monitor.sources.bag_limits import check_bag, unpack_message
 
 
 class BagMessage(NamedTuple):
@@ -40,6 +41,7 @@ class Bag:
                 f"{path}: expected the folder of a bag, got one without metadata.yaml; "
                 "name the .mcap file in it, or make it with `ros2 bag reindex`"
             )
+        check_bag(path)
         try:
             self._reader = Reader(path)
             self._reader.open()
@@ -52,6 +54,10 @@ class Bag:
                 self.close()
                 raise SessionError(f"{path}: topic {connection.topic} has messages of {other} and {connection.msgtype}")
         self._types: Any = None
+        self._packed = self._reader.compression_mode == "message"
+        if self._packed:  # rosbags would unpack them without a limit
+            storage = self._reader.storage
+            storage.metadata = storage.metadata._replace(compression_mode=None)
 
     def messages(self, topics: Iterable[str]) -> Iterator[BagMessage]:
         """Yield the messages of these topics by the time of receipt. Raises SessionError if the bag is damaged."""
@@ -61,7 +67,8 @@ class Bag:
             return
         try:
             for connection, log_time, data in self._reader.messages(connections):
-                yield BagMessage(connection.topic, connection.msgtype, log_time, data)
+                plain = unpack_message(data, connection.topic) if self._packed else data
+                yield BagMessage(connection.topic, connection.msgtype, log_time, plain)
         except GeneratorExit:
             raise
         except SessionError:

@@ -19,13 +19,13 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import yaml
 
 from collision_monitor.codec.shape_fields import make_shape
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.records import ShapeType
+from collision_monitor.settings.yaml_file import read_yaml
 
 HEADER, RECEIVED = "header", "received"
 
@@ -79,14 +79,7 @@ class Mapping:
 
 def load_mapping(path: Path) -> Mapping:
     """Read a mapping file. Raises InputError, with the object and the key, if it cannot be used."""
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: expected a mapping file, got: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        where = getattr(error, "problem_mark", None)
-        line = f" (line {where.line + 1})" if where else ""
-        raise InputError(f"{path}: expected YAML, got something else{line}") from None
+    content = read_yaml(path)
     try:
         return make_mapping(content)
     except CollisionMonitorError as error:

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-import yaml
-
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.session.history.conditions import (
     Condition,
@@ -26,6 +24,7 @@ from collision_monitor.session.history.conditions import (
     warned_before,
 )
 from collision_monitor.session.history.history import ANY, History
+from collision_monitor.settings.yaml_file import read_yaml
 
 
 @dataclass(frozen=True)
@@ -50,12 +49,7 @@ def read_expectations(path: str | Path) -> Any:
 
     Raises InputError with the file, the expectation and the choices.
     """
-    try:
-        content = yaml.load(Path(path).read_text(encoding="utf-8"), _Loader)
-    except OSError as error:
-        raise InputError(f"{path}: expected a file that can be read, got: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{path}: expected YAML, got: {' '.join(str(error).split())}") from None
+    content = read_yaml(Path(path))
     try:
         parse_expectations(content)
     except InputError as error:
@@ -63,18 +57,8 @@ def read_expectations(path: str | Path) -> Any:
     return content
 
 
-class _Loader(yaml.SafeLoader):
-    """Refuses a duplicate key. YAML would ignore the first one, and an expectation would be lost."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys = [key.value for key, _ in node.value]
-        if len(set(map(str, keys))) < len(keys):
-            raise yaml.constructor.ConstructorError(None, None, f"the same key twice in {keys}", node.start_mark)
-        return super().construct_mapping(node, deep)
-
-
 def parse_expectations(content: Any) -> list[Expectation]:
-    """Return the expectations in the content from `yaml.safe_load`. Raises InputError."""
+    """Return the expectations in the content from `read_yaml`. Raises InputError."""
     if not isinstance(content, Mapping) or list(content) != ["expect"] or not isinstance(content["expect"], list):
         raise InputError(f"expected a list under the one key `expect`, got {content!r:.80}")
     if not content["expect"]:

@@ -13,22 +13,17 @@ import re
 import struct
 import zlib
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Final
+from typing import Final
 
-import lz4.frame  # type: ignore[import-untyped]
-import zstandard
 from mcap.opcode import Opcode
 
-from collision_monitor.session.mcap.layout import CHUNK_HEAD, FIELDS, HEAD, LARGEST_CHUNK, MAGIC, MESSAGE, OPCODES
+from collision_monitor.session.mcap.chunk import ChunkLimitError, Unpacker, records
+from collision_monitor.session.mcap.layout import CHUNK_HEAD, FIELDS, HEAD, MAGIC, MESSAGE, OPCODES
 
 _EFFORT: Final = 8
 """Bound of the work on places that might be chunks and are none, as a multiple of the file's size."""
-
-_PIECE: Final = 1 << 12
-"""Bytes of a chunk that are unpacked at a time: data before damage in it is recovered to this granularity."""
 
 _CANDIDATE: Final = re.compile(rb"[\x01-\x0f](?=.{5}\x00\x00\x00)", re.DOTALL)
 """Start of a possible record: a known opcode, and a length below 2^40."""
@@ -87,12 +82,13 @@ def walk(data: mmap.mmap) -> Iterator[RecoveredRecord | Damage]:
         at = 0
     closed = chunked = False
     effort = _EFFORT * len(data)
+    unpacker = Unpacker(len(data))
     while at < len(data):
         if closed and _is_end(data, at):
             return
         record = _record(data, at)
         if record is None or record.opcode not in OPCODES:
-            chunk, spent = _chunk_at(data, at) if effort > 0 else (None, 0)
+            chunk, spent = _chunk_at(data, at, unpacker) if effort > 0 else (None, 0)
             effort -= spent
             record = chunk or record
         following = len(data) if record is None else record.end
@@ -104,13 +100,13 @@ def walk(data: mmap.mmap) -> Iterator[RecoveredRecord | Damage]:
                 if not closed:
                     yield Damage(f"{following - at} bytes from byte {at} on are damaged or incomplete")
                     if cut:
-                        yield from _cut_chunk(data, at)
+                        yield from _cut_chunk(data, at, unpacker)
                 at = following
                 continue
             following = record.end
         if record.opcode == Opcode.CHUNK:
             chunked = True
-            yield from _chunk(data[record.begin : record.end], at)
+            yield from _chunk(data[record.begin : record.end], at, unpacker)
         elif record.opcode not in OPCODES:
             yield Damage(f"a record of unknown kind {record.opcode}, {record.end - at} bytes at byte {at}, is left out")
         elif record.opcode in (Opcode.DATA_END, Opcode.FOOTER):
@@ -200,7 +196,7 @@ def _next_record(data: mmap.mmap, at: int) -> int:
 # -- chunks
 
 
-def _chunk_at(data: mmap.mmap, at: int) -> tuple[_RecordSpan | None, int]:
+def _chunk_at(data: mmap.mmap, at: int, unpacker: Unpacker) -> tuple[_RecordSpan | None, int]:
     """Return the chunk here if its checksum is right, even if its opcode or a length is wrong; else the bytes spent."""
     begin = at + HEAD.size
     if begin + CHUNK_HEAD.size > len(data):
@@ -208,25 +204,31 @@ def _chunk_at(data: mmap.mmap, at: int) -> tuple[_RecordSpan | None, int]:
     spent = 0
     for size in (_own_length(data, Opcode.CHUNK, begin), int(HEAD.unpack_from(data, at)[1])):
         if size is not None and size <= len(data) - begin:
-            if _unpacked(data[begin : begin + size])[1] is Trust.CHECKED:
+            if _is_checked(data[begin : begin + size], unpacker):
                 return _RecordSpan(Opcode.CHUNK, begin, begin + size), 0
             spent += size
     return None, spent
 
 
-def _chunk(payload: bytes, at: int) -> Iterator[RecoveredRecord | Damage]:
+def _is_checked(payload: bytes, unpacker: Unpacker) -> bool:
+    try:
+        return _unpacked(payload, unpacker)[1] is Trust.CHECKED
+    except ValueError:
+        return False
+
+
+def _chunk(payload: bytes, at: int, unpacker: Unpacker) -> Iterator[RecoveredRecord | Damage]:
     """Yield the records of a chunk."""
-    records, trust = _unpacked(payload)
+    what = f"the chunk of {len(payload)} bytes at byte {at}"
+    try:
+        data, trust = _unpacked(payload, unpacker)
+        messages = _messages(data, len(payload))
+    except ValueError as error:
+        yield Damage(f"{what} is left out: {error}")
+        return
     if trust is Trust.NONE:
-        found = list(_inner(records, trust))
-        messages = sum(each.opcode == Opcode.MESSAGE for each in found)
-        yield Damage(
-            f"the chunk of {len(payload)} bytes at byte {at} is not as it was written: {messages} messages in it are "
-            "complete and cannot be trusted"
-        )
-        yield from found
-    else:
-        yield from _inner(records, trust)
+        yield Damage(f"{what} is not as it was written: {messages} messages in it are complete and cannot be trusted")
+    yield from _inner(data, trust, len(payload))
 
 
 def _is_cut_chunk(data: mmap.mmap, at: int) -> bool:
@@ -242,17 +244,22 @@ def _is_cut_chunk(data: mmap.mmap, at: int) -> bool:
     return length == CHUNK_HEAD.size + 12 + name + size and at + HEAD.size + length > len(data)
 
 
-def _cut_chunk(data: mmap.mmap, at: int) -> Iterator[RecoveredRecord | Damage]:
+def _cut_chunk(data: mmap.mmap, at: int, unpacker: Unpacker) -> Iterator[RecoveredRecord | Damage]:
     """Yield the complete records of a cut chunk, because its remaining bytes are as they were written."""
-    found = list(_inner(_unpacked(data[at + HEAD.size :])[0], Trust.WHOLE))
-    messages = sum(each.opcode == Opcode.MESSAGE for each in found)
+    payload = data[at + HEAD.size :]
+    try:
+        found, _ = _unpacked(payload, unpacker)
+        messages = _messages(found, len(payload))
+    except ValueError as error:
+        yield Damage(f"the chunk that is cut off at byte {at} is left out: {error}")
+        return
     if messages:
         yield Damage(f"of the chunk that is cut off at byte {at}, {messages} messages are complete and kept")
-    yield from found
+    yield from _inner(found, Trust.WHOLE, len(payload))
 
 
-def _unpacked(payload: bytes) -> tuple[bytes, Trust]:
-    """Return a chunk's records as far as they can be unpacked, and how far they can be trusted."""
+def _unpacked(payload: bytes, unpacker: Unpacker) -> tuple[bytes, Trust]:
+    """Return a chunk's records as far as they can be unpacked, and how far they can be trusted. Raises ValueError."""
     try:
         _, _, size, checksum = CHUNK_HEAD.unpack_from(payload)
         (name,) = struct.unpack_from("<I", payload, CHUNK_HEAD.size)
@@ -261,40 +268,34 @@ def _unpacked(payload: bytes) -> tuple[bytes, Trust]:
     begin = CHUNK_HEAD.size + 4 + name + 8
     if name > 8 or begin > len(payload):
         return b"", Trust.NONE
-    records, whole = _decompressed(payload[begin:])
+    data, whole = unpacker.unpack(payload[begin:])
     if not whole:
-        return records, Trust.NONE
-    if checksum and zlib.crc32(records) == checksum:
-        return records, Trust.CHECKED
-    return records, Trust.WHOLE if checksum == 0 and len(records) == size else Trust.NONE
+        return data, Trust.NONE
+    if checksum and zlib.crc32(data) == checksum:
+        return data, Trust.CHECKED
+    return data, Trust.WHOLE if checksum == 0 and len(data) == size else Trust.NONE
 
 
-def _decompressed(packed: bytes) -> tuple[bytes, bool]:
-    """Unpack as much as possible, by the magic number of the bytes. Return also whether that was all of them."""
-    unpacker: Any
-    if packed.startswith(b"\x28\xb5\x2f\xfd"):
-        unpacker = zstandard.ZstdDecompressor(max_window_size=LARGEST_CHUNK).decompressobj()
-    elif packed.startswith(b"\x04\x22\x4d\x18"):
-        unpacker = lz4.frame.LZ4FrameDecompressor()
-    else:
-        return packed, True
-    out = bytearray()
-    end = 0
-    with suppress(zstandard.ZstdError, RuntimeError, EOFError):
-        while end < len(packed) and not unpacker.eof and len(out) <= LARGEST_CHUNK:
-            out += unpacker.decompress(packed[end : end + _PIECE])
-            end += _PIECE
-    return bytes(out), bool(unpacker.eof and not unpacker.unused_data and end >= len(packed))
+def _messages(data: bytes, packed: int) -> int:
+    """Return the number of complete messages in the bytes of a chunk. Raises ChunkLimitError."""
+    return sum(opcode == Opcode.MESSAGE for opcode, _, _ in _complete(data, packed))
 
 
-def _inner(records: bytes, trust: Trust) -> Iterator[RecoveredRecord]:
+def _inner(data: bytes, trust: Trust, packed: int) -> Iterator[RecoveredRecord]:
     """Yield the complete records in the bytes of a chunk."""
-    at = 0
-    while at + HEAD.size <= len(records):
-        opcode, length = HEAD.unpack_from(records, at)
-        at += HEAD.size
-        if opcode == 0 or length > len(records) - at:
-            return
-        if opcode in _IN_CHUNKS and (opcode != Opcode.MESSAGE or length >= MESSAGE.size):
-            yield RecoveredRecord(opcode, records[at : at + length], trust, Section.CHUNK)
-        at += length
+    for opcode, begin, end in _complete(data, packed):
+        yield RecoveredRecord(opcode, data[begin:end], trust, Section.CHUNK)
+
+
+def _complete(data: bytes, packed: int) -> Iterator[tuple[int, int, int]]:
+    """Yield the complete records in the bytes of a chunk, up to the first that is none. Raises ChunkLimitError."""
+    try:
+        for opcode, begin, end in records(data, packed):
+            if end > len(data):
+                return
+            if opcode in _IN_CHUNKS and (opcode != Opcode.MESSAGE or end - begin >= MESSAGE.size):
+                yield opcode, begin, end
+    except ChunkLimitError:
+        raise
+    except ValueError:
+        return  # opcode 0

@@ -15,9 +15,6 @@ from mcap.opcode import Opcode
 MAGIC: Final = b"\x89MCAP0\r\n"
 """The first and the last bytes of a file."""
 
-LARGEST_CHUNK: Final = 1 << 30
-"""Limit of an unpacked chunk (bytes), so that a damaged one cannot take all memory. rosbag2 writes under 1 MiB."""
-
 SEQUENCE_MASK: Final = 0xFFFFFFFF
 """The sequence numbers of messages are uint32 and wrap."""
 

@@ -3,21 +3,37 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterator
-from io import BytesIO
+from collections.abc import Callable, Iterable, Iterator
+from io import SEEK_CUR, BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, Final, NamedTuple
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, Header, Metadata, Schema
-from mcap.stream_reader import get_chunk_data_stream
+from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
 from collision_monitor.errors import SessionError
-from collision_monitor.session.mcap.layout import HEAD, LARGEST_CHUNK, MAGIC, MESSAGE
+from collision_monitor.session.mcap.chunk import LARGEST_CHUNK, Unpacker, records
+from collision_monitor.session.mcap.definitions_in_force import LARGEST_DEFINITION, DefinitionsInForce
+from collision_monitor.session.mcap.layout import CHUNK_HEAD, HEAD, MAGIC, MESSAGE
+from collision_monitor.session.mcap.sentences import add_sentence
 
 _GLANCE: Final = 256
 """Bytes of a record that hold its times and its name."""
+
+_LARGEST: Final[dict[int, int]] = {
+    Opcode.MESSAGE: LARGEST_CHUNK,
+    Opcode.CHUNK: LARGEST_CHUNK,
+    Opcode.ATTACHMENT: 64 << 20,  # a snapshot of 10,000 objects has 3 MB
+    Opcode.METADATA: 4 << 20,  # the longest are rosbag2's copy of metadata.yaml and the losses of a salvage
+    Opcode.HEADER: 1 << 20,
+    Opcode.SCHEMA: LARGEST_DEFINITION,
+    Opcode.CHANNEL: LARGEST_DEFINITION,
+}
+"""Bytes of a record that is read; longer ones are damage. Records of other kinds are skipped unread."""
+
+_DEFINITIONS: Final = 1 << 17
+"""Schemas and channels in one chunk: there are 2^16 ids of each."""
 
 
 class Message(NamedTuple):
@@ -40,6 +56,8 @@ class McapReader:
         self.path = path
         self.damage: list[str] = []
         self.position = 0
+        self._unpacker = Unpacker(0)
+        self._in_force = DefinitionsInForce()
         try:
             self.size = path.stat().st_size
             with path.open("rb") as file:
@@ -60,16 +78,25 @@ class McapReader:
     def read(self, begin: int = 0) -> Iterator[Any]:
         """Yield the same. begin: offset of a record; the records from the first message up to it are skipped."""
         self.damage = []
+        self._unpacker = Unpacker(self.size)
+        self._in_force = DefinitionsInForce()
         with self.path.open("rb") as file:
-            for start, opcode, payload in self._whole(file):
+            for start, opcode, length in self._heads(file):
+                limit = _LARGEST.get(opcode, 0)
+                if not 0 < length <= limit:
+                    if limit:
+                        found = f"expected 1 to {limit} bytes"
+                        self._note(f"{_name(opcode)} of {length} bytes at byte {start} is damaged: {found}")
+                    file.seek(length, SEEK_CUR)
+                    continue
                 # The library raises many kinds of errors for wrong bytes. Each means that the record is damaged.
                 try:
-                    records = _unpack(opcode, payload)
+                    found_records = self._unpack(opcode, file.read(length))
                 except Exception as error:
                     reason = str(error) or repr(error)
-                    self.damage.append(f"{_name(opcode)} of {len(payload)} bytes at byte {start} is damaged: {reason}")
+                    self._note(f"{_name(opcode)} of {length} bytes at byte {start} is damaged: {reason}")
                     continue
-                for record in records:
+                for record in found_records:
                     if start < begin and isinstance(record, Message):
                         file.seek(begin)
                         break
@@ -83,10 +110,8 @@ class McapReader:
                 yield start, opcode, file.read(min(length, _GLANCE))
                 file.seek(start + HEAD.size + length)
 
-    def _whole(self, file: BinaryIO) -> Iterator[tuple[int, int, bytes]]:
-        """Yield offset, opcode and payload of each record."""
-        for start, opcode, length in self._heads(file):
-            yield start, opcode, file.read(length)
+    def _note(self, text: str) -> None:
+        add_sentence(self.damage, text)
 
     def _heads(self, file: BinaryIO) -> Iterator[tuple[int, int, int]]:
         """Yield offset, opcode and length of each record, up to the end of the data or of the file."""
@@ -95,50 +120,76 @@ class McapReader:
             self.position = start = file.tell()
             head = file.read(HEAD.size)
             if not head:
-                self.damage.append("the recording was not closed: it ends without a summary")
+                self._note("the recording was not closed: it ends without a summary")
                 return
             opcode, length = HEAD.unpack(head) if len(head) == HEAD.size else (0, self.size)
             if length > self.size - start - HEAD.size:
-                self.damage.append(
-                    f"the recording was cut off: its last {self.size - start} bytes are an incomplete record"
-                )
+                self._note(f"the recording was cut off: its last {self.size - start} bytes are an incomplete record")
+                return
+            if not opcode:
+                self._note(f"its last {self.size - start} bytes, from byte {start} on, are zeros or no records")
                 return
             if opcode == Opcode.DATA_END:
                 self.position = self.size
                 return
             yield start, opcode, length
 
-
-def _unpack(opcode: int, payload: bytes) -> list[Any]:
-    """Return the records in the payload. Any exception means that it is damaged."""
-    if opcode == Opcode.MESSAGE:
-        return [_message(payload, 0, len(payload))]
-    stream = ReadDataStream(BytesIO(payload))
-    if opcode == Opcode.CHUNK:
-        chunk = Chunk.read(stream)
-        if chunk.uncompressed_size > LARGEST_CHUNK:
-            raise ValueError(f"it claims {chunk.uncompressed_size} bytes")
-        records, size = get_chunk_data_stream(chunk, validate_crc=True)
-        return _in_chunk(records.read(size))
-    if opcode == Opcode.ATTACHMENT and int.from_bytes(payload[-4:], "little") not in (0, zlib.crc32(payload[:-4])):
-        raise ValueError("its checksum is wrong")
-    return [_DECODERS[opcode](stream)] if opcode in _DECODERS else []
-
-
-def _in_chunk(data: bytes) -> list[Any]:
-    """Return the records of a chunk. Most are messages, which are unpacked here because the library takes longer."""
-    records: list[Any] = []
-    at = 0
-    while at < len(data):
-        opcode, length = HEAD.unpack_from(data, at)
-        begin, at = at + HEAD.size, at + HEAD.size + length
-        if at > len(data):
-            raise ValueError(f"a record of {length} bytes in it is cut off")
+    def _unpack(self, opcode: int, payload: bytes) -> Iterable[Any]:
+        """Return the records in the payload. Any exception means that it is damaged."""
         if opcode == Opcode.MESSAGE:
-            records.append(_message(data, begin, at))
-        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            records += _unpack(opcode, data[begin:at])
-    return records
+            return [_message(payload, 0, len(payload))]
+        if opcode == Opcode.CHUNK:
+            return self._in_chunk(*self._unpack_chunk(payload))
+        if opcode == Opcode.ATTACHMENT:
+            checksum = zlib.crc32(memoryview(payload)[:-4])
+            if int.from_bytes(payload[-4:], "little") not in (0, checksum):
+                raise ValueError("its checksum is wrong")
+        record = _DECODERS[opcode](ReadDataStream(BytesIO(payload)))
+        if opcode in _DEFINED:
+            self._in_force.add(opcode, record.id, len(payload))
+        return [record]
+
+    def _unpack_chunk(self, payload: bytes) -> tuple[bytes, int]:
+        """Return the records of a chunk, and the bytes that they had been packed into."""
+        _, _, size, checksum = CHUNK_HEAD.unpack_from(payload)
+        if size > LARGEST_CHUNK:
+            raise ValueError(f"it claims {size} bytes")
+        at = CHUNK_HEAD.size
+        at += 4 + int.from_bytes(payload[at : at + 4], "little")
+        length = int.from_bytes(payload[at : at + 8], "little")
+        packed = payload[at + 8 : at + 8 + length]
+        if len(packed) < length:
+            raise ValueError(f"{len(packed)} of its {length} bytes are there")
+        data, whole = self._unpacker.unpack(packed)
+        if checksum and zlib.crc32(data) != checksum:
+            raise ValueError("its checksum is wrong")
+        if not checksum and not (whole and len(data) == size):
+            raise ValueError(f"{len(data)} of its {size} unpacked bytes are there")
+        return data, len(packed)
+
+    def _in_chunk(self, data: bytes, packed: int) -> Iterator[Any]:
+        """Return the records of a chunk, after a check of all. The messages in it are made one by one."""
+        definitions: dict[int, Any] = {}
+        end = 0
+        for opcode, begin, end in records(data, packed):
+            if opcode == Opcode.MESSAGE:
+                if end - begin < MESSAGE.size:
+                    raise ValueError(f"a message of {end - begin} bytes is none")
+            elif opcode in _DEFINED:
+                if end - begin > _LARGEST[opcode] or len(definitions) >= _DEFINITIONS:
+                    raise ValueError("its schemas and channels are too large or too many")
+                if end <= len(data):
+                    (definitions[begin],) = self._unpack(opcode, data[begin:end])
+        if end > len(data):
+            raise ValueError("a record in it is cut off")
+        return self._yield(data, packed, definitions)
+
+    def _yield(self, data: bytes, packed: int, definitions: dict[int, Any]) -> Iterator[Any]:
+        for opcode, begin, end in records(data, packed):
+            if opcode == Opcode.MESSAGE:
+                yield _message(data, begin, end)
+            elif begin in definitions:
+                yield definitions[begin]
 
 
 def _message(data: bytes, begin: int, end: int) -> Message:
@@ -147,6 +198,8 @@ def _message(data: bytes, begin: int, end: int) -> Message:
     channel_id, sequence, log_time, publish_time = MESSAGE.unpack_from(data, begin)
     return Message(channel_id, sequence, log_time, publish_time, data[begin + MESSAGE.size : end])
 
+
+_DEFINED: Final = (Opcode.SCHEMA, Opcode.CHANNEL)
 
 _DECODERS: Final[dict[int, Callable[[ReadDataStream], Any]]] = {
     Opcode.HEADER: Header.read,

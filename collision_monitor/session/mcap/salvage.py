@@ -32,7 +32,9 @@ from mcap.writer import Writer
 from collision_monitor._version import VERSION
 from collision_monitor.errors import SessionError
 from collision_monitor.session.mcap.damaged import Damage, RecoveredRecord, Section, Trust, walk
+from collision_monitor.session.mcap.definitions_in_force import DefinitionsInForce
 from collision_monitor.session.mcap.layout import LIBRARY, MESSAGE, SALVAGE, SEQUENCE_HALF
+from collision_monitor.session.mcap.sentences import add_sentence
 
 _DECODERS: Final[dict[int, Any]] = {
     Opcode.HEADER: Header,
@@ -131,6 +133,7 @@ class _Contents:
         self.statistics: Statistics | None = None
         self.names: list[str] = []  # of metadata and attachments in the summary
         trust: dict[tuple[int, int], Trust] = {}  # by opcode and id: the most trusted copy counts
+        in_force = DefinitionsInForce()
         for each in walk(data):
             if isinstance(each, Damage) or each.opcode not in _DECODERS or each.opcode == Opcode.MESSAGE_INDEX:
                 continue
@@ -140,6 +143,10 @@ class _Contents:
                     self.profile = header.profile
                     self.library = header.library
                 case (Schema() | Channel()) as record if each.trust > trust.get((each.opcode, record.id), -1):
+                    try:
+                        in_force.add(each.opcode, record.id, len(each.payload))
+                    except ValueError:
+                        continue
                     if isinstance(record, Schema) and record.name and record.id:
                         self.schemas[record.id] = record
                     elif isinstance(record, Channel) and record.topic and record.message_encoding:
@@ -187,7 +194,7 @@ class _Copy:
             if isinstance(each, Damage):
                 self._settle_chunk()
                 self._damaged = True
-                self._result.losses.append(each.text)
+                self._lose(each.text)
             elif each.opcode == Opcode.MESSAGE:
                 self._message(each)
             elif each.opcode == Opcode.MESSAGE_INDEX:
@@ -245,6 +252,9 @@ class _Copy:
 
     # -- the account
 
+    def _lose(self, text: str) -> None:
+        add_sentence(self._result.losses, text)
+
     def _seconds(self, log_time: int) -> str:
         return f"{(log_time - (self._begin or 0)) * 1e-9:.3f} s"
 
@@ -255,18 +265,16 @@ class _Copy:
         first = 0 if self._last is None else self._last[0] + 1
         if self._contents.library.startswith(LIBRARY) and 0 < sequence - first < SEQUENCE_HALF:
             since = "the beginning" if self._last is None else self._seconds(self._last[1])
-            self._result.losses.append(
-                f"messages {first} to {sequence - 1}, from {since} to {self._seconds(log_time)}, are not there"
-            )
+            self._lose(f"messages {first} to {sequence - 1}, from {since} to {self._seconds(log_time)}, are not there")
 
     def _settle_chunk(self) -> None:
         """Note the losses of a damaged chunk, by the indexes behind it."""
         if self._stray:
-            self._result.losses.append(f"{self._stray} messages in it are complete and cannot be trusted")
+            self._lose(f"{self._stray} messages in it are complete and cannot be trusted")
         missing = self._indexed - self._kept
         if missing:
             parts = ", ".join(f"{count} of {self._topic(i)}" for i, count in sorted(missing.items()))
-            self._result.losses.append(f"in it were, by the index behind it, {parts}")
+            self._lose(f"in it were, by the index behind it, {parts}")
         self._indexed.clear()
         self._kept.clear()
         self._stray = 0
@@ -275,9 +283,10 @@ class _Copy:
     def _settle_doubt(self) -> None:
         if self._doubt:
             (first, begin), (last, end) = self._doubt[0], self._doubt[-1]
-            self._result.notes.append(
+            add_sentence(
+                self._result.notes,
                 f"messages {first} to {last}, from {self._seconds(begin)} to {self._seconds(end)}, are complete and "
-                "have no checksum that is right"
+                "have no checksum that is right",
             )
         self._doubt = []
 

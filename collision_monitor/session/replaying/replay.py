@@ -96,6 +96,7 @@ class _Replay:
         self.comparison = Comparison(self.report)
         self._mode = _Mode.EXACT
         self._next = 0  # sequence number of the next message
+        self._snapshot: int | None = None  # sequence number of the snapshot that the pipeline continues from
 
     # -- snapshots and gaps
 
@@ -138,6 +139,7 @@ class _Replay:
             self.report.notes.append(f"compared from the snapshot in step {step} on")
         self.report.digest = self._pipeline.monitor.digest
         self._mode, self._next = _Mode.EXACT, recorded.sequence
+        self._snapshot = recorded.sequence
         self.comparison.drop()
 
     def take(self, message: Recorded) -> bool:
@@ -166,7 +168,15 @@ class _Replay:
         self._next = (message.sequence + 1) & SEQUENCE_MASK
         self.comparison.sequence = message.sequence
         if self._mode is not _Mode.STOPPED:
-            self._feed(message, compare=self._mode is _Mode.EXACT)
+            try:
+                self._feed(message, compare=self._mode is _Mode.EXACT)
+            except Exception as error:
+                if self._snapshot is None:
+                    raise
+                # it fits the monitor's arrays, but no monitor can have been in this state
+                text = f"the snapshot before message {self._snapshot} cannot be used: message {message.sequence} fails"
+                self.report.notes.append(f"{text} with it: {error!r:.200}")
+                self._mode, self.report.hole = _Mode.STOPPED, True
         return self._mode is not _Mode.STOPPED
 
     def _note_gap(self, missing: int, what: str) -> None:
