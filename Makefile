@@ -30,6 +30,8 @@ test: ## set up, lint and run every test
 test-core: setup ## run the tests, except those of the node and of the set-up
 	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore=test/ros --ignore=test/setup
 
+fuzz-files: setup ; @$(BIN)/python test/attacks/fuzz_sessions.py $(ARGS) ## read damaged and hostile copies of sessions; ARGS=--files=100000
+
 lint: setup ## run ruff and mypy --strict
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
-from mcap.opcode import Opcode
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 import session_mutations as mutations
 from fuzz_sessions import Child, make_bases, run
+from mcap.opcode import Opcode
 from session_mutations import MAGIC, MIB, Record, make_chunk, make_file, mutate, parse
 
 from collision_monitor.session import Session
