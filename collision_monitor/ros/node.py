@@ -22,6 +22,7 @@ from collision_monitor.records import Phase
 from collision_monitor.ros.endpoints import publisher, subscription
 from collision_monitor.ros.live_settings import LiveSettings
 from collision_monitor.ros.markers import MarkerView
+from collision_monitor.ros.name_conflict import NameConflict
 from collision_monitor.ros.node_recording import NodeRecording
 from collision_monitor.ros.parameters import read_monitor_parameters
 from collision_monitor.ros.process import StopRequest
@@ -58,6 +59,7 @@ class MonitorNode(Node):
             raise
         self._warm_up(stop)
         self._name = self.get_fully_qualified_name()
+        self._name_conflict = NameConflict(self)
         self._pipeline = Pipeline(settings.profile, frame_id=settings.frame_id)
         self._times = StepTimes(settings.profile.max_time_step)
         self._markers = MarkerView(self._pipeline.catalogue, settings.frame_id)
@@ -174,6 +176,7 @@ class MonitorNode(Node):
 
     def _on_watchdog(self) -> None:
         self._recording.log_problems()
+        self._name_conflict.look()
         now = time.monotonic_ns()
         silent = self._is_silent(now)
         if silent != self._was_silent:

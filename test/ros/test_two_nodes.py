@@ -1,0 +1,38 @@
+"""Two monitors of one name on one domain: each one goes on, and each one's log says so."""
+
+import numpy as np
+
+from collision_monitor import records
+from collision_monitor.geometry.shapes import Sphere
+from collision_monitor.objects.description import ObjectDescription
+
+WARNING = "another node has the name /object_monitor"
+
+
+def overlapping():
+    rows = np.zeros(2, records.STATE)
+    rows["id"], rows["quaternion"][:, 3], rows["position"][:, 0] = (1, 2), 1.0, (0.0, 0.9)
+    return rows
+
+
+def test_each_of_two_nodes_of_one_name_goes_on_and_warns(start, team):
+    first = start("run")
+    team.meet()
+    assert WARNING not in first.words
+    second = start("run")
+    team.until(lambda: WARNING in first.words and WARNING in second.words, 60.0)
+    team.describe(*(ObjectDescription(i, Sphere(0.5)) for i in (1, 2)))
+    team.listen(0.5)
+    stamp = team.now
+    for _ in range(20):  # best effort
+        stamp += 10_000_000
+        team.say(*overlapping(), stamp=stamp)
+        team.listen(0.02)
+    answers = [len(m.contacts) for m in team.contacts]
+    assert answers.count(1) > 25, "both answer"
+    assert first.running and second.running
+    assert second.stop() == 0
+    team.until(lambda: "no other node has the name /object_monitor any more" in first.words)
+    team.ask(*overlapping())
+    assert first.words.count(WARNING) == 1, "once, not at each look"
+    assert first.stop() == 0
