@@ -16,7 +16,7 @@ from collision_monitor.cli.quantities import positive, whole
 from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
-    from collision_monitor.session.history.changes import Change, Changes, Event
+    from collision_monitor.session.history.changes import Changes, Event, EventChange
     from collision_monitor.session.history.history import History
 
 EPILOG = """\
@@ -144,7 +144,7 @@ def _milliseconds(seconds: float) -> str:
     return "not known" if math.isnan(seconds) else f"{seconds * 1e3:.3f} ms"
 
 
-def _change(change: Change) -> str:
+def _change(change: EventChange) -> str:
     event = change.event
     if change.a is None or change.b is None:
         where = "only in A" if change.b is None else "only in B"

@@ -212,11 +212,6 @@ class Monitor:
 
     # ------------------------------------------------------------------ steps
 
-    def reset(self) -> None:
-        """Forget all states, events and contacts. All objects that are not static are unseen until their next state."""
-        self._timeline.forget()
-        self._restart()
-
     def _restart(self) -> None:
         self._active_pairs.end_all()
         self._events.clear()

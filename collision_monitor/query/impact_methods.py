@@ -33,7 +33,7 @@ from collision_monitor.query.time_of_impact import ITERATIONS
 from collision_monitor.tolerances import PARALLEL_SIN2
 
 Array = NDArray[np.float64]
-Method = Callable[[Shape, Array, Shape, Array, float], Array]
+ImpactMethod = Callable[[Shape, Array, Shape, Array, float], Array]
 
 STEP: Final = 1 / 60
 """Step (s) of the methods that test one time after the other: a frame."""
@@ -132,7 +132,7 @@ def end_of_step(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: flo
     return bisection(shape_a, a, shape_b, b, horizon, step, 0)
 
 
-METHODS: Final[dict[str, Method]] = {
+METHODS: Final[dict[str, ImpactMethod]] = {
     "closed_form": closed_form,
     "swept_bounds": swept_bounds,
     "swept_sat": swept_sat,

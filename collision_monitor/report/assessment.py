@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from collision_monitor.errors import Refusal
-from collision_monitor.report.facts import Facts
+from collision_monitor.report.facts import ReportFacts
 from collision_monitor.session.history.alerts import AlertOutcome
 from collision_monitor.session.history.history import History
 
@@ -33,7 +33,7 @@ class Assessment:
     doubts: list[str]
 
 
-def assess(history: History, facts: Facts) -> Assessment:
+def assess(history: History, facts: ReportFacts) -> Assessment:
     """Assess a session."""
     doubts = _doubts(history, facts)
     count = len(facts.collisions)
@@ -55,7 +55,7 @@ def _were(count: int) -> str:
     return f"{count} {'was' if count == 1 else 'were'}"
 
 
-def _findings(facts: Facts) -> list[str]:
+def _findings(facts: ReportFacts) -> list[str]:
     lines = []
     leads = np.array([each.warned for each in facts.collisions if each.warned > 0.0])
     if len(leads):
@@ -82,7 +82,7 @@ def _findings(facts: Facts) -> list[str]:
     return lines
 
 
-def _doubts(history: History, facts: Facts) -> list[str]:
+def _doubts(history: History, facts: ReportFacts) -> list[str]:
     lines = _some(history.problems, "problems with the recording")
     if not len(history.times):
         return [*lines, "no step was answered; --replay computes the answers now"]

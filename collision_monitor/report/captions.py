@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collision_monitor.report.assessment import counted
-from collision_monitor.report.facts import Facts
+from collision_monitor.report.facts import ReportFacts
 from collision_monitor.report.figures import CURVES, PAIRS, drawn_collisions, largest_error
 from collision_monitor.report.from_above import AROUND, EVENTS
 from collision_monitor.session.history.history import History
 
 
-def captions(history: History, facts: Facts) -> dict[str, str]:
+def captions(history: History, facts: ReportFacts) -> dict[str, str]:
     """Return the caption of each figure, by the names that `figures` uses."""
     return {
         "timeline": _timeline(facts),
@@ -20,13 +20,13 @@ def captions(history: History, facts: Facts) -> dict[str, str]:
     }
 
 
-def _timeline(facts: Facts) -> str:
+def _timeline(facts: ReportFacts) -> str:
     left = len(facts.risky) - PAIRS
     out = f" Only the {PAIRS} riskiest pairs; {counted(left, 'more pair')} left out." if left > 0 else ""
     return f"When each pair touched, and when it was predicted to touch.{out}"
 
 
-def _predicted(facts: Facts) -> str:
+def _predicted(facts: ReportFacts) -> str:
     left = len(facts.answered) - len(drawn_collisions(facts))
     worst = largest_error(facts)
     held = f"The largest error of an interval was {worst:.2g} s" if worst > 0.0005 else "Here every interval was right"
@@ -45,7 +45,7 @@ def _distances() -> str:
     )
 
 
-def _events(facts: Facts) -> str:
+def _events(facts: ReportFacts) -> str:
     left = len(facts.collisions) - EVENTS
     out = f" Only the unpredicted, then the deepest collisions; {left} more left out." if left > 0 else ""
     return (

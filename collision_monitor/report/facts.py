@@ -12,7 +12,7 @@ from collision_monitor.session.history.history import CollisionEvent, Floats, Hi
 
 
 @dataclass(frozen=True, eq=False)
-class Facts:
+class ReportFacts:
     """Numbers of a session.
 
     period: median time between steps (s). gaps: from, to (s), without an answered step. collisions: certain contacts.
@@ -33,7 +33,7 @@ class Facts:
     tracks: Tracks
 
 
-def gather(history: History) -> Facts:
+def gather(history: History) -> ReportFacts:
     """Gather the facts of a history."""
     period = history.period
     found = alerts_of(history)
@@ -42,7 +42,7 @@ def gather(history: History) -> Facts:
         alerts.setdefault(alert.pair, []).append(alert)
     certain = [each for each in history.collisions if each.certain]
     before = {each: alert_before(alerts.get(each.pair, []), each) for each in certain}
-    return Facts(
+    return ReportFacts(
         period=period,
         gaps=_gaps(history.times, history.longest_step),
         collisions=certain,

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from collision_monitor.report.facts import Facts
+from collision_monitor.report.facts import ReportFacts
 from collision_monitor.report.from_above import from_above
 from collision_monitor.report.rendering import CONTACT, INK, PALETTE, POSSIBLE, STYLE, WARNING, Size, shortened
 from collision_monitor.session.history.alerts import stated_error
@@ -32,9 +32,9 @@ TAIL: Final = 0.995
 """Quantile of the step times at which the histogram ends. Its last bar includes all longer times."""
 
 
-def figures(history: History, facts: Facts, size: Size) -> dict[str, Figure]:
+def figures(history: History, facts: ReportFacts, size: Size) -> dict[str, Figure]:
     """Draw the figures that have content. Return them by name, in their order on the page."""
-    draw: dict[str, Callable[[History, Facts, Size], Figure | None]] = {
+    draw: dict[str, Callable[[History, ReportFacts, Size], Figure | None]] = {
         "timeline": _timeline,
         "predicted": _predicted,
         "distances": _distances,
@@ -51,18 +51,18 @@ def pair_name(history: History, pair: Pair, longest: int = 18) -> str:
     return " – ".join(shortened(history.name_of(object_id), longest) for object_id in pair)
 
 
-def drawn_collisions(facts: Facts) -> list[CollisionEvent]:
+def drawn_collisions(facts: ReportFacts) -> list[CollisionEvent]:
     """Return the collisions to draw: those with the largest errors, then those with the longest warning."""
     chosen = sorted(facts.answered, key=lambda c: (-_worst(facts, c), -c.warned, c.begin, c.pair))[:CURVES]
     return sorted(chosen, key=lambda c: (c.begin, c.pair))
 
 
-def largest_error(facts: Facts) -> float:
+def largest_error(facts: ReportFacts) -> float:
     """Return the largest error of the stated intervals of all predicted collisions (s), or 0 without any."""
     return max((_worst(facts, each) for each in facts.answered), default=0.0)
 
 
-def _worst(facts: Facts, collision: CollisionEvent) -> float:
+def _worst(facts: ReportFacts, collision: CollisionEvent) -> float:
     return float(np.abs(stated_error(facts.answered[collision], collision, facts.period)).max())
 
 
@@ -72,7 +72,7 @@ def _runs(times: Floats, longest: float, period: float) -> list[tuple[float, flo
     return [(float(part[0]), float(part[-1] - part[0]) + period) for part in np.split(times, breaks) if len(part)]
 
 
-def _timeline(history: History, facts: Facts, size: Size) -> Figure | None:
+def _timeline(history: History, facts: ReportFacts, size: Size) -> Figure | None:
     pairs = facts.risky[:PAIRS]
     if not pairs:
         return None
@@ -129,7 +129,7 @@ def _legend(figure: Figure, handles: list[Patch | Line2D], columns: int) -> None
     figure.legend(handles=handles, loc="outside upper left", ncols=columns, columnspacing=1.2)
 
 
-def _predicted(history: History, facts: Facts, size: Size) -> Figure | None:
+def _predicted(history: History, facts: ReportFacts, size: Size) -> Figure | None:
     """Draw the error of each prediction of a collision over the time before the contact."""
     chosen = drawn_collisions(facts)
     if not chosen:
@@ -157,7 +157,7 @@ def _predicted(history: History, facts: Facts, size: Size) -> Figure | None:
     return figure
 
 
-def _distances(history: History, facts: Facts, size: Size) -> Figure | None:
+def _distances(history: History, facts: ReportFacts, size: Size) -> Figure | None:
     curves: list[tuple[Pair, tuple[Floats, Floats]]] = []
     for pair in facts.risky:
         if len(curves) == CLOSEST:
@@ -188,7 +188,7 @@ def _distances(history: History, facts: Facts, size: Size) -> Figure | None:
     return figure
 
 
-def _steps(history: History, facts: Facts, size: Size) -> Figure | None:
+def _steps(history: History, facts: ReportFacts, size: Size) -> Figure | None:
     if not len(history.durations):
         return None
     milliseconds = history.durations * 1e3

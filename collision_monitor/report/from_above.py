@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from collision_monitor.report.facts import Facts
+from collision_monitor.report.facts import ReportFacts
 from collision_monitor.report.footprint import footprint
 from collision_monitor.report.rendering import INK, PALETTE, Size, shortened
 from collision_monitor.report.tracks import Track
@@ -27,7 +27,7 @@ POINTS: Final = 400
 """Largest number of points of a track."""
 
 
-def chosen_events(facts: Facts) -> list[CollisionEvent]:
+def chosen_events(facts: ReportFacts) -> list[CollisionEvent]:
     """Return the collisions to draw, in order of time.
 
     Collisions without a prediction have priority, those from the first step on come last, and deep ones come first.
@@ -37,7 +37,7 @@ def chosen_events(facts: Facts) -> list[CollisionEvent]:
     return sorted(worst, key=lambda c: (c.begin, c.pair))
 
 
-def from_above(history: History, facts: Facts, size: Size) -> Figure | None:
+def from_above(history: History, facts: ReportFacts, size: Size) -> Figure | None:
     """Draw one panel for each chosen collision. Return None if there is none."""
     chosen = chosen_events(facts)
     if not chosen:
@@ -54,7 +54,7 @@ def from_above(history: History, facts: Facts, size: Size) -> Figure | None:
     return figure
 
 
-def _panel(axes: Axes, history: History, facts: Facts, collision: CollisionEvent) -> None:
+def _panel(axes: Axes, history: History, facts: ReportFacts, collision: CollisionEvent) -> None:
     now = np.array([collision.begin])
     middle = _middle(history, facts, collision)
     tracks: list[Floats] = []
@@ -88,7 +88,7 @@ def _panel(axes: Axes, history: History, facts: Facts, collision: CollisionEvent
     axes.tick_params(labelsize=8)
 
 
-def _middle(history: History, facts: Facts, collision: CollisionEvent) -> Floats:
+def _middle(history: History, facts: ReportFacts, collision: CollisionEvent) -> Floats:
     """Return the point of contact (2,), or the position of the first known object if the point is unknown."""
     rows = history.contacts[history.contact_step == collision.step]
     rows = rows[(rows["id_a"] == collision.pair[0]) & (rows["id_b"] == collision.pair[1])]

@@ -12,7 +12,7 @@ from collision_monitor._version import VERSION
 from collision_monitor.errors import SessionError
 from collision_monitor.report.assessment import assess, counted
 from collision_monitor.report.captions import captions
-from collision_monitor.report.facts import Facts, gather
+from collision_monitor.report.facts import ReportFacts, gather
 from collision_monitor.report.figures import figures
 from collision_monitor.report.rendering import BROAD, NARROW, as_png, as_svg
 from collision_monitor.session.history.history import CollisionEvent, History
@@ -112,7 +112,7 @@ def check_outputs(files: list[Path], overwrite: bool) -> None:
             raise SessionError(f"{file}: expected a new file, got one that exists; choose another name or --force")
 
 
-def page(history: History, facts: Facts, pictures: dict[str, str]) -> str:
+def page(history: History, facts: ReportFacts, pictures: dict[str, str]) -> str:
     """Return the whole page. pictures: HTML of the figures, by the names that `figures` uses."""
     said = captions(history, facts)
     drawn = [_section(title, said[name], pictures.get(name)) for name, title in PICTURES.items()]
@@ -131,7 +131,7 @@ def _section(title: str, caption: str, picture: str | None) -> str:
     return f"<h2>{title}</h2>\n<p>{caption}</p>\n<figure>{picture}</figure>" if picture else ""
 
 
-def _verdict(history: History, facts: Facts) -> str:
+def _verdict(history: History, facts: ReportFacts) -> str:
     """Return the headline of the page, with its findings and doubts."""
     found = assess(history, facts)
     moving = sum(not each.static for each in history.objects.values())
@@ -164,7 +164,7 @@ def _list(sentences: list[str], name: str) -> str:
 
 # -- tables
 
-_COLUMNS: Final[tuple[tuple[str, Callable[[CollisionEvent, Facts], str]], ...]] = (
+_COLUMNS: Final[tuple[tuple[str, Callable[[CollisionEvent, ReportFacts], str]], ...]] = (
     ("began<br>(s)", lambda each, facts: f"{each.begin:.3f}"),
     ("ended<br>(s)", lambda each, facts: f"after {each.last:.3f}" if each.end is None else f"{each.end:.3f}"),
     ("depth<br>(m)", lambda each, facts: f"{max(-each.deepest, 0.0):.3g}"),
@@ -179,14 +179,14 @@ def _warned(collision: CollisionEvent) -> str:
     return f"{collision.warned:.3f}" if collision.warned else '<span class="bad">not</span>'
 
 
-def _stated(collision: CollisionEvent, facts: Facts) -> str:
+def _stated(collision: CollisionEvent, facts: ReportFacts) -> str:
     if collision not in facts.answered:
         return "–"
     low, high = facts.answered[collision].first_stated
     return f"{low:.3f} … {high:.3f}" if math.isfinite(high) else f"{low:.3f} or later"
 
 
-def _collisions(history: History, facts: Facts) -> str:
+def _collisions(history: History, facts: ReportFacts) -> str:
     if not facts.collisions:
         return ""
     rows = []

@@ -40,7 +40,7 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Change:
+class EventChange:
     """An event of A, of B, or of both. fields: the fields of Event in which they differ."""
 
     a: Event | None
@@ -82,7 +82,7 @@ class Changes:
 
     a: SessionSummary
     b: SessionSummary
-    changes: list[Change]
+    changes: list[EventChange]
     by_stamps: bool
 
     @property
@@ -96,7 +96,7 @@ def changes(a: History, b: History, tolerance: float = 0.0) -> Changes:
     shift = (b.begin_ns - a.begin_ns) * NANOSECOND
     by_stamps = -b.duration <= shift <= a.duration  # sessions of different times are compared from their starts
     names = _naming(a, b)
-    found: list[Change] = []
+    found: list[EventChange] = []
     events_a, warnings_a = _events(a, 0.0, names)
     events_b, warnings_b = _events(b, shift if by_stamps else 0.0, names)
     for ours, theirs in ((events_a, events_b), (warnings_a, warnings_b)):
@@ -105,7 +105,7 @@ def changes(a: History, b: History, tolerance: float = 0.0) -> Changes:
             for one, two in _matched(mine, other, lambda event: event.begin):
                 fields = _differing(one, two, tolerance + EXACT) if one and two else ()
                 if fields or one is None or two is None:
-                    found.append(Change(one, two, fields))
+                    found.append(EventChange(one, two, fields))
     found.sort(key=lambda change: (change.event.what, change.event.begin, change.event.pair))
     return Changes(_summary(a), _summary(b), found, by_stamps)
 
