@@ -192,10 +192,9 @@ def find_moved(bodies, uncertainty, count, now, settings, columns, found):
                 bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
             moved[n] = i
             n += 1
-        elif _is_wide_without_need(bodies, i, age, settings):
-            moved[n] = i
-            n += 1
-        elif sigmas > 0.0 and not _is_covered(bodies, uncertainty, i, now, settings):
+        elif _is_wide_without_need(bodies, i, age, settings) or (
+            sigmas > 0.0 and not _is_covered(bodies, uncertainty, i, now, settings)
+        ):
             moved[n] = i
             n += 1
         elif m.cover < now + horizon:

@@ -19,8 +19,8 @@ class NameConflict:
         others = max(0, self._node.get_node_names_and_namespaces().count(own) - 1)
         if others and not self._others:
             self._node.get_logger().warning(
-                f"another node has the name {self._name}: both publish on the same topics, and a subscriber cannot tell "
-                "their answers apart; end one of them or remap its name (--ros-args -r __node:=other)"
+                f"another node has the name {self._name}: both publish on the same topics, and a subscriber cannot "
+                "tell their answers apart; end one of them or remap its name (--ros-args -r __node:=other)"
             )
         elif self._others and not others:
             self._node.get_logger().info(f"no other node has the name {self._name} any more")

@@ -46,7 +46,7 @@ END: Final = 10.0
 """s for a node to end after a SIGINT."""
 
 NODE_GROWTH: Final = 48e6
-"""Bytes by which the node may grow after the first quarter of the attacks. Fast DDS keeps histories of large messages."""
+"""Bytes by which the node may grow after the first quarter of the attacks. Fast DDS keeps the last messages."""
 
 SHORTEST: Final = 4
 """Bytes of the shortest message that the middleware transports: the encapsulation header."""
@@ -126,7 +126,7 @@ class Attacker:
                 contacts, predictions = self.contacts.get(stamp), self.predictions.get(stamp)
                 if contacts is not None and predictions is not None:
                     wrong = known_scene.wrong(step, contacts, predictions)
-                    if not wrong or known_scene.IDS <= set(contacts.ids.tolist()):
+                    if not wrong or set(contacts.ids.tolist()) >= known_scene.IDS:
                         return wrong
                     break  # answered before the scene was described; the states come on another topic
         return wrong if "wrong" in locals() else [f"no answer to the known scene in {ANSWER} s"]

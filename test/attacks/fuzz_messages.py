@@ -5,8 +5,9 @@
     make fuzz ARGS="--dds --messages 20000"             # a node in its own process, on a ROS domain of its own
     make fuzz ARGS="--reproduce attack_7_123.json"
 
-Each run of 5,000 messages has its own seed and pipeline, so that a failure is reproduced in seconds. Between the attacks
-a scene with answers in closed form has to be answered right. Exit code 3: an attack succeeded; its input is in a file.
+Each run of 5,000 messages has its own seed and pipeline, so that a failure is reproduced in seconds. Between the
+attacks a scene with answers in closed form has to be answered right. Exit code 3: an attack succeeded; its input is in
+a file.
 """
 
 from __future__ import annotations
@@ -119,8 +120,7 @@ def over_dds(args: argparse.Namespace) -> dict[str, Any]:
     columns = ("attacks over DDS", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=args.messages)
-        report = attack_node(args.seed, args.messages, args.rate, args.folder, lambda done: bar.update(task, advance=done))
-    return report
+        return attack_node(args.seed, args.messages, args.rate, args.folder, lambda n: bar.update(task, advance=n))
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -130,7 +130,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1, help="seed of the first run; the next runs have the next ones")
     parser.add_argument("--jobs", type=int, default=max(1, (cpu_count() or 2) - 1), help="processes")
     parser.add_argument("--failures", type=int, default=5, help="end after so many")
-    parser.add_argument("--folder", type=Path, default=Path("build/fuzz"), help="where the inputs of failures are saved")
+    parser.add_argument("--folder", type=Path, default=Path("build/fuzz"), help="for the inputs of failures")
     parser.add_argument("--reproduce", type=Path, metavar="FILE", help="send a saved input again")
     parser.add_argument("--dds", action="store_true", help="attack a node in its own process, over DDS")
     parser.add_argument("--rate", type=float, default=500.0, help="messages per second over DDS")

@@ -9,7 +9,7 @@ import numpy as np
 from dice import Allowed, Dice
 from hostile_shapes import any_shape
 
-from collision_monitor.codec import encode_parameter_event, encode_states
+from collision_monitor.codec import encode_parameter_event
 from collision_monitor.codec.cdr import ENCAPSULATION, Writer
 from collision_monitor.codec.states import COVARIANCE_SIZE
 from collision_monitor.errors import MessageError
@@ -24,7 +24,7 @@ IDS: Final = 10
 """Ids of the attackers' objects: FIRST_ID and those behind it."""
 
 REACH: Final = 10.0
-"""m: where the attackers' objects mostly are. Larger: few of their pairs meet. Smaller: most steps examine all of them."""
+"""m: where the attackers' objects mostly are. Larger: few of their pairs meet. Smaller: all of them do."""
 
 SEEN_IDS: Final = 6
 """Ids from 0 on that a hostile message may claim: those of the known scene among them."""

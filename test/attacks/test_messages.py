@@ -46,7 +46,7 @@ def test_the_same_seed_gives_the_same_messages_and_the_same_digest() -> None:
 
 
 def test_the_fuzzer_makes_valid_and_invalid_content_of_every_kind() -> None:
-    """Most messages are accepted, so that hostile ones meet a monitor at work; and the kinds that are open are left out."""
+    """Most messages are accepted, so that hostile ones meet a monitor at work."""
     campaign = Campaign(1)
     campaign.run(500)
     assert campaign.summary.steps > 400
