@@ -59,6 +59,11 @@ class Timeline(Stage):
         """The latest time (s after the origin)."""
         return self.seconds(self.now_ns)
 
+    @property
+    def has_begun(self) -> bool:
+        """Whether there is a latest time."""
+        return self._origin_ns is not None
+
     def is_behind(self, stamp_ns: int) -> bool:
         """Whether the stamp is older than the latest time."""
         return self.has_begun and stamp_ns < self.now_ns

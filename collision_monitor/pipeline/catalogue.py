@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.codec import Change, ObjectDescriptionArray, Removal
+from collision_monitor.geometry.planar import is_planar
 from collision_monitor.objects.description import ObjectDescription
 
 
@@ -16,12 +17,13 @@ class Catalogue:
     """The objects that the monitor accepted.
 
     descriptions: the last one of each object, by id. After a restart from a snapshot they are missing until an object
-    is described again. static: ids of the objects that do not move.
+    is described again. static: ids of the objects that do not move. planar: whether the scene lies in the x-y plane.
     """
 
     def __init__(self) -> None:
         self.descriptions: dict[int, ObjectDescription] = {}
         self.static: set[int] = set()
+        self.planar = False
         self._names: dict[int, str] = {}  # of the removed objects too
         self._removed: set[int] = set()  # since the last step: the next step ends their contacts and needs their names
         self._new: set[int] = set()  # since the last step: they have no contacts that could end
@@ -30,11 +32,15 @@ class Catalogue:
         """Return the changes that a message requests, in order.
 
         A snapshot first removes each object that it does not mention. An object that the message mentions and the codec
-        refused keeps its last description.
+        refused keeps its last description. A snapshot that turns a scene in the plane into one in space, or back,
+        first removes all objects, because no object of the one kind is accepted beside one of the other.
         """
         if not message.snapshot:
             return list(message.objects)
         mentioned = {each.object_id for each in message.objects} | {object_id for object_id, _ in message.refused}
+        described = [each for each in message.objects if isinstance(each, ObjectDescription)]
+        if described and all(_is_planar(each) != self.planar for each in described):
+            mentioned = set()
         missing = sorted(self._names.keys() - self._removed - mentioned)
         return [*map(Removal, missing), *message.objects]
 
@@ -52,6 +58,7 @@ class Catalogue:
             return
         if object_id not in self._names:
             self._new.add(object_id)
+        self.planar = _is_planar(change)
         self.descriptions[object_id] = change
         (self.static.add if change.static else self.static.discard)(object_id)
         self._names[object_id] = change.name
@@ -71,6 +78,7 @@ class Catalogue:
         """Return the state without the descriptions, for a snapshot."""
         return {
             "static": sorted(self.static),
+            "planar": self.planar,
             "names": {str(object_id): name for object_id, name in self._names.items()},
             "removed": sorted(self._removed),
             "new": sorted(self._new),
@@ -82,5 +90,10 @@ class Catalogue:
         catalogue = cls()
         catalogue.static, catalogue._removed = set(facts["static"]), set(facts["removed"])
         catalogue._new = set(facts.get("new", ()))  # older sessions have none
+        catalogue.planar = facts.get("planar", False)  # sessions of earlier versions lack it
         catalogue._names = {int(object_id): name for object_id, name in facts["names"].items()}
         return catalogue
+
+
+def _is_planar(description: ObjectDescription) -> bool:
+    return any(is_planar(shape) for shape, _ in description.shapes)

@@ -39,9 +39,9 @@ STEP: Final = 10_000_000
 """ns between two steps of the known scene."""
 
 SLOWEST: Final = 0.1
-"""s for one input of up to LARGEST bytes. Processor time counts too, because other programs share the cores."""
+"""s for one input of up to LARGEST bytes. The time of the processor counts too, as others share the cores."""
 SLOWEST_SHAPES: Final = 0.5
-"""s for a description of concave meshes: how far a coarser model exceeds one is sampled, 10 to 100 ms for each mesh."""
+"""s for a description of concave meshes: how far a coarser model exceeds one is sampled, in 10 to 100 ms each."""
 STUCK: Final = 20.0
 """s of wall time that no input may take, whatever the load: it waits for something that does not come."""
 LARGEST: Final = 1 << 20
@@ -111,7 +111,7 @@ def resident() -> int:
 
 @cache
 def load_kernels() -> None:
-    """Load the kernels and the modules that the first inputs of a process need."""
+    """Load what the first inputs of a process would wait for: kernels, and modules imported at their first use."""
     warm_up_monitor()
     for seed in range(2):
         campaign = Campaign(-1 - seed)

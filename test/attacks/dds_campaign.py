@@ -28,6 +28,7 @@ from collision_monitor.codec import (
     decode_status,
 )
 from collision_monitor.pipeline.topics import Topic
+from collision_monitor.ros.domain import free_domain
 from collision_monitor.ros.endpoints import quality_of
 from collision_monitor_msgs import msg
 
@@ -46,7 +47,7 @@ END: Final = 10.0
 """s for a node to end after a SIGINT."""
 
 NODE_GROWTH: Final = 48e6
-"""Bytes by which the node may grow after the first quarter of the attacks. Fast DDS keeps large messages."""
+"""Bytes by which the node may grow after the first quarter of the attacks. Fast DDS keeps the last messages."""
 
 SHORTEST: Final = 4
 """Bytes of the shortest message that the middleware transports: the encapsulation header."""
@@ -164,7 +165,8 @@ def attack_node(
 ) -> dict[str, Any]:
     """Attack a node in the present ROS domain with messages at a rate (Hz). Return the report."""
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    if "ROS_DOMAIN_ID" not in os.environ:
+        os.environ["ROS_DOMAIN_ID"] = str(free_domain())
     folder = Path(tempfile.mkdtemp()) if folder is None else folder
     report: dict[str, Any] = {"messages": 0, "known answers": 0, "failures": [], "problems": []}
     with running_node(folder) as (process, log):

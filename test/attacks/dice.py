@@ -18,18 +18,10 @@ TINY: Final = (5e-324, -5e-324, 1e-310, 2.2250738585072014e-308, 1e-200, 1e-100)
 """Denormal numbers, and numbers with a square of zero."""
 
 WORDS: Final = (
-    "",
-    "world",
-    "map",
-    "World",
-    "world/",
-    "größe 物体",
-    "x" * 255,
-    "a\tb\nc",
-    "../../etc",
-    "\x1b[31m",
-    "%s{0}",
+    *("", "world", "map", "World", "world/", "größe 物体", "x" * 255),
+    *("a\tb\nc", "../../etc", "\x1b[31m", "%s{0}"),
 )
+"""Texts that a careless reader confuses with another, formats, prints or opens."""
 
 LONGEST_NAME: Final = 256
 """Bytes of a name that the monitor has to accept."""
@@ -76,9 +68,8 @@ class Dice:
         if kind < 0.85 and self.allowed.tiny:
             value: float = struct.unpack("<d", self.random.randbytes(8))[0]  # any float at all
             return value
-        return math.copysign(
-            10.0 ** self.random.uniform(-15 if not self.allowed.tiny else -60, 40), self.random.random() - 0.5
-        )
+        least = -60 if self.allowed.tiny else -15
+        return math.copysign(10.0 ** self.random.uniform(least, 40), self.random.random() - 0.5)
 
     def number(self, low: float, high: float) -> float:
         """Return a number from low to high, or a hostile one."""

@@ -6,8 +6,8 @@
     make fuzz ARGS="--reproduce attack_7_123.json"
 
 Each run of 5,000 messages has its own seed and pipeline, so that a failure is reproduced in seconds. Between the
-attacks, the answers to a scene with a closed form have to be right.
-Exit code 3: an attack succeeded; its input is in a file.
+attacks a scene with answers in closed form has to be answered right. Exit code 3: an attack succeeded; its input is in
+a file.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ HERE: Final = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1])]
 
 from campaign import OPEN, RUN, Campaign, Failure, Summary, is_broken_by, resident  # noqa: E402
+from dice import Allowed  # noqa: E402
 from rich.console import Console  # noqa: E402
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn  # noqa: E402
 
@@ -40,9 +41,9 @@ WORKER_GROWTH: Final = 64e6
 """Bytes by which a process may grow over many runs."""
 
 
-def run(seed: int, messages: int) -> tuple[Summary, int]:
+def run(seed: int, messages: int, allowed: Allowed) -> tuple[Summary, int]:
     """Run one campaign. Return its summary and the resident memory afterwards (bytes)."""
-    return Campaign(seed).run(messages), resident()
+    return Campaign(seed, allowed).run(messages), resident()
 
 
 def runs(seed: int, messages: int) -> list[tuple[int, int]]:
@@ -51,9 +52,10 @@ def runs(seed: int, messages: int) -> list[tuple[int, int]]:
     return [(seed + k, RUN) for k in range(whole)] + ([(seed + whole, rest)] if rest else [])
 
 
-def summaries(seed: int, messages: int, jobs: int) -> Iterator[tuple[Summary, int]]:
+def summaries(args: argparse.Namespace) -> Iterator[tuple[Summary, int]]:
     """Run all campaigns on several processes."""
-    wanted = runs(seed, messages)
+    wanted = [(*each, Allowed() if args.everything else OPEN) for each in runs(args.seed, args.messages)]
+    jobs = args.jobs
     if jobs == 1 or len(wanted) == 1:
         for each in wanted:
             yield run(*each)
@@ -89,7 +91,7 @@ def in_process(args: argparse.Namespace) -> dict[str, Any]:
     columns = ("attacks", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=args.messages)
-        for summary, memory in summaries(args.seed, args.messages, args.jobs):
+        for summary, memory in summaries(args):
             bar.update(task, advance=summary.messages)
             totals["messages"] += summary.messages
             totals["steps"] += summary.steps
@@ -120,10 +122,7 @@ def over_dds(args: argparse.Namespace) -> dict[str, Any]:
     columns = ("attacks over DDS", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=args.messages)
-        report = attack_node(
-            args.seed, args.messages, args.rate, args.folder, lambda done: bar.update(task, advance=done)
-        )
-    return report
+        return attack_node(args.seed, args.messages, args.rate, args.folder, lambda n: bar.update(task, advance=n))
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -133,10 +132,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1, help="seed of the first run; the next runs have the next ones")
     parser.add_argument("--jobs", type=int, default=max(1, (cpu_count() or 2) - 1), help="processes")
     parser.add_argument("--failures", type=int, default=5, help="end after so many")
-    parser.add_argument(
-        "--folder", type=Path, default=Path("build/fuzz"), help="where the inputs of failures are saved"
-    )
+    parser.add_argument("--folder", type=Path, default=Path("build/fuzz"), help="for the inputs of failures")
     parser.add_argument("--reproduce", type=Path, metavar="FILE", help="send a saved input again")
+    parser.add_argument("--everything", action="store_true", help="also what is known to break the monitor")
     parser.add_argument("--dds", action="store_true", help="attack a node in its own process, over DDS")
     parser.add_argument("--rate", type=float, default=500.0, help="messages per second over DDS")
     parser.add_argument("--json", action="store_true", help="print one JSON object")

@@ -18,22 +18,8 @@ LARGE: Final = 12_000
 """Vertices of the largest shapes, about 0.3 MB."""
 
 _CORNERS: Final = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-_CUBE: Final = np.array(
-    [
-        [0, 1, 3],
-        [0, 3, 2],
-        [4, 6, 7],
-        [4, 7, 5],
-        [0, 4, 5],
-        [0, 5, 1],
-        [2, 3, 7],
-        [2, 7, 6],
-        [0, 2, 6],
-        [0, 6, 4],
-        [1, 5, 7],
-        [1, 7, 3],
-    ]
-)
+_CUBE_SIDES: Final = "013 032 467 475 045 051 237 276 026 064 157 173"
+_CUBE: Final = np.array([[int(k) for k in side] for side in _CUBE_SIDES.split()])
 _TETRAHEDRON: Final = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 _SIDES: Final = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 
@@ -109,7 +95,7 @@ def _degenerate(dice: Dice, points: Vertices) -> Vertices:
     if kind == 2:
         return points * size
     if kind == 3:
-        return [*points, size, 0.0, -size]
+        return points + np.array([size, 0.0, -size])
     if kind == 4:
         return np.repeat(points[:1], len(points), axis=0)
     return np.concatenate([points, points])  # each point twice

@@ -10,7 +10,6 @@ from collision_monitor.codec import (
     ContactArray,
     ObjectDescriptionArray,
     PredictedCollisionArray,
-    decode_descriptions,
     encode_descriptions,
     encode_states,
 )
@@ -85,13 +84,8 @@ def states(step: int, place: int, stamp_ns: int) -> bytes:
     rows["quaternion"][:, 3] = 1.0
     rows["flags"] = StateFlag.DISCONTINUITY
     y = Y + MOVED * (place % 2)
-    rows["position"] = [
-        (ball_x(step), y, 0),
-        (-20, y, 0),
-        (-20 + 1 - DEPTH, y + 0.2, 0),
-        (-60, y + 2, 0),
-        (-60, y - 2, 0),
-    ]
+    cubes = (-20, y, 0), (-20 + 1 - DEPTH, y + 0.2, 0)
+    rows["position"] = [(ball_x(step), y, 0), *cubes, (-60, y + 2, 0), (-60, y - 2, 0)]
     rows["linear"][:, 0] = SPEED, 0, 0, 1, -1
     return encode_states(stamp_ns, "world", 0, rows)
 
@@ -105,29 +99,22 @@ def wrong(step: int, contacts: ContactArray, predictions: PredictedCollisionArra
     if contact is None:
         found.append("the two cubes overlap and are not reported")
     elif not abs(contact["signed_distance"] + DEPTH) <= DISTANCE_TOLERANCE + contact["error_bound"] <= 1e-3:
-        found.append(
-            f"the two cubes: expected -{DEPTH} m, got {contact['signed_distance']} +- {contact['error_bound']}"
-        )
+        got = f"{contact['signed_distance']} +- {contact['error_bound']}"
+        found.append(f"the two cubes: expected -{DEPTH} m, got {got} m")
     impact, truth = predicted.pop((BALL, WALL), None), time_of_impact(step)
     if impact is None:
-        found.append(
-            f"the ball meets the wall in {truth:.4f} s and is not reported"
-            if truth < predictions.horizon - TIME_TOLERANCE
-            else ""
-        )
+        if truth < predictions.horizon - TIME_TOLERANCE:
+            found.append(f"the ball meets the wall in {truth:.4f} s and is not reported")
     elif not impact["lower"] - TIME_TOLERANCE <= truth <= impact["upper"] + TIME_TOLERANCE:
         found.append(f"the ball: expected {truth} s, got {impact['lower']} to {impact['upper']} s")
     elif impact["status"] != PredictionStatus.HIT or impact["stale"]:
         found.append(f"the ball: expected a certain collision, got status {impact['status']}, stale {impact['stale']}")
     found += [f"{pair} do not touch and are reported as a contact" for pair in touching]
     found += [f"{pair} never meet and are reported as a prediction" for pair in predicted]
-    return [text for text in found if text]
+    return found
 
 
 def _pairs(rows: Any) -> dict[tuple[int, int], Any]:
     """Return the rows of the pairs of the scene alone."""
     both = (rows["id_a"] >= BALL) & (rows["id_b"] <= SOUTH)  # id_a < id_b
     return {(int(row["id_a"]), int(row["id_b"])): row for row in rows[both]}
-
-
-__all__ = ["IDS", "changes_the_scene", "decode_descriptions", "descriptions", "objects", "states", "wrong"]

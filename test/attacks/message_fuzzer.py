@@ -24,7 +24,7 @@ IDS: Final = 10
 """Ids of the attackers' objects: FIRST_ID and those behind it."""
 
 REACH: Final = 10.0
-"""m: half width of the region of most hostile objects. If larger, few pairs meet; if smaller, nearly all do."""
+"""m: where the attackers' objects mostly are. Larger: few of their pairs meet. Smaller: all of them do."""
 
 SEEN_IDS: Final = 6
 """Ids from 0 on that a hostile message may claim: those of the known scene among them."""

@@ -11,7 +11,7 @@ from collision_monitor.codec import decode_status, encode_descriptions, encode_s
 from collision_monitor.codec.descriptions import decode_descriptions
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
-from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Sphere
+from collision_monitor.geometry.shapes import Box, Circle, ConvexHull, Mesh, Sphere
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
@@ -103,3 +103,18 @@ def test_a_snapshot_of_a_monitor_with_a_limit_of_pairs_goes_on_with_the_sphere_t
         assert first is not None and second is not None
         assert first.result.status == second.result.status
         assert first.digest == second.digest
+
+
+@pytest.mark.parametrize("restored", [False, True])
+def test_a_snapshot_that_turns_a_plane_scene_into_one_in_space_is_taken_as_a_whole(restored: bool) -> None:
+    pipeline = Pipeline()
+    flat = [ObjectDescription(k, Circle(1.0)) for k in (3, 4)]
+    solid = [ObjectDescription(k, Sphere(1.0)) for k in (1, 2, 3)]
+    for objects in (flat, solid, flat):
+        pipeline.on_shapes(encode_descriptions(0, "world", objects, snapshot=True))
+        assert pipeline.monitor.ids == [each.object_id for each in objects]
+        if restored:
+            pipeline = Pipeline.restored(Snapshot.decode(pipeline.snapshot().encode()), "world")
+    pipeline.on_shapes(encode_descriptions(0, "world", solid))
+    assert pipeline.monitor.ids == [3, 4], "a message that is no snapshot removes nothing"
+    assert decode_status(pipeline.status()).refused_shape == 3

@@ -29,9 +29,8 @@ def faults_of_contacts(message: ContactArray) -> list[str]:
     if rows["phase"].max() >= PHASES or rows["status"].max() >= STATUSES:
         found.append("a contact has an unknown phase or status")
     if np.isnan(now["signed_distance"]).any() or not (now["error_bound"] >= 0.0).all():
-        found.append(
-            f"a contact has no distance or bound: {now[['id_a', 'id_b', 'signed_distance', 'error_bound']][:4]}"
-        )
+        columns = ["id_a", "id_b", "signed_distance", "error_bound"]
+        found.append(f"a contact has no distance or bound: {now[columns][:4]}")
     if not (now["duration"] >= 0.0).all():  # NaN where a contact ended because the clock began anew
         found.append(f"a contact has no duration: {rows['duration'].tolist()[:4]}")
     length = np.einsum("ij,ij->i", now["normal"], now["normal"])

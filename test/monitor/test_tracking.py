@@ -52,6 +52,6 @@ def test_a_pair_that_reports_again_after_a_silence_has_narrow_bounds_again(silen
 def test_a_publisher_that_is_slower_than_others_is_not_predicted_anew_at_each_state() -> None:
     """One object reports at 10 Hz, the other at 100 Hz: neither is ever stale, and both keep their predictions."""
     road = Road(Profile())
-    reports = [(FIRST, OTHER) if step % 10 == 0 else (OTHER,) for step in range(300)]
-    moved = [road.step(0.01, each).status.objects_moved for each in reports]
+    ids = [(FIRST, OTHER) if step % 10 == 0 else (OTHER,) for step in range(300)]
+    moved = [road.step(0.01, each).status.objects_moved for each in ids]
     assert sum(moved[50:]) < 10

@@ -95,7 +95,13 @@ def test_it_is_restored_from_its_facts_without_descriptions() -> None:
     assert (
         restored.facts()
         == catalogue.facts()
-        == {"static": [1], "names": {"1": "a", "2": "b", "3": "c", "4": "d"}, "removed": [3], "new": [4]}
+        == {
+            "static": [1],
+            "planar": False,
+            "names": {"1": "a", "2": "b", "3": "c", "4": "d"},
+            "removed": [3],
+            "new": [4],
+        }
     )
     assert restored.descriptions == {}
     assert restored.changes(message(ball(2), snapshot=True))[0] == Removal(1)

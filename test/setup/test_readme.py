@@ -50,14 +50,14 @@ def test_the_parameter_table_has_every_setting_with_its_default(setting: Profile
 
 
 def test_every_linked_file_exists() -> None:
-    for document in ("README.md", "CONTRIBUTING.md", "docs/node.md", "docs/architecture.md"):
+    for document in ("README.md", "CONTRIBUTING.md", "docs/node.md", "docs/architecture.md", "docs/safety.md"):
         for target in re.findall(r"\]\((?!http)([^)#]+)(?:#[^)]*)?\)", (ROOT / document).read_text()):
             assert (ROOT / document).parent.joinpath(target).exists(), f"{document} links to {target}"
 
 
 def test_every_make_target_that_is_named_exists() -> None:
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    for document in ("README.md", "CONTRIBUTING.md"):
+    for document in ("README.md", "CONTRIBUTING.md", "docs/safety.md"):
         named = set(re.findall(r"(?:^    |`)make ([a-z-]+)", (ROOT / document).read_text(), re.MULTILINE))
         assert named <= targets, f"{document} names {sorted(named - targets)}"
 
