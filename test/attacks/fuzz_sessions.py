@@ -58,7 +58,7 @@ def make_bases(folder: Path) -> list[bytes]:
         patch.multiple(recording_files, SNAPSHOT_PERIOD=0.1, SNAPSHOT_SHARE=1e9),
     ):
         pipeline = Pipeline("balanced", timed=False)
-        record(folder / "new.mcap", 30, pipeline=pipeline, snapshots=True, switches={15: Profile.named("fast")})
+        record(folder / "new.mcap", 20, pipeline=pipeline, snapshots=True, switches={10: Profile.named("fast")})
     ours = steady((folder / "new.mcap").read_bytes())
     (folder / "base.mcap").write_bytes(ours)
     assert replay(Session(folder / "base.mcap")).verdict is Verdict.IDENTICAL
