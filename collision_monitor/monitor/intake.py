@@ -73,7 +73,7 @@ class Intake(Stage):
     def refuse(self, reason: Refusal, text: str, count: int = 1) -> None:
         """Count refused inputs; `text` describes the last of these."""
         self.refused[reason] += count
-        self.last_refusal = text if len(text) <= MOST_REFUSAL_TEXT else f"{text[:MOST_REFUSAL_TEXT]}…"
+        self.last_refusal = text if len(text) <= MOST_REFUSAL_TEXT else f"{text[: MOST_REFUSAL_TEXT - 1]}…"
         self.texts[reason] = self.last_refusal
 
     def order(self, states: States, time: float, late: bool, roster: Roster) -> Order:

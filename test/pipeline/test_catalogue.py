@@ -65,7 +65,7 @@ def test_a_removed_object_has_its_name_until_the_step_is_over() -> None:
 def test_an_object_that_no_step_knew_leaves_no_name() -> None:
     catalogue = filled(ball(1, "a"))
     catalogue.apply(Removal(1))
-    assert catalogue.facts() == {"static": [], "names": {}, "removed": [], "new": []}
+    assert catalogue.facts() == {"static": [], "planar": False, "names": {}, "removed": [], "new": []}
     assert catalogue.changes(message(snapshot=True)) == []
 
 
