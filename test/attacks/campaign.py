@@ -245,10 +245,10 @@ class Campaign:
         self._scene_step += 1
         if self.now > self._scene_stamp + LONG_GAP:
             self._place += 1
-        for _ in range(TRIES):
+        for tried in range(TRIES):
             stamp = self.now + STEP
             if not -(2**31) <= stamp // 1_000_000_000 < 2**31:
-                stamp = START  # no message can hold a later stamp
+                stamp = START + tried * STEP  # no message can hold a later stamp; a duplicate confirms no jump
             outputs = self._send(index, Message(Topic.STATES, known_scene.states(self._scene_step, self._place, stamp)))
             if outputs is not None and outputs.result.stamp_ns == stamp:
                 contacts, predictions = decode_contacts(outputs.contacts), decode_predictions(outputs.predictions)
