@@ -8,12 +8,12 @@ The Art of Computer Programming 3, section 5.4.1; one event per sphere: F. Small
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from collision_monitor._jit import device
-from collision_monitor.world.hard_spheres.state import Floats, Indices
 
 
-def empty_tree(count: int) -> tuple[Floats, Indices]:
+def empty_tree(count: int) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Return `times` and `winners` of a tree for `count` spheres without events (time infinite)."""
     leaves = 1 << max(count - 1, 1).bit_length()
     winners = np.zeros(2 * leaves, np.int32)

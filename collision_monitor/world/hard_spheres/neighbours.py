@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from collision_monitor._jit import inlined
+from collision_monitor.tolerances import ROUNDED_UP
 from collision_monitor.world.hard_spheres.state import CLOCK, NOTHING, RADIUS, VELOCITY, X
 
 LEAD = 0.8
@@ -108,7 +109,7 @@ def _make_list(state, i, bx, by, bz):  # type: ignore[no-untyped-def]
     centres, neighbours, counts = state.centres, state.neighbours, state.counts
     periodic = per_side != 0.0
     cx, cy, cz, radius = centres[i, 0], centres[i, 1], centres[i, 2], state.spheres[i, RADIUS]
-    width = 2.0 * state.half_cell
+    width = 2.0 * state.half_cell * (1.0 + ROUNDED_UP)
     for nx in range(bx - 1, bx + 2):
         x = _wrap(nx, grid, periodic)
         for ny in range(by - 1, by + 2):
