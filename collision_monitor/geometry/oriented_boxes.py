@@ -27,6 +27,10 @@ FACE_NORMALS: Final = 256
 """Largest number of hull faces, the largest first, that a box is aligned with.
 Larger: seconds for round hulls of a thousand similar faces. Smaller: the best face may be missed."""
 
+MOST_TURNS: Final = 100
+"""Turns about the best box's own axes. The volume falls at each one and no box was seen to take ten; larger values
+change nothing, smaller ones would end the search early."""
+
 DISTINCT: Final = 1e-9
 """Directions closer than this count as equal."""
 
@@ -69,11 +73,12 @@ def obb_minimum_volume(points: ArrayLike) -> Obb:
     candidates = [_turned(vertices, edges, normal) for normal in normals]
     candidates += [_measured(vertices, obb_pca(points).rotation), _measured(vertices, np.eye(3))]
     volume, axes = min(candidates, key=lambda candidate: candidate[0])
-    while True:
+    for _ in range(MOST_TURNS):
         turned = min((_turned(vertices, edges, axis) for axis in axes.T), key=lambda candidate: candidate[0])
-        if turned[0] >= volume * (1 - 1e-12):
-            return _along(points, axes)
+        if not turned[0] < volume * (1 - 1e-12):
+            break
         volume, axes = turned
+    return _along(points, axes)
 
 
 def _flat(points: Array) -> Obb:
