@@ -8,13 +8,16 @@ Shewchuk, Adaptive precision floating-point arithmetic and fast robust geometric
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from math import ldexp
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from collision_monitor.errors import InputError
+from collision_monitor.errors import InputError, TooCostlyError
 from collision_monitor.geometry.coordinates import Array
 
 CANCELLATION: Final = 2.0**-7
@@ -26,9 +29,25 @@ UNDERFLOW: Final = 1e-290
 """Sums of products below this, relative to the factor that multiplies a product again, may have lost terms to
 underflow: each product loses at most 5e-324."""
 
+_limits: ContextVar[list[int] | None] = ContextVar("exact_limit", default=None)
+
 LARGEST: Final = 1.7976931348623157e308
 SMALLEST: Final = 5e-324
 """The largest and the smallest positive float64: values of determinants that exceed the range on either side."""
+
+
+@contextmanager
+def exact_limit(most: int) -> Iterator[list[int]]:
+    """Allow at most this many determinants in integers within the context, 10 to 20 µs each. Yields the number left.
+
+    Beyond it, the functions of this module raise TooCostlyError. Shapes can be made so that nearly every one is needed.
+    """
+    left = [most]
+    token = _limits.set(left)
+    try:
+        yield left
+    finally:
+        _limits.reset(token)
 
 
 def cross(a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> Array:
@@ -82,6 +101,11 @@ def _corrected(value: Array, certain: NDArray[np.bool_], exactly: Any, *points: 
     if certain.all():
         return value
     value = np.array(value)
+    limit = _limits.get()
+    if limit is not None:
+        limit[0] -= int(np.count_nonzero(~certain))
+        if limit[0] < 0:
+            raise TooCostlyError("determinants: expected fewer that need exact arithmetic")
     chosen = np.stack([point[~certain] for point in points], axis=1)  # (m, points, width)
     # as integers: every coordinate of a row is digits * 2^exponent
     mantissa, exponent = np.frexp(chosen)

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from math import frexp
 from typing import Final
 
 import numpy as np
@@ -30,6 +31,9 @@ Larger: seconds for round hulls of a thousand similar faces. Smaller: the best f
 MOST_TURNS: Final = 100
 """Turns about the best box's own axes. The volume falls at each one and no box was seen to take ten; larger values
 change nothing, smaller ones would end the search early."""
+
+SMALLEST: Final = 1e-90
+"""Sizes (m) below which the points are enlarged first, because volumes and squares of lengths would vanish."""
 
 DISTINCT: Final = 1e-9
 """Directions closer than this count as equal."""
@@ -57,6 +61,12 @@ def obb_minimum_volume(points: ArrayLike) -> Obb:
     best turn about its normal.
     """
     points = point_set(points, "points", 3)
+    size = float(np.abs(points).max())
+    if 0.0 < size < SMALLEST:
+        scale = 2.0 ** (-frexp(size)[1] // 2)  # twice, because the inverse of a denormal number is infinite
+        box = obb_minimum_volume(points * scale * scale)
+        half = np.nextafter(box.half_extents / scale / scale, np.inf)
+        return Obb(box.center / scale / scale, box.rotation, half)
     try:
         hull = convex_hull(points)
     except ShapeError:

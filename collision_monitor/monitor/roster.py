@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
 from collision_monitor._jit.vectors import LANES
-from collision_monitor.errors import CollisionMonitorError, InputError, UnsupportedError
+from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.shape_table import POLYGON, ShapeTable, ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.objects.models import monitored_model
+from collision_monitor.objects.models import Modelled, monitored_model
 from collision_monitor.prediction.bodies import Bodies, Multibody, Parts, enlarge, make_bodies, make_parts
 from collision_monitor.prediction.body_layout import lay_out_body
 from collision_monitor.prediction.impact_record import pair_keys
@@ -49,7 +49,7 @@ class Roster(Stage):
         self._names: dict[int, str] = {}
         self._free: list[int] = []
         self._allowed: dict[int, frozenset[int]] = {}
-        self._allowed_keys = np.zeros(0, np.uint64)
+        self._allowed_keys: NDArray[np.uint64] | None = np.zeros(0, np.uint64)  # None: to be made
         self._last_ids, self._last_slots = np.zeros(0, np.uint32), np.zeros(0, np.int32)
 
     # ------------------------------------------------------------------ reading
@@ -66,7 +66,11 @@ class Roster(Stage):
 
     @property
     def allowed_keys(self) -> NDArray[np.uint64]:
-        """Keys of the pairs that are never checked, sorted."""
+        """Keys of the pairs that are never checked, sorted. Made once after any number of changes."""
+        if self._allowed_keys is None:
+            pairs = [(a, b) for a, others in self._allowed.items() for b in others]
+            ids = np.sort(np.array(pairs, np.uint32).reshape(-1, 2), axis=1)
+            self._allowed_keys = np.unique(pair_keys(*ids.T))
         return self._allowed_keys
 
     @property
@@ -113,21 +117,23 @@ class Roster(Stage):
 
     # ------------------------------------------------------------------ changing
 
-    def describe(self, d: ObjectDescription, model: Model) -> int:
+    def describe(self, d: ObjectDescription, model: Model, prepared: Modelled | None = None) -> int:
         """Add a new object, or replace the description of a known one and keep its state. Return its slot.
 
+        prepared: what represents the object, if it is known already.
         Raises InputError, ShapeError; UnsupportedError for an unsupported shape or model.
         """
         if not d.static and any(isinstance(shape, HalfSpace) for shape, _ in d.shapes):
             raise UnsupportedError(f"object {d.object_id}: a HalfSpace has no end and can only be static")
         planar = self._is_planar(d)
         pose = flat_pose(d.pose) if planar and d.pose is not None else d.pose
-        modelled = monitored_model(d.shapes, model)
+        modelled = monitored_model(d.shapes, model) if prepared is None else prepared
+        corners = modelled.corners or (None,) * len(modelled.pieces)
         slots: list[int] = []
         try:
-            for shape, offset in modelled.pieces:
-                slots.append(self._shapes.append(shape, flat_pose(offset) if planar else offset, d.padding))
-        except CollisionMonitorError:
+            for (shape, offset), chosen in zip(modelled.pieces, corners, strict=True):
+                slots.append(self._shapes.append(shape, flat_pose(offset) if planar else offset, d.padding, chosen))
+        except Exception:
             for slot in slots:
                 self._shapes.remove(slot)
             raise
@@ -220,8 +226,7 @@ class Roster(Stage):
         self._allowed[object_id] = others
         if not others:
             del self._allowed[object_id]
-        pairs = {(min(a, b), max(a, b)) for a, others in self._allowed.items() for b in others}
-        self._allowed_keys = np.unique(pair_keys(*np.array(list(pairs), np.uint32).reshape(-1, 2).T))
+        self._allowed_keys = None
 
     def _forget_ids(self) -> None:
         self._last_ids = np.zeros(0, np.uint32)
