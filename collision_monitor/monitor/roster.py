@@ -34,9 +34,9 @@ class Roster(Stage):
 
     SAVED = (
         *("bodies", "parts", "top", "planar", "renewed"),
-        *("_shapes", "_slots", "_names", "_free", "_allowed", "_allowed_keys"),
+        *("_shapes", "_slots", "_names", "_free", "_allowed"),
     )
-    CACHES = ("_last_ids", "_last_slots")
+    CACHES = ("_allowed_keys", "_last_ids", "_last_slots")
 
     def __init__(self) -> None:
         self.bodies: Bodies = make_bodies(FIRST_CAPACITY)
