@@ -48,6 +48,11 @@ _MODELS: Final = {
 """In all, and for each vertex, beyond the model EXACT."""
 
 
+def is_quick(shapes: Sequence[tuple[Shape, Pose]]) -> bool:
+    """Whether an object is one shape with dimensions. All of its models take less than SMALL_MS."""
+    return len(shapes) == 1 and not isinstance(shapes[0][0], ConvexHull | Mesh | Polygon)
+
+
 class Budget:
     """Time (ms, estimated) that is left for the objects of one message."""
 

@@ -34,7 +34,7 @@ from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.bounding_box_model import bounding_box_model
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled
-from collision_monitor.objects.preparation_cost import BOXES_MS, Budget
+from collision_monitor.objects.preparation_cost import BOXES_MS, Budget, is_quick
 from collision_monitor.pipeline.catalogue import Catalogue
 from collision_monitor.pipeline.preparation import STAYS, Job, Preparation
 from collision_monitor.pipeline.provenance import provenance
@@ -217,6 +217,9 @@ class Pipeline:
         The second budget, that of the boxes, is used in the same way live and in a replay, where `change` is what was
         taken then. The first one is for the live monitor alone.
         """
+        if is_quick(change.shapes):
+            self.monitor.describe(change, ready)
+            return change
         own, boxes = budgets
         model = self.monitor.model_of(change)
         if model is not Model.AABB:
