@@ -49,6 +49,7 @@ def convex_pieces(shape: Shape) -> tuple[tuple[Shape, Pose], ...]:
     return ((shape, Pose()),)
 
 
+@lru_cache(maxsize=64)
 def is_convex_mesh(mesh: Mesh) -> bool:
     """Whether a mesh bounds a solid and no vertex is outside the plane of any face, up to round-off."""
     if not is_closed(mesh.faces):
