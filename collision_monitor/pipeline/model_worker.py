@@ -1,4 +1,4 @@
-"""A process that makes expensive models: jobs on its standard input, models on its standard output, one at a time.
+"""A process that makes expensive models: it reads jobs from its standard input and writes models, one at a time.
 
 It is a process, not a thread, because libraries below it hold Python's lock, can fail for lack of memory, or crash. It
 has limits of time and memory that the kernel enforces, so that it cannot outlive them. It ends with its parent.
@@ -9,13 +9,11 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
-import pickle
 import resource
 import signal
 import struct
 import sys
-from collections.abc import Sequence
-from typing import IO, Any, Final
+from typing import IO, Final
 
 LIMIT_S: Final = 30.0
 """s for one model; the decomposition of an ordinary mesh takes 1 to 10 s. Longer: others wait for their models."""
@@ -29,8 +27,11 @@ START_S: Final = 120
 NICENESS: Final = 10
 """The monitor's own threads come first."""
 
-HEADER: Final = struct.Struct("<Q")
-"""Length of the pickle that follows."""
+LENGTH: Final = struct.Struct("<Q")
+"""Length of the bytes that follow."""
+
+JOB: Final = struct.Struct("<dB")
+"""Limit (s) and number of the model, followed by an ObjectDescriptionArray with one object."""
 
 COMMAND: Final = (sys.executable, "-m", "collision_monitor.pipeline.model_worker")
 
@@ -40,23 +41,22 @@ ENVIRONMENT: Final = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_TH
 _PR_SET_PDEATHSIG: Final = 1
 
 
-def send(stream: IO[bytes], value: Any) -> None:
-    """Write one value. Raises OSError if the other side has ended."""
-    data = pickle.dumps(value, pickle.HIGHEST_PROTOCOL)
-    stream.write(HEADER.pack(len(data)) + data)
+def send(stream: IO[bytes], data: bytes) -> None:
+    """Write a job or a model. Raises OSError if the other side has ended."""
+    stream.write(LENGTH.pack(len(data)) + data)
     stream.flush()
 
 
-def receive(stream: IO[bytes]) -> Any:
-    """Read one value. Raises EOFError if the other side has ended."""
-    head = stream.read(HEADER.size)
-    if len(head) < HEADER.size:
+def receive(stream: IO[bytes]) -> bytes:
+    """Read a job or a model. Raises EOFError if the other side has ended."""
+    head = stream.read(LENGTH.size)
+    if len(head) < LENGTH.size:
         raise EOFError
-    size = HEADER.unpack(head)[0]
+    size = LENGTH.unpack(head)[0]
     data = stream.read(size)
     if len(data) < size:
         raise EOFError
-    return pickle.loads(data)  # from our own process, over a pipe that nobody else has
+    return data
 
 
 def _limit() -> None:
@@ -70,33 +70,40 @@ def _limit() -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
-def _made(shapes: Sequence[Any], model: Any) -> Any:
-    """Return the model with the corners of its hulls, or a text that says why there is none."""
+def _make(data: bytes, number: int) -> bytes:
+    """Return the model with the corners of its hulls, or a text that says why there is none; as `encode_model` does."""
+    from collision_monitor.codec import decode_descriptions
     from collision_monitor.errors import reason_of
     from collision_monitor.geometry.qhull import hull_vertices
     from collision_monitor.geometry.shapes import ConvexHull
+    from collision_monitor.objects.description import ObjectDescription
     from collision_monitor.objects.models import monitored_model
+    from collision_monitor.pipeline.model_message import encode_model
+    from collision_monitor.records import Model
 
     try:
-        found = monitored_model(shapes, model)
+        (description,) = decode_descriptions(data).objects
+        assert isinstance(description, ObjectDescription)
+        found = monitored_model(description.shapes, Model(number))
         corners = (hull_vertices(piece.points) if isinstance(piece, ConvexHull) else None for piece, _ in found.pieces)
-        return found._replace(corners=tuple(corners))
+        return encode_model(found._replace(corners=tuple(corners)))
     except Exception as error:  # see `reason_of`
-        return reason_of(error)
+        return encode_model(reason_of(error))
 
 
 def main() -> None:
-    """Process jobs (shapes, model, s) until the parent closes the pipe."""
+    """Process jobs until the parent closes the pipe."""
     _limit()
     results = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a library prints is no result
+    os.dup2(2, 1)  # a library's output must not mix with the models
     while True:  # ends with the parent, at the limit of time, or when the pipe is closed
         try:
-            shapes, model, limit = receive(sys.stdin.buffer)
+            job = receive(sys.stdin.buffer)
         except EOFError:
             return
+        limit, number = JOB.unpack_from(job)
         signal.setitimer(signal.ITIMER_REAL, limit)
-        result = _made(shapes, model)
+        result = _make(job[JOB.size :], number)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         send(results, result)
 

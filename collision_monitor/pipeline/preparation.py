@@ -26,7 +26,8 @@ from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import ConvexHull, Mesh, Polygon, Shape
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled
-from collision_monitor.pipeline.model_worker import COMMAND, ENVIRONMENT, LIMIT_BYTES, LIMIT_S, receive, send
+from collision_monitor.pipeline.model_message import decode_model
+from collision_monitor.pipeline.model_worker import COMMAND, ENVIRONMENT, JOB, LIMIT_BYTES, LIMIT_S, receive, send
 from collision_monitor.records import Model
 
 MOST_WAITING: Final = 64 << 20
@@ -140,10 +141,9 @@ class Preparation:
             return "the monitor ends"
         assert process.stdin is not None and process.stdout is not None
         try:
-            send(process.stdin, (job.description.shapes, job.model, self._limit))
-            result: Modelled | str = receive(process.stdout)
-            return result
-        except (OSError, EOFError):
+            send(process.stdin, JOB.pack(self._limit, job.model) + job.data)
+            return decode_model(receive(process.stdout))
+        except (OSError, EOFError, ValueError):  # it ended, or wrote something that is no model
             return self._why_it_ended(process)
 
     def _started(self) -> subprocess.Popen[bytes] | None:
