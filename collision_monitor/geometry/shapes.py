@@ -191,10 +191,12 @@ class HalfSpace(Shape):
             raise ShapeError(
                 f"HalfSpace: expected a non-zero, finite normal and a finite offset, got {self.normal}, {offset}"
             )
-        normal = normal / length
+        normal, offset = normal / length, offset / length
+        if not abs(offset) <= LARGEST_INPUT:
+            raise ShapeError(f"HalfSpace offset: expected at most {LARGEST_INPUT:g} m, got {offset:g} m")
         normal.setflags(write=False)
         object.__setattr__(self, "normal", normal)
-        object.__setattr__(self, "offset", offset / length)
+        object.__setattr__(self, "offset", offset)
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from collision_monitor.monitor.timeline import Order, Progress, Timeline
 from collision_monitor.monitor.tracking import Tracking
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.objects.models import parse_model, shape_class
+from collision_monitor.objects.models import Modelled, parse_model, shape_class
 from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.records import Model, joined
 from collision_monitor.settings.profile import Profile
@@ -128,12 +128,13 @@ class Monitor:
         """
         self.describe(ObjectDescription(object_id, shape, **fields))
 
-    def describe(self, description: ObjectDescription) -> None:
+    def describe(self, description: ObjectDescription, prepared: Modelled | None = None) -> None:
         """Add a new object, or replace the description of a known one and keep its state.
 
+        prepared: what represents the object, if it is known already.
         Raises InputError, ShapeError; UnsupportedError for an unsupported shape or model.
         """
-        i = self._roster.describe(description, self.model_of(description))
+        i = self._roster.describe(description, self.model_of(description), prepared)
         self._make_room()
         self._candidates.forget(np.array([i], np.int32))  # the next step inserts its new box
         self._time_critical.describe(self._roster, i, self._profile)
