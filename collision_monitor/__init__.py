@@ -13,6 +13,7 @@
     query.feature_impact           vertex_face_impact, edge_edge_impact   the same for features in linear motion
     records                        Model                                  the geometric models of an object
     errors                         CollisionMonitorError and subclasses   errors of the inputs
+    world                          world.HardSpheres, world.make_scene    simulated worlds to monitor
 
 This module exports the names in the second column, such as `collision_monitor.contact`. Each name is imported at its
 first use.
@@ -67,9 +68,11 @@ _HOME = {
     "SessionError": "errors",
     "Refusal": "errors",
 }
-__all__ = ["__version__", *_HOME]
+_MODULES = ("world",)
+__all__ = ["__version__", *_HOME, *_MODULES]
 
 if TYPE_CHECKING:
+    from collision_monitor import world as world
     from collision_monitor.errors import CollisionMonitorError as CollisionMonitorError
     from collision_monitor.errors import InputError as InputError
     from collision_monitor.errors import MessageError as MessageError
@@ -114,6 +117,8 @@ if TYPE_CHECKING:
 
 def __getattr__(name: str) -> Any:
     """Import the name at its first use, so that `collision-monitor --help` does not wait for the kernels."""
+    if name in _MODULES:
+        return import_module(f"{__name__}.{name}")
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

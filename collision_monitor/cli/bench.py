@@ -8,7 +8,10 @@ from pathlib import Path
 
 from collision_monitor.accuracy.detection_time import WARM_UP_FRAMES
 from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.quantities import whole
+from collision_monitor.cli.quantities import positive, whole
+from collision_monitor.errors import InputError
+
+HARD_SPHERES = ("hard-spheres", "hard_spheres")
 
 DESCRIPTION = """\
 Measure how long it takes to find all contacts of N moving bodies.
@@ -17,12 +20,16 @@ Every pose is new in every frame. The input is NumPy arrays of poses; the output
 pairs, signed distances, normals and points. The bodies move and turn at random, and the density of
 contacts does not depend on N. The command prints the median and the 99th percentile of the time
 per frame, and the number of colliding pairs.
+
+The scene hard-spheres measures the event-driven simulation instead: collisions per second on one
+core, the relative drift of the energy, and the pressure, with that of Carnahan and Starling.
 """
 EPILOG = """\
 examples:
   collision-monitor bench --scene boxes --n 10000
   collision-monitor bench --scene hulls --n 1000 --threads 1 --json
   collision-monitor bench --scene-file scene.npz --json
+  collision-monitor bench --scene hard-spheres --n 4000 --packing 0.25 --json
 
 exit codes:
   0  done
@@ -39,7 +46,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--scene", default="boxes", metavar="NAME", help="boxes (default), spheres, mixed or hulls")
+    parser.add_argument(
+        "--scene", default="boxes", metavar="NAME", help="boxes (default), spheres, mixed, hulls or hard-spheres"
+    )
     parser.add_argument("--n", type=whole(1), default=10_000, metavar="N", help="number of bodies (default: 10000)")
     parser.add_argument("--seed", type=whole(0), default=1, metavar="S", help="seed of the random scene (default: 1)")
     parser.add_argument("--scene-file", type=Path, metavar="FILE", help="measure a saved scene (.npz) instead")
@@ -52,6 +61,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--threads", type=whole(1), metavar="T", help="number of threads (default: 2, or 1 on a single core)"
     )
+    parser.add_argument(
+        "--packing",
+        type=positive,
+        metavar="P",
+        help="part of space that hard spheres fill (default: 0.45); for hard-spheres only",
+    )
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
     parser.set_defaults(command=bench_command)
 
@@ -62,6 +77,10 @@ def bench_command(args: argparse.Namespace) -> int:
     from collision_monitor.detection.detector import default_threads
     from collision_monitor.world.moving_bodies import FRAMES, load_moving_bodies, make_moving_bodies
 
+    if args.scene_file is None and args.scene in HARD_SPHERES:
+        return _bench_hard_spheres(args)
+    if args.packing is not None:
+        raise InputError("--packing: expected the scene hard-spheres, other scenes have a fixed density")
     if args.scene_file is None:
         scene = make_moving_bodies(args.scene, args.n, args.seed, args.frames or FRAMES)
     else:
@@ -74,5 +93,23 @@ def bench_command(args: argparse.Namespace) -> int:
             f"{result['scene']}, {result['n']} objects, {result['threads']} thread{'s'[: result['threads'] > 1]}: "
             f"{result['median_ms']:.3f} ms per frame (p99 {result['p99_ms']:.3f} ms over {result['frames']} frames), "
             f"{result['pairs']} colliding pairs"
+        )
+    return ExitCode.DONE
+
+
+def _bench_hard_spheres(args: argparse.Namespace) -> int:
+    from collision_monitor.accuracy.collision_rate import PACKING, measure_collision_rate
+
+    for name in ("frames", "threads"):
+        if getattr(args, name) is not None:
+            raise InputError(f"--{name}: expected no value with hard-spheres, which has no frames and uses one thread")
+    result = measure_collision_rate(args.n, PACKING if args.packing is None else args.packing, args.seed)
+    if args.json:
+        print(json.dumps(result))
+    else:
+        print(
+            f"hard spheres, {result['n']} at packing {result['packing']:g}: {result['collisions_per_s']:,.0f} collisions "
+            f"per second, energy drift {result['energy_drift']:.1e}, pressure {result['pressure']:.4f} Pa, "
+            f"compressibility {result['compressibility']:.4f} (Carnahan-Starling {result['carnahan_starling']:.4f})"
         )
     return ExitCode.DONE

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Sphere
+from collision_monitor.geometry.shapes import Sphere
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.world.collision_response import bounce_between_walls, collide
 from collision_monitor.world.scene import Array, Scene, States, object_count, positive_rate, state_array
+from collision_monitor.world.walls import closed_box
 
 Integers = NDArray[np.int64]
 
@@ -22,8 +22,6 @@ SPEEDS = (0.2, 1.5)
 """Range of the speeds at the start (m/s)."""
 DENSITY = 1000.0
 """Density of the particles (kg/m^3)."""
-WALL = 0.2
-"""Thickness of the walls (m)."""
 
 
 @allocating_kernel
@@ -91,18 +89,7 @@ class Particles(Scene):
         self.descriptions = [
             ObjectDescription(int(i), Sphere(r), f"particle_{i}") for i, r in zip(self._ids, self.radius, strict=True)
         ]
-        self.descriptions += self._walls(count)
-
-    def _walls(self, count: int) -> list[ObjectDescription]:
-        walls: list[ObjectDescription] = []
-        for k, axis in enumerate("xyz"):
-            for end, at in (("low", -WALL / 2), ("high", self.size + WALL / 2)):
-                size, centre = np.full(3, self.size + 2 * WALL), np.full(3, self.size / 2)
-                size[k], centre[k] = WALL, at
-                pose = Pose(centre)
-                object_id = count + len(walls) + 1
-                walls.append(ObjectDescription(object_id, Box(size), f"wall_{axis}_{end}", static=True, pose=pose))
-        return walls
+        self.descriptions += closed_box(self.size, count + 1)
 
     def _advance(self, dt: float) -> None:
         """Advance in substeps of at most half the least radius, so that no overlap is skipped."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from collision_monitor._jit import inlined
 from collision_monitor.tolerances import ROUNDED_UP
-from collision_monitor.world.hard_spheres.state import CLOCK, NOTHING, RADIUS, VELOCITY, X
+from collision_monitor.world.hard_spheres.state import CLOCK, NOTHING, RADIUS, USUAL, VELOCITY, X
 
 LEAD = 0.8
 """Distance from the sphere to its new cell's centre as part of the half cell. Larger: spheres that are deflected soon
@@ -34,7 +34,7 @@ def move(state, i, now):  # type: ignore[no-untyped-def]
 
 @inlined
 def new_cell(state, i, now):  # type: ignore[no-untyped-def]
-    """Give sphere i a new cell and a new list at `now` (s); return False, with a partial list, if a row is full."""
+    """Give sphere i a new cell and a new list at `now` (s); return False if a row of the arrays is full."""
     spheres, centres, side = state.spheres, state.centres, state.side
     move(state, i, now)
     fastest = 0.0
@@ -46,20 +46,33 @@ def new_cell(state, i, now):  # type: ignore[no-untyped-def]
         centres[i, axis] = spheres[i, X + axis] + lead * spheres[i, VELOCITY + axis]
     _leave_lists(state, i)
     bx, by, bz = _along(state, i, 0), _along(state, i, 1), _along(state, i, 2)
-    _enter_box(state, i, (bx * state.grid + by) * state.grid + bz)
-    return _make_list(state, i, bx, by, bz)
+    if not _enter_box(state, i, (bx * state.grid + by) * state.grid + bz):
+        return False
+    return _make_list(state, i, _gather(state, bx, by, bz))
+
+
+@inlined
+def _remove(row, first, end, value):  # type: ignore[no-untyped-def]
+    """Overwrite a value in row[first:end] by the last one; return whether it was there.
+
+    The search has no early exit, because a mispredicted branch costs more than the rest of a short row.
+    """
+    place = -1
+    for m in range(first, end):
+        if row[m] == value:
+            place = m
+    if place < 0:
+        return False
+    row[place] = row[end - 1]
+    return True
 
 
 @inlined
 def _leave_lists(state, i):  # type: ignore[no-untyped-def]
     for m in range(state.counts[i]):
         j = state.neighbours[i, m]
-        last = state.counts[j] - 1
-        place = 0
-        while state.neighbours[j, place] != i:
-            place += 1
-        state.neighbours[j, place] = state.neighbours[j, last]
-        state.counts[j] = last
+        if _remove(state.neighbours[j], 0, state.counts[j], i):
+            state.counts[j] -= 1
     state.counts[i] = 0
 
 
@@ -84,32 +97,26 @@ def _along(state, i, axis):  # type: ignore[no-untyped-def]
 
 @inlined
 def _enter_box(state, i, box):  # type: ignore[no-untyped-def]
-    """Move sphere i to this box of the grid."""
-    heads, following, preceding = state.heads, state.following, state.preceding
-    old = state.boxes[i]
+    """Move sphere i to this box of the grid; return False if the box is full."""
+    members, old = state.members, state.boxes[i]
     if box == old:
-        return
-    before, after = preceding[i], following[i]
-    if before != NOTHING:
-        following[before] = after
-    elif old != NOTHING:
-        heads[old] = after
-    if after != NOTHING:
-        preceding[after] = before
-    first = heads[box]
-    if first != NOTHING:
-        preceding[first] = i
-    heads[box], following[i], preceding[i], state.boxes[i] = i, first, NOTHING, box
+        return True
+    if members[box, 0] + 1 >= members.shape[1]:
+        return False
+    if old != NOTHING and _remove(members[old], 1, members[old, 0] + 1, i):
+        members[old, 0] -= 1
+    members[box, 0] += 1
+    members[box, members[box, 0]] = i
+    state.boxes[i] = box
+    return True
 
 
 @inlined
-def _make_list(state, i, bx, by, bz):  # type: ignore[no-untyped-def]
-    """Enter sphere i and all spheres with cells within reach into each other's lists."""
-    grid, side, per_side = state.grid, state.side, state.per_side
-    centres, neighbours, counts = state.centres, state.neighbours, state.counts
-    periodic = per_side != 0.0
-    cx, cy, cz, radius = centres[i, 0], centres[i, 1], centres[i, 2], state.spheres[i, RADIUS]
-    width = 2.0 * state.half_cell * (1.0 + ROUNDED_UP)
+def _gather(state, bx, by, bz):  # type: ignore[no-untyped-def]
+    """Copy the spheres of a box and of the 26 around it into `candidates` and return their number."""
+    grid, members, candidates = state.grid, state.members, state.candidates
+    periodic = state.per_side != 0.0
+    found = 0
     for nx in range(bx - 1, bx + 2):
         x = _wrap(nx, grid, periodic)
         for ny in range(by - 1, by + 2):
@@ -118,18 +125,43 @@ def _make_list(state, i, bx, by, bz):  # type: ignore[no-untyped-def]
                 z = _wrap(nz, grid, periodic)
                 if min(x, y, z) < 0:
                     continue
-                j = state.heads[(x * grid + y) * grid + z]
-                while j != NOTHING:
-                    dx, dy, dz = centres[j, 0] - cx, centres[j, 1] - cy, centres[j, 2] - cz
-                    dx = max(abs(dx - side * np.rint(dx * per_side)) - width, 0.0)
-                    dy = max(abs(dy - side * np.rint(dy * per_side)) - width, 0.0)
-                    dz = max(abs(dz - side * np.rint(dz * per_side)) - width, 0.0)
-                    contact = radius + centres[j, 3]
-                    if (dx * dx + dy * dy + dz * dz < contact * contact) & (j != i):
-                        if max(counts[i], counts[j]) >= neighbours.shape[1]:
-                            return False
-                        neighbours[i, counts[i]], neighbours[j, counts[j]] = j, i
-                        counts[i] += 1
-                        counts[j] += 1
-                    j = state.following[j]
+                box = (x * grid + y) * grid + z
+                for m in range(USUAL):  # a fixed number, also beyond the last, as that needs no branch
+                    candidates[found + m] = members[box, 1 + m]
+                for m in range(USUAL, members[box, 0]):
+                    candidates[found + m] = members[box, 1 + m]
+                found += members[box, 0]
+    return found
+
+
+@inlined
+def _make_list(state, i, found):  # type: ignore[no-untyped-def]
+    """Enter sphere i and the candidates with cells within reach into each other's lists; return False if one is full.
+
+    A list that is not complete stays consistent: `_leave_lists` takes back the entries that are there.
+    """
+    side, per_side, centres = state.side, state.per_side, state.centres
+    neighbours, counts, candidates = state.neighbours, state.counts, state.candidates
+    capacity = neighbours.shape[1]
+    cx, cy, cz, radius = centres[i, 0], centres[i, 1], centres[i, 2], state.spheres[i, RADIUS]
+    width = 2.0 * state.half_cell * (1.0 + ROUNDED_UP)
+    count = 0
+    for m in range(found):
+        j = candidates[m]
+        dx, dy, dz = centres[j, 0] - cx, centres[j, 1] - cy, centres[j, 2] - cz
+        dx = max(abs(dx - side * np.rint(dx * per_side)) - width, 0.0)
+        dy = max(abs(dy - side * np.rint(dy * per_side)) - width, 0.0)
+        dz = max(abs(dz - side * np.rint(dz * per_side)) - width, 0.0)
+        contact = radius + centres[j, 3]
+        if count == capacity:
+            return False
+        neighbours[i, count] = j
+        count += (dx * dx + dy * dy + dz * dz < contact * contact) & (j != i)
+    counts[i] = count
+    for m in range(count):
+        j = neighbours[i, m]
+        if counts[j] == capacity:
+            return False
+        neighbours[j, counts[j]] = i
+        counts[j] += 1
     return True

@@ -25,7 +25,7 @@ from collision_monitor.world.hard_spheres.state import (
     X,
     largest_half_cell,
     make_state,
-    wider_rows,
+    with_wider_rows,
 )
 
 Walls = Literal["reflecting", "periodic"]
@@ -148,7 +148,7 @@ class HardSpheres:
             self.time = float(self._state.totals[EPOCH] + self._state.times[1])
 
     def _widen(self) -> None:
-        self._state = self._state._replace(neighbours=wider_rows(self._state.neighbours))
+        self._state = with_wider_rows(self._state)
 
     def run(self, seconds: float, record: bool = False) -> NDArray[np.void]:
         """Simulate this time (s) and return the collisions in it in order, (n,) of COLLISION; none unless `record`.

@@ -33,6 +33,8 @@ cell exits. 0.15 to 0.3 differ by less than 15 % at packings 0.1 to 0.45."""
 ROW_LINES: Final = 3
 """Cache lines in a row of neighbours. An odd number spreads the starts of the rows over all sets of the cache."""
 INDICES_PER_LINE: Final = CACHE_LINE // 4
+USUAL: Final = 4
+"""Spheres that a box of the grid holds at most in the usual case; more are correct but slower."""
 CONTACT_DURATION: Final = 1e-5
 """Contact duration as part of the time in which a sphere of mean speed passes the mean distance of neighbours.
 Larger: dissipation is lost. Smaller: an inelastic collapse takes more collisions."""
@@ -55,12 +57,10 @@ class State(NamedTuple):
     """(N, capacity): spheres whose cells are near enough for a collision."""
     counts: Indices
     """(N,) neighbours in each row."""
-    heads: Indices
-    """(grid**3,) first sphere of each box of the grid, or NOTHING."""
-    following: Indices
-    """(N,) next sphere in the same box of the grid, or NOTHING."""
-    preceding: Indices
-    """(N,) previous sphere in the same box of the grid, or NOTHING."""
+    members: Indices
+    """(grid**3, capacity): number of spheres in each box of the grid, then the spheres."""
+    candidates: Indices
+    """Scratch memory: spheres of a box and of those around it."""
     boxes: Indices
     """(N,) index of the grid's box that holds the centre of the sphere's cell."""
     partners: Indices
@@ -117,10 +117,11 @@ def make_state(
         centres,
         masses.copy(),
         np.full(count, -np.inf),
-        wider_rows(np.zeros((count, 0), np.int32)),
+        _aligned((count, INDICES_PER_LINE * ROW_LINES), np.int32),
         np.zeros(count, np.int32),
-        np.full(grid**3, NOTHING, np.int32),
-        *(np.full(count, NOTHING, np.int32) for _ in range(4)),
+        _aligned((grid**3, INDICES_PER_LINE), np.int32),
+        _candidates(INDICES_PER_LINE),
+        *(np.full(count, NOTHING, np.int32) for _ in range(2)),
         np.zeros(count, np.int32),
         np.zeros(count, np.int32),
         times,
@@ -149,13 +150,23 @@ def largest_half_cell(count: int, radius: float, side: float, periodic: bool) ->
     return min(half, (side / 3.0 - 2.0 * radius) / 2.1, (side / 2.0 - 2.0 * radius) / 4.1)
 
 
-def wider_rows(neighbours: Indices) -> Indices:
-    """Copy the lists into rows of the next larger capacity."""
-    count, capacity = neighbours.shape
-    lines = 2 * (capacity // INDICES_PER_LINE) + 1 if capacity else ROW_LINES
-    wider: Indices = _aligned((count, lines * INDICES_PER_LINE), np.int32)
-    wider[:, :capacity] = neighbours
+def with_wider_rows(state: State) -> State:
+    """Copy the lists and the boxes into rows of about twice the capacity."""
+    lines = 2 * (state.neighbours.shape[1] // INDICES_PER_LINE) + 1
+    members = _wider(state.members, 2 * state.members.shape[1])
+    neighbours = _wider(state.neighbours, lines * INDICES_PER_LINE)
+    return state._replace(neighbours=neighbours, members=members, candidates=_candidates(members.shape[1]))
+
+
+def _wider(rows: Indices, capacity: int) -> Indices:
+    wider: Indices = _aligned((len(rows), capacity), np.int32)
+    wider[:, : rows.shape[1]] = rows
     return wider
+
+
+def _candidates(capacity: int) -> Indices:
+    """Memory for the spheres of 27 full boxes."""
+    return np.zeros(27 * capacity, np.int32)
 
 
 def _aligned(shape: tuple[int, ...], dtype: type = np.float64) -> NDArray[Any]:
