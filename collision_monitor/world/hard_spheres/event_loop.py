@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 
@@ -25,6 +26,10 @@ from collision_monitor.world.hard_spheres.state import (
     WALL_IMPULSE,
     X,
 )
+
+SEPARATION: Final = 1e-13
+"""Spheres separate at least at this part of their speeds. With less, round-off could let them approach and collide
+again at the same time without end. The energy changes by the square of it."""
 
 DONE, PAUSED, ROWS_FULL, LOG_FULL = range(4)
 """Why `advance` returned: time reached, number of events reached, a larger `neighbours` or `log` is needed."""
@@ -110,7 +115,11 @@ def _collide(state, i, j, now):  # type: ignore[no-untyped-def]
     approach += dy * (spheres[j, VELOCITY + 1] - spheres[i, VELOCITY + 1])
     approach += dz * (spheres[j, VELOCITY + 2] - spheres[i, VELOCITY + 2])
     mass_i, mass_j = state.masses[i], state.masses[j]
-    change = (1.0 + restitution) * approach / ((dx * dx + dy * dy + dz * dz) * (mass_i + mass_j))
+    speeds = 0.0
+    for axis in range(3):
+        speeds += abs(spheres[i, VELOCITY + axis]) + abs(spheres[j, VELOCITY + axis])
+    separation = max(-restitution * approach, SEPARATION * speeds * (spheres[i, RADIUS] + spheres[j, RADIUS]))
+    change = (approach - separation) / ((dx * dx + dy * dy + dz * dz) * (mass_i + mass_j))
     spheres[i, VELOCITY] += change * mass_j * dx
     spheres[i, VELOCITY + 1] += change * mass_j * dy
     spheres[i, VELOCITY + 2] += change * mass_j * dz
@@ -120,7 +129,7 @@ def _collide(state, i, j, now):  # type: ignore[no-untyped-def]
     _count(state, i, now)
     _count(state, j, now)
     state.totals[COLLISIONS] += 1
-    state.totals[VIRIAL] -= (1.0 + restitution) * approach * mass_i * mass_j / (mass_i + mass_j)
+    state.totals[VIRIAL] += (separation - approach) * mass_i * mass_j / (mass_i + mass_j)
 
 
 @inlined

@@ -34,6 +34,8 @@ def place(radii: Floats, side: float, periodic: bool, random: np.random.Generato
         a, b = pairs.T
         offset = at[b] - at[a]
         offset -= side * np.rint(offset / side) if periodic else 0.0
+        same = ~offset.any(axis=1)  # walls can press spheres of one size to the same point
+        offset[same] = CLEARANCE * radii.min() * random.normal(size=(np.count_nonzero(same), 3))
         distance = np.linalg.norm(offset, axis=1, keepdims=True)
         push = offset * (((1.0 + CLEARANCE) * (radii[a] + radii[b])[:, None] / distance - 1.0) / 2.0)
         np.add.at(at, b, push)
