@@ -31,6 +31,9 @@ SEPARATION: Final = 1e-13
 """Spheres separate at least at this part of their speeds. With less, round-off could let them approach and collide
 again at the same time without end. The energy changes by the square of it."""
 
+EVENTS_PER_CALL: Final = 1_000_000
+"""Events of one call of `advance`: 1 s or less, so that Ctrl-C is noticed."""
+
 DONE, PAUSED, ROWS_FULL, LOG_FULL = range(4)
 """Why `advance` returned: time reached, number of events reached, a larger `neighbours` or `log` is needed."""
 

@@ -9,10 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import InputError
-from collision_monitor.world.hard_spheres.event_loop import DONE, LOG_FULL, PAUSED, ROWS_FULL, advance, start
+from collision_monitor.world.hard_spheres.event_loop import (
+    DONE,
+    EVENTS_PER_CALL,
+    LOG_FULL,
+    PAUSED,
+    ROWS_FULL,
+    advance,
+    start,
+)
 from collision_monitor.world.hard_spheres.starting_points import overlapping, place, thermal
 from collision_monitor.world.hard_spheres.state import (
-    CLOCK,
     COLLISIONS,
     EPOCH,
     LOGGED,
@@ -21,10 +28,9 @@ from collision_monitor.world.hard_spheres.state import (
     WALL_HITS,
     WALL_IMPULSE,
     Floats,
-    State,
-    X,
     largest_half_cell,
     make_state,
+    positions_at,
     with_wider_rows,
 )
 
@@ -40,8 +46,6 @@ LARGEST_RATIO: Final = 10.0
 """Largest ratio of two radii. Lists of large spheres among small ones grow with its third power."""
 EVENTS_AT_START: Final = 150
 """Events per sphere before time 0, in which the lattice of the start melts."""
-EVENTS_PER_CALL: Final = 1_000_000
-"""Events between two checks for Ctrl-C."""
 LOG_ROWS: Final = 100_000
 
 
@@ -184,9 +188,7 @@ class HardSpheres:
     @property
     def positions(self) -> Floats:
         """Centres at `time`, (N, 3) from 0 to `side` (m)."""
-        spheres = self._state.spheres
-        since = self.time - self._state.totals[EPOCH] - spheres[:, CLOCK, None]
-        at = spheres[:, X : X + 3] + since * spheres[:, VELOCITY : VELOCITY + 3]
+        at = positions_at(self._state, self.time)
         return np.asarray(np.mod(at, self.side) if self.is_periodic else at)
 
     @property

@@ -101,13 +101,15 @@ def make_state(
     side: float,
     periodic: bool,
     restitution: float,
+    duration: float = math.inf,
 ) -> State:
-    """Create the state at time 0, without events; see `event_loop.start`."""
+    """Create the state at time 0, without events; see `event_loop.start`. With a short duration (s), lists are short."""
     count = len(radii)
     spheres, centres = _aligned((count, 8)), _aligned((count, 4))
     spheres[:, X : X + 3], spheres[:, VELOCITY : VELOCITY + 3] = positions, velocities
     spheres[:, RADIUS] = centres[:, 3] = radii
-    half_cell = largest_half_cell(count, float(radii.max()), side, periodic)
+    fastest = float(np.abs(velocities).max()) or 1.0
+    half_cell = min(largest_half_cell(count, float(radii.max()), side, periodic), fastest * duration)
     grid = max(1, int(side / (2.0 * (float(radii.max()) + half_cell) * (1.0 + 1e-9))))
     times, winners = empty_tree(count)
     speed = math.sqrt(float((velocities**2).sum()) / count) or 1.0
@@ -136,6 +138,12 @@ def make_state(
         CONTACT_DURATION * passing,
         2.0 ** round(math.log2(SET_BACK * passing)),
     )
+
+
+def positions_at(state: State, time: float) -> Floats:
+    """Return the centres (N, 3) at a time (s since the start) before which nothing is due; periodic: not wrapped."""
+    since = time - state.totals[EPOCH] - state.spheres[:, CLOCK, None]
+    return np.asarray(state.spheres[:, X : X + 3] + since * state.spheres[:, VELOCITY : VELOCITY + 3])
 
 
 def largest_half_cell(count: int, radius: float, side: float, periodic: bool) -> float:
