@@ -108,8 +108,9 @@ def _bench_hard_spheres(args: argparse.Namespace) -> int:
         print(json.dumps(result))
     else:
         print(
-            f"hard spheres, {result['n']} at packing {result['packing']:g}: {result['collisions_per_s']:,.0f} collisions "
-            f"per second, energy drift {result['energy_drift']:.1e}, pressure {result['pressure']:.4f} Pa, "
-            f"compressibility {result['compressibility']:.4f} (Carnahan-Starling {result['carnahan_starling']:.4f})"
+            f"hard spheres, {result['n']} at packing {result['packing']:g}: "
+            f"{result['collisions_per_s']:,.0f} collisions per second, energy drift {result['energy_drift']:.1e}, "
+            f"pressure {result['pressure']:.4f} Pa, compressibility {result['compressibility']:.4f} "
+            f"(Carnahan-Starling {result['carnahan_starling']:.4f})"
         )
     return ExitCode.DONE

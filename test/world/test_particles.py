@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plain_spheres import simulate
 
 from collision_monitor.world.particles import Particles
-from plain_spheres import simulate
 
 
 def two_particles(rate, position, velocity):

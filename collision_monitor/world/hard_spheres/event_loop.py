@@ -24,6 +24,9 @@ from collision_monitor.world.hard_spheres.state import (
     WALL,
     WALL_HITS,
     WALL_IMPULSE,
+    Floats,
+    Indices,
+    State,
     X,
 )
 
@@ -39,7 +42,7 @@ DONE, PAUSED, ROWS_FULL, LOG_FULL = range(4)
 
 
 @kernel
-def start(state):  # type: ignore[no-untyped-def]
+def start(state: State) -> bool:
     """Give all spheres their cells, lists and first events; return False if a row of neighbours is full."""
     for i in range(len(state.spheres)):
         if not new_cell(state, i, state.spheres[i, CLOCK]):
@@ -50,7 +53,7 @@ def start(state):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def advance(state, until, events, log_times, log_pairs):  # type: ignore[no-untyped-def]
+def advance(state: State, until: float, events: int, log_times: Floats, log_pairs: Indices) -> int:
     """Process the events up to the time `until` (s since the start), at most `events` of them; return the reason.
 
     log_times (n,), log_pairs (n, 2): filled with the collisions from row totals[LOGGED] on; n = 0 for no log. A wall
@@ -88,7 +91,7 @@ def advance(state, until, events, log_times, log_pairs):  # type: ignore[no-unty
 
 
 @inlined
-def _restitution(state, since):  # type: ignore[no-untyped-def]
+def _restitution(state: State, since: float) -> float:
     """Restitution of a collision `since` seconds after one of the same sphere: elastic if that is too short.
 
     Otherwise infinitely many collisions can happen in a finite time (inelastic collapse). Source: the TC model,
@@ -98,7 +101,7 @@ def _restitution(state, since):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _collide(state, i, j, now):  # type: ignore[no-untyped-def]
+def _collide(state: State, i: int, j: int, now: float) -> None:
     """Exchange momentum along the line of centres.
 
     The impulse is divided by the distance squared, not by the sum of the radii squared, so that energy is conserved in
@@ -136,7 +139,7 @@ def _collide(state, i, j, now):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _bounce(state, i, axis, now):  # type: ignore[no-untyped-def]
+def _bounce(state: State, i: int, axis: int, now: float) -> None:
     """Turn the velocity back at a wall."""
     speed, radius = state.spheres[i, VELOCITY + axis], state.spheres[i, RADIUS]
     restitution = _restitution(state, now - state.last_hit[i])
@@ -149,13 +152,13 @@ def _bounce(state, i, axis, now):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _count(state, i, now):  # type: ignore[no-untyped-def]
+def _count(state: State, i: int, now: float) -> None:
     state.hits[i] += 1
     state.last_hit[i] = now
 
 
 @inlined
-def _set_back(state, by):  # type: ignore[no-untyped-def]
+def _set_back(state: State, by: float) -> None:
     """Subtract `by` seconds from all clocks and event times."""
     for i in range(len(state.spheres)):
         state.spheres[i, CLOCK] -= by

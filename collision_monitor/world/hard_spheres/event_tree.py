@@ -7,6 +7,8 @@ The Art of Computer Programming 3, section 5.4.1; one event per sphere: F. Small
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,7 +28,7 @@ def empty_tree(count: int) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
 
 
 @device
-def schedule(times, winners, sphere, time):  # type: ignore[no-untyped-def]
+def schedule(times: Any, winners: Any, sphere: int, time: float) -> None:
     """Give the sphere's event this time."""
     node = len(times) // 2 + sphere
     times[node] = time

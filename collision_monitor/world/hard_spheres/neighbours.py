@@ -14,7 +14,7 @@ import numpy as np
 
 from collision_monitor._jit import inlined
 from collision_monitor.tolerances import ROUNDED_UP
-from collision_monitor.world.hard_spheres.state import CLOCK, NOTHING, RADIUS, USUAL, VELOCITY, X
+from collision_monitor.world.hard_spheres.state import CLOCK, NOTHING, RADIUS, USUAL, VELOCITY, Indices, State, X
 
 LEAD = 0.8
 """Distance from the sphere to its new cell's centre as part of the half cell. Larger: spheres that are deflected soon
@@ -23,7 +23,7 @@ leave sooner. Smaller: spheres that fly straight leave sooner. 0.5 to 0.95 diffe
 
 
 @inlined
-def move(state, i, now):  # type: ignore[no-untyped-def]
+def move(state: State, i: int, now: float) -> None:
     """Advance sphere i on its straight path to `now` (s)."""
     spheres = state.spheres
     since = now - spheres[i, CLOCK]
@@ -33,7 +33,7 @@ def move(state, i, now):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def new_cell(state, i, now):  # type: ignore[no-untyped-def]
+def new_cell(state: State, i: int, now: float) -> bool:
     """Give sphere i a new cell and a new list at `now` (s); return False if a row of the arrays is full."""
     spheres, centres, side = state.spheres, state.centres, state.side
     move(state, i, now)
@@ -52,7 +52,7 @@ def new_cell(state, i, now):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _remove(row, first, end, value):  # type: ignore[no-untyped-def]
+def _remove(row: Indices, first: int, end: int, value: int) -> bool:
     """Overwrite a value in row[first:end] by the last one; return whether it was there.
 
     The search has no early exit, because a mispredicted branch costs more than the rest of a short row.
@@ -68,7 +68,7 @@ def _remove(row, first, end, value):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _leave_lists(state, i):  # type: ignore[no-untyped-def]
+def _leave_lists(state: State, i: int) -> None:
     for m in range(state.counts[i]):
         j = state.neighbours[i, m]
         if _remove(state.neighbours[j], 0, state.counts[j], i):
@@ -77,7 +77,7 @@ def _leave_lists(state, i):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _wrap(index, grid, periodic):  # type: ignore[no-untyped-def]
+def _wrap(index: int, grid: int, periodic: bool) -> int:
     """Index of a box of the grid along an axis, from -1 to grid; NOTHING outside of reflecting walls."""
     if 0 <= index < grid:
         return index
@@ -87,16 +87,16 @@ def _wrap(index, grid, periodic):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _along(state, i, axis):  # type: ignore[no-untyped-def]
+def _along(state: State, i: int, axis: int) -> int:
     """Index along an axis of the grid's box that holds the centre of sphere i's cell; beyond a wall, the nearest."""
-    index = math.floor(state.centres[i, axis] * state.grid_per_metre)
+    index: int = math.floor(state.centres[i, axis] * state.grid_per_metre)
     if state.per_side != 0.0:
         return _wrap(index, state.grid, True)
     return min(max(index, 0), state.grid - 1)
 
 
 @inlined
-def _enter_box(state, i, box):  # type: ignore[no-untyped-def]
+def _enter_box(state: State, i: int, box: int) -> bool:
     """Move sphere i to this box of the grid; return False if the box is full."""
     members, old = state.members, state.boxes[i]
     if box == old:
@@ -112,11 +112,11 @@ def _enter_box(state, i, box):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _gather(state, bx, by, bz):  # type: ignore[no-untyped-def]
+def _gather(state: State, bx: int, by: int, bz: int) -> int:
     """Copy the spheres of a box and of the 26 around it into `candidates` and return their number."""
     grid, members, candidates = state.grid, state.members, state.candidates
     periodic = state.per_side != 0.0
-    found = 0
+    found: int = 0
     for nx in range(bx - 1, bx + 2):
         x = _wrap(nx, grid, periodic)
         for ny in range(by - 1, by + 2):
@@ -130,12 +130,12 @@ def _gather(state, bx, by, bz):  # type: ignore[no-untyped-def]
                     candidates[found + m] = members[box, 1 + m]
                 for m in range(USUAL, members[box, 0]):
                     candidates[found + m] = members[box, 1 + m]
-                found += members[box, 0]
+                found += int(members[box, 0])
     return found
 
 
 @inlined
-def _make_list(state, i, found):  # type: ignore[no-untyped-def]
+def _make_list(state: State, i: int, found: int) -> bool:
     """Enter sphere i and the candidates with cells within reach into each other's lists; return False if one is full.
 
     A list that is not complete stays consistent: `_leave_lists` takes back the entries that are there.

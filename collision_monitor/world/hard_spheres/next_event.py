@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from collision_monitor._jit import inlined
-from collision_monitor.world.hard_spheres.state import CELL_EXIT, CLOCK, RADIUS, VELOCITY, WALL, X
+from collision_monitor.world.hard_spheres.state import CELL_EXIT, CLOCK, RADIUS, VELOCITY, WALL, State, X
 
 
 @inlined
-def predict(state, i, now):  # type: ignore[no-untyped-def]
+def predict(state: State, i: int, now: float) -> float:
     """Store the partner of sphere i's next event after `now` (s), and return the event's time (s).
 
     Two spheres touch at the smaller root of |r + v t| = R_i + R_j. c / (-b + sqrt(b^2 - a c)) is that root without

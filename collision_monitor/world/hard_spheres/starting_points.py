@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from collision_monitor.errors import InputError
@@ -16,6 +17,9 @@ PUSHES: Final = 2000
 """Rounds of pushing after which the packing counts as impossible. Equal spheres at 0.5 take about 100."""
 
 
+Pairs = NDArray[np.intp]
+
+
 def place(radii: Floats, side: float, periodic: bool, random: np.random.Generator) -> Floats:
     """Return centres (N, 3) of spheres without overlaps in a cube (m). Raises InputError if they do not fit.
 
@@ -23,10 +27,7 @@ def place(radii: Floats, side: float, periodic: bool, random: np.random.Generato
     """
     lattice = _lattice(len(radii), random)
     low, high = radii[:, None], side - radii[:, None]
-    if periodic:
-        at = lattice * side
-    else:
-        at = low + lattice / lattice.max(initial=1e-300) * (high - low)
+    at = lattice * side if periodic else low + lattice / lattice.max(initial=1e-300) * (high - low)
     for _ in range(PUSHES):
         pairs = overlapping(at, radii, side if periodic else None)
         if not len(pairs):
@@ -55,7 +56,7 @@ def _lattice(count: int, random: np.random.Generator) -> Floats:
     return random.permutation(sites.reshape(-1, 3))[:count] / along
 
 
-def overlapping(positions: Floats, radii: Floats, period: float | None) -> np.ndarray[tuple[int, int], np.dtype[np.intp]]:
+def overlapping(positions: Floats, radii: Floats, period: float | None) -> Pairs:
     """Return the pairs (n, 2) of overlapping spheres; period: side of the cube with periodic walls (m)."""
     at = positions if period is None else np.mod(positions, period)
     at = np.where(at == period, 0.0, at)  # the remainder of a tiny negative number rounds up to the period
@@ -65,7 +66,7 @@ def overlapping(positions: Floats, radii: Floats, period: float | None) -> np.nd
         offset -= period * np.rint(offset / period)
     touching = (offset**2).sum(axis=1) < (radii[pairs[:, 0]] + radii[pairs[:, 1]]) ** 2
     found = pairs[touching]
-    ordered: np.ndarray[tuple[int, int], np.dtype[np.intp]] = found[np.lexsort(found.T)]
+    ordered: Pairs = found[np.lexsort(found.T)]
     return ordered
 
 

@@ -103,7 +103,7 @@ def make_state(
     restitution: float,
     duration: float = math.inf,
 ) -> State:
-    """Create the state at time 0, without events; see `event_loop.start`. With a short duration (s), lists are short."""
+    """Create the state at time 0, without events; see `event_loop.start`. For a short duration (s), lists are short."""
     count = len(radii)
     spheres, centres = _aligned((count, 8)), _aligned((count, 4))
     spheres[:, X : X + 3], spheres[:, VELOCITY : VELOCITY + 3] = positions, velocities
@@ -115,28 +115,29 @@ def make_state(
     speed = math.sqrt(float((velocities**2).sum()) / count) or 1.0
     passing = side / count ** (1.0 / 3.0) / speed
     return State(
-        spheres,
-        centres,
-        masses.copy(),
-        np.full(count, -np.inf),
-        _aligned((count, INDICES_PER_LINE * ROW_LINES), np.int32),
-        np.zeros(count, np.int32),
-        _aligned((grid**3, INDICES_PER_LINE), np.int32),
-        _candidates(INDICES_PER_LINE),
-        *(np.full(count, NOTHING, np.int32) for _ in range(2)),
-        np.zeros(count, np.int32),
-        np.zeros(count, np.int32),
-        times,
-        winners,
-        np.zeros(6),
-        side,
-        1.0 / side if periodic else 0.0,
-        half_cell,
-        grid / side,
-        grid,
-        restitution,
-        CONTACT_DURATION * passing,
-        2.0 ** round(math.log2(SET_BACK * passing)),
+        spheres=spheres,
+        centres=centres,
+        masses=masses.copy(),
+        last_hit=np.full(count, -np.inf),
+        neighbours=_aligned((count, INDICES_PER_LINE * ROW_LINES), np.int32),
+        counts=np.zeros(count, np.int32),
+        members=_aligned((grid**3, INDICES_PER_LINE), np.int32),
+        candidates=_candidates(INDICES_PER_LINE),
+        boxes=np.full(count, NOTHING, np.int32),
+        partners=np.full(count, NOTHING, np.int32),
+        expected=np.zeros(count, np.int32),
+        hits=np.zeros(count, np.int32),
+        times=times,
+        winners=winners,
+        totals=np.zeros(6),
+        side=side,
+        per_side=1.0 / side if periodic else 0.0,
+        half_cell=half_cell,
+        grid_per_metre=grid / side,
+        grid=grid,
+        restitution=restitution,
+        contact_duration=CONTACT_DURATION * passing,
+        set_back=2.0 ** round(math.log2(SET_BACK * passing)),
     )
 
 
@@ -152,7 +153,7 @@ def largest_half_cell(count: int, radius: float, side: float, periodic: bool) ->
     With periodic walls, the grid needs three boxes along an axis, and two spheres whose cells are within reach must
     stay nearer than half the side, so that only their nearest images can touch.
     """
-    half = CELL * side / count ** (1.0 / 3.0)
+    half: float = CELL * side / count ** (1.0 / 3.0)
     if not periodic:
         return half
     return min(half, (side / 3.0 - 2.0 * radius) / 2.1, (side / 2.0 - 2.0 * radius) / 4.1)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plain_spheres import simulate
 from scipy import stats
 
 import collision_monitor as cm
 from collision_monitor.errors import InputError
 from collision_monitor.world.hard_spheres.simulation import carnahan_starling
 from collision_monitor.world.hard_spheres.starting_points import overlapping
-from plain_spheres import simulate
 
 HardSpheres = cm.world.HardSpheres
 
