@@ -162,7 +162,7 @@ def main() -> None:
     parser.add_argument("--objects", type=int, default=200, help="number of spheres (default: 200)")
     parser.add_argument("--seed", type=int, default=1, help="seed of the scene (default: 1)")
     parser.add_argument("--duration", type=float, default=30.0, help="simulated time (s, default: 30)")
-    parser.add_argument("--session", type=Path, help="session of a node that watched the scene with this number and seed")
+    parser.add_argument("--session", type=Path, help="recording of a node that watched this scene")
     args = parser.parse_args()
     scene, again = (make_scene("hard_spheres", objects=args.objects, seed=args.seed) for _ in range(2))
     assert isinstance(scene, HardSpheresScene) and isinstance(again, HardSpheresScene)

@@ -97,8 +97,10 @@ def against_the_step() -> dict[str, list[float]]:
     its velocity at the end of the step is not that of the event-driven simulation.
     """
     result: dict[str, list[float]] = {name: [] for name in ("events", "backed up", "overlaps", "right", "missed")}
-    print("| step (s) | event-driven | step, backing up | step, overlaps at its end | collided spheres wrong: backing up "
-          "| overlaps |")  # fmt: skip
+    print(
+        "| step (s) | event-driven | step, backing up | step, overlaps at its end | collided spheres wrong: backing up "
+        "| overlaps |"
+    )
     print("|---|---|---|---|---|---|")
     for dt in STEPS:
         spheres = HardSpheres(SPHERES, PACKING, 3)
@@ -151,24 +153,26 @@ def draw(folder: Path, rows: list[tuple[float, float, float]], steps: dict[str, 
     left.set(xlabel="step (s)", ylabel="CPU time per simulated second (s)", title="Cost")
     right.semilogx(STEPS, 100 * np.array(steps["missed"]), "C1o-", label="overlaps at the step's end")
     right.semilogx(STEPS, 100 * np.array(steps["right"]), "C2s-", label="backing up to each contact")
-    right.set(xlabel="step (s)", ylabel="spheres with a wrong velocity\n(% of those that collided)", title="Error of a step")
+    right.set(xlabel="step (s)", ylabel="spheres with a wrong velocity\n(% of those that collided)")
+    right.set_title("Error of a step")
     for axes in (left, right):
         axes.grid(alpha=0.3)
         axes.legend()
     figure.suptitle(f"{SPHERES} hard spheres at packing {PACKING:g}, mean speed 1.6 diameters per second")
     figure.savefig(folder / "hard_spheres_steps.png", dpi=110)
 
-    packing, measured, _ = np.array(rows).T
+    packing, measured, error = np.array(rows).T
     theory = carnahan_starling(packing)
     dense = np.linspace(0.0, 0.46, 200)
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
     left.plot(dense, carnahan_starling(dense), "C0-", label="Carnahan–Starling")
     left.plot(packing, measured, "C3o", label="measured")
     left.set(xlabel="packing", ylabel="compressibility P V / N kT", title="Pressure")
-    series = sum(b * dense**k for k, b in enumerate(VIRIAL))
+    sparse = dense[dense < 0.36]
+    series = sum(b * sparse**k for k, b in enumerate(VIRIAL))
     right.axhspan(-0.5, 0.5, color="C0", alpha=0.1, label="0.5 %")
-    right.plot(dense[dense < 0.36], 100 * (series / carnahan_starling(dense) - 1)[dense < 0.36], "C2--", label="virial series")
-    right.errorbar(packing, 100 * (measured / theory - 1), 100 * np.array(rows)[:, 2] / theory, fmt="C3o", label="measured")
+    right.plot(sparse, 100 * (series / carnahan_starling(sparse) - 1), "C2--", label="virial series")
+    right.errorbar(packing, 100 * (measured / theory - 1), 100 * error / theory, fmt="C3o", label="measured")
     right.set(xlabel="packing", ylabel="difference from Carnahan–Starling (%)", title="Difference")
     for axes in (left, right):
         axes.grid(alpha=0.3)
@@ -179,7 +183,7 @@ def draw(folder: Path, rows: list[tuple[float, float, float]], steps: dict[str, 
 def main() -> None:
     """Run all three measurements."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--collisions", type=int, default=10_000_000, help="of the first measurement (default: 10 million)")
+    parser.add_argument("--collisions", type=int, default=10_000_000, help="collisions of 1. (default: 10 million)")
     parser.add_argument("--png", type=Path, metavar="FOLDER", help="save the pictures in this folder")
     args = parser.parse_args()
     conservation(args.collisions)

@@ -16,7 +16,6 @@ from collision_monitor.geometry.coordinates import Array, Booleans, coordinates,
 from collision_monitor.geometry.lines import LineKind
 from collision_monitor.tolerances import EPSILON
 
-
 ROUND_OFF = 8 * EPSILON
 """Distances that differ by less than this part of the particles' offset are equal: the round-off of both."""
 
