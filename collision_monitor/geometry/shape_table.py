@@ -242,7 +242,7 @@ class ShapeTableBuilder:
                 del self._users[start], self._blocks[key]
                 self._free_blocks.setdefault(int(self.table.vertex_count[slot]), []).append(start)
         self.table.kind[slot] = 0
-        self.table.vertex_count[slot] = 0
+        self.table.vertex_start[slot] = self.table.vertex_count[slot] = 0
         self._free_slots.append(slot)
 
     def _new_slot(self) -> int:

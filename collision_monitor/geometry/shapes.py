@@ -186,7 +186,8 @@ class HalfSpace(Shape):
         except (TypeError, ValueError):
             got = f"{self.normal!r}, {self.offset!r}"
             raise ShapeError(f"HalfSpace: expected a normal (3) and an offset, got {got}") from None
-        length = float(np.linalg.norm(normal)) if normal.shape == (3,) else 0.0
+        with np.errstate(over="ignore"):  # an infinite length is refused below
+            length = float(np.linalg.norm(normal)) if normal.shape == (3,) else 0.0
         if not (length > 0.0 and np.isfinite(length) and np.isfinite(offset)):
             raise ShapeError(
                 f"HalfSpace: expected a non-zero, finite normal and a finite offset, got {self.normal}, {offset}"

@@ -105,6 +105,10 @@ class Roster(Stage):
         """The ids of all described objects, ascending."""
         return sorted(self._slots)
 
+    def __contains__(self, object_id: int) -> bool:
+        """Whether the object is described."""
+        return object_id in self._slots
+
     def __len__(self) -> int:
         """Number of described objects."""
         return len(self._slots)
@@ -228,9 +232,14 @@ class Roster(Stage):
         """Mark every object to be predicted anew in the next step."""
         self.renewed.update(self.used().tolist())
 
-    def forget_states(self) -> None:
-        """Forget all states: every object that is not static is unseen until its next state."""
+    def forget_states(self, which: NDArray[np.int32] | None = None) -> None:
+        """Forget the states of the bodies `which`, of all by default: those that move are unseen until the next one."""
         bodies = self.bodies
+        if which is not None:
+            bodies.seen[which] = False
+            bodies.version[which] += 1
+            self.renewed.update(which.tolist())
+            return
         bodies.seen[:] = bodies.static & bodies.used
         bodies.version[:] += 1
         self.renewed = set(self.used().tolist())

@@ -38,6 +38,7 @@ _HEIGHT: Final = 2e-5  # a vertex above the plane of a face, in the test for con
 _CONCAVE: Final = (30.0, 0.12)  # the excess around a concave object: in all, for each face
 _EXACT: Final = 0.02  # a determinant in integers
 _PIECE: Final = 10.0  # the excess around several pieces: for each piece
+_TRIANGLE: Final = 3.0  # the excess around a concave mesh beside other shapes: for each face
 _POLYGON: Final = 0.012  # two corners of a concave polygon
 
 _MODELS: Final = {
@@ -66,8 +67,9 @@ class Budget:
         """
         coarse = model not in (Model.AUTO, Model.EXACT)
         cost = _PIECE * len(shapes) if coarse and len(shapes) > 1 else 0.0
+        mixed = coarse and not all(isinstance(shape, Mesh) for shape, _ in shapes)
         for shape, _ in shapes:
-            cost += self._estimate(shape, model)
+            cost += self._estimate(shape, model, mixed)
             if cost > max(self.left, SMALL_MS):
                 return False
         if cost > SMALL_MS:
@@ -86,7 +88,8 @@ class Budget:
                 if used > SMALL_MS:
                     self.left -= used
 
-    def _estimate(self, shape: Shape, model: Model) -> float:
+    def _estimate(self, shape: Shape, model: Model, mixed: bool) -> float:
+        """Return the time for one shape of an object. mixed: there are shapes other than meshes, and a coarse model."""
         fixed, each = _MODELS.get(model, (0.0, 0.0))
         match shape:
             case ConvexHull():
@@ -102,7 +105,9 @@ class Budget:
                 own = _of_hull(n) + (fixed if n > 8 else 0.1 * fixed) + each * n
                 if is_convex_mesh(shape):
                     return own
-                return inf if model is Model.CONVEX_DECOMPOSITION else own + _CONCAVE[0] + _CONCAVE[1] * m
+                if model is Model.CONVEX_DECOMPOSITION:
+                    return inf
+                return own + _CONCAVE[0] + (_TRIANGLE if mixed else _CONCAVE[1]) * m
             case Polygon():
                 n = len(shape.points)
                 try:

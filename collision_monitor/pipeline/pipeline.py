@@ -197,7 +197,7 @@ class Pipeline:
             if isinstance(change, Removal):
                 self.monitor.remove(change.object_id)
             else:
-                was_known = change.object_id in self.catalogue.descriptions
+                was_known = change.object_id in self.monitor
                 change = self._describe(change, stamp_ns, budgets, ready)
         except Exception as error:  # see `reason_of`
             if not isinstance(change, Removal):  # removing an unknown object is no error

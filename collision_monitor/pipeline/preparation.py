@@ -68,7 +68,10 @@ class Prepared:
 
 
 class Preparation:
-    """Makes models in another process, one after the other, in the order of the descriptions. limit: s for each."""
+    """Makes models in another process, one after the other, in the order of the descriptions.
+
+    limit: s for each; 0: no model is made, and the objects that take long keep their boxes.
+    """
 
     def __init__(self, limit: float = LIMIT_S) -> None:
         self._limit = limit
@@ -95,6 +98,9 @@ class Preparation:
         with self._wake:
             old = self._waiting.pop(job.object_id, None)
             self._waiting_bytes -= len(old.data) if old is not None else 0
+            if self._limit <= 0.0:
+                self._ended.append(Prepared(job, "no time is allowed for models"))
+                return
             if self._closed or self._waiting_bytes + len(job.data) > MOST_WAITING:
                 self._ended.append(Prepared(job, "too many objects wait for their models"))
                 return

@@ -49,5 +49,5 @@ def test_a_text_comes_back():
 
 @pytest.mark.parametrize("data", [b"", b"no model", encode_model("cut")[:-40]])
 def test_other_bytes_raise_a_value_error(data):
-    with pytest.raises(ValueError, match="expected a model|pickled|magic"):
+    with pytest.raises(ValueError, match=r"expected a model|pickled|magic"):
         decode_model(data)
