@@ -35,7 +35,7 @@ SEPARATION: Final = 1e-13
 again at the same time without end. The energy changes by the square of it."""
 
 EVENTS_PER_CALL: Final = 1_000_000
-"""Events of one call of `advance`: 1 s or less, so that Ctrl-C is noticed."""
+"""Events of one call of `advance`: about a second, after which Ctrl-C is noticed."""
 
 DONE, PAUSED, ROWS_FULL, LOG_FULL = range(4)
 """Why `advance` returned: time reached, number of events reached, a larger `neighbours` or `log` is needed."""

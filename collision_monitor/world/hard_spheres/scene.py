@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from collision_monitor.geometry.shapes import Sphere
 from collision_monitor.objects.description import ObjectDescription
@@ -16,10 +15,11 @@ from collision_monitor.world.walls import closed_box
 RADII: Final = (0.10, 0.25)
 """Range of the radii (m)."""
 PACKING: Final = 0.02
+"""Part of the box that the spheres fill; each then collides about once a second, and half as often with a wall."""
 
 
 class HardSpheresScene(Scene):
-    """Ids 1..n for the spheres, followed by the six walls. States are exact, and each collision is in `collisions`."""
+    """Ids 1..n for the spheres, followed by the six walls. States are exact; sphere k of `spheres` is object k + 1."""
 
     def __init__(self, objects: int | None, seed: int, rate: float | None) -> None:
         self.name = "hard_spheres"
@@ -27,8 +27,6 @@ class HardSpheresScene(Scene):
         count = object_count(objects, 200, 1, 100_000, self.name)
         radii = np.random.default_rng(seed).uniform(*RADII, count)
         self.spheres = HardSpheres(count, PACKING, seed, radii=radii)
-        self.collisions: list[NDArray[np.void]] = []
-        """Collisions of each step, (n,) of `simulation.COLLISION`; sphere k is object k + 1."""
         self._ids = np.arange(1, count + 1, dtype=np.uint32)
         self.descriptions = [
             ObjectDescription(int(i), Sphere(r), f"sphere_{i}") for i, r in zip(self._ids, radii, strict=True)
@@ -36,7 +34,7 @@ class HardSpheresScene(Scene):
         self.descriptions += closed_box(self.spheres.side, count + 1)
 
     def _advance(self, dt: float) -> None:
-        self.collisions.append(self.spheres.run(dt, record=True))
+        self.spheres.run(dt)
 
     def states(self) -> States:
         """Return the current states. See Scene."""

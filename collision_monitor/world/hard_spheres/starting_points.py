@@ -26,6 +26,8 @@ def place(radii: Floats, side: float, periodic: bool, random: np.random.Generato
     The spheres begin on random sites of a face-centred cubic lattice. Overlapping pairs are then pushed apart.
     """
     lattice = _lattice(len(radii), random)
+    if radii.min() < radii.max():
+        random.shuffle(lattice)  # sizes must not depend on the place; equal spheres stay near their neighbours in memory
     low, high = radii[:, None], side - radii[:, None]
     at = lattice * side if periodic else low + lattice / lattice.max(initial=1e-300) * (high - low)
     for _ in range(PUSHES):
@@ -49,11 +51,12 @@ def place(radii: Floats, side: float, periodic: bool, random: np.random.Generato
 
 
 def _lattice(count: int, random: np.random.Generator) -> Floats:
-    """Random sites of a face-centred cubic lattice, (count, 3) from 0 to less than 1."""
+    """Random sites of a face-centred cubic lattice in the order of their coordinates, (count, 3) from 0 to below 1."""
     along = int(np.ceil(round((count / 4.0) ** (1.0 / 3.0), 9)))
     corners = np.stack(np.meshgrid(*[np.arange(along)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
     sites = corners + np.array([[0.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.5, 0.0, 0.5], [0.0, 0.5, 0.5]])
-    return random.permutation(sites.reshape(-1, 3))[:count] / along
+    chosen = np.sort(random.permutation(4 * along**3)[:count])
+    return np.asarray(sites.reshape(-1, 3)[chosen] / along)
 
 
 def overlapping(positions: Floats, radii: Floats, period: float | None) -> Pairs:

@@ -19,13 +19,3 @@ def test_the_monitors_predictions_happen_within_their_intervals():
     assert confirmed.happened + confirmed.prevented == confirmed.predictions
     assert confirmed.first_happened == confirmed.first == len(steps)
     assert confirmed.predicted == confirmed.due > 1000
-
-
-def test_the_scene_lists_the_collisions_of_its_steps():
-    scene = HardSpheresScene(100, 1, 10.0)
-    for _ in range(20):
-        scene.step()
-    assert len(scene.collisions) == 20
-    assert sum(map(len, scene.collisions)) == scene.spheres.collisions + scene.spheres.wall_collisions > 50
-    for step, happened in enumerate(scene.collisions):
-        assert ((happened["time"] > step / 10 - 1e-9) & (happened["time"] <= (step + 1) / 10 + 1e-9)).all()
