@@ -27,7 +27,7 @@ def place(radii: Floats, side: float, periodic: bool, random: np.random.Generato
     """
     lattice = _lattice(len(radii), random)
     if radii.min() < radii.max():
-        random.shuffle(lattice)  # sizes must not depend on the place; equal spheres stay near their neighbours in memory
+        random.shuffle(lattice)  # sizes must not depend on the place; equal spheres stay near neighbours in memory
     low, high = radii[:, None], side - radii[:, None]
     at = lattice * side if periodic else low + lattice / lattice.max(initial=1e-300) * (high - low)
     for _ in range(PUSHES):
