@@ -139,7 +139,7 @@ def _leader(joint: Joint, urdf: Urdf) -> tuple[str, float, float]:
         multiplier *= at.mimic.multiplier
         leader = urdf.joints.get(at.mimic.joint)
         if leader is None or leader.type not in _KINDS or leader.type is JointType.FIXED or leader.name in seen:
-            raise at.element.error(f"mimic: expected a moving joint without a loop of mimics, got {at.mimic.joint!r:.80}")
+            raise at.element.error(f"mimic: expected a moving joint, and no loop, got {at.mimic.joint!r:.80}")
         seen.add(leader.name)
         at = leader
     return at.name, multiplier, offset
