@@ -44,12 +44,14 @@ class LinkTable(NamedTuple):
 class KinematicTree:
     """links: names, by row of the table. joints: names of the variables, by column.
 
-    needs (L, J): whether the pose of a link in the base link depends on a joint.
+    wraps (J,): whether the position of a joint may jump by a turn, as that of a continuous one. needs (L, J): whether the
+    pose of a link in the base link depends on a joint.
     """
 
     links: tuple[str, ...]
     joints: tuple[str, ...]
     table: LinkTable
+    wraps: NDArray[np.bool_]
     needs: NDArray[np.bool_]
 
 
@@ -104,7 +106,8 @@ def _downward(base: str, children: dict[str, list[Joint]]) -> list[str]:
 def _tree(order: list[str], by_child: dict[str, Joint], urdf: Urdf) -> KinematicTree:
     row = {name: i for i, name in enumerate(order)}
     moving = [by_child[name] for name in order[1:] if _KINDS[by_child[name].type] != FIXED]
-    column = {joint.name: j for j, joint in enumerate(joint for joint in moving if joint.mimic is None)}
+    free = [joint for joint in moving if joint.mimic is None]
+    column = {joint.name: j for j, joint in enumerate(free)}
     count = len(order)
     table = LinkTable(
         np.full(count, -1, np.int32),
@@ -127,7 +130,8 @@ def _tree(order: list[str], by_child: dict[str, Joint], urdf: Urdf) -> Kinematic
             source, table.multiplier[i], table.offset[i] = _leader(joint, urdf)
             table.variable[i] = column[source]
             needs[i, column[source]] = True
-    return KinematicTree(tuple(order), tuple(column), table, needs)
+    wraps = np.array([joint.type is JointType.CONTINUOUS for joint in free], np.bool_)
+    return KinematicTree(tuple(order), tuple(column), table, wraps, needs)
 
 
 def _leader(joint: Joint, urdf: Urdf) -> tuple[str, float, float]:

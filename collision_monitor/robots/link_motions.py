@@ -31,6 +31,14 @@ def link_motions(table: LinkTable, joints: Floats, base: Floats) -> tuple[Floats
     return poses, twists
 
 
+def load() -> None:
+    """Compile the kernel, or load it from the cache, before messages arrive."""
+    one = np.zeros((1, 3)), np.zeros((1, 4)), np.zeros((1, 3))
+    row = np.zeros(1, np.int32)
+    table = LinkTable(row, row, *one, row, np.zeros(1), np.zeros(1))
+    link_motions(table, np.zeros((1, 0, 2)), np.zeros((1, 13)))
+
+
 @kernel
 def _link_motions(parent, kind, position, quaternion, axis, variable, multiplier, offset, joints, poses, twists):
     for n in range(len(poses)):

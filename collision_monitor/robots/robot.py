@@ -50,14 +50,17 @@ class Description:
 class Robot:
     """Links with shapes, in the order of `rows`.
 
-    rows (S,): rows of these links in the tree. shapes: of each link, with their poses in its frame. allowed: pairs of
-    links whose contact is expected. problems: a text for each part of the files that is left out.
+    rows (S,): rows of these links in the tree. shapes: of each link, with their poses in its frame. touching, disabled:
+    pairs of links whose contact is expected, by construction and by the SRDF. known_joints: names of all joints, with
+    the fixed and mimic ones. problems: a text for each part of the files that is left out.
     """
 
     tree: KinematicTree
     rows: NDArray[np.intp]
     shapes: tuple[tuple[tuple[Shape, Pose], ...], ...]
-    allowed: frozenset[Pair]
+    touching: frozenset[Pair]
+    disabled: frozenset[Pair]
+    known_joints: frozenset[str]
     problems: tuple[str, ...]
 
     @property
@@ -65,19 +68,14 @@ class Robot:
         """Names of the links with shapes, (S)."""
         return [self.tree.links[row] for row in self.rows]
 
-    @property
-    def needs(self) -> NDArray[np.bool_]:
-        """Whether the pose of a link with shapes in the base link depends on a joint, (S, J)."""
-        return self.tree.needs[self.rows]
-
     def motions(self, joints: Floats, base: Floats) -> tuple[Floats, Floats]:
-        """Return poses (S, 7) and twists (S, 6) of the links with shapes, in the frame of the base's pose.
+        """Return poses (L, 7) and twists (L, 6) of all links of the tree, in the frame of the base's pose.
 
         joints (J, 2): position and velocity of each joint of `tree.joints`. base (13,): position, quaternion, linear
         and angular velocity of the base link.
         """
         poses, twists = link_motions(self.tree.table, joints[None], base[None])
-        return poses[0, self.rows], twists[0, self.rows]
+        return poses[0], twists[0]
 
 
 def make_robot(urdf: Description, srdf: Description | None = None, packages: Mapping[str, Path] | None = None) -> Robot:
@@ -99,15 +97,20 @@ def make_robot(urdf: Description, srdf: Description | None = None, packages: Map
     if not shapes:
         reason = f": {problems[0]}" if problems else ", only <visual> or nothing"
         raise InputError(f"{urdf.name}: expected a link with a <collision> that can be used, got none{reason}")
-    allowed = touching_links(tree, shapes)
+    disabled: set[Pair] = set()
     if srdf is not None:
         disabled = disabled_pairs(srdf.text, srdf.name, tree.links)
-        allowed |= {pair for pair in disabled if pair[0] in shapes and pair[1] in shapes}
         unknown = sorted({name for pair in disabled for name in pair} - set(model.links))
         if unknown:
             more = "" if len(unknown) <= _SHOWN else f" and {len(unknown) - _SHOWN} more"
             problems.append(f"{srdf.name}: expected links of {urdf.name}, got {', '.join(unknown[:_SHOWN])}{more}")
     rows = np.array([row for row, name in enumerate(tree.links) if name in shapes])
-    robot = Robot(tree, rows, tuple(shapes.values()), frozenset(allowed), tuple(problems))
-    robot.motions(np.zeros((len(tree.joints), 2)), np.eye(1, 13, 6)[0])  # compiles the kernel before messages arrive
-    return robot
+    return Robot(
+        tree,
+        rows,
+        tuple(shapes.values()),
+        frozenset(touching_links(tree, shapes)),
+        frozenset(pair for pair in disabled if pair[0] in shapes and pair[1] in shapes),
+        frozenset(model.joints),
+        tuple(problems),
+    )

@@ -108,11 +108,10 @@ def test_a_file_that_is_missing_is_refused(tmp_path: Path) -> None:
 
 def test_srdf_and_construction_allow_pairs() -> None:
     srdf = Description.read(ARM / "arm.srdf")
-    alone, both = (make_robot(Description.read(ARM / "arm.urdf"), each) for each in (None, srdf))
-    added = {("left_finger", "right_finger"), ("wrist_1", "wrist_3")}
-    assert both.allowed - alone.allowed == added and alone.allowed < both.allowed and not both.problems
-    assert ("hand", "wrist_3") in alone.allowed  # rigid, over a flange without a shape
-    assert ("hand", "wrist_2") not in alone.allowed
+    arm = make_robot(Description.read(ARM / "arm.urdf"), srdf)
+    assert arm.disabled == {("left_finger", "right_finger"), ("wrist_1", "wrist_3")} and not arm.problems
+    assert ("hand", "wrist_3") in arm.touching  # rigid, over a flange without a shape
+    assert ("hand", "wrist_2") not in arm.touching
     other = Description('<robot><disable_collisions link1="tail" link2="hand"/></robot>', "other.srdf")
     (problem,) = make_robot(Description.read(ARM / "arm.urdf"), other).problems
     assert problem.startswith("other.srdf: expected links of ") and problem.endswith("got tail")
@@ -120,13 +119,13 @@ def test_srdf_and_construction_allow_pairs() -> None:
 
 def test_links_without_shapes_pass_contact_on() -> None:
     base = make_robot(Description.read(MODELS / "mobile_base.urdf"))
-    assert ("back_caster", "base_link") in base.allowed  # over a fork without a shape
-    assert ("mast", "torso") in base.allowed and ("laser", "mast") in base.allowed
+    assert ("back_caster", "base_link") in base.touching  # over a fork without a shape
+    assert ("mast", "torso") in base.touching and ("laser", "mast") in base.touching
     for pair in (("back_caster", "front_caster"), ("base_link", "torso"), ("left_wheel", "right_wheel")):
-        assert pair not in base.allowed
+        assert pair not in base.touching
 
 
 def test_needs_are_the_joints_on_the_way_to_the_base() -> None:
     arm = make_robot(Description.read(ARM / "arm.urdf"))
-    needs = dict(zip(arm.links, arm.needs.sum(axis=1), strict=True))
+    needs = dict(zip(arm.tree.links, arm.tree.needs.sum(axis=1), strict=True))
     assert needs["base"] == 0 and needs["forearm"] == 4 and needs["hand"] == 7 and needs["right_finger"] == 8

@@ -1,0 +1,52 @@
+"""Bodies that links of a robot carry: the links' own shapes and attached objects, as arrays for one step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.geometry.pose import Pose, multiply, rotation_matrix
+from collision_monitor.geometry.shapes import Shape
+from collision_monitor.sources.scene_states import empty_states
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(eq=False)
+class Body:
+    """An object that moves with a link. row: of the link in the tree. offset: its pose in the link's frame.
+
+    touch: links whose contact with an attached object is expected.
+    """
+
+    object_id: int
+    name: str
+    row: int
+    shapes: tuple[tuple[Shape, Pose], ...]
+    offset: Pose = field(default_factory=Pose)
+    touch: frozenset[str] = frozenset()
+
+
+class CarriedBodies:
+    """Bodies (N) as arrays: rows (N,), offsets (N, 3) and quaternions (N, 4) in the frames of their links."""
+
+    def __init__(self, bodies: Sequence[Body]) -> None:
+        self.ids = [body.object_id for body in bodies]
+        self.rows = np.array([body.row for body in bodies], np.intp)
+        self._positions = np.array([body.offset.position for body in bodies]).reshape(-1, 3)
+        self._quaternions = np.array([body.offset.quaternion for body in bodies]).reshape(-1, 4)
+
+    def states(self, poses: Floats, twists: Floats) -> Any:
+        """Return states (N,) of the bodies from poses (L, 7) and twists (L, 6) of all links."""
+        states = empty_states(self.ids)
+        at, moves = poses[self.rows], twists[self.rows]
+        arms = (rotation_matrix(at[:, 3:]) @ self._positions[:, :, None])[:, :, 0]
+        states["position"] = at[:, :3] + arms
+        states["quaternion"] = multiply(at[:, 3:], self._quaternions)
+        states["linear"] = moves[:, :3] + np.cross(moves[:, 3:], arms)
+        states["angular"] = moves[:, 3:]
+        return states
