@@ -1,0 +1,28 @@
+"""Message bytes to objects with the fields of the message, by the library rosbags, which needs no ROS."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from collision_monitor.errors import MessageError
+
+
+class Decoder:
+    """Decodes by the definitions of ROS 2 Jazzy, and by further ones, which take their place.
+
+    definitions: fields of further types, as `rosbags.typesys` returns them.
+    """
+
+    def __init__(self, definitions: dict[str, Any]) -> None:
+        from rosbags.typesys import Stores, get_typestore
+
+        self._types = get_typestore(Stores.EMPTY)
+        self._types.register({**get_typestore(Stores.ROS2_JAZZY).fielddefs, **definitions})
+
+    def __call__(self, message_type: str, data: bytes) -> Any:
+        """Return the message. Raises MessageError."""
+        try:
+            return self._types.deserialize_cdr(data, message_type)
+        except Exception as error:  # the library raises one for each kind of damage
+            reason = str(error) or type(error).__name__
+            raise MessageError(f"expected a {message_type}, cannot be decoded: {reason}") from None
