@@ -44,8 +44,8 @@ class LinkTable(NamedTuple):
 class KinematicTree:
     """links: names, by row of the table. joints: names of the variables, by column.
 
-    wraps (J,): whether the position of a joint may jump by a turn, as that of a continuous one. needs (L, J): whether the
-    pose of a link in the base link depends on a joint.
+    wraps (J,): whether the position of a joint may jump by a turn, as that of a continuous one. needs (L, J): whether
+    the pose of a link in the base link depends on a joint.
     """
 
     links: tuple[str, ...]

@@ -39,14 +39,18 @@ class CarriedBodies:
         self.rows = np.array([body.row for body in bodies], np.intp)
         self._positions = np.array([body.offset.position for body in bodies]).reshape(-1, 3)
         self._quaternions = np.array([body.offset.quaternion for body in bodies]).reshape(-1, 4)
+        self._at_links = not self._positions.any() and not self._quaternions[:, :3].any()
 
     def states(self, poses: Floats, twists: Floats) -> Any:
         """Return states (N,) of the bodies from poses (L, 7) and twists (L, 6) of all links."""
         states = empty_states(self.ids)
         at, moves = poses[self.rows], twists[self.rows]
+        states["position"], states["quaternion"] = at[:, :3], at[:, 3:]
+        states["linear"], states["angular"] = moves[:, :3], moves[:, 3:]
+        if self._at_links:
+            return states
         arms = (rotation_matrix(at[:, 3:]) @ self._positions[:, :, None])[:, :, 0]
-        states["position"] = at[:, :3] + arms
+        states["position"] += arms
         states["quaternion"] = multiply(at[:, 3:], self._quaternions)
-        states["linear"] = moves[:, :3] + np.cross(moves[:, 3:], arms)
-        states["angular"] = moves[:, 3:]
+        states["linear"] += np.cross(moves[:, 3:], arms)
         return states

@@ -157,8 +157,13 @@ class Feed:
         header = getattr(content, "header", None)
         if header is None:  # a MarkerArray
             header = next((each.header for each in getattr(content, "markers", ())), None)
-        stamp = raw.received if header is None else self.scene.stamp_of(header, raw.received)
-        yield from self._step(raw, content, sources, stamp)
+        if header is not None:
+            yield from self._step(raw, content, sources, self.scene.stamp_of(header, raw.received))
+            return
+        now = self._timeline.now_ns if self._timeline.has_begun else raw.received
+        for source in sources:  # a message without a stamp, such as a URDF, makes no step
+            source.take(raw.topic, content, now, self.scene)
+        yield from self._changes(raw.received)
 
     def _step(self, raw: RawMessage, content: Any, sources: list[Source], stamp: int) -> Iterator[Input]:
         """Give a message to its sources, and yield the inputs that are due with it."""
@@ -175,11 +180,13 @@ class Feed:
             return
         for source in sources:
             source.take(raw.topic, content, stamp, self.scene)
-        now = self._timeline.now_ns
-        for source in self._sources:
-            source.settle(now, self.scene)
+        at = self._step_time(raw.topic, stamp)
+        if at is not None:
+            for source in self._sources:
+                source.settle(at, self.scene)
         yield from self._changes(raw.received)
-        yield from (self._states(step, raw.received) for step in self._due(raw.topic, stamp, now))
+        if at is not None:
+            yield from (self._states(step, raw.received) for step in self._due(at))
 
     def _advance(self, topic: str, stamp: int) -> Progress:
         order = Order.OLD if stamp < self._last_stamps.get(topic, stamp) else Order.IN_ORDER
@@ -192,20 +199,23 @@ class Feed:
     def _has_own_steps(self) -> bool:
         return bool(self.mapping.rate or self.mapping.step_topic)
 
-    def _due(self, topic: str, stamp: int, now: int) -> Iterator[Step]:
+    def _step_time(self, topic: str, stamp: int) -> int | None:
+        """Return the stamp of the step that is due with a message; None if there is none."""
+        if not self._has_own_steps:
+            return self._timeline.now_ns
+        if self.mapping.step_topic:
+            return stamp if topic == self.mapping.step_topic else None
+        tick = int(self._timeline.now_ns * self.mapping.rate // 1_000_000_000)
+        if self._tick is not None and tick <= self._tick:
+            return None
+        self._tick = tick
+        return int(tick * 1_000_000_000 / self.mapping.rate)
+
+    def _due(self, at: int) -> Iterator[Step]:
         waiting = self.scene.waiting
         if not self._has_own_steps:
             yield from waiting.as_stamped()
             return
-        if self.mapping.step_topic:
-            if topic != self.mapping.step_topic:
-                return
-            at = stamp
-        else:
-            tick = int(now * self.mapping.rate // 1_000_000_000)
-            if self._tick is not None and tick <= self._tick:
-                return
-            self._tick, at = tick, int(tick * 1_000_000_000 / self.mapping.rate)
         yield waiting.at(at)
         for object_id in waiting.too_old:
             self.scene.refuse_old(object_id)

@@ -50,7 +50,7 @@ class JointTable:
         places, columns = self._layout(names)
         given = position[places]
         late = self._stamps[columns] - stamp_ns
-        usable = np.isfinite(given) & ~(self._seen[columns] & (0 < late) & (late <= self._max_age))
+        usable = np.isfinite(given) & ~(self._seen[columns] & (late > 0) & (late <= self._max_age))
         if not usable.all():
             places, columns, given = places[usable], columns[usable], given[usable]
         if len(velocity):
@@ -67,7 +67,7 @@ class JointTable:
         return f"expected finite positions, got others for {', '.join(bad)}" if bad else None
 
     def at(self, now_ns: int) -> tuple[Floats, Mask, Mask]:
-        """Return positions and velocities (J, 2) at this time, (J,) whether they are known, (J,) whether velocities are.
+        """Return positions and velocities (J, 2) at a time, and whether positions (J,) and velocities (J,) are known.
 
         A joint moves on at its velocity since its message, and is unknown beyond `max_age`.
         """

@@ -9,6 +9,7 @@ from collision_monitor.sources.mapping import Mapping
 from collision_monitor.sources.markers import MARKER, MARKERS, MarkerSource
 from collision_monitor.sources.object_entry import ObjectEntry
 from collision_monitor.sources.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE, PoseSource
+from collision_monitor.sources.robot_source import make_robots
 from collision_monitor.sources.source import Source
 from collision_monitor.sources.tf_objects import TRANSFORMS, FrameSource
 
@@ -23,6 +24,6 @@ BY_TYPE: Final[dict[str, Callable[[ObjectEntry, str, Mapping], Source]]] = {
 """Makes the source of an entry of `objects:` from the entry, the type of its topic, and the whole file. Raises
 InputError for an entry that does not fit the type."""
 
-SECTIONS: Final[dict[str, Callable[[Any, Mapping], list[Source]]]] = {}
+SECTIONS: Final[dict[str, Callable[[Any, Mapping], list[Source]]]] = {"robots": make_robots}
 """Makes the sources of a section of the file, such as `robots`, from the content of that section, checked here, and the
 rest of the file. Raises InputError. The name is also in `mapping.SECTIONS`."""

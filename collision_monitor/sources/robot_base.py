@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +22,20 @@ Floats = NDArray[np.float64]
 _EXACT: Final = np.zeros(4)
 
 
-@dataclass(frozen=True, eq=False)
-class BaseMotion:
-    """Motion of the base link in the monitor's frame. stddev (4,): of its position (m), orientation (rad), linear
-    (m/s) and angular velocity (rad/s)."""
+class BaseMotion(NamedTuple):
+    """Motion of the base link in the monitor's frame.
+
+    stddev (4,): of its position (m), orientation (rad), linear (m/s) and angular velocity (rad/s).
+    """
 
     motion: FrameMotion
     stddev: Floats = _EXACT
+
+    @property
+    def row(self) -> Floats:
+        """Position, quaternion, linear and angular velocity, (13,)."""
+        m = self.motion
+        return np.concatenate([m.position, m.quaternion, m.linear, m.angular])
 
 
 class RobotBase(Protocol):
@@ -66,7 +72,7 @@ class FixedBase:
     def take(self, content: Any, stamp_ns: int, robot: Robot, scene: Scene) -> None:
         """See RobotBase."""
 
-    def motion(self, now_ns: int, robot: Robot, scene: Scene) -> BaseMotion | None:
+    def motion(self, now_ns: int, robot: Robot, scene: Scene) -> BaseMotion:
         """See RobotBase."""
         self.fresh = False
         return self._motion

@@ -39,8 +39,11 @@ _MODELS: Final = tuple(model.name.lower() for model in Model)
 
 @dataclass(frozen=True)
 class BaseEntry:
-    """Where the base is. odometry: its topic, or empty. frame: of tf; empty: by the link's name. link: whose pose it is,
-    empty: the base link's. pose: in `frame`; None: none is given."""
+    """Where the base is.
+
+    odometry: its topic, or empty. frame: of tf; empty: by the link's name. link: the one that is there; empty: the base
+    link. pose: in `frame`; None: none is given.
+    """
 
     frame: str = ""
     odometry: str = ""
@@ -132,7 +135,8 @@ def _base(name: str, value: Any) -> BaseEntry:
 
 def _allowed(name: str, value: Any, mapping: Mapping) -> dict[str, list[int]]:
     if not isinstance(value, dict) or not all(isinstance(others, list) for others in value.values()):
-        raise InputError(f"{name}, allowed: expected lists of objects by link, such as {{base: [floor]}}, got {value!r}")
+        example = "{base: [floor]}"
+        raise InputError(f"{name}, allowed: expected lists of objects by link, such as {example}, got {value!r}")
     ids = {entry.name: entry.object_id for entry in mapping.sources}
     for others in value.values():
         for other in others:

@@ -15,14 +15,16 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
 from collision_monitor.robots import link_motions
 from collision_monitor.robots.robot import Description, Robot, make_robot
-from collision_monitor.robots.srdf import Pair, ordered
+from collision_monitor.robots.srdf import Pair
 from collision_monitor.sources.carried_bodies import Body, CarriedBodies
 from collision_monitor.sources.frames import FrameMotion
 from collision_monitor.sources.joint_table import JointTable
 from collision_monitor.sources.mapping import Mapping
-from collision_monitor.sources.robot_base import BaseMotion, at_links, robot_base
-from collision_monitor.sources.robot_entry import RobotEntry
+from collision_monitor.sources.robot_base import BaseMotion, FixedBase, at_links, robot_base
+from collision_monitor.sources.robot_entry import RobotEntry, read_robots
 from collision_monitor.sources.scene import Scene
+from collision_monitor.sources.solid_shapes import scaled
+from collision_monitor.sources.source import Source
 
 Floats = NDArray[np.float64]
 
@@ -44,6 +46,14 @@ class LinkRules:
     scale: Table[str, float] = field(default_factory=dict)
     allowed: Table[str, frozenset[int]] = field(default_factory=dict)
     checked: frozenset[Pair] = frozenset()
+
+
+def make_robots(content: Any, mapping: Mapping) -> list[Source]:
+    """Return the sources of the section `robots:`. Raises InputError."""
+    fleet: list[RobotSource] = []
+    for entry in read_robots(content, mapping):
+        fleet.append(RobotSource(entry, mapping, fleet))
+    return list[Source](fleet)
 
 
 class RobotSource:
@@ -108,9 +118,9 @@ class RobotSource:
         values, known, speed_known = self._joints.at(now_ns)
         if base is None:
             return
-        m = base.motion
-        poses, twists = self.robot.motions(values, np.concatenate([m.position, m.quaternion, m.linear, m.angular]))
-        self._stand(base, poses, scene)
+        poses, twists = self.robot.motions(values, base.row)
+        if self._finds_standing(base, poses):
+            self._describe(scene)
         due = (self._needs & fresh).any(axis=1) | base_is_fresh
         lacking = self._needs & ~known
         chosen = np.flatnonzero(due & ~lacking.any(axis=1))
@@ -134,7 +144,6 @@ class RobotSource:
             scene.remove(self.attached[name].object_id)
             self._described.pop(self.attached[name].object_id, None)
         self.attached = bodies
-        self._base.fresh = True
         self._show(scene)
 
     def link_id(self, link: str) -> int | None:
@@ -143,7 +152,7 @@ class RobotSource:
         return None if body is None else body.object_id
 
     def link_motion(self, link: str, now_ns: int, scene: Scene) -> FrameMotion | None:
-        """Return the motion of a link in the monitor's frame; None if the robot lacks it or its joints are not known."""
+        """Return the motion of a link in the monitor's frame; None if there is no such link or it is not known."""
         if self.robot is None or link not in self.robot.tree.links:
             return None
         row = self.robot.tree.links.index(link)
@@ -153,8 +162,7 @@ class RobotSource:
         self._joints.fresh, self._base.fresh = fresh, base_is_fresh
         if base is None or not known[self.robot.tree.needs[row]].all():
             return None
-        m = base.motion
-        poses, twists = self.robot.motions(values, np.concatenate([m.position, m.quaternion, m.linear, m.angular]))
+        poses, twists = self.robot.motions(values, base.row)
         return FrameMotion(poses[row, :3], poses[row, 3:], twists[row, :3], twists[row, 3:], moving=True)
 
     # -- descriptions
@@ -196,7 +204,12 @@ class RobotSource:
             link: Body(self._ids[link], f"{self.name}/{link}", int(row), shapes)
             for link, row, shapes in zip(robot.links, robot.rows, robot.shapes, strict=True)
         }
-        self._base.fresh = True
+        self._base.fresh, self._place = True, None
+        self._standing = {}
+        if isinstance(self._base, FixedBase):  # its links stand from the start
+            base = self._base.motion(0, robot, scene)
+            self._finds_standing(base, robot.motions(self._joints.at(0)[0], base.row)[0])
+            self._base.fresh = True
         self._describe(scene)
 
     def _describe(self, scene: Scene) -> None:
@@ -244,7 +257,8 @@ class RobotSource:
     def _allowed(self) -> dict[int, tuple[int, ...]]:
         """Return the ids of the objects that each body may touch."""
         assert self.robot is not None
-        found: dict[int, set[int]] = {body.object_id: set() for body in (*self._links.values(), *self.attached.values())}
+        bodies = (*self._links.values(), *self.attached.values())
+        found: dict[int, set[int]] = {body.object_id: set() for body in bodies}
         for a, b in self.robot.touching | (self.robot.disabled - self._rules.checked):
             found[self._ids[a]].add(self._ids[b])
             found[self._ids[b]].add(self._ids[a])
@@ -253,25 +267,26 @@ class RobotSource:
                 found[self._ids[link]] |= set(others)
         for body in self.attached.values():
             links = {*body.touch, self.robot.tree.links[body.row]} & self._links.keys()
-            found[body.object_id] |= {self._ids[link] for link in links} | self._rules.allowed.get(body.name, frozenset())
+            found[body.object_id] |= {self._ids[link] for link in links}
+            found[body.object_id] |= self._rules.allowed.get(body.name, frozenset())
             found[body.object_id] |= {other.object_id for other in self.attached.values() if other.row == body.row}
         return {object_id: tuple(sorted(others - {object_id})) for object_id, others in found.items()}
 
     # -- states
 
-    def _stand(self, base: BaseMotion, poses: Floats, scene: Scene) -> None:
-        """Describe the links that are rigid with a base at rest as static objects."""
+    def _finds_standing(self, base: BaseMotion, poses: Floats) -> bool:
+        """Find the bodies that are rigid with a base at rest, which are static objects. Return whether it changed."""
         assert self.robot is not None
         place = None if base.motion.moving else (*base.motion.position, *base.motion.quaternion)
         if place == self._place:
-            return
+            return False
         self._place = place
         self._standing = {
-            body.object_id: Pose(poses[body.row, :3], poses[body.row, 3:])
-            for body in (self._links.values() if place is not None else ())
+            body.object_id: Pose(poses[body.row, :3], poses[body.row, 3:]) @ body.offset
+            for body in ((*self._links.values(), *self.attached.values()) if place is not None else ())
             if not self.robot.tree.needs[body.row].any()
         }
-        self._describe(scene)
+        return True
 
     def _observe(
         self,
@@ -300,4 +315,5 @@ class RobotSource:
                 if len(self._unknown_joints) < 1000:
                     self._unknown_joints.add(name)
                 if not any(other.robot is not None and name in other.robot.known_joints for other in self._fleet):
-                    scene.refuse(self.name, f"expected joints of its URDF on {self._entry.joint_states}, got {name!r:.80}")
+                    topic = self._entry.joint_states
+                    scene.refuse(self.name, f"expected joints of its URDF on {topic}, got {name!r:.80}")
