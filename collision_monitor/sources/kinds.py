@@ -9,7 +9,8 @@ from collision_monitor.sources.mapping import Mapping
 from collision_monitor.sources.markers import MARKER, MARKERS, MarkerSource
 from collision_monitor.sources.object_entry import ObjectEntry
 from collision_monitor.sources.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE, PoseSource
-from collision_monitor.sources.robot_source import make_robots
+from collision_monitor.sources.planning_scene import COLLISION_OBJECT, PLANNING_SCENE, planning_world
+from collision_monitor.sources.robot_section import make_robots
 from collision_monitor.sources.source import Source
 from collision_monitor.sources.tf_objects import TRANSFORMS, FrameSource
 
@@ -20,6 +21,8 @@ BY_TYPE: Final[dict[str, Callable[[ObjectEntry, str, Mapping], Source]]] = {
     TRANSFORMS: FrameSource,
     MARKER: MarkerSource,
     MARKERS: MarkerSource,
+    PLANNING_SCENE: planning_world,
+    COLLISION_OBJECT: planning_world,
 }
 """Makes the source of an entry of `objects:` from the entry, the type of its topic, and the whole file. Raises
 InputError for an entry that does not fit the type."""

@@ -21,10 +21,9 @@ from collision_monitor.sources.frames import FrameMotion
 from collision_monitor.sources.joint_table import JointTable
 from collision_monitor.sources.mapping import Mapping
 from collision_monitor.sources.robot_base import BaseMotion, FixedBase, at_links, robot_base
-from collision_monitor.sources.robot_entry import RobotEntry, read_robots
+from collision_monitor.sources.robot_entry import RobotEntry
 from collision_monitor.sources.scene import Scene
 from collision_monitor.sources.solid_shapes import scaled
-from collision_monitor.sources.source import Source
 
 Floats = NDArray[np.float64]
 
@@ -46,14 +45,6 @@ class LinkRules:
     scale: Table[str, float] = field(default_factory=dict)
     allowed: Table[str, frozenset[int]] = field(default_factory=dict)
     checked: frozenset[Pair] = frozenset()
-
-
-def make_robots(content: Any, mapping: Mapping) -> list[Source]:
-    """Return the sources of the section `robots:`. Raises InputError."""
-    fleet: list[RobotSource] = []
-    for entry in read_robots(content, mapping):
-        fleet.append(RobotSource(entry, mapping, fleet))
-    return list[Source](fleet)
 
 
 class RobotSource:
@@ -133,23 +124,20 @@ class RobotSource:
 
     # -- for a planning scene
 
-    def apply(self, rules: LinkRules, scene: Scene) -> None:
-        """Change padding, scale and allowed pairs of the links."""
-        self._rules = rules
-        self._show(scene)
+    @property
+    def link_ids(self) -> dict[str, int]:
+        """The objects of the links with shapes, by the links' names."""
+        return {link: body.object_id for link, body in self._links.items()}
 
-    def attach(self, bodies: dict[str, Body], scene: Scene) -> None:
-        """Carry these bodies, by name, from now on, and no others."""
-        for name in self.attached.keys() - bodies.keys():
-            scene.remove(self.attached[name].object_id)
-            self._described.pop(self.attached[name].object_id, None)
-        self.attached = bodies
-        self._show(scene)
+    def carry(self, bodies: dict[str, Body], rules: LinkRules, scene: Scene) -> None:
+        """Carry these bodies, by name, from now on, and no others; use these rules for them and for the links.
 
-    def link_id(self, link: str) -> int | None:
-        """Return the object of a link; None if it has none."""
-        body = self._links.get(link)
-        return None if body is None else body.object_id
+        The caller removes the objects that are not carried any more.
+        """
+        for body in self.attached.values():
+            self._described.pop(body.object_id, None)
+        self.attached, self._rules = bodies, rules
+        self._show(scene)
 
     def link_motion(self, link: str, now_ns: int, scene: Scene) -> FrameMotion | None:
         """Return the motion of a link in the monitor's frame; None if there is no such link or it is not known."""
@@ -265,10 +253,10 @@ class RobotSource:
         for link, others in [*self._entry.allowed.items(), *self._rules.allowed.items()]:
             if link in self._links:
                 found[self._ids[link]] |= set(others)
-        for body in self.attached.values():
+        for name, body in self.attached.items():
             links = {*body.touch, self.robot.tree.links[body.row]} & self._links.keys()
             found[body.object_id] |= {self._ids[link] for link in links}
-            found[body.object_id] |= self._rules.allowed.get(body.name, frozenset())
+            found[body.object_id] |= self._rules.allowed.get(name, frozenset())
             found[body.object_id] |= {other.object_id for other in self.attached.values() if other.row == body.row}
         return {object_id: tuple(sorted(others - {object_id})) for object_id, others in found.items()}
 
