@@ -19,6 +19,12 @@ class Decoder:
         self._types = get_typestore(Stores.EMPTY)
         self._types.register({**get_typestore(Stores.ROS2_JAZZY).fielddefs, **definitions})
 
+    def define(self, message_type: str, text: str) -> None:
+        """Add the definition of a type, and of those in it, in the form of rosbag2 (`ros2msg`)."""
+        from rosbags.typesys import get_types_from_msg
+
+        self._types.register(get_types_from_msg(text, message_type))
+
     def __call__(self, message_type: str, data: bytes) -> Any:
         """Return the message. Raises MessageError."""
         try:

@@ -26,7 +26,8 @@ class Scene:
     """What the sources know.
 
     frame: the monitor's. frames: the tree of tf frames. waiting: the states since the last step. states: number of
-    states of each object, by name. refused: what was left out, by its reason.
+    states of each object, by name. refused: what was left out, by its reason. refused_by_name, last_refusal: the same
+    by the key in the sources file.
     """
 
     def __init__(self, frame: str, max_age: float, *, first_free_id: int = 1, by_header: bool = True) -> None:
@@ -35,7 +36,9 @@ class Scene:
         self.waiting = WaitingStates(max_age)
         self.states: Counter[str] = Counter()
         self.refused: Counter[str] = Counter()
+        self.refused_by_name: Counter[str] = Counter()
         self.last_refusal: dict[str, str] = {}
+        self._news: dict[str, tuple[int, str]] = {}
         self._names: dict[int, str] = {}
         self._changes: list[Change] = []
         self._next_id = first_free_id
@@ -88,7 +91,10 @@ class Scene:
         """Count something that was left out. name: the key in the sources file."""
         what = f"{name}: {text}"
         self.refused[what if what in self.refused or len(self.refused) < MOST_TEXTS else _OTHERS] += 1
-        self.last_refusal[name] = text
+        key = name if name in self.last_refusal or len(self.last_refusal) < MOST_TEXTS else _OTHERS
+        self.refused_by_name[key] += 1
+        self.last_refusal[key] = text
+        self._news[key] = self._news.get(key, (0, ""))[0] + 1, text
 
     def refuse_old(self, object_id: int) -> None:
         """Count a state that was too old for the step that would have taken it."""
@@ -100,6 +106,11 @@ class Scene:
         """Return the descriptions and removals since the last call, in order."""
         changes, self._changes = self._changes, []
         return changes
+
+    def take_news(self) -> dict[str, tuple[int, str]]:
+        """Return the refusals since the last call: by name, how many, and the text of the last one."""
+        news, self._news = self._news, {}
+        return news
 
     def restart(self) -> None:
         """Forget stamps and transforms after the time has jumped. Objects stay."""

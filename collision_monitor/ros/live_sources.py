@@ -1,0 +1,172 @@
+"""The sources of a running node: topics of other programs, converted to the node's own inputs as they arrive.
+
+A topic is subscribed when its publisher is there, with the publisher's quality of service and type. A line of the file
+that cannot be used is logged with the reason and reported in `~/sources`; the others work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, Final
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from collision_monitor.errors import CollisionMonitorError, InputError
+from collision_monitor.session.mcap.definitions import definition
+from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage
+from collision_monitor.sources.tf_objects import TRANSFORMS
+
+SEARCH_PERIOD: Final = 0.2
+"""s between two looks at the graph for topics of the file."""
+
+REPORT_PERIOD: Final = 1.0
+"""s between two messages on `~/sources`."""
+
+_TF: Final = ("/tf", "/tf_static")
+_DEPTH: Final = {"/tf": 100, "/tf_static": 100}
+"""Depth of the queue; 10 for the other topics."""
+
+
+class LiveSources:
+    """Subscribes to the topics of a sources file. take: called with each input for the monitor.
+
+    warn: called with the name of a line, a text and how often it happened.
+    """
+
+    def __init__(
+        self, node: Node, mapping: Mapping, take: Callable[[Input], None], warn: Callable[[str, str, int], None]
+    ) -> None:
+        self._node, self._take, self._warn = node, take, warn
+        self._mapping = mapping
+        self._decoder = Decoder({})
+        self._feed = Feed(mapping, self._decoder)
+        self._wanted = {node.resolve_topic_name(topic): (topic, types) for topic, types in self._feed.wanted.items()}
+        for topic in _TF:
+            self._wanted.setdefault(topic, (topic, (TRANSFORMS,)))
+        self._found: dict[str, str] = {}  # topic of the file -> type
+        self._problems: dict[str, str] = {}  # the same -> why it cannot be used
+        self._messages: dict[str, int] = {}
+        self._out = node.create_publisher(DiagnosticArray, "~/sources", QoSProfile(depth=1))
+        node.create_timer(SEARCH_PERIOD, self._search)
+        node.create_timer(REPORT_PERIOD, self._report)
+
+    def begin(self) -> None:
+        """Describe what is known from the start, and look for the topics."""
+        for each in self._feed.begin(self._now()):
+            self._take(each)
+        self._search()
+
+    # -- topics
+
+    def _search(self) -> None:
+        """Subscribe to the topics that have a publisher by now."""
+        for resolved in [name for name, (topic, _) in self._wanted.items() if topic not in self._found]:
+            infos = self._node.get_publishers_info_by_topic(resolved)
+            if infos:
+                topic, types = self._wanted[resolved]
+                kinds = {info.topic_type for info in infos}
+                try:
+                    self._bind(topic, resolved, self._chosen(topic, kinds, types), infos)
+                except CollisionMonitorError as error:
+                    self._set_problem(topic, str(error))
+
+    def _chosen(self, topic: str, kinds: set[str], types: tuple[str, ...]) -> str:
+        usable = sorted(kinds & set(types))
+        if not usable:
+            expected = types[0] if len(types) == 1 else f"one of {', '.join(types)}"
+            raise InputError(
+                f"{self._line(topic)}: expected {topic} to carry {expected}, got {', '.join(sorted(kinds))}"
+            )
+        return usable[0]
+
+    def _bind(self, topic: str, resolved: str, kind: str, infos: list[Any]) -> None:
+        package, _, name = kind.split("/")
+        try:
+            message_class = getattr(import_module(f"{package}.msg"), name)
+            self._decoder.define(kind, definition(kind))
+        except (ImportError, AttributeError, CollisionMonitorError):
+            raise InputError(
+                f"{self._line(topic)}: {topic} carries {kind}, and package {package} is not installed; "
+                f"`make interfaces` builds it, or install ros-<distro>-{package.replace('_', '-')}"
+            ) from None
+        if topic in self._mapping.topics:
+            self._feed.bind(topic, kind)
+        self._found[topic] = kind
+        self._problems.pop(topic, None)
+        self._node.create_subscription(
+            message_class, resolved, lambda data: self._on_message(topic, kind, data), _quality(topic, infos), raw=True
+        )
+        self._node.get_logger().info(f"source {topic}: {kind}")
+
+    def _line(self, topic: str) -> str:
+        """Return the name of the first line of the file about a topic."""
+        entries = self._mapping.topics.get(topic, ())
+        return entries[0].name if entries else next(iter(self._mapping.sections), topic)
+
+    def _set_problem(self, topic: str, text: str) -> None:
+        if self._problems.get(topic) != text:
+            self._problems[topic] = text
+            self._node.get_logger().error(self._mapping.located(text))
+
+    # -- messages
+
+    def _on_message(self, topic: str, kind: str, data: bytes) -> None:
+        self._messages[topic] = self._messages.get(topic, 0) + 1
+        for each in self._feed.take(RawMessage(topic, kind, data, self._now())):
+            self._take(each)
+        for name, (count, text) in self._feed.scene.take_news().items():
+            self._warn(name, self._mapping.located(f"{name}: {text}"), count)
+
+    def _now(self) -> int:
+        return int(self._node.get_clock().now().nanoseconds)
+
+    # -- report
+
+    def _report(self) -> None:
+        """Publish the state of each line of the file."""
+        array = DiagnosticArray()
+        array.header.stamp = self._node.get_clock().now().to_msg()
+        for topic, entries in self._mapping.topics.items():
+            for entry in entries:
+                array.status.append(self._status(entry.name, topic))
+        named = self._mapping.topics
+        array.status += [self._status(topic, topic) for topic, _ in self._wanted.values() if topic not in named]
+        self._out.publish(array)
+
+    def _status(self, name: str, topic: str) -> DiagnosticStatus:
+        scene, messages = self._feed.scene, self._messages.get(topic, 0)
+        refused = scene.refused_by_name.get(name, 0)
+        values = {
+            "topic": topic,
+            "type": self._found.get(topic, "not found yet"),
+            "messages": messages,
+            "states": scene.states.get(name, 0),
+            "refused": refused,
+            "last refusal": scene.last_refusal.get(name, ""),
+        }
+        if topic in self._problems:
+            level, text = DiagnosticStatus.ERROR, self._problems[topic]
+        elif topic not in self._found:
+            level, text = DiagnosticStatus.WARN, f"{topic} has no publisher"
+        elif not messages:
+            level, text = DiagnosticStatus.WARN, f"no message on {topic} yet"
+        else:
+            level, text = (DiagnosticStatus.WARN, scene.last_refusal[name]) if refused else (DiagnosticStatus.OK, "ok")
+        pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+        full = f"{self._node.get_name()}: {name}"
+        return DiagnosticStatus(level=level, name=full, message=text, hardware_id="none", values=pairs)
+
+
+def _quality(topic: str, infos: list[Any]) -> QoSProfile:
+    """Return the strictest quality of service that all publishers of a topic offer."""
+    offered = [info.qos_profile for info in infos]
+    reliable = all(each.reliability is ReliabilityPolicy.RELIABLE for each in offered)
+    latched = reliable and all(each.durability is DurabilityPolicy.TRANSIENT_LOCAL for each in offered)
+    return QoSProfile(
+        depth=_DEPTH.get(topic, 10),
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
