@@ -59,7 +59,9 @@ def operation_of(message: Any) -> int:
 def collision_object(message: Any, before: CollisionObject | None = None) -> CollisionObject:
     """Return the object after a CollisionObject of ADD, APPEND or MOVE. before: as it was.
 
-    MOVE keeps the shapes, and takes their poses from the message if it has some. Raises InputError, ShapeError, PoseError.
+    MOVE keeps the shapes, and takes their poses from the message if it has some.
+
+    Raises InputError, ShapeError, PoseError.
     """
     operation = operation_of(message)
     shapes = tuple(_shapes(message))

@@ -8,8 +8,8 @@ from typing import Any, Final
 from collision_monitor.sources.mapping import Mapping
 from collision_monitor.sources.markers import MARKER, MARKERS, MarkerSource
 from collision_monitor.sources.object_entry import ObjectEntry
-from collision_monitor.sources.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE, PoseSource
 from collision_monitor.sources.planning_scene import COLLISION_OBJECT, PLANNING_SCENE, planning_world
+from collision_monitor.sources.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE, PoseSource
 from collision_monitor.sources.robot_section import make_robots
 from collision_monitor.sources.source import Source
 from collision_monitor.sources.tf_objects import TRANSFORMS, FrameSource

@@ -191,9 +191,9 @@ class PlanningSceneSource:
             scene.refuse(self._name, f"{name}: {error}")
             return
         touch = frozenset(map(str, message.touch_links))
-        if held is not None and (held.link, held.touch) == (link, touch):
-            if held.content.fingerprint == content.fingerprint:
-                return
+        same = held is not None and held.content.fingerprint == content.fingerprint
+        if held is not None and same and (held.link, held.touch) == (link, touch):
+            return
         self._world.pop(name, None)
         self._held[name] = HeldObject(self._id(name, scene), content, link, touch)
         self._is_changed = True
