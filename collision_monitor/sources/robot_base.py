@@ -197,4 +197,3 @@ def at_links(base: BaseMotion, arms: Floats) -> Floats:
     result[:, 0], result[:, 1] = np.hypot(position, orientation * lengths), orientation
     result[:, 2], result[:, 3] = np.hypot(velocity, turning * lengths), turning
     return result
-
