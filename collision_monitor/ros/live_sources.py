@@ -43,9 +43,9 @@ class LiveSources:
         self._mapping = mapping
         self._decoder = Decoder({})
         self._feed = Feed(mapping, self._decoder)
-        self._wanted = {node.resolve_topic_name(topic): (topic, types) for topic, types in self._feed.wanted.items()}
-        for topic in _TF:
-            self._wanted.setdefault(topic, (topic, (TRANSFORMS,)))
+        # Transforms first: if several messages wait, the executor takes them in the order of the subscriptions.
+        wanted = dict.fromkeys(_TF, (TRANSFORMS,)) | self._feed.wanted
+        self._wanted = {node.resolve_topic_name(topic): (topic, types) for topic, types in wanted.items()}
         self._found: dict[str, str] = {}  # topic of the file -> type
         self._problems: dict[str, str] = {}  # the same -> why it cannot be used
         self._messages: dict[str, int] = {}

@@ -24,6 +24,7 @@ class Decoder:
         from rosbags.typesys import get_types_from_msg
 
         self._types.register(get_types_from_msg(text, message_type))
+        self._types.get_msgdef(message_type)  # generates the code now, and not when the first message waits
 
     def __call__(self, message_type: str, data: bytes) -> Any:
         """Return the message. Raises MessageError."""

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
+from collision_monitor.sources.autoware import PREDICTED, TRACKED, AutowareSource
+from collision_monitor.sources.detections import DETECTIONS, DetectionSource
+from collision_monitor.sources.footprints import FOOTPRINT, FootprintSource
 from collision_monitor.sources.mapping import Mapping
 from collision_monitor.sources.markers import MARKER, MARKERS, MarkerSource
 from collision_monitor.sources.object_entry import ObjectEntry
@@ -23,6 +26,10 @@ BY_TYPE: Final[dict[str, Callable[[ObjectEntry, str, Mapping], Source]]] = {
     MARKERS: MarkerSource,
     PLANNING_SCENE: planning_world,
     COLLISION_OBJECT: planning_world,
+    TRACKED: AutowareSource,
+    PREDICTED: AutowareSource,
+    DETECTIONS: DetectionSource,
+    FOOTPRINT: FootprintSource,
 }
 """Makes the source of an entry of `objects:` from the entry, the type of its topic, and the whole file. Raises
 InputError for an entry that does not fit the type."""

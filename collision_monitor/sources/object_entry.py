@@ -14,13 +14,14 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.sources.yaml_table import SHAPES, known, number, pose, shape, table, text, truth
 
 PLACE: Final = ("topic", "type", "frame", "marker", "static", "pose")
-BODY: Final = ("shape", "shapes", "id", "padding", "group", "mask", "allowed")
+BODY: Final = ("shape", "shapes", "each", "id", "padding", "group", "mask", "allowed")
 NUMBERS: Final = {
     "forget_after": ("s", 1.0),
     "min_existence": ("probability", 0.0),
     "shape_tolerance": ("m", 0.05),
     "position_stddev": ("m", 0.0),
     "estimate_over": ("s", 0.0),
+    "gate": ("m", 1.0),
     "height": ("m", 0.0),
     "radius": ("m", 0.05),
     "voxel": ("m", 0.0),
@@ -37,7 +38,8 @@ class ObjectEntry:
     """An object, or a group of objects, and where its pose comes from.
 
     type: of the topic's messages, empty if the topic decides. marker: namespace and id of its marker; id None: all
-    markers of the namespace. shapes: empty if the messages hold them. pose: of a static object, in `frame` (empty: the
+    markers of the namespace. shapes: empty if the messages hold them. each: the shape of each object of a
+    group, in place of those in the messages. pose: of a static object, in `frame` (empty: the
     monitor's). covariance: whether covariances in the messages are used. given: the keys that the file holds.
     The numbers are those of NUMBERS.
     """
@@ -49,6 +51,7 @@ class ObjectEntry:
     frame: str = ""
     marker: tuple[str, int | None] | None = None
     shapes: tuple[tuple[Shape, Pose], ...] = ()
+    each: tuple[tuple[Shape, Pose], ...] = ()
     static: bool = False
     pose: Pose | None = None
     padding: float = 0.0
@@ -62,6 +65,7 @@ class ObjectEntry:
     shape_tolerance: float = 0.05
     position_stddev: float = 0.0
     estimate_over: float = 0.0
+    gate: float = 1.0
     height: float = 0.0
     radius: float = 0.05
     voxel: float = 0.0
@@ -100,7 +104,7 @@ class ObjectEntry:
     def allow_only(self, keys: Collection[str], message_type: str) -> None:
         """Check that the file holds no key for this entry that its type of messages does not use."""
         for key in self.given:
-            if key not in ("topic", "type", *BODY, *keys):
+            if key not in ("topic", "type", *(set(BODY) - {"each"}), *keys):
                 used = ", ".join(sorted({*keys, "shape", "padding", "group", "mask", "allowed"}))
                 raise InputError(f"{self.name}, {key}: {message_type} does not use it; it uses {used}")
 
@@ -162,6 +166,7 @@ def _entry(name: str, content: dict[str, Any], object_id: int) -> ObjectEntry:
         frame=frame.removeprefix("/"),
         marker=marker,
         shapes=tuple(shape(each, name) for each in _shapes_given(name, content)),
+        each=(shape(content["each"], f"{name}, each"),) if "each" in content else (),
         static=static,
         pose=stands_at,
         padding=content.get("padding", 0.0),

@@ -87,14 +87,14 @@ class Scene:
         stamp = int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
         return stamp if stamp and self._by_header else otherwise
 
-    def refuse(self, name: str, text: str) -> None:
-        """Count something that was left out. name: the key in the sources file."""
+    def refuse(self, name: str, text: str, count: int = 1) -> None:
+        """Count what was left out. name: the key in the sources file."""
         what = f"{name}: {text}"
-        self.refused[what if what in self.refused or len(self.refused) < MOST_TEXTS else _OTHERS] += 1
+        self.refused[what if what in self.refused or len(self.refused) < MOST_TEXTS else _OTHERS] += count
         key = name if name in self.last_refusal or len(self.last_refusal) < MOST_TEXTS else _OTHERS
-        self.refused_by_name[key] += 1
+        self.refused_by_name[key] += count
         self.last_refusal[key] = text
-        self._news[key] = self._news.get(key, (0, ""))[0] + 1, text
+        self._news[key] = self._news.get(key, (0, ""))[0] + count, text
 
     def refuse_old(self, object_id: int) -> None:
         """Count a state that was too old for the step that would have taken it."""

@@ -7,8 +7,8 @@ from typing import Any, Final
 import numpy as np
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, HalfSpace, Mesh, Shape, Sphere
-from collision_monitor.geometry.triangulation import convex_parts
+from collision_monitor.geometry.shapes import Box, Capsule, Cone, Cylinder, HalfSpace, Mesh, Shape, Sphere
+from collision_monitor.sources.prisms import prism
 
 _DIMENSIONS: Final = {1: 3, 2: 1, 3: 2, 4: 2, 5: 1}
 """Numbers of a SolidPrimitive by its type: BOX, SPHERE, CYLINDER, CONE, PRISM."""
@@ -32,17 +32,10 @@ def primitive_shapes(primitive: Any) -> list[Shape]:
         return [Cylinder(values[1], values[0])]
     if kind == 4:
         return [Cone(values[1], values[0])]
-    return prism([(p.x, p.y) for p in primitive.polygon.points], float(values[0]))
-
-
-def prism(outline: Any, height: float) -> list[Shape]:
-    """Return the convex parts of a polygon (n, 2) in m, extruded by height / 2 to both sides. Raises ShapeError."""
-    points = np.asarray(outline, np.float64).reshape(-1, 2)
-    parts = []
-    for part in convex_parts(points):
-        corners = np.repeat(points[part], 2, axis=0)
-        parts.append(ConvexHull(np.column_stack([corners, np.tile([-height / 2, height / 2], len(part))])))
-    return list(parts)
+    if not values[0] > 0.0:
+        raise InputError(f"SolidPrimitive of type 5: expected a positive height, got {values[0]}")
+    outline = np.array([(p.x, p.y) for p in primitive.polygon.points], np.float64).reshape(-1, 2)
+    return [shape for shape, _ in prism(outline, -values[0] / 2, values[0] / 2)]
 
 
 def mesh_shape(mesh: Any) -> Shape:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -37,8 +37,15 @@ class TrackTable:
         self._vanished: OrderedDict[Hashable, Track] = OrderedDict()
         self._forget_after = forget_after
 
-    def __len__(self) -> int:
-        return len(self._tracks)
+    def __contains__(self, key: Hashable) -> bool:
+        """Whether the track is there, or its name is kept for its return."""
+        return key in self._tracks or key in self._vanished
+
+    def touch(self, keys: Iterable[Hashable], stamp_ns: int) -> None:
+        """Keep the known ones of these tracks for another `forget_after`, although their states cannot be used."""
+        for key in keys:
+            if (track := self._tracks.get(key)) is not None:
+                track.seen_ns = max(track.seen_ns, stamp_ns)
 
     def get(self, key: Hashable, name: str, stamp_ns: int, scene: Scene, object_id: int | None = None) -> Track | None:
         """Return the track with this key, or a new one. None, after a refusal, if there are too many.

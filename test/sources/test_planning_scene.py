@@ -147,7 +147,7 @@ def test_an_object_waits_for_its_frame() -> None:
         (an_object("x", solid(2, 1), operation=MOVE), "x: expected an object that was added before"),
         (an_object("x", solid(2, 1), operation=9), "x: operation: expected 0 (ADD) to 3 (MOVE), got 9"),
         (an_object("x", solid(2, 1), primitive_poses=[pose()] * 2), "x: expected a pose of each of 1 shapes, got 2"),
-        (an_object("x", solid(5, 1, outline=[(0, 0), (1, 0)])), "x: polygon: expected"),
+        (an_object("x", solid(5, 1, outline=[(0, 0), (1, 0)])), "x: Polygon points: expected at least 3 points"),
     ],
 )
 def test_objects_that_cannot_be_used_are_counted(content: Any, text: str) -> None:
