@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,6 +18,9 @@ from collision_monitor.robots.xml_tree import Element
 
 LARGEST_MESH: Final = 256 << 20
 """Bytes of a mesh file. Collision meshes have 10 kB to 10 MB."""
+
+_UNIT: Final = re.compile(rb"""<unit\b[^>]*\bmeter\s*=\s*["']([^"']*)""")
+"""Length of COLLADA's unit in m, which trimesh does not apply."""
 
 
 def link_shapes(link: Link, files: FileLocator) -> tuple[list[tuple[Shape, Pose]], list[str]]:
@@ -48,7 +52,7 @@ def _shape(geometry: Element, files: FileLocator) -> Shape:
 
 
 def _mesh(path: Path, scale: NDArray[np.float64]) -> Mesh:
-    """Load a mesh in m. A negative scale mirrors it, and its faces then change their order to point outwards again."""
+    """Return the mesh of a file, in m. If the scale mirrors it, its faces change their order to point outwards again."""
     if not scale.all():
         raise InputError(f"{path.name}: expected a scale without zeros, got {scale.tolist()}")
     vertices, faces = _read_mesh(path)
@@ -56,6 +60,7 @@ def _mesh(path: Path, scale: NDArray[np.float64]) -> Mesh:
 
 
 def _read_mesh(path: Path) -> tuple[NDArray[np.float64], NDArray[Any]]:
+    """Return vertices (n, 3) and faces (m, 3). COLLADA's unit counts and its up axis does not, as in RViz."""
     try:
         import trimesh
     except ImportError:
@@ -65,6 +70,8 @@ def _read_mesh(path: Path) -> tuple[NDArray[np.float64], NDArray[Any]]:
     try:
         mesh = trimesh.load_mesh(path)
         vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces)
+        if path.suffix.lower() == ".dae" and (unit := _UNIT.search(path.read_bytes())):
+            vertices = vertices * float(unit[1])
     except Exception as error:  # trimesh and its readers raise many kinds of errors
         reason = str(error) or type(error).__name__
         raise InputError(f"{path}: expected a mesh, cannot be read: {reason:.200}") from None

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from collision_monitor import Box, Capsule, Cylinder, Mesh, Sphere
 from collision_monitor.errors import InputError
@@ -53,6 +54,24 @@ def test_a_mesh_is_scaled_and_its_faces_point_outwards(tmp_path: Path, scale: st
     ((mesh, _),) = robot.shapes[0]
     assert isinstance(mesh, Mesh)
     assert volume(mesh) == pytest.approx(factor / 6)
+
+
+@pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "dae", "glb"])
+def test_mesh_files_of_every_kind(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"part.{suffix}"
+    trimesh.creation.box((1, 2, 3)).export(path)
+    ((mesh, _),) = robot_of(geometry(f'<mesh filename="{path.name}"/>'), tmp_path).shapes[0]
+    assert isinstance(mesh, Mesh)
+    assert volume(mesh) == pytest.approx(6) and len(mesh.vertices) == 8  # welded, also where the file repeats corners
+
+
+def test_the_unit_of_collada_counts(tmp_path: Path) -> None:
+    path = tmp_path / "part.dae"
+    text = trimesh.creation.box((1, 2, 3)).export(file_type="dae").decode()
+    path.write_text(text.replace("<up_axis>", '<unit name="centimeter" meter="0.01"/><up_axis>'))
+    ((mesh, _),) = robot_of(geometry('<mesh filename="part.dae"/>'), tmp_path).shapes[0]
+    assert isinstance(mesh, Mesh)
+    assert volume(mesh) == pytest.approx(6e-6)
 
 
 def test_addresses_of_meshes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
