@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
@@ -28,6 +28,20 @@ REPORT_PERIOD: Final = 1.0
 _TF: Final = ("/tf", "/tf_static")
 _DEPTH: Final = {"/tf": 100, "/tf_static": 100}
 """Depth of the queue; 10 for the other topics."""
+
+
+class LineReport(NamedTuple):
+    """What a line of the file does. level: of DiagnosticStatus, with a text. The counts are those since the start."""
+
+    name: str
+    topic: str
+    type: str
+    messages: int
+    states: int
+    refused: int
+    last_refusal: str
+    level: bytes
+    text: str
 
 
 class LiveSources:
@@ -97,7 +111,11 @@ class LiveSources:
         self._found[topic] = kind
         self._problems.pop(topic, None)
         self._node.create_subscription(
-            message_class, resolved, lambda data: self._on_message(topic, kind, data), _quality(topic, infos), raw=True
+            message_class,
+            resolved,
+            lambda data: self._on_message(topic, kind, data),
+            quality_of_all(topic, infos),
+            raw=True,
         )
         self._node.get_logger().info(f"source {topic}: {kind}")
 
@@ -125,42 +143,42 @@ class LiveSources:
 
     # -- report
 
-    def _report(self) -> None:
-        """Publish the state of each line of the file."""
-        array = DiagnosticArray()
-        array.header.stamp = self._node.get_clock().now().to_msg()
-        for topic, entries in self._mapping.topics.items():
-            for entry in entries:
-                array.status.append(self._status(entry.name, topic))
+    def lines(self) -> list[LineReport]:
+        """Return what each line of the file does, in the order of the file; then the topics that it implies."""
         named = self._mapping.topics
-        array.status += [self._status(topic, topic) for topic, _ in self._wanted.values() if topic not in named]
-        self._out.publish(array)
+        found = [self._line_report(each.name, each.topic) for each in self._mapping.sources if each.topic]
+        return found + [self._line_report(topic, topic) for topic, _ in self._wanted.values() if topic not in named]
 
-    def _status(self, name: str, topic: str) -> DiagnosticStatus:
+    def _line_report(self, name: str, topic: str) -> LineReport:
         scene, messages = self._feed.scene, self._messages.get(topic, 0)
-        refused = scene.refused_by_name.get(name, 0)
-        values = {
-            "topic": topic,
-            "type": self._found.get(topic, "not found yet"),
-            "messages": messages,
-            "states": scene.states.get(name, 0),
-            "refused": refused,
-            "last refusal": scene.last_refusal.get(name, ""),
-        }
+        refused, refusal = scene.refused_by_name.get(name, 0), scene.last_refusal.get(name, "")
+        states = sum(count for other, count in scene.states.items() if other == name or other.startswith(f"{name}_"))
         if topic in self._problems:
             level, text = DiagnosticStatus.ERROR, self._problems[topic]
         elif topic not in self._found:
             level, text = DiagnosticStatus.WARN, f"{topic} has no publisher"
-        elif not messages:
+        elif not messages and topic not in _TF:
             level, text = DiagnosticStatus.WARN, f"no message on {topic} yet"
         else:
-            level, text = (DiagnosticStatus.WARN, scene.last_refusal[name]) if refused else (DiagnosticStatus.OK, "ok")
-        pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
-        full = f"{self._node.get_name()}: {name}"
-        return DiagnosticStatus(level=level, name=full, message=text, hardware_id="none", values=pairs)
+            level, text = (DiagnosticStatus.WARN, refusal) if refused else (DiagnosticStatus.OK, "ok")
+        kind = self._found.get(topic, "")
+        return LineReport(name, topic, kind, messages, states, refused, refusal, level, text)
+
+    def _report(self) -> None:
+        """Publish the state of each line of the file."""
+        array = DiagnosticArray()
+        array.header.stamp = self._node.get_clock().now().to_msg()
+        for line in self.lines():
+            values = {key: value for key, value in line._asdict().items() if key not in ("name", "level", "text")}
+            pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+            name = f"{self._node.get_name()}: {line.name}"
+            array.status.append(
+                DiagnosticStatus(level=line.level, name=name, message=line.text, hardware_id="none", values=pairs)
+            )
+        self._out.publish(array)
 
 
-def _quality(topic: str, infos: list[Any]) -> QoSProfile:
+def quality_of_all(topic: str, infos: list[Any]) -> QoSProfile:
     """Return the strictest quality of service that all publishers of a topic offer."""
     offered = [info.qos_profile for info in infos]
     reliable = all(each.reliability is ReliabilityPolicy.RELIABLE for each in offered)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from collision_monitor.sources.autoware import PREDICTED, TRACKED, AutowareSource
+from collision_monitor.sources.clouds import CLOUD, SCAN, CloudSource
 from collision_monitor.sources.detections import DETECTIONS, DetectionSource
 from collision_monitor.sources.footprints import FOOTPRINT, FootprintSource
 from collision_monitor.sources.mapping import Mapping
@@ -30,6 +31,8 @@ BY_TYPE: Final[dict[str, Callable[[ObjectEntry, str, Mapping], Source]]] = {
     PREDICTED: AutowareSource,
     DETECTIONS: DetectionSource,
     FOOTPRINT: FootprintSource,
+    SCAN: CloudSource,
+    CLOUD: CloudSource,
 }
 """Makes the source of an entry of `objects:` from the entry, the type of its topic, and the whole file. Raises
 InputError for an entry that does not fit the type."""
