@@ -52,7 +52,7 @@ def _shape(geometry: Element, files: FileLocator) -> Shape:
 
 
 def _mesh(path: Path, scale: NDArray[np.float64]) -> Mesh:
-    """Return the mesh of a file, in m. If the scale mirrors it, its faces change their order to point outwards again."""
+    """Return the mesh of a file, in m. If the scale mirrors it, its faces are turned to point outwards again."""
     if not scale.all():
         raise InputError(f"{path.name}: expected a scale without zeros, got {scale.tolist()}")
     vertices, faces = _read_mesh(path)

@@ -18,6 +18,7 @@ from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Mapping
 from collision_monitor.sources.frames import frame_name
 from collision_monitor.sources.kinds import BY_TYPE
+from collision_monitor.sources.robot_template import is_of_robot
 
 DISCOVERY: Final = 0.7
 """s until DDS has told of the publishers that are there."""
@@ -63,7 +64,7 @@ def survey(seconds: float) -> list[TopicFacts]:
         decoder = Decoder({})
         found = []
         for topic, kinds in sorted(node.node.get_topic_names_and_types()):
-            kind = next((each for each in kinds if each in BY_TYPE), None)
+            kind = next((each for each in kinds if each in BY_TYPE or is_of_robot(topic, each)), None)
             infos = node.node.get_publishers_info_by_topic(topic) if kind else []
             if kind is None or not infos:
                 continue

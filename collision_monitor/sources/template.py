@@ -10,8 +10,9 @@ from collision_monitor.sources.clouds import CLOUD, SCAN
 from collision_monitor.sources.detections import DETECTIONS
 from collision_monitor.sources.footprints import FOOTPRINT
 from collision_monitor.sources.markers import MARKER, MARKERS
+from collision_monitor.sources.planning_scene import COLLISION_OBJECT, PLANNING_SCENE
 from collision_monitor.sources.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE
-from collision_monitor.sources.tf_objects import TRANSFORMS
+from collision_monitor.sources.robot_template import robot_lines
 
 _ENTRIES: Final = {
     ODOMETRY: "shape: {box: [1.0, 0.7, 0.5]}",
@@ -53,15 +54,20 @@ def sources_file(topics: Iterable[Seen], parents: dict[str, str]) -> str:
             for namespace in each.namespaces:
                 name = _name(namespace or each.topic, used)
                 lines.append(f"  {name}: {{topic: {each.topic}, marker: {{ns: {namespace!r}}}}}")
-        elif each.type != TRANSFORMS:
+        elif each.type in _ENTRIES:
             note = "   # its real shape, in m" if each.type in _SIZED else ""
             lines.append(f"  {_name(each.topic, used)}: {{topic: {each.topic}, {_ENTRIES[each.type]}}}{note}")
     for child in sorted(parents.keys() - {*parents.values()}):
         lines.append(
             f"  # {_name(child, used)}: {{topic: /tf, frame: {child}, shape: {{sphere: 0.3}}}}   # a frame of tf"
         )
+    robots = robot_lines((each.topic, each.type) for each in given)
+    if not robots:  # the world of a planning scene alone
+        scenes = [each.topic for each in given if each.type in (PLANNING_SCENE, COLLISION_OBJECT)]
+        lines += [f"  {_name(topic, used)}: {{topic: {topic}}}" for topic in scenes]
     if len(lines) == 3:
-        lines[-1] = "objects: {}               # no topic of a known type is there"
+        lines[-1:] = [] if robots else ["objects: {}               # no topic of a known type is there"]
+    lines += robots
     return "\n".join(lines) + "\n"
 
 

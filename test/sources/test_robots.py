@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from played_sources import JOINTS, MILLISECOND, START, TF, Played, base_row, check, transform, turned
 from ros_messages import SECOND, definitions, header, message, pose, vector
 
@@ -16,7 +17,8 @@ from collision_monitor.records import Model, StateFlag
 from collision_monitor.robots.robot import Description, Robot, make_robot
 from collision_monitor.sources.decoding import Decoder
 from collision_monitor.sources.feed import Feed
-from collision_monitor.sources.mapping import load_mapping
+from collision_monitor.sources.mapping import load_mapping, make_mapping
+from collision_monitor.sources.template import Seen, sources_file
 
 ROOT = Path(__file__).parents[2]
 ARM = ROOT / "examples/arm/arm.urdf"
@@ -247,3 +249,27 @@ def test_time_that_jumps_back_begins_anew() -> None:
     for k in range(3):
         played.joints(early + k * 100 * MILLISECOND, np.full(8, 0.5), np.zeros(8))
     assert len(played.states) == 10 and played.steps[-1].stamp_ns == early + 200 * MILLISECOND
+
+
+def test_the_file_to_start_from_holds_the_robots_that_are_there() -> None:
+    topics = [
+        Seen("/robot_description", STRING),
+        Seen("/joint_states", "sensor_msgs/msg/JointState"),
+        Seen("/monitored_planning_scene", "moveit_msgs/msg/PlanningScene"),
+        Seen("/hall/cart_2/joint_states", "sensor_msgs/msg/JointState"),
+        Seen("/hall/cart_2/odom", ODOMETRY, ("map",)),
+    ]
+    content = yaml.safe_load(sources_file(topics, {}))
+    assert content["robots"] == {
+        "robot": {
+            "urdf_topic": "/robot_description",
+            "joint_states": "/joint_states",
+            "planning_scene": "/monitored_planning_scene",
+        },
+        "hall_cart_2": {"urdf": "robot.urdf", "joint_states": "/hall/cart_2/joint_states"},
+    }
+    assert list(content["objects"]) == ["hall_cart_2_odom"]
+    alone = yaml.safe_load(sources_file([Seen("/scene", "moveit_msgs/msg/PlanningScene")], {}))
+    assert alone["objects"] == {"scene": {"topic": "/scene"}} and "robots" not in alone
+    bolted = yaml.safe_load(sources_file(topics[:2], {}))
+    assert "objects" not in bolted and make_mapping(bolted)
