@@ -202,10 +202,11 @@ class Feed:
                 return
             at = stamp
         else:
-            tick = int(now * self.mapping.rate // 1_000_000_000)
-            if self._tick is not None and tick <= self._tick:
+            period = round(1e9 / self.mapping.rate)
+            if self._tick is not None and now // period <= self._tick:
                 return
-            self._tick, at = tick, int(tick * 1_000_000_000 / self.mapping.rate)
+            self._tick = now // period
+            at = self._tick * period
         yield waiting.at(at)
         for object_id in waiting.too_old:
             self.scene.refuse_old(object_id)
