@@ -116,8 +116,9 @@ def cloud_points(cloud: Any) -> Floats:
     rows = data[: cloud.height * cloud.row_step].reshape(cloud.height, cloud.row_step)[:, :least]
     raw = np.ascontiguousarray(rows).reshape(-1).view(dtype)
     points = np.empty((count, 3))
-    for k, name in enumerate("xyz"):
-        points[:, k] = raw[name]
+    with np.errstate(invalid="ignore"):  # a signalling NaN
+        for k, name in enumerate("xyz"):
+            points[:, k] = raw[name]
     return points[np.isfinite(points).all(1)]
 
 

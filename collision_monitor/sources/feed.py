@@ -205,11 +205,12 @@ class Feed:
             return self._timeline.now_ns
         if self.mapping.step_topic:
             return stamp if topic == self.mapping.step_topic else None
-        tick = int(self._timeline.now_ns * self.mapping.rate // 1_000_000_000)
+        period = round(1e9 / self.mapping.rate)
+        tick = self._timeline.now_ns // period
         if self._tick is not None and tick <= self._tick:
             return None
         self._tick = tick
-        return int(tick * 1_000_000_000 / self.mapping.rate)
+        return tick * period
 
     def _due(self, at: int) -> Iterator[Step]:
         waiting = self.scene.waiting

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ AUTOWARE = "autoware_perception_msgs/msg/"
 BOX, CYLINDER, POLYGON = 0, 1, 2
 
 
+@cache
 def decoder() -> Decoder:
     return Decoder(DEFINITIONS)
 
