@@ -33,6 +33,7 @@ from collision_monitor.sources import Decoder, Feed, Input, RawMessage, load_map
 SOURCES: Final = Path(__file__).parents[1] / "examples/arm/sources.yaml"
 NAMES: Final = [*(f"joint_{k}" for k in range(1, 8)), "finger_joint"]
 KIND: Final = "sensor_msgs/msg/JointState"
+STORE: Final = get_typestore(Stores.ROS2_JAZZY)
 TICK: Final = os.sysconf("SC_CLK_TCK")
 WARM: Final = 3.0
 """s of messages before the measurement."""
@@ -46,13 +47,12 @@ def cpu(pid: int) -> float:
 
 def joint_state(stamp: int, time_s: float) -> bytes:
     """Return a JointState of a waving arm."""
-    store = get_typestore(Stores.ROS2_JAZZY)
-    header = store.types["std_msgs/msg/Header"](
-        store.types["builtin_interfaces/msg/Time"](stamp // 10**9, stamp % 10**9), ""
-    )
+    types = STORE.types
+    time_of = types["builtin_interfaces/msg/Time"](stamp // 10**9, stamp % 10**9)
     phase = np.arange(8.0) + time_s
-    message = store.types[KIND](header, NAMES, 0.5 * np.sin(phase), 0.5 * np.cos(phase), np.zeros(0))
-    return bytes(store.serialize_cdr(message, KIND))
+    position, velocity = 0.5 * np.sin(phase), 0.5 * np.cos(phase)
+    message = types[KIND](types["std_msgs/msg/Header"](time_of, ""), NAMES, position, velocity, np.zeros(0))
+    return bytes(STORE.serialize_cdr(message, KIND))
 
 
 def pace(rate: float, seconds: float) -> Any:
