@@ -7,7 +7,6 @@ larger than the measured one by up to `shape_tolerance`.
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final
 
 import numpy as np
@@ -17,6 +16,7 @@ from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.geometry.pose import Pose, rotation_matrix
 from collision_monitor.geometry.shapes import Box, Cylinder
 from collision_monitor.records import StateFlag
+from collision_monitor.sources.autoware_bytes import POLYGON, TrackArrays
 from collision_monitor.sources.covariances import usable_blocks
 from collision_monitor.sources.frames import IDENTITY, frame_name
 from collision_monitor.sources.mapping import Mapping
@@ -24,18 +24,22 @@ from collision_monitor.sources.object_entry import ObjectEntry
 from collision_monitor.sources.prisms import prism
 from collision_monitor.sources.scene import Scene
 from collision_monitor.sources.scene_states import carry, empty_states, turn_twists, turned_triangles
-from collision_monitor.sources.track_shapes import held_by, rounded_up
+from collision_monitor.sources.track_shapes import Measured, held_by, rounded_up, still_held
 from collision_monitor.sources.tracks import Track, TrackTable
 
 TRACKED: Final = "autoware_perception_msgs/msg/TrackedObjects"
 PREDICTED: Final = "autoware_perception_msgs/msg/PredictedObjects"
 
-_BOX, _CYLINDER, _POLYGON = 0, 1, 2
+_BOX, _CYLINDER = 0, 1
 _NO_ORIENTATION = 0
 _LABELS: Final = (
     *("unknown", "car", "truck", "bus", "trailer", "motorcycle", "bicycle", "pedestrian", "animal", "hazard"),
     *("over_drivable", "under_drivable"),
 )
+
+
+Found = tuple[Track, int]
+"""A track and its row in a message."""
 
 
 class AutowareSource:
@@ -48,34 +52,30 @@ class AutowareSource:
         self.topics = {entry.topic: (message_type,)}
         self._entry = entry
         self._tracks = TrackTable(entry.forget_after)
-        self._predicted = message_type == PREDICTED
         self._number = 0
 
     def begin(self, scene: Scene) -> None:
         """See Source. A track is described when it appears."""
 
-    def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
+    def take(self, topic: str, content: TrackArrays, stamp_ns: int, scene: Scene) -> None:
         """See Source."""
         entry = self._entry
         frame = scene.locate(entry.name, frame_name(content.header.frame_id), stamp_ns)
-        seen: dict[bytes, Any] = {}
-        for each in content.objects:
-            key = each.object_id.uuid.tobytes()
-            if key in seen:
-                scene.refuse(entry.name, f"UUID {key.hex()}: expected it once in a message, got it twice")
-            elif each.existence_probability >= entry.min_existence or math.isnan(each.existence_probability):
-                seen[key] = each
+        wanted = ~(content.existence < entry.min_existence)  # NaN: not known
+        seen: dict[bytes, int] = {}
+        for row in np.flatnonzero(wanted).tolist():
+            if content.uuids[row] in seen:
+                text = f"UUID {content.uuids[row].hex()}: expected it once in a message, got it twice"
+                scene.refuse(entry.name, text)
+            else:
+                seen[content.uuids[row]] = row
         if frame is None:  # they stay, and become stale
             self._tracks.touch(seen, stamp_ns)
             return
-        tracks, objects = [], []
-        for key, each in seen.items():
-            track = self._track(key, each, stamp_ns, scene)
-            if track is not None and self._describe(track, each, scene):
-                tracks.append(track)
-                objects.append(each)
-        if tracks:
-            states, covariance = self._states(tracks, objects, scene)
+        found = [(self._track(key, content.labels[row], stamp_ns, scene), row) for key, row in seen.items()]
+        kept = self._described([(track, row) for track, row in found if track is not None], content, scene)
+        if kept:
+            states, covariance = self._states(kept, content, scene)
             given = covariance if frame is IDENTITY else carry(states, frame, covariance)
             scene.observe(states, stamp_ns, given)
 
@@ -83,28 +83,38 @@ class AutowareSource:
         """See Source."""
         self._tracks.expire(now_ns, scene)
 
-    def _track(self, key: bytes, each: Any, stamp_ns: int, scene: Scene) -> Track | None:
+    def _track(self, key: bytes, label: int, stamp_ns: int, scene: Scene) -> Track | None:
         if key not in self._tracks:
             self._number += 1
-        likeliest = max(each.classification, key=lambda it: it.probability, default=None)
-        label = likeliest.label if likeliest is not None else 0
         word = _LABELS[label] if label < len(_LABELS) else f"label{label}"
         return self._tracks.get(key, f"{self._entry.name}_{word}_{self._number}", stamp_ns, scene)
 
-    def _describe(self, track: Track, each: Any, scene: Scene) -> bool:
-        """Describe a track that is new or has left its described shape. Return whether it is described."""
+    def _described(self, found: list[Found], content: TrackArrays, scene: Scene) -> list[Found]:
+        """Describe the tracks that are new or have left their described shapes. Return those that are described."""
         entry, tolerance = self._entry, self._entry.shape_tolerance
+        kinds, sizes = _measured(content)
+        before = [track.shape for track, _ in found]
         if entry.each:
-            if track.shape is None:
-                track.shape = ()
-                scene.describe(entry.describe(track.object_id, track.name, entry.each))
-            return True
-        measured = _measured(each, self._predicted)
-        if track.shape is not None and held_by(track.shape, measured, tolerance):
-            return True
+            still = np.array([shape is not None for shape in before])
+        else:
+            rows = np.array([row for _, row in found], np.int64)
+            still = still_held(before, kinds[rows], sizes[rows], tolerance)
+        kept = []
+        for (track, row), held in zip(found, still.tolist(), strict=True):
+            if held or self._describe(track, (int(kinds[row]), sizes[row]), content.footprints.get(row), scene):
+                kept.append((track, row))
+        return kept
+
+    def _describe(self, track: Track, measured: Measured, corners: Any, scene: Scene) -> bool:
+        """Describe one track. Return whether it is described."""
+        entry, tolerance = self._entry, self._entry.shape_tolerance
+        if measured[0] == POLYGON and not entry.each:
+            measured = POLYGON, np.column_stack([corners[:, :2], np.full(len(corners), measured[1][2])])
+            if track.shape is not None and held_by(track.shape, measured, tolerance):
+                return True
         described = rounded_up(measured, tolerance)
         try:
-            shapes, padding = _shapes(described, tolerance)
+            shapes, padding = (entry.each, 0.0) if entry.each else _shapes(described, tolerance)
             scene.describe(entry.describe(track.object_id, track.name, shapes, extra_padding=padding))
         except CollisionMonitorError as error:
             scene.refuse(entry.name, f"{track.name}: {error}")
@@ -112,87 +122,51 @@ class AutowareSource:
         track.shape = described
         return True
 
-    def _states(self, tracks: list[Track], objects: list[Any], scene: Scene) -> tuple[Any, Any]:
+    def _states(self, kept: list[Found], content: TrackArrays, scene: Scene) -> tuple[Any, Any]:
         """Return states in the frame of the message, with covariances or None."""
-        entry = self._entry
-        states = empty_states([track.object_id for track in tracks])
-        parts = [_kinematics(each) for each in objects]
-        poses = np.array([_pose_numbers(pose.pose) for pose, _, _ in parts])
-        states["position"] = poses[:, :3]
-        states["quaternion"] = poses[:, 3:]
-        if not self._predicted:
-            unknown = np.array([it.kinematics.orientation_availability == _NO_ORIENTATION for it in objects])
-            states["quaternion"][unknown] = 0.0, 0.0, 0.0, 1.0
-            standing = np.array([it.kinematics.is_stationary for it in objects])
-        else:
-            standing = np.zeros(len(objects), np.bool_)
-        twists = np.array([_twist_numbers(twist.twist) for _, twist, _ in parts])
-        accelerations = np.array([_vector(accel.accel.linear) for _, _, accel in parts])
-        twists[standing], accelerations[standing] = 0.0, 0.0
-        states["linear"], states["angular"], states["acceleration"] = twists[:, :3], twists[:, 3:], accelerations
-        states["flags"][accelerations.any(1)] = StateFlag.ACCELERATION_VALID
-        covariance = self._covariances(states, parts, scene) if entry.covariance else None
+        states = empty_states([track.object_id for track, _ in kept])
+        rows = np.array([row for _, row in kept])
+        poses, twists, acceleration = content.pose[rows], content.twist[rows], content.acceleration[rows]
+        standing = content.stationary[rows]
+        twists[standing], acceleration[standing] = 0.0, 0.0
+        states["position"], states["quaternion"] = poses[:, :3], poses[:, 3:]
+        states["quaternion"][content.orientation[rows] == _NO_ORIENTATION] = 0.0, 0.0, 0.0, 1.0
+        states["linear"], states["angular"], states["acceleration"] = twists[:, :3], twists[:, 3:], acceleration
+        states["flags"][acceleration.any(1)] = StateFlag.ACCELERATION_VALID
+        covariance = self._covariances(states, content, rows, scene) if self._entry.covariance else None
         turn_twists(states)
         return states, covariance
 
-    def _covariances(self, states: Any, parts: list[Any], scene: Scene) -> NDArray[np.float64] | None:
-        pose = usable_blocks(np.array([pose.covariance for pose, _, _ in parts], np.float64))
-        twist = usable_blocks(np.array([twist.covariance for _, twist, _ in parts], np.float64))
+    def _covariances(
+        self, states: Any, content: TrackArrays, rows: NDArray[np.int64], scene: Scene
+    ) -> NDArray[np.float64] | None:
+        pose = usable_blocks(content.pose_covariance[rows])
+        twist = usable_blocks(content.twist_covariance[rows])
         wrong = int((~(pose[2] & twist[2])).sum())
         if wrong:
             text = "covariance: expected symmetric matrices without negative eigenvalues; it was ignored"
             scene.refuse(self._entry.name, text, wrong)
         states["orientation_stddev"], states["angular_velocity_stddev"] = pose[1], twist[1]
-        joined = np.concatenate([pose[0], twist[0]], axis=1)
-        known = ~np.isnan(joined)
-        if not known.any():
+        joined: NDArray[np.float64] = np.nan_to_num(np.concatenate([pose[0], twist[0]], axis=1))
+        if not joined.any():
             return None
-        joined = np.where(known.any(1, keepdims=True), np.where(known, joined, 0.0), 0.0)
         joined[:, 6:] = turned_triangles(rotation_matrix(states["quaternion"]), joined)[:, 6:]
         return joined
 
 
-def _kinematics(each: Any) -> tuple[Any, Any, Any]:
-    """Return pose, twist and acceleration, each with its covariance."""
-    k = each.kinematics
-    if hasattr(k, "pose_with_covariance"):
-        return k.pose_with_covariance, k.twist_with_covariance, k.acceleration_with_covariance
-    return k.initial_pose_with_covariance, k.initial_twist_with_covariance, k.initial_acceleration_with_covariance
-
-
-def _vector(v: Any) -> tuple[float, float, float]:
-    return v.x, v.y, v.z
-
-
-def _pose_numbers(pose: Any) -> tuple[float, ...]:
-    p, q = pose.position, pose.orientation
-    return p.x, p.y, p.z, q.x, q.y, q.z, q.w
-
-
-def _twist_numbers(twist: Any) -> tuple[float, ...]:
-    return (*_vector(twist.linear), *_vector(twist.angular))
-
-
-def _measured(each: Any, predicted: bool) -> tuple[int, NDArray[np.float64]]:
-    """Return the kind and the numbers of a shape: full extents (3,), or the corners (n, 3) with the height in z.
-
-    A box without orientation counts as the cylinder about it.
-    """
-    shape = each.shape
-    size = np.array(_vector(shape.dimensions))
-    if shape.type == _POLYGON:
-        corners = [(float(p.x), float(p.y), size[2]) for p in shape.footprint.points]
-        return _POLYGON, np.array(corners).reshape(-1, 3)
-    if shape.type == _BOX and not predicted and each.kinematics.orientation_availability == _NO_ORIENTATION:
-        around = math.hypot(size[0], size[1])
-        return _CYLINDER, np.array([around, around, size[2]])
-    return int(shape.type), size
+def _measured(content: TrackArrays) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """Return kinds (N,) and sizes (N, 3). A box without orientation counts as the cylinder about it."""
+    kinds, sizes = content.kind.copy(), content.size.copy()
+    around = (kinds == _BOX) & (content.orientation == _NO_ORIENTATION)
+    kinds[around] = _CYLINDER
+    sizes[around, :2] = np.hypot(sizes[around, 0], sizes[around, 1])[:, None]
+    return kinds, sizes
 
 
 def _shapes(described: tuple[int, NDArray[np.float64]], tolerance: float) -> tuple[Any, float]:
     """Return shapes and how far the object may exceed them. Raises ShapeError, InputError."""
     kind, numbers = described
-    if kind == _POLYGON:
+    if kind == POLYGON:
         height = float(numbers[0, 2]) if len(numbers) else 0.0
         if not height > 0.0:
             raise InputError(f"dimensions.z: expected a height above 0, got {height}")

@@ -27,6 +27,8 @@ def usable_blocks(matrices: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """
     full = matrices.reshape(-1, 6, 6)
     none = (full == 0.0).all((1, 2)) | (full[:, 0, 0] == -1.0)
+    if none.all():  # the usual case of many drivers
+        return np.full((len(full), 6), np.nan), np.zeros(len(full)), none
     finite = np.isfinite(full).all((1, 2))
     full = np.where((finite & ~none)[:, None, None], full, 0.0)
     unmeasured = np.diagonal(full, axis1=1, axis2=2) >= PLACEHOLDER

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,3 +28,15 @@ def held_by(described: Measured, measured: Measured, tolerance: float) -> bool:
         return bool((np.abs(numbers - described[1]) <= tolerance).all())
     spare = described[1] - numbers
     return bool((spare >= -1e-6 * tolerance).all() and (spare <= 2.0 * tolerance).all())
+
+
+def still_held(
+    described: Sequence[Measured | None], kinds: NDArray[np.uint8], sizes: NDArray[np.float64], tolerance: float
+) -> NDArray[np.bool_]:
+    """Return `held_by` for kinds (N,) and extents (N, 3) at once; False where there is no description, or corners."""
+    none = np.full(3, np.nan)
+    comparable = [it[1] if it is not None and it[1].ndim == 1 and it[0] == k else none for it, k in
+                  zip(described, kinds.tolist(), strict=True)]  # fmt: skip
+    spare = np.array(comparable).reshape(-1, 3) - sizes
+    with np.errstate(invalid="ignore"):
+        return np.asarray(((spare >= -1e-6 * tolerance) & (spare <= 2.0 * tolerance)).all(1))
