@@ -18,25 +18,25 @@ Floats = NDArray[np.float64]
 
 @dataclass(eq=False)
 class Body:
-    """An object that moves with a link. row: of the link in the tree. offset: its pose in the link's frame.
+    """An object that moves with a link. offset: its pose in the frame of the link.
 
     touch: links whose contact with an attached object is expected.
     """
 
     object_id: int
     name: str
-    row: int
+    link: str
     shapes: tuple[tuple[Shape, Pose], ...]
     offset: Pose = field(default_factory=Pose)
     touch: frozenset[str] = frozenset()
 
 
 class CarriedBodies:
-    """Bodies (N) as arrays: rows (N,), offsets (N, 3) and quaternions (N, 4) in the frames of their links."""
+    """Bodies (N) as arrays: rows (N,) of their links, offsets (N, 3) and quaternions (N, 4) in the links' frames."""
 
-    def __init__(self, bodies: Sequence[Body]) -> None:
+    def __init__(self, bodies: Sequence[Body], links: Sequence[str]) -> None:
         self.ids = [body.object_id for body in bodies]
-        self.rows = np.array([body.row for body in bodies], np.intp)
+        self.rows = np.array([links.index(body.link) for body in bodies], np.intp)
         self._positions = np.array([body.offset.position for body in bodies]).reshape(-1, 3)
         self._quaternions = np.array([body.offset.quaternion for body in bodies]).reshape(-1, 4)
         self._at_links = not self._positions.any() and not self._quaternions[:, :3].any()

@@ -35,16 +35,21 @@ class CollisionObject:
     @cached_property
     def fingerprint(self) -> Any:
         """Equal for two objects with the same shapes, poses and frame."""
-        parts = [(type(shape), *map(_bytes, vars(shape).values()), *_pose_bytes(at)) for shape, at in self.shapes]
-        return self.name, self.frame, _pose_bytes(self.pose), parts
+        return self.name, self.frame, pose_bytes(self.pose), shape_bytes(self.shapes)
+
+
+def shape_bytes(shapes: Parts) -> Any:
+    """Return what is equal for equal shapes at equal poses."""
+    return [(type(shape), *map(_bytes, vars(shape).values()), *pose_bytes(at)) for shape, at in shapes]
+
+
+def pose_bytes(pose: Pose) -> tuple[bytes, bytes]:
+    """Return what is equal for equal poses."""
+    return pose.position.tobytes(), pose.quaternion.tobytes()
 
 
 def _bytes(value: Any) -> Any:
     return value.tobytes() if isinstance(value, np.ndarray) else value
-
-
-def _pose_bytes(pose: Pose) -> tuple[bytes, bytes]:
-    return pose.position.tobytes(), pose.quaternion.tobytes()
 
 
 def operation_of(message: Any) -> int:

@@ -17,6 +17,7 @@ from collision_monitor.pipeline.topics import Topic
 from collision_monitor.sources.frames import frame_name
 from collision_monitor.sources.kinds import BY_TYPE, SECTIONS
 from collision_monitor.sources.mapping import HEADER, Mapping
+from collision_monitor.sources.robot_source import RobotSource
 from collision_monitor.sources.scene import Scene
 from collision_monitor.sources.source import RawMessage, Source
 from collision_monitor.sources.standing import StandingObjects
@@ -146,7 +147,9 @@ class Feed:
             self._standing.settle(0, scene)
         moved: dict[int, list[Source]] = {}
         for source in self._by_topic.get(raw.topic, ()):
-            if isinstance(source, FrameSource) and (header := source.moved_by(content, scene)) is not None:
+            if not isinstance(source, FrameSource | RobotSource):
+                continue
+            if (header := source.moved_by(content, scene)) is not None:
                 moved.setdefault(scene.stamp_of(header, raw.received), []).append(source)
         for stamp in sorted(moved):
             yield from self._step(raw, content, moved[stamp], stamp)

@@ -236,14 +236,10 @@ class PlanningSceneSource:
                 self._is_changed |= held.offset is not None
         if self._is_changed:
             self._is_changed = False
-            tree = robot.robot.tree
             bodies = {
-                name: Body(
-                    *(held.object_id, f"{robot.name}/{name}", tree.links.index(held.link), held.content.shapes),
-                    *(held.offset, held.touch),
-                )
-                for name, held in self._held.items()
-                if held.offset is not None
+                name: Body(it.object_id, f"{robot.name}/{name}", it.link, it.content.shapes, it.offset, it.touch)
+                for name, it in self._held.items()
+                if it.offset is not None
             }
             robot.carry(bodies, self._rules(robot), scene)
 

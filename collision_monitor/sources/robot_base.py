@@ -16,6 +16,7 @@ from collision_monitor.sources.poses import ODOMETRY, put_pose, worst_stddev
 from collision_monitor.sources.robot_entry import RobotEntry
 from collision_monitor.sources.scene import Scene
 from collision_monitor.sources.scene_states import empty_states, turn_twists
+from collision_monitor.sources.tf_objects import TRANSFORMS, header_of
 
 Floats = NDArray[np.float64]
 
@@ -47,6 +48,9 @@ class RobotBase(Protocol):
     def take(self, content: Any, stamp_ns: int, robot: Robot, scene: Scene) -> None:
         """Process a decoded message."""
 
+    def moved_by(self, content: Any, robot: Robot, scene: Scene) -> Any:
+        """Return the header of the transform in a TFMessage that moves the base; None if there is none."""
+
     def motion(self, now_ns: int, robot: Robot, scene: Scene) -> BaseMotion | None:
         """Return the motion of the base link; None, after a refusal, if it is not known."""
 
@@ -72,6 +76,9 @@ class FixedBase:
     def take(self, content: Any, stamp_ns: int, robot: Robot, scene: Scene) -> None:
         """See RobotBase."""
 
+    def moved_by(self, content: Any, robot: Robot, scene: Scene) -> Any:
+        """See RobotBase."""
+
     def motion(self, now_ns: int, robot: Robot, scene: Scene) -> BaseMotion:
         """See RobotBase."""
         self.fresh = False
@@ -82,23 +89,31 @@ class FrameBase:
     """A link is at a frame of tf: the link with the frame's name, or the base link if no link has it."""
 
     def __init__(self, entry: RobotEntry) -> None:
-        self.topics: Mapping[str, tuple[str, ...]] = {}
+        self.topics: Mapping[str, tuple[str, ...]] = {"/tf": (TRANSFORMS,)}
         self.fresh = True
         self._entry = entry
 
     def take(self, content: Any, stamp_ns: int, robot: Robot, scene: Scene) -> None:
+        """See RobotBase. The feed has put the transforms into the tree."""
+        self.fresh = True
+
+    def moved_by(self, content: Any, robot: Robot, scene: Scene) -> Any:
         """See RobotBase."""
+        return header_of(content, scene.frames.nearest_moving(self._frame(robot)))
+
+    def _frame(self, robot: Robot) -> str:
+        return self._entry.base.frame or self._entry.base.link or robot.tree.links[0]
 
     def motion(self, now_ns: int, robot: Robot, scene: Scene) -> BaseMotion | None:
         """See RobotBase."""
         name, base = self._entry.name, self._entry.base
-        frame = base.frame or base.link or robot.tree.links[0]
+        frame = self._frame(robot)
         found = scene.locate(name, frame, now_ns)
         link = base.link or (frame if frame in robot.tree.links else robot.tree.links[0])
         back = _base_in_link(robot, link, f"{name}, base", scene)
         if found is None or back is None:
             return None
-        self.fresh = found.moving
+        self.fresh = False
         at = IDENTITY if base.pose is None else _at_rest(base.pose)
         return BaseMotion(found @ at @ back)
 
@@ -136,6 +151,9 @@ class OdometryBase:
         moved = FrameMotion(state["position"], state["quaternion"], state["linear"], state["angular"], moving=True)
         self._last = BaseMotion(frame @ moved @ back, _stddev(content))
         self._stamp, self.fresh = stamp_ns, True
+
+    def moved_by(self, content: Any, robot: Robot, scene: Scene) -> Any:
+        """See RobotBase."""
 
     def motion(self, now_ns: int, robot: Robot, scene: Scene) -> BaseMotion | None:
         """See RobotBase. The base moves on at its twist since the message."""

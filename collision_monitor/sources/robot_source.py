@@ -17,6 +17,7 @@ from collision_monitor.robots import link_motions
 from collision_monitor.robots.robot import Description, Robot, make_robot
 from collision_monitor.robots.srdf import Pair
 from collision_monitor.sources.carried_bodies import Body, CarriedBodies
+from collision_monitor.sources.collision_objects import pose_bytes, shape_bytes
 from collision_monitor.sources.frames import FrameMotion
 from collision_monitor.sources.joint_table import JointTable
 from collision_monitor.sources.mapping import Mapping
@@ -59,14 +60,14 @@ class RobotSource:
         self._base = robot_base(entry, mapping.frame, mapping.max_age)
         self._joints: JointTable
         self._fleet = fleet
-        self._texts = {entry.urdf_topic: entry.urdf, entry.srdf_topic: entry.srdf}
+        self._urdf, self._srdf = entry.urdf, entry.srdf
         self._links: dict[str, Body] = {}
         self._ids: dict[str, int] = {}
         self._rules = LinkRules()
         self._described: dict[int, Any] = {}
         self._place: tuple[float, ...] | None = None  # of a base at rest
         self._standing: dict[int, Pose] = {}  # poses of the links that are rigid with it
-        self._moving = CarriedBodies(())
+        self._moving = CarriedBodies((), ())
         self._needs = np.zeros((0, 0), np.bool_)
         self._unknown_joints: set[str] = set()
         topics = {entry.joint_states: (JOINT_STATE,), entry.urdf_topic: (TEXT,), entry.srdf_topic: (TEXT,)}
@@ -76,7 +77,7 @@ class RobotSource:
         link_motions.load()
         if entry.urdf is not None:
             try:
-                self._make(entry.urdf, entry.srdf)
+                self._make(entry.urdf)
             except InputError as error:
                 raise InputError(f"{entry.name}, urdf: {error}") from None
 
@@ -85,6 +86,7 @@ class RobotSource:
     def begin(self, scene: Scene) -> None:
         """See Source."""
         if self.robot is not None:
+            self._report_problems(self.robot, scene)
             self._show(scene)
 
     def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
@@ -99,6 +101,10 @@ class RobotSource:
             self._refuse_unknown(content.name, scene)
             if (reason := self._joints.take(content, stamp_ns)) is not None:
                 scene.refuse(self.name, f"{topic}: {reason}")
+
+    def moved_by(self, content: Any, scene: Scene) -> Any:
+        """Return the header of the transform in a TFMessage that moves the base; None if there is none."""
+        return None if self.robot is None else self._base.moved_by(content, self.robot, scene)
 
     def settle(self, now_ns: int, scene: Scene) -> None:
         """See Source. Observes the bodies about which there is news."""
@@ -156,41 +162,52 @@ class RobotSource:
     # -- descriptions
 
     def _take_text(self, topic: str, text: str, scene: Scene) -> None:
-        self._texts[topic] = Description(text, topic)
-        urdf, srdf = self._texts[self._entry.urdf_topic], self._texts[self._entry.srdf_topic]
-        if urdf is None:
+        if topic == self._entry.urdf_topic:
+            self._urdf = Description(text, topic)
+        else:
+            self._srdf = Description(text, topic)
+        if self._urdf is None:
             return
         try:
-            self._make(urdf, srdf)
+            robot = self._make(self._urdf)
         except InputError as error:
             scene.refuse(self.name, str(error))
             return
+        for name in [name for name, body in self.attached.items() if body.link not in robot.tree.links]:
+            self._forget(self.attached.pop(name), scene)
+        self._report_problems(robot, scene)
         self._show(scene)
 
-    def _make(self, urdf: Description, srdf: Description | None) -> None:
-        robot = make_robot(urdf, srdf, self._entry.packages)
+    def _forget(self, body: Body, scene: Scene) -> None:
+        scene.remove(body.object_id)
+        self._described.pop(body.object_id, None)
+
+    def _report_problems(self, robot: Robot, scene: Scene) -> None:
+        for problem in robot.problems:
+            scene.refuse(self.name, problem)
+
+    def _make(self, urdf: Description) -> Robot:
+        robot = make_robot(urdf, self._srdf, self._entry.packages)
         for link in self._entry.allowed:
             if link not in robot.links:
                 raise InputError(f"{self.name}, allowed: expected a link with shapes, got {link!r:.80}")
         if self.robot is None or self.robot.tree.joints != robot.tree.joints:
             self._joints = JointTable(robot.tree, self._max_age)
         self.robot = robot
+        return robot
 
     def _show(self, scene: Scene) -> None:
         """Describe the bodies that are new or have changed, and remove the links that are gone."""
         robot = self.robot
         assert robot is not None
-        for problem in robot.problems if not self._described else ():
-            scene.refuse(self.name, problem)
-        for link in self._links.keys() - set(robot.links):
-            scene.remove(self._links[link].object_id)
-            self._described.pop(self._links[link].object_id, None)
+        for link in sorted(self._links.keys() - set(robot.links)):
+            self._forget(self._links[link], scene)
         for link in robot.links:
             if link not in self._ids:
                 self._ids[link] = scene.new_id()
         self._links = {
-            link: Body(self._ids[link], f"{self.name}/{link}", int(row), shapes)
-            for link, row, shapes in zip(robot.links, robot.rows, robot.shapes, strict=True)
+            link: Body(self._ids[link], f"{self.name}/{link}", link, shapes)
+            for link, shapes in zip(robot.links, robot.shapes, strict=True)
         }
         self._base.fresh, self._place = True, None
         self._standing = {}
@@ -201,28 +218,25 @@ class RobotSource:
         self._describe(scene)
 
     def _describe(self, scene: Scene) -> None:
-        bodies = [*self._links.values(), *self.attached.values()]
+        assert self.robot is not None
+        rules, bodies = self._rules, [*self._links.values(), *self.attached.values()]
         allowed = self._allowed()
         for body in bodies:
-            link = body.name.removeprefix(f"{self.name}/")
-            facts = (
-                [(id(shape), pose.position.tobytes(), pose.quaternion.tobytes()) for shape, pose in body.shapes],
-                self._rules.scale.get(link, 1.0),
-                self._entry.padding + self._rules.padding.get(link, 0.0),
-                allowed[body.object_id],
-                self._standing.get(body.object_id),
-            )
+            is_link = body is self._links.get(body.link)
+            at = self._standing.get(body.object_id)
+            scale = rules.scale.get(body.link, 1.0) if is_link else 1.0
+            padding = self._entry.padding + (rules.padding.get(body.link, 0.0) if is_link else 0.0)
+            facts = scale, padding, allowed[body.object_id], at and pose_bytes(at), shape_bytes(body.shapes)
             if self._described.get(body.object_id) == facts:
                 continue
             try:
-                scene.describe(self._description(body, *facts[1:]))
+                scene.describe(self._description(body, scale, padding, allowed[body.object_id], at))
             except CollisionMonitorError as error:
                 scene.refuse(self.name, str(error))
                 continue
             self._described[body.object_id] = facts
-        moving = [body for body in bodies if body.object_id not in self._standing]
-        self._moving = CarriedBodies(moving)
-        assert self.robot is not None
+        moving = [it for it in bodies if it.object_id in self._described and it.object_id not in self._standing]
+        self._moving = CarriedBodies(moving, self.robot.tree.links)
         self._needs = self.robot.tree.needs[self._moving.rows]
 
     def _description(
@@ -254,10 +268,10 @@ class RobotSource:
             if link in self._links:
                 found[self._ids[link]] |= set(others)
         for name, body in self.attached.items():
-            links = {*body.touch, self.robot.tree.links[body.row]} & self._links.keys()
+            links = {*body.touch, body.link} & self._links.keys()
             found[body.object_id] |= {self._ids[link] for link in links}
             found[body.object_id] |= self._rules.allowed.get(name, frozenset())
-            found[body.object_id] |= {other.object_id for other in self.attached.values() if other.row == body.row}
+            found[body.object_id] |= {other.object_id for other in self.attached.values() if other.link == body.link}
         return {object_id: tuple(sorted(others - {object_id})) for object_id, others in found.items()}
 
     # -- states
@@ -269,11 +283,11 @@ class RobotSource:
         if place == self._place:
             return False
         self._place = place
-        self._standing = {
-            body.object_id: Pose(poses[body.row, :3], poses[body.row, 3:]) @ body.offset
-            for body in ((*self._links.values(), *self.attached.values()) if place is not None else ())
-            if not self.robot.tree.needs[body.row].any()
-        }
+        self._standing = {}
+        for body in (*self._links.values(), *self.attached.values()) if place is not None else ():
+            row = self.robot.tree.links.index(body.link)
+            if not self.robot.tree.needs[row].any():
+                self._standing[body.object_id] = Pose(poses[row, :3], poses[row, 3:]) @ body.offset
         return True
 
     def _observe(

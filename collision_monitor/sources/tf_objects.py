@@ -50,5 +50,9 @@ class FrameSource:
 
     def moved_by(self, content: Any, scene: Scene) -> Any:
         """Return the header of the transform in this message that moves the object; None if there is none."""
-        child = scene.frames.nearest_moving(self._entry.frame)
-        return next((t.header for t in reversed(content.transforms) if frame_name(t.child_frame_id) == child), None)
+        return header_of(content, scene.frames.nearest_moving(self._entry.frame))
+
+
+def header_of(content: Any, child: str | None) -> Any:
+    """Return the header of the last transform of a TFMessage to a frame; None if there is none."""
+    return next((t.header for t in reversed(content.transforms) if frame_name(t.child_frame_id) == child), None)

@@ -147,7 +147,7 @@ def test_a_base_follows_a_moving_frame_of_tf() -> None:
     stamp = START + 200 * MILLISECOND
     played.joints(stamp, np.zeros(8), np.zeros(8))
     check(played, robot, np.zeros((8, 2)), base_row((0.4, 0, 0.3), linear=(2, 0, 0)), atol=1e-9)
-    assert len(played.states) == 11
+    assert len(played.states) == 10  # the base link moved with its transform
 
 
 def test_the_links_of_a_base_that_stands_in_tf_become_static() -> None:
@@ -273,3 +273,13 @@ def test_the_file_to_start_from_holds_the_robots_that_are_there() -> None:
     assert alone["objects"] == {"scene": {"topic": "/scene"}} and "robots" not in alone
     bolted = yaml.safe_load(sources_file(topics[:2], {}))
     assert "objects" not in bolted and make_mapping(bolted)
+
+
+def test_a_robot_without_joint_states_moves_with_its_frame_alone() -> None:
+    played = Played({"urdf": str(MOBILE), "base": {"frame": "base_link"}})
+    for k in range(3):
+        stamp = START + k * 100 * MILLISECOND
+        played.send("/tf", TF, transform(stamp, "map", "base_link", (0.2 * k, 0, 0)), stamp)
+    assert played.steps[-1].stamp_ns == START + 200 * MILLISECOND
+    assert set(played.states) == {"arm/base_link", "arm/mast", "arm/laser"}
+    np.testing.assert_allclose(played.states["arm/base_link"]["linear"], (2, 0, 0), rtol=0, atol=1e-9)
