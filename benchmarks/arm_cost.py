@@ -1,6 +1,6 @@
 """Measures the CPU that a node needs for an arm of seven joints at 500 Hz, beside the monitor.
 
-    python benchmarks/arm_cost.py [--seconds 20] [--rate 500]
+    python benchmarks/arm_cost.py [--seconds 20] [--rate 500] [--executor events]
 
 The node runs twice in turns: with the sources file of examples/arm, and with the states that it made of it, on the
 node's own topics. The difference of the two is the price of the joint states: DDS, decoding, kinematics. Then the same
@@ -65,10 +65,10 @@ def pace(rate: float, seconds: float) -> Any:
         yield k
 
 
-def with_sources(node: Node, rate: float, seconds: float, record: Path) -> float:
+def with_sources(node: Node, rate: float, seconds: float, record: Path, options: list[str]) -> float:
     """Return the CPU (% of a core) of a node that reads joint states."""
     out = node.create_publisher(JointState, "/joint_states", 10)
-    with Child("run", "--sources", str(SOURCES), "--record", str(record)) as child:
+    with Child("run", "--sources", str(SOURCES), "--record", str(record), *options) as child:
         wait_for(lambda: bool(out.get_subscription_count()), child)
         share = measured(child, rate, seconds, lambda k: out.publish(joint_state(time.time_ns(), k / rate)))
         child.finish()
@@ -76,7 +76,7 @@ def with_sources(node: Node, rate: float, seconds: float, record: Path) -> float
     return share
 
 
-def without_sources(node: Node, record: Path, rate: float, seconds: float) -> float:
+def without_sources(node: Node, seconds: float, record: Path, options: list[str]) -> float:
     """Return the CPU of a node that gets the same objects and as many states on its own topics."""
     messages = list(Session(record).messages())
     states = [m.data for m in messages if m.type == Topic.STATES.message]
@@ -87,7 +87,7 @@ def without_sources(node: Node, record: Path, rate: float, seconds: float) -> fl
     )
     for data in shapes:
         shapes_out.publish(bytes(data))
-    with Child("run", "--record", str(record.with_name("own.mcap")), "--ros-args", "-p", "frame_id:=world") as child:
+    with Child("run", "--record", str(record.with_name("own.mcap")), *options, "-p", "frame_id:=world") as child:
         wait_for(lambda: bool(states_out.get_subscription_count() and shapes_out.get_subscription_count()), child)
         steps = len(states) / seconds_of(states, messages)
         share = measured(child, steps, seconds, lambda k: states_out.publish(bytes(states[k % len(states)])))
@@ -143,8 +143,10 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--rate", type=float, default=500.0)
     parser.add_argument("--turns", type=int, default=3)
+    parser.add_argument("--executor", choices=("single", "events"), default="single", help="parameter of the node")
     arguments = parser.parse_args()
     rate, seconds = arguments.rate, arguments.seconds
+    options = ["--ros-args", "-p", f"executor:={arguments.executor}"]
     os.environ["ROS_DOMAIN_ID"] = str(free_domain())
     stay_on_this_machine()
     pairs = []
@@ -152,7 +154,8 @@ def main() -> None:
         node = Node("arm_cost")
         for turn in range(arguments.turns):
             record = Path(folder) / f"{turn}.mcap"
-            pairs.append((with_sources(node, rate, seconds, record), without_sources(node, record, rate, seconds)))
+            share = with_sources(node, rate, seconds, record, options)
+            pairs.append((share, without_sources(node, seconds, record, options)))
             print(f"with joint states {pairs[-1][0]:.1f} %, with states {pairs[-1][1]:.1f} % of a core", flush=True)
         node.destroy_node()
     differences = [a - b for a, b in pairs]

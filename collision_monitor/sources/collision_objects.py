@@ -73,7 +73,9 @@ def collision_object(message: Any, before: CollisionObject | None = None) -> Col
     if operation in (APPEND, MOVE) and before is None:
         raise InputError("expected an object that was added before")
     if operation == APPEND and before is not None:
-        return CollisionObject(before.name, (*before.shapes, *shapes)[:_MOST_PARTS], before.frame, before.pose)
+        if len(before.shapes) + len(shapes) > _MOST_PARTS:
+            raise InputError(f"expected at most {_MOST_PARTS} shapes, got more")
+        return CollisionObject(before.name, (*before.shapes, *shapes), before.frame, before.pose)
     pose = _pose(message.pose)
     if operation == MOVE and before is not None:
         moved = [*message.primitive_poses, *message.mesh_poses, *message.plane_poses]

@@ -8,11 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.robots.kinematic_tree import KinematicTree
+from collision_monitor.tolerances import LARGEST_INPUT
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 NANOSECOND: Final = 1e-9
+
+_SHOWN: Final = 5
 
 _MOST_LAYOUTS: Final = 32
 """Different lists of names that are remembered. Each publisher of a robot has one."""
@@ -50,12 +53,12 @@ class JointTable:
         places, columns = self._layout(names)
         given = position[places]
         late = self._stamps[columns] - stamp_ns
-        usable = np.isfinite(given) & ~(self._seen[columns] & (late > 0) & (late <= self._max_age))
+        usable = (np.abs(given) <= LARGEST_INPUT) & ~(self._seen[columns] & (late > 0) & (late <= self._max_age))
         if not usable.all():
             places, columns, given = places[usable], columns[usable], given[usable]
         if len(velocity):
             speed = velocity[places]
-            known = np.isfinite(speed)
+            known = np.abs(speed) <= LARGEST_INPUT
         else:
             speed, known = self._difference(columns, given, stamp_ns)
         self._values[columns, 0] = given
@@ -63,8 +66,8 @@ class JointTable:
         self._speed_known[columns] = known
         self._stamps[columns] = stamp_ns
         self._seen[columns] = self.fresh[columns] = True
-        bad = [names[k] for k in np.flatnonzero(~np.isfinite(position))]
-        return f"expected finite positions, got others for {', '.join(bad)}" if bad else None
+        bad = [names[k] for k in np.flatnonzero(~(np.abs(position) <= LARGEST_INPUT))[:_SHOWN]]
+        return f"expected finite positions, got others for {', '.join(bad):.200}" if bad else None
 
     def at(self, now_ns: int) -> tuple[Floats, Mask, Mask]:
         """Return positions and velocities (J, 2) at a time, and whether positions (J,) and velocities (J,) are known.

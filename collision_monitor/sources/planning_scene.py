@@ -87,6 +87,7 @@ class PlanningSceneSource:
         self._scale: dict[str, float] = {}
         self._ids: dict[str, int] = {}
         self._is_changed = False
+        self._waits = False  # whether an object is not placed yet
 
     def begin(self, scene: Scene) -> None:
         """See Source. The messages bring all objects."""
@@ -108,7 +109,7 @@ class PlanningSceneSource:
     def _take_scene(self, content: Any, stamp_ns: int, scene: Scene) -> None:
         objects = content.world.collision_objects
         if not content.is_diff:
-            for name in self._world.keys() - {each.id for each in objects}:
+            for name in sorted(self._world.keys() - {each.id for each in objects}):
                 self._drop(name, scene)
         for each in objects:
             self._change_world(each, scene)
@@ -121,7 +122,7 @@ class PlanningSceneSource:
                 scene.refuse(self._name, "expected attached objects in the planning scene of an entry of `robots:`")
             return
         if not (content.is_diff or content.robot_state.is_diff):
-            for name in self._held.keys() - {each.object.id for each in attached}:
+            for name in sorted(self._held.keys() - {each.object.id for each in attached}):
                 scene.remove(self._held.pop(name).object_id)
                 self._is_changed = True
         for each in attached:
@@ -142,8 +143,8 @@ class PlanningSceneSource:
             for row in rows:
                 value, link = float(getattr(row, field)), str(row.link_name)
                 if not (0.0 <= value < 1e3 and (value > 0.0 or field == "padding")):
-                    scene.refuse(self._name, f"{field} of {link}: expected a positive number, got {value}")
-                elif known.get(link) != value:
+                    scene.refuse(self._name, f"{field} of {link:.80}: expected a positive number, got {value}")
+                elif known.get(link) != value and len(known) < MOST_OBJECTS:
                     known[link] = value
                     self._is_changed = True
 
@@ -157,7 +158,7 @@ class PlanningSceneSource:
                 return
             content = collision_object(message, known.content if known else None)
         except CollisionMonitorError as error:
-            scene.refuse(self._name, f"{name}: {error}")
+            scene.refuse(self._name, f"{name:.80}: {error}")
             return
         if known is None and len(self._world) >= MOST_OBJECTS:
             scene.refuse(self._name, f"expected at most {MOST_OBJECTS} objects in the planning scene")
@@ -188,7 +189,7 @@ class PlanningSceneSource:
             else:
                 content = collision_object(message.object, held.content if held else None)
         except CollisionMonitorError as error:
-            scene.refuse(self._name, f"{name}: {error}")
+            scene.refuse(self._name, f"{name:.80}: {error}")
             return
         touch = frozenset(map(str, message.touch_links))
         same = held is not None and held.content.fingerprint == content.fingerprint
@@ -205,10 +206,15 @@ class PlanningSceneSource:
         self._is_changed = True
         link = self._robot.link_motion(held.link, stamp_ns, scene)
         if link is None or held.offset is None:
-            scene.refuse(self._name, f"{name}: it was detached while the pose of {held.link} was not known")
+            scene.refuse(self._name, f"{name:.80}: it was detached while the pose of {held.link} was not known")
             scene.remove(held.object_id)
             return
-        at = Pose(link.position, link.quaternion) @ held.offset
+        try:
+            at = Pose(link.position, link.quaternion) @ held.offset
+        except CollisionMonitorError as error:
+            scene.refuse(self._name, f"{name:.80}: {error}")
+            scene.remove(held.object_id)
+            return
         content = CollisionObject(name, held.content.shapes, scene.frame, at)
         self._world[name] = WorldObject(held.object_id, content)
 
@@ -224,16 +230,23 @@ class PlanningSceneSource:
 
     def _place(self, now_ns: int, scene: Scene, *, is_new: bool) -> None:
         """Describe the objects whose frames are known. is_new: count those whose frames are not."""
+        if not (is_new or self._waits or self._is_changed):
+            return
         for name, it in self._world.items():
             if it.at is None:
                 self._place_in_world(name, it, now_ns, scene, is_new)
         robot = self._robot
+        self._waits = any(it.at is None for it in self._world.values())
         if robot is None or robot.robot is None:
             return
         for name, held in self._held.items():
             if held.offset is None:
-                held.offset = self._offset(name, held, now_ns, scene, is_new)
+                try:
+                    held.offset = self._offset(name, held, now_ns, scene, is_new)
+                except CollisionMonitorError as error:
+                    scene.refuse(self._name, f"{name:.80}: {error}")
                 self._is_changed |= held.offset is not None
+                self._waits |= held.offset is None
         if self._is_changed:
             self._is_changed = False
             bodies = {
@@ -247,13 +260,13 @@ class PlanningSceneSource:
         frame = scene.frames.motion(scene.frame, it.content.frame or scene.frame, now_ns)
         if isinstance(frame, MissingFrame):
             if is_new:
-                scene.refuse(self._name, f"{name}: {frame}")
+                scene.refuse(self._name, f"{name:.80}: {frame}")
             return
         try:
             it.at = Pose(frame.position, frame.quaternion) @ it.content.pose
             scene.describe(self._describe(it.object_id, f"{self._name}/{name}", it.content.shapes, it.at))
         except CollisionMonitorError as error:
-            scene.refuse(self._name, f"{name}: {error}")
+            scene.refuse(self._name, f"{name:.80}: {error}")
 
     def _offset(self, name: str, held: HeldObject, now_ns: int, scene: Scene, is_new: bool) -> Pose | None:
         """Return the pose of an attached object in the frame of its link; None, after a refusal, if it is not known."""
@@ -261,7 +274,7 @@ class PlanningSceneSource:
         assert robot is not None and robot.robot is not None
         if held.link not in robot.robot.tree.links:
             if is_new:
-                scene.refuse(self._name, f"{name}: expected it at a link of {robot.name}, got {held.link!r:.80}")
+                scene.refuse(self._name, f"{name:.80}: expected it at a link of {robot.name}, got {held.link!r:.80}")
             return None
         if frame == held.link:
             return held.content.pose
@@ -271,7 +284,7 @@ class PlanningSceneSource:
             other = scene.frames.motion(scene.frame, frame or scene.frame, now_ns)
         if link is None or isinstance(other, MissingFrame):
             if is_new:
-                scene.refuse(self._name, f"{name}: {other if link else f'the pose of {held.link} is not known'}")
+                scene.refuse(self._name, f"{name:.80}: {other if link else f'the pose of {held.link} is not known'}")
             return None
         between = link.inverse() @ other
         return Pose(between.position, between.quaternion) @ held.content.pose

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.pose import Motion, Pose
+from collision_monitor.geometry.pose import Pose, from_rotation_vector, multiply
 from collision_monitor.robots.robot import Robot
 from collision_monitor.sources.covariances import usable_blocks
 from collision_monitor.sources.frames import IDENTITY, FrameMotion, frame_name
@@ -17,6 +17,7 @@ from collision_monitor.sources.robot_entry import RobotEntry
 from collision_monitor.sources.scene import Scene
 from collision_monitor.sources.scene_states import empty_states, turn_twists
 from collision_monitor.sources.tf_objects import TRANSFORMS, header_of
+from collision_monitor.tolerances import LARGEST_INPUT
 
 Floats = NDArray[np.float64]
 
@@ -115,7 +116,8 @@ class FrameBase:
             return None
         self.fresh = False
         at = IDENTITY if base.pose is None else _at_rest(base.pose)
-        return BaseMotion(found @ at @ back)
+        moved = BaseMotion(found @ at @ back)
+        return moved if _is_near(moved, name, scene) else None
 
 
 class OdometryBase:
@@ -142,14 +144,17 @@ class OdometryBase:
         states["linear"] = twist.linear.x, twist.linear.y, twist.linear.z
         states["angular"] = twist.angular.x, twist.angular.y, twist.angular.z
         numbers = np.concatenate([states[0][field] for field in ("position", "quaternion", "linear", "angular")])
-        if not np.isfinite(numbers).all() or abs(float(np.linalg.norm(numbers[3:7])) - 1.0) > 1e-3:
+        if not (np.abs(numbers) <= LARGEST_INPUT).all() or abs(float(np.linalg.norm(numbers[3:7])) - 1.0) > 1e-3:
             scene.refuse(name, "base: expected finite numbers and a unit quaternion in the odometry")
             return
         states["quaternion"] /= np.linalg.norm(states["quaternion"])
         turn_twists(states)
         state = states[0]
         moved = FrameMotion(state["position"], state["quaternion"], state["linear"], state["angular"], moving=True)
-        self._last = BaseMotion(frame @ moved @ back, _stddev(content))
+        base = BaseMotion(frame @ moved @ back, _stddev(content))
+        if not _is_near(base, name, scene):
+            return
+        self._last = base
         self._stamp, self.fresh = stamp_ns, True
 
     def moved_by(self, content: Any, robot: Robot, scene: Scene) -> Any:
@@ -169,7 +174,7 @@ class OdometryBase:
 def _base_in_link(robot: Robot, link: str, what: str, scene: Scene) -> FrameMotion | None:
     """Return the pose of the base link in a link that is rigid with it; None, after a refusal, for other links."""
     if link not in robot.tree.links:
-        scene.refuse(what, f"expected the odometry of a link of the robot, got {link!r:.80}; name it with `link: …`")
+        scene.refuse(what, f"expected the pose of a link of the robot, got {link!r:.80}; name it with `link: …`")
         return None
     row = robot.tree.links.index(link)
     if robot.tree.needs[row].any():
@@ -181,6 +186,14 @@ def _base_in_link(robot: Robot, link: str, what: str, scene: Scene) -> FrameMoti
     return _at_rest(Pose(poses[row, :3], poses[row, 3:])).inverse()
 
 
+def _is_near(base: BaseMotion, name: str, scene: Scene) -> bool:
+    """Return whether all numbers are finite and small enough for the monitor, else refuse the motion."""
+    if (np.abs(base.row) <= LARGEST_INPUT).all():
+        return True
+    scene.refuse(name, f"base: expected finite numbers up to {LARGEST_INPUT:g}, got NaN, infinity or larger")
+    return False
+
+
 def _at_rest(pose: Pose) -> FrameMotion:
     return FrameMotion(pose.position, pose.quaternion, np.zeros(3), np.zeros(3))
 
@@ -190,10 +203,11 @@ def _advanced(base: BaseMotion, elapsed: float) -> BaseMotion:
     if elapsed == 0.0:
         return base
     m = base.motion
-    pose = Motion(Pose(m.position, m.quaternion), m.linear, m.angular).at(elapsed)
+    position = m.position + m.linear * elapsed
+    quaternion = multiply(from_rotation_vector(m.angular * elapsed), m.quaternion)
     stddev = base.stddev.copy()
     stddev[:2] = np.hypot(stddev[:2], stddev[2:] * elapsed)
-    moved = FrameMotion(pose.position, pose.quaternion, m.linear, m.angular, m.twist_known, m.moving)
+    moved = FrameMotion(position, quaternion, m.linear, m.angular, m.twist_known, m.moving)
     return BaseMotion(moved, stddev)
 
 

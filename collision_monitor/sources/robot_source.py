@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Table
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.errors import CollisionMonitorError, InputError
+from collision_monitor.errors import CollisionMonitorError, InputError, PoseError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
@@ -30,6 +31,8 @@ Floats = NDArray[np.float64]
 
 JOINT_STATE: Final = "sensor_msgs/msg/JointState"
 TEXT: Final = "std_msgs/msg/String"
+
+_SHOWN: Final = 8
 
 _STDDEVS: Final = ("position_stddev", "orientation_stddev", "velocity_stddev", "angular_velocity_stddev")
 
@@ -124,7 +127,9 @@ class RobotSource:
         if (due & lacking.any(axis=1)).any():
             names = [self.robot.tree.joints[j] for j in np.flatnonzero(lacking[due].any(axis=0))]
             topic = self._entry.joint_states or "no topic: give `joint_states`"
-            scene.refuse(self.name, f"expected positions of {', '.join(names)} on {topic} not older than max_age")
+            more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+            joints = f"{', '.join(names[:_SHOWN])}{more}"
+            scene.refuse(self.name, f"expected positions of {joints} on {topic} not older than max_age")
         if len(chosen):
             self._observe(chosen, base, poses, twists, speed_known, now_ns, scene)
 
@@ -287,7 +292,8 @@ class RobotSource:
         for body in (*self._links.values(), *self.attached.values()) if place is not None else ():
             row = self.robot.tree.links.index(body.link)
             if not self.robot.tree.needs[row].any():
-                self._standing[body.object_id] = Pose(poses[row, :3], poses[row, 3:]) @ body.offset
+                with suppress(PoseError):  # too far away; the states of such a link are refused
+                    self._standing[body.object_id] = Pose(poses[row, :3], poses[row, 3:]) @ body.offset
         return True
 
     def _observe(

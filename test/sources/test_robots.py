@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from foreign_bag import write_bag
 from played_sources import JOINTS, MILLISECOND, START, TF, Played, base_row, check, transform, turned
 from ros_messages import SECOND, definitions, header, message, pose, vector
 
@@ -15,6 +16,7 @@ from collision_monitor.errors import InputError
 from collision_monitor.geometry.pose import multiply, rotation_matrix
 from collision_monitor.records import Model, StateFlag
 from collision_monitor.robots.robot import Description, Robot, make_robot
+from collision_monitor.sources import import_bag
 from collision_monitor.sources.decoding import Decoder
 from collision_monitor.sources.feed import Feed
 from collision_monitor.sources.mapping import load_mapping, make_mapping
@@ -283,3 +285,34 @@ def test_a_robot_without_joint_states_moves_with_its_frame_alone() -> None:
     assert played.steps[-1].stamp_ns == START + 200 * MILLISECOND
     assert set(played.states) == {"arm/base_link", "arm/mast", "arm/laser"}
     np.testing.assert_allclose(played.states["arm/base_link"]["linear"], (2, 0, 0), rtol=0, atol=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore:invalid value")
+@pytest.mark.parametrize("number", [np.nan, np.inf, 1e300, 1e18])
+def test_numbers_without_end_stop_nothing(number: float) -> None:
+    played = Played({**BOLTED, "base": {"frame": "mount"}})
+    played.send("/tf_static", TF, transform(START, "map", "mount", (number, 0, 0)))
+    played.joints(START, np.full(8, number), np.full(8, number))
+    moving = Played({"urdf": str(MOBILE), "base": {"odometry": "/odom"}})
+    moving.send("/tf_static", TF, transform(START, "map", "odom", (number, 0, 0)))
+    moving.send("/odom", ODOMETRY, odometry(START, base_row((number, 0, 0), linear=(number, 0, 0)), "base_link"), START)
+    good = odometry(START + SECOND // 10, base_row((1, 0, 0)), "base_link")
+    moving.send("/odom", ODOMETRY, good, START)
+    assert played.refusals or number == 1e18
+
+
+def test_a_bag_of_a_robot_is_imported(tmp_path: Path) -> None:
+    (tmp_path / "sources.yaml").write_text(
+        "frame: map\nrate: 50\nrobots:\n  arm:\n    urdf_topic: /robot_description\n"
+        "    joint_states: /joint_states\n    base: {pose: [0, 0, 0]}\n"
+    )
+    joints = "sensor_msgs/msg/JointState"
+    messages: list[Any] = [("/robot_description", START, (STRING, message(STRING, data=ARM.read_text())))]
+    for k in range(20):
+        stamp = START + 5 * k * MILLISECOND
+        content = message(joints, header=header("", stamp), name=JOINTS, position=np.full(8, 0.01 * k))
+        messages.append(("/joint_states", stamp, (joints, content)))
+    bag = write_bag(tmp_path / "bag", messages)
+    imported = import_bag(bag, tmp_path / "run.mcap", load_mapping(tmp_path / "sources.yaml"))
+    assert imported.whole and imported.steps == 5, imported
+    assert imported.states["arm/hand"] == 5
