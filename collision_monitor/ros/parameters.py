@@ -72,6 +72,7 @@ class ParameterReader:
         return self._given.get(name)
 
 
+DEFAULT_FRAME = "world"
 EXECUTORS = ("single", "events")
 RECORD_MODES = ("always", "on_event")
 _RECORD = ("record", "record_mode", "record_before", "record_after", "record_split_size", "record_split_duration")
@@ -103,7 +104,7 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
         reader.declare(setting.name, getattr(profile, setting.name), _descriptor(setting))
 
     text = "Frame of all poses; messages in another frame are refused. A sources file sets it."
-    frame_id = reader.read("frame_id", "world", text)
+    frame_id = reader.read("frame_id", DEFAULT_FRAME, text)
     sources = _read_sources(reader, frame_id)
     record = reader.read("record", "", "Path of the session to write, a .mcap file or a folder; empty: no recording.")
     splitting = _read_splitting(reader)
@@ -121,7 +122,7 @@ def _read_sources(reader: ParameterReader, frame_id: str) -> Mapping | None:
     if not path:
         return None
     mapping = load_mapping(Path(path))
-    if reader.given("frame_id") not in (None, mapping.frame):
+    if frame_id not in (DEFAULT_FRAME, mapping.frame):
         raise InputError(f"parameter frame_id: expected that of {path}, {mapping.frame!r}, got {frame_id!r}")
     return mapping
 

@@ -20,8 +20,8 @@ from collision_monitor.sources.frames import frame_name
 from collision_monitor.sources.kinds import BY_TYPE
 from collision_monitor.sources.robot_template import is_of_robot
 
-DISCOVERY: Final = 0.7
-"""s until DDS has told of the publishers that are there."""
+LOOK_PERIOD: Final = 0.2
+"""s between two looks at the graph: DDS discovers publishers one after the other."""
 
 
 @dataclass
@@ -59,28 +59,33 @@ class TopicFacts:
 
 def survey(seconds: float) -> list[TopicFacts]:
     """Listen to every topic of a type that the sources understand, and return what was there, by topic."""
-    with _Listener("collision_monitor_survey") as node:
-        node.listen(DISCOVERY)
-        decoder = Decoder({})
-        found = []
-        for topic, kinds in sorted(node.node.get_topic_names_and_types()):
-            kind = next((each for each in kinds if each in BY_TYPE or is_of_robot(topic, each)), None)
-            infos = node.node.get_publishers_info_by_topic(topic) if kind else []
-            if kind is None or not infos:
-                continue
-            facts = TopicFacts(topic, kind)
-            found.append(facts)
-            try:
-                package, _, name = kind.split("/")
-                message_class = getattr(import_module(f"{package}.msg"), name)
-                decoder.define(kind, definition(kind))
-            except (ImportError, AttributeError, CollisionMonitorError):
-                facts.installed = False
-                continue
-            quality = quality_of_all(topic, infos)
-            node.node.create_subscription(message_class, topic, _noting(facts, decoder), quality, raw=True)
-        node.listen(seconds)
-    return found
+    found: dict[str, TopicFacts] = {}
+    decoder = Decoder({})
+    end = time.monotonic() + seconds
+    with _Listener("collision_monitor_survey") as listener:
+        while time.monotonic() < end:
+            listener.listen(LOOK_PERIOD)
+            for topic, kinds in listener.node.get_topic_names_and_types():
+                kind = next((each for each in kinds if each in BY_TYPE or is_of_robot(topic, each)), None)
+                if kind is not None and topic not in found:
+                    _subscribe(listener.node, topic, kind, found, decoder)
+    return [found[topic] for topic in sorted(found)]
+
+
+def _subscribe(node: Node, topic: str, kind: str, found: dict[str, TopicFacts], decoder: Decoder) -> None:
+    """Subscribe to a topic that has a publisher, if its type is installed."""
+    infos = node.get_publishers_info_by_topic(topic)
+    if not infos:
+        return
+    facts = found[topic] = TopicFacts(topic, kind)
+    try:
+        package, _, name = kind.split("/")
+        message_class = getattr(import_module(f"{package}.msg"), name)
+        decoder.define(kind, definition(kind))
+    except (ImportError, AttributeError, CollisionMonitorError):
+        facts.installed = False
+        return
+    node.create_subscription(message_class, topic, _noting(facts, decoder), quality_of_all(topic, infos), raw=True)
 
 
 def _noting(facts: TopicFacts, decoder: Decoder) -> Callable[[bytes], None]:
@@ -95,11 +100,10 @@ def _noting(facts: TopicFacts, decoder: Decoder) -> Callable[[bytes], None]:
 
 def check(mapping: Mapping, seconds: float) -> list[LineReport]:
     """Run the sources of a file without a monitor, and return what each of its lines did."""
-    with _Listener("collision_monitor_check") as node:
-        sources = LiveSources(node.node, mapping, lambda given: None, lambda name, text, count: None)
-        node.listen(DISCOVERY)
+    with _Listener("collision_monitor_check") as listener:
+        sources = LiveSources(listener.node, mapping, lambda given: None, lambda name, text, count: None)
         sources.begin()
-        node.listen(seconds)
+        listener.listen(seconds)
         return sources.lines()
 
 
