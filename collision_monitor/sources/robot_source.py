@@ -52,7 +52,7 @@ class LinkRules:
 
 
 class RobotSource:
-    """The links of one robot. fleet: all robots of the file, to whom the joints of a shared topic may belong."""
+    """The links of one robot. fleet: all robots of the file, to which the joints of a shared topic may belong."""
 
     def __init__(self, entry: RobotEntry, mapping: Mapping, fleet: list[RobotSource]) -> None:
         self.name = entry.name

@@ -1,7 +1,7 @@
-"""python examples/arm/arm.py      An arm swings towards a post, and the monitor predicts which link hits it, and when.
+""".venv/bin/python examples/arm/arm.py
 
-The monitor learns of the arm from /joint_states alone, as sources.yaml says. A driver of a real arm and
-robot_state_publisher publish the same topics, so this file ends where your robot begins.
+An arm swings into a post and back. The monitor knows its URDF and /joint_states, as sources.yaml says, and predicts
+which link hits the post, and when. The driver of a real arm publishes the same topic.
 """
 
 from __future__ import annotations
@@ -69,9 +69,9 @@ class Arm(Node):
 
 
 def main() -> None:
-    """Run the monitor and the arm until Ctrl-C, or for --seconds."""
+    """Run the monitor and the arm."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=math.inf, help="stop so long after the monitor is there")
+    parser.add_argument("--seconds", type=float, default=9.0, help="stop so long after the monitor is there (default: 9)")
     arguments = parser.parse_args()
     monitor = subprocess.Popen([sys.executable, "-m", "collision_monitor", "run", "--sources", str(SOURCES)])
     rclpy.init()
