@@ -71,7 +71,7 @@ class Arm(Node):
 def main() -> None:
     """Run the monitor and the arm."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=9.0, help="stop so long after the monitor is there (default: 9)")
+    parser.add_argument("--seconds", type=float, default=9.0, help="stop so long after the start of the swing")
     arguments = parser.parse_args()
     monitor = subprocess.Popen([sys.executable, "-m", "collision_monitor", "run", "--sources", str(SOURCES)])
     rclpy.init()
