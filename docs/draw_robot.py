@@ -21,7 +21,7 @@ from collision_monitor.robots.robot import Description, Robot, make_robot
 from collision_monitor.ros.surfaces import surface_triangles
 
 ROOT = Path(__file__).parents[1]
-SWING = (-0.35, 0.2, 0.62)  # rad of joint_1, one picture each
+SWING = (-0.2, 0.2, 0.62)  # rad of joint_1, one picture each
 AT_REST = [0.0, 0.2, 0.0, -2.0, 0.0, 2.2, 0.785, 0.03]
 SPEED = 0.98  # rad/s of joint_1
 POST = Pose((0.3, 0.48, 0.5)), Cylinder(0.04, 1.0)
@@ -68,7 +68,7 @@ def main() -> None:
         axes.set(xlim=(-0.3, 0.7), ylim=(-0.4, 0.6), zlim=(0.0, 1.0))
         axes.set_axis_off()
         axes.view_init(28, 35)
-        axes.set_box_aspect(None, zoom=1.7)
+        axes.set_box_aspect(None, zoom=1.35)
         axes.set_title(text, fontsize=9, y=0.93)
     figure.subplots_adjust(0, 0, 1, 0.97, 0, 0)
     figure.savefig(ROOT / "docs/images/arm.png")

@@ -122,7 +122,7 @@ class LiveSources:
     def _line(self, topic: str) -> str:
         """Return the name of the first line of the file about a topic."""
         entries = self._mapping.topics.get(topic, ())
-        return entries[0].name if entries else next(iter(self._mapping.sections), topic)
+        return entries[0].name if entries else self._feed.owners.get(topic, topic)
 
     def _set_problem(self, topic: str, text: str) -> None:
         if self._problems.get(topic) != text:
@@ -145,14 +145,16 @@ class LiveSources:
 
     def lines(self) -> list[LineReport]:
         """Return what each line of the file does, in the order of the file; then the topics that it implies."""
-        named = self._mapping.topics
+        named, owners = self._mapping.topics, self._feed.owners
         found = [self._line_report(each.name, each.topic) for each in self._mapping.sources if each.topic]
-        return found + [self._line_report(topic, topic) for topic, _ in self._wanted.values() if topic not in named]
+        others = [topic for topic, _ in self._wanted.values() if topic not in named]
+        return found + [self._line_report(owners.get(topic, topic), topic) for topic in others]
 
     def _line_report(self, name: str, topic: str) -> LineReport:
         scene, messages = self._feed.scene, self._messages.get(topic, 0)
         refused, refusal = scene.refused_by_name.get(name, 0), scene.last_refusal.get(name, "")
-        states = sum(count for other, count in scene.states.items() if other == name or other.startswith(f"{name}_"))
+        parts = f"{name}_", f"{name}/"  # of a group, of a robot
+        states = sum(count for other, count in scene.states.items() if other == name or other.startswith(parts))
         if topic in self._problems:
             level, text = DiagnosticStatus.ERROR, self._problems[topic]
         elif topic not in self._found:
@@ -171,7 +173,8 @@ class LiveSources:
         for line in self.lines():
             values = {key: value for key, value in line._asdict().items() if key not in ("name", "level", "text")}
             pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
-            name = f"{self._node.get_name()}: {line.name}"
+            topic = f" {line.topic}" if line.name in self._feed.owners.values() else ""  # a robot has several
+            name = f"{self._node.get_name()}: {line.name}{topic}"
             array.status.append(
                 DiagnosticStatus(level=line.level, name=name, message=line.text, hardware_id="none", values=pairs)
             )

@@ -46,7 +46,7 @@ class Input(NamedTuple):
 
 
 class Feed:
-    """Converts messages, one by one. scene: what is known, and what was refused.
+    """Converts messages, one by one. scene: what is known, and what was refused. owners: lines of sections by topic.
 
     Call `bind` for each topic when its type is known, `begin` once, and `take` for each message. Raises InputError for
     a file that cannot be used.
@@ -67,9 +67,11 @@ class Feed:
         self._standing = StandingObjects([entry for entry in mapping.sources if entry.static and not entry.topic])
         self._sources: list[Source] = [self._standing]
         self._by_topic: dict[str, list[Source]] = {}
+        self.owners: dict[str, str] = {}
         for name, content in mapping.sections.items():
             for source in SECTIONS[name](content, mapping):
                 self._add(source, source.topics)
+                self.owners.update(dict.fromkeys(source.topics, getattr(source, "name", name)))
 
     # -- topics
 

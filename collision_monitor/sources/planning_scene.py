@@ -77,7 +77,7 @@ class PlanningSceneSource:
         self, name: str, topics: Mapping[str, tuple[str, ...]], describe: Describe, robot: RobotSource | None
     ) -> None:
         self.topics = topics
-        self._name = name
+        self.name = name
         self._describe = describe
         self._robot = robot
         self._world: dict[str, WorldObject] = {}
@@ -114,12 +114,12 @@ class PlanningSceneSource:
         for each in objects:
             self._change_world(each, scene)
         if len(content.world.octomap.octomap.data):
-            scene.refuse(self._name, "the octomap of the planning scene is not monitored; give its points as a topic")
+            scene.refuse(self.name, "the octomap of the planning scene is not monitored; give its points as a topic")
         self._take_rules(content, scene)
         attached = content.robot_state.attached_collision_objects
         if self._robot is None:
             if attached:
-                scene.refuse(self._name, "expected attached objects in the planning scene of an entry of `robots:`")
+                scene.refuse(self.name, "expected attached objects in the planning scene of an entry of `robots:`")
             return
         if not (content.is_diff or content.robot_state.is_diff):
             for name in sorted(self._held.keys() - {each.object.id for each in attached}):
@@ -135,7 +135,7 @@ class PlanningSceneSource:
             try:
                 self._matrix, self._is_changed = CollisionMatrix(matrix), True
             except CollisionMonitorError as error:
-                scene.refuse(self._name, str(error))
+                scene.refuse(self.name, str(error))
         for rows, field, known in (
             (content.link_padding, "padding", self._padding),
             (content.link_scale, "scale", self._scale),
@@ -143,7 +143,7 @@ class PlanningSceneSource:
             for row in rows:
                 value, link = float(getattr(row, field)), str(row.link_name)
                 if not (0.0 <= value < 1e3 and (value > 0.0 or field == "padding")):
-                    scene.refuse(self._name, f"{field} of {link:.80}: expected a positive number, got {value}")
+                    scene.refuse(self.name, f"{field} of {link:.80}: expected a positive number, got {value}")
                 elif known.get(link) != value and len(known) < MOST_OBJECTS:
                     known[link] = value
                     self._is_changed = True
@@ -158,10 +158,10 @@ class PlanningSceneSource:
                 return
             content = collision_object(message, known.content if known else None)
         except CollisionMonitorError as error:
-            scene.refuse(self._name, f"{name:.80}: {error}")
+            scene.refuse(self.name, f"{name:.80}: {error}")
             return
         if known is None and len(self._world) >= MOST_OBJECTS:
-            scene.refuse(self._name, f"expected at most {MOST_OBJECTS} objects in the planning scene")
+            scene.refuse(self.name, f"expected at most {MOST_OBJECTS} objects in the planning scene")
             return
         if known is None or known.content.fingerprint != content.fingerprint:
             self._world[name] = WorldObject(self._id(name, scene), content)
@@ -189,7 +189,7 @@ class PlanningSceneSource:
             else:
                 content = collision_object(message.object, held.content if held else None)
         except CollisionMonitorError as error:
-            scene.refuse(self._name, f"{name:.80}: {error}")
+            scene.refuse(self.name, f"{name:.80}: {error}")
             return
         touch = frozenset(map(str, message.touch_links))
         same = held is not None and held.content.fingerprint == content.fingerprint
@@ -206,13 +206,13 @@ class PlanningSceneSource:
         self._is_changed = True
         link = self._robot.link_motion(held.link, stamp_ns, scene)
         if link is None or held.offset is None:
-            scene.refuse(self._name, f"{name:.80}: it was detached while the pose of {held.link} was not known")
+            scene.refuse(self.name, f"{name:.80}: it was detached while the pose of {held.link} was not known")
             scene.remove(held.object_id)
             return
         try:
             at = Pose(link.position, link.quaternion) @ held.offset
         except CollisionMonitorError as error:
-            scene.refuse(self._name, f"{name:.80}: {error}")
+            scene.refuse(self.name, f"{name:.80}: {error}")
             scene.remove(held.object_id)
             return
         content = CollisionObject(name, held.content.shapes, scene.frame, at)
@@ -244,7 +244,7 @@ class PlanningSceneSource:
                 try:
                     held.offset = self._offset(name, held, now_ns, scene, is_new)
                 except CollisionMonitorError as error:
-                    scene.refuse(self._name, f"{name:.80}: {error}")
+                    scene.refuse(self.name, f"{name:.80}: {error}")
                 self._is_changed |= held.offset is not None
                 self._waits |= held.offset is None
         if self._is_changed:
@@ -260,13 +260,13 @@ class PlanningSceneSource:
         frame = scene.frames.motion(scene.frame, it.content.frame or scene.frame, now_ns)
         if isinstance(frame, MissingFrame):
             if is_new:
-                scene.refuse(self._name, f"{name:.80}: {frame}")
+                scene.refuse(self.name, f"{name:.80}: {frame}")
             return
         try:
             it.at = Pose(frame.position, frame.quaternion) @ it.content.pose
-            scene.describe(self._describe(it.object_id, f"{self._name}/{name}", it.content.shapes, it.at))
+            scene.describe(self._describe(it.object_id, f"{self.name}/{name}", it.content.shapes, it.at))
         except CollisionMonitorError as error:
-            scene.refuse(self._name, f"{name:.80}: {error}")
+            scene.refuse(self.name, f"{name:.80}: {error}")
 
     def _offset(self, name: str, held: HeldObject, now_ns: int, scene: Scene, is_new: bool) -> Pose | None:
         """Return the pose of an attached object in the frame of its link; None, after a refusal, if it is not known."""
@@ -274,7 +274,7 @@ class PlanningSceneSource:
         assert robot is not None and robot.robot is not None
         if held.link not in robot.robot.tree.links:
             if is_new:
-                scene.refuse(self._name, f"{name:.80}: expected it at a link of {robot.name}, got {held.link!r:.80}")
+                scene.refuse(self.name, f"{name:.80}: expected it at a link of {robot.name}, got {held.link!r:.80}")
             return None
         if frame == held.link:
             return held.content.pose
@@ -284,7 +284,7 @@ class PlanningSceneSource:
             other = scene.frames.motion(scene.frame, frame or scene.frame, now_ns)
         if link is None or isinstance(other, MissingFrame):
             if is_new:
-                scene.refuse(self._name, f"{name:.80}: {other if link else f'the pose of {held.link} is not known'}")
+                scene.refuse(self.name, f"{name:.80}: {other if link else f'the pose of {held.link} is not known'}")
             return None
         between = link.inverse() @ other
         return Pose(between.position, between.quaternion) @ held.content.pose

@@ -151,7 +151,7 @@ class OdometryBase:
         turn_twists(states)
         state = states[0]
         moved = FrameMotion(state["position"], state["quaternion"], state["linear"], state["angular"], moving=True)
-        base = BaseMotion(frame @ moved @ back, _stddev(content))
+        base = BaseMotion(frame @ moved @ back, _stddev(content, name, scene))
         if not _is_near(base, name, scene):
             return
         self._last = base
@@ -211,11 +211,13 @@ def _advanced(base: BaseMotion, elapsed: float) -> BaseMotion:
     return BaseMotion(moved, stddev)
 
 
-def _stddev(odometry: Any) -> Floats:
+def _stddev(odometry: Any, name: str, scene: Scene) -> Floats:
     """Return standard deviations (4,) along the worst axes from the covariances of a message; 0 where it has none."""
     found = []
     for part in (odometry.pose, odometry.twist):
-        triangles, angular, _ = usable_blocks(np.asarray(part.covariance, np.float64).reshape(1, 36))
+        triangles, angular, valid = usable_blocks(np.asarray(part.covariance, np.float64).reshape(1, 36))
+        if not valid[0]:
+            scene.refuse(name, "base: expected symmetric covariances without negative eigenvalues; one was ignored")
         found.append((np.nan_to_num(worst_stddev(triangles))[0], angular[0]))
     (position, orientation), (velocity, turning) = found
     return np.array([position, orientation, velocity, turning])

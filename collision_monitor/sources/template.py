@@ -42,7 +42,7 @@ class Seen(NamedTuple):
 def sources_file(topics: Iterable[Seen], parents: dict[str, str]) -> str:
     """Return the text of a sources file. parents: the parent of each tf frame."""
     given = list(topics)
-    frames = [frame for each in given for frame in each.frames]
+    frames = [frame for each in given for frame in each.frames if frame]
     roots = sorted({*parents.values()} - parents.keys())
     frame = next(
         (name for name in ("map", "world", "odom") if name in [*roots, *frames]), (roots or frames or ["map"])[0]

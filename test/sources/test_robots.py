@@ -256,7 +256,7 @@ def test_time_that_jumps_back_begins_anew() -> None:
 def test_the_file_to_start_from_holds_the_robots_that_are_there() -> None:
     topics = [
         Seen("/robot_description", STRING),
-        Seen("/joint_states", "sensor_msgs/msg/JointState"),
+        Seen("/joint_states", "sensor_msgs/msg/JointState", ("",)),
         Seen("/monitored_planning_scene", "moveit_msgs/msg/PlanningScene"),
         Seen("/hall/cart_2/joint_states", "sensor_msgs/msg/JointState"),
         Seen("/hall/cart_2/odom", ODOMETRY, ("map",)),
@@ -274,7 +274,7 @@ def test_the_file_to_start_from_holds_the_robots_that_are_there() -> None:
     alone = yaml.safe_load(sources_file([Seen("/scene", "moveit_msgs/msg/PlanningScene")], {}))
     assert alone["objects"] == {"scene": {"topic": "/scene"}} and "robots" not in alone
     bolted = yaml.safe_load(sources_file(topics[:2], {}))
-    assert "objects" not in bolted and make_mapping(bolted)
+    assert "objects" not in bolted and make_mapping(bolted).frame == "map"
 
 
 def test_a_robot_without_joint_states_moves_with_its_frame_alone() -> None:
@@ -316,3 +316,10 @@ def test_a_bag_of_a_robot_is_imported(tmp_path: Path) -> None:
     imported = import_bag(bag, tmp_path / "run.mcap", load_mapping(tmp_path / "sources.yaml"))
     assert imported.whole and imported.steps == 5, imported
     assert imported.states["arm/hand"] == 5
+
+
+def test_a_covariance_of_the_base_that_is_none_is_ignored_and_counted() -> None:
+    played = Played({"urdf": str(MOBILE), "base": {"odometry": "/odom"}}, frame="odom")
+    played.send("/odom", ODOMETRY, odometry(START, base_row((0, 0, 0)), "base_link", -0.5), START)
+    assert any("base: expected symmetric covariances" in text for text in played.refusals)
+    assert played.states["arm/base_link"]["position_stddev"] == 0.0
