@@ -61,7 +61,7 @@ class LiveSources:
         wanted = dict.fromkeys(_TF, (TRANSFORMS,)) | self._feed.wanted
         self._wanted = {node.resolve_topic_name(topic): (topic, types) for topic, types in wanted.items()}
         self._found: dict[str, str] = {}  # topic of the file -> type
-        self._problems: dict[str, str] = {}  # the same -> why it cannot be used
+        self._problems: dict[str, str] = {}  # the same, or the name of a line -> why it cannot be used
         self._messages: dict[str, int] = {}
         self._out = node.create_publisher(DiagnosticArray, "~/sources", QoSProfile(depth=1))
         node.create_timer(SEARCH_PERIOD, self._search)
@@ -106,10 +106,10 @@ class LiveSources:
                 f"{self._line(topic)}: {topic} carries {kind}, and package {package} is not installed; "
                 f"`make interfaces` builds it, or install ros-<distro>-{package.replace('_', '-')}"
             ) from None
-        if topic in self._mapping.topics:
-            self._feed.bind(topic, kind)
         self._found[topic] = kind
         self._problems.pop(topic, None)
+        for name, text in self._feed.bind(topic, kind).items():
+            self._set_problem(name, text)
         self._node.create_subscription(
             message_class,
             resolved,
@@ -124,9 +124,9 @@ class LiveSources:
         entries = self._mapping.topics.get(topic, ())
         return entries[0].name if entries else self._feed.owners.get(topic, topic)
 
-    def _set_problem(self, topic: str, text: str) -> None:
-        if self._problems.get(topic) != text:
-            self._problems[topic] = text
+    def _set_problem(self, key: str, text: str) -> None:
+        if self._problems.get(key) != text:
+            self._problems[key] = text
             self._node.get_logger().error(self._mapping.located(text))
 
     # -- messages
@@ -155,8 +155,9 @@ class LiveSources:
         refused, refusal = scene.refused_by_name.get(name, 0), scene.last_refusal.get(name, "")
         parts = f"{name}_", f"{name}/"  # of a group, of a robot
         states = sum(count for other, count in scene.states.items() if other == name or other.startswith(parts))
-        if topic in self._problems:
-            level, text = DiagnosticStatus.ERROR, self._problems[topic]
+        problem = self._problems.get(name) or self._problems.get(topic)
+        if problem:
+            level, text = DiagnosticStatus.ERROR, problem
         elif topic not in self._found:
             level, text = DiagnosticStatus.WARN, f"{topic} has no publisher"
         elif not messages and topic not in _TF:

@@ -29,10 +29,10 @@ def usable_blocks(matrices: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     none = (full == 0.0).all((1, 2)) | (full[:, 0, 0] == -1.0)
     if none.all():  # the usual case of many drivers
         return np.full((len(full), 6), np.nan), np.zeros(len(full)), none
-    finite = np.isfinite(full).all((1, 2))
-    full = np.where((finite & ~none)[:, None, None], full, 0.0)
     unmeasured = np.diagonal(full, axis1=1, axis2=2) >= PLACEHOLDER
     full = np.where(unmeasured[:, :, None] | unmeasured[:, None, :], 0.0, full)
+    finite = (np.abs(full) < PLACEHOLDER).all((1, 2))  # no covariance exceeds both variances
+    full = np.where((finite & ~none)[:, None, None], full, 0.0)
     linear, angular = full[:, :3, :3][:, *_UPPER], full[:, 3:, 3:][:, *_UPPER]
     eigenvalues = np.linalg.eigvalsh(np.stack([squares(linear), squares(angular)]))
     scale = np.abs(eigenvalues).max(2)

@@ -17,6 +17,7 @@ from collision_monitor.pipeline.topics import Topic
 from collision_monitor.sources.frames import frame_name
 from collision_monitor.sources.kinds import BY_TYPE, SECTIONS
 from collision_monitor.sources.mapping import HEADER, Mapping
+from collision_monitor.sources.object_entry import ObjectEntry
 from collision_monitor.sources.robot_source import RobotSource
 from collision_monitor.sources.scene import Scene
 from collision_monitor.sources.source import RawMessage, Source
@@ -78,22 +79,30 @@ class Feed:
     @property
     def wanted(self) -> dict[str, tuple[str, ...]]:
         """The topics of the file with the types that each may carry."""
-        found = {topic: (entries[0].type,) if entries[0].type else tuple(BY_TYPE) for topic, entries in
-                 self.mapping.topics.items()}  # fmt: skip
+        found: dict[str, tuple[str, ...]] = {}
+        for topic, entries in self.mapping.topics.items():
+            found[topic] = tuple({entry.type: None for entry in entries if entry.type}) or tuple(BY_TYPE)
         for source in self._sources:
             found.update(source.topics)
         return found
 
-    def bind(self, topic: str, message_type: str) -> None:
-        """Make the sources of a topic of `objects:`. Raises InputError if the entries do not fit the type."""
+    def bind(self, topic: str, message_type: str) -> dict[str, str]:
+        """Make the sources of a topic of `objects:`. Return the reason for each entry that does not fit the type."""
+        problems = {}
         for entry in self.mapping.topics.get(topic, ()):
-            if entry.type and entry.type != message_type:
-                raise InputError(f"{entry.name}, type: expected {topic} to carry {entry.type}, got {message_type}")
-            if message_type not in BY_TYPE:
-                raise InputError(
-                    f"{entry.name}: expected {topic} to be one of {', '.join(BY_TYPE)}, got {message_type}"
-                )
-            self._add(BY_TYPE[message_type](entry, message_type, self.mapping), [topic])
+            try:
+                self._add(self._source(entry, message_type), [topic])
+            except InputError as error:
+                problems[entry.name] = str(error)
+        return problems
+
+    def _source(self, entry: ObjectEntry, message_type: str) -> Source:
+        if entry.type and entry.type != message_type:
+            raise InputError(f"{entry.name}, type: expected {entry.topic} to carry {entry.type}, got {message_type}")
+        if message_type not in BY_TYPE:
+            known = ", ".join(BY_TYPE)
+            raise InputError(f"{entry.name}: expected {entry.topic} to be one of {known}, got {message_type}")
+        return BY_TYPE[message_type](entry, message_type, self.mapping)
 
     def _add(self, source: Source, topics: Iterable[str]) -> None:
         self._sources.append(source)
@@ -179,8 +188,8 @@ class Feed:
         elif progress is Progress.REFUSED and self._has_own_steps:
             self.scene.refuse(
                 raw.topic,
-                f"stamp: expected one within {MAX_TIME_STEP:g} s of the others, got one that is "
-                f"{(stamp - self._timeline.now_ns) * 1e-9:.3f} s later",
+                f"stamp: expected one within {MAX_TIME_STEP:g} s of the others, got one further away: another clock, "
+                "or a jump that the next message confirms",
             )
             return
         for source in sources:

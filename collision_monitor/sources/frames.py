@@ -180,11 +180,10 @@ class FrameTree:
         if link.static:
             return FrameMotion(last[1], last[2], AT_REST, AT_REST)
         if not first[0] - self._max_age <= stamp_ns <= last[0] + self._max_age:
-            age = (stamp_ns - last[0]) if stamp_ns > last[0] else (first[0] - stamp_ns)
             side = "older" if stamp_ns > last[0] else "newer"
             return MissingFrame(
-                f"the transform from {link.parent!r} to {frame!r} is {age * _NANOSECOND:.3f} s {side} than the "
-                f"message; expected at most {self._max_age * _NANOSECOND:g} s"
+                f"the transform from {link.parent!r} to {frame!r} is {side} than the message by more than max_age, "
+                f"{self._max_age * _NANOSECOND:g} s"
             )
         if len(samples) == 1:
             return FrameMotion(last[1], last[2], AT_REST, AT_REST, twist_known=False, moving=True)

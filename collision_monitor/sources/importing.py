@@ -170,10 +170,8 @@ def _feed_of(bag: Bag, mapping: Mapping) -> Feed:
                 f"what can be mapped there is {', '.join(usable) or 'nothing'}"
             )
         if topic in mapping.topics:
-            try:
-                feed.bind(topic, bag.topics[topic])
-            except InputError as error:
-                raise SessionError(mapping.located(str(error))) from None
+            for problem in feed.bind(topic, bag.topics[topic]).values():
+                raise SessionError(mapping.located(problem))
         elif bag.topics[topic] not in types:
             raise SessionError(f"expected {topic} to carry {' or '.join(types)}, got {bag.topics[topic]}")
     return feed

@@ -14,7 +14,7 @@ from collision_monitor.sources.frames import IDENTITY, frame_name
 from collision_monitor.sources.mapping import Mapping
 from collision_monitor.sources.object_entry import ObjectEntry
 from collision_monitor.sources.scene import Scene
-from collision_monitor.sources.scene_states import carry, empty_states, turn_twists, turned_triangles
+from collision_monitor.sources.scene_states import carry, empty_states, squares, turn_twists, turned_triangles
 from collision_monitor.sources.yaml_table import SHAPES
 
 ODOMETRY: Final = "nav_msgs/msg/Odometry"
@@ -93,8 +93,6 @@ def put_pose(states: Any, pose: Any) -> None:
 
 def worst_stddev(triangles: Any) -> Any:
     """Return the standard deviations (N,) along the worst axes of covariances (N, 6); NaN where there is none."""
-    from collision_monitor.sources.scene_states import squares
-
     none = np.isnan(triangles).any(1)
     eigenvalues = np.linalg.eigvalsh(squares(np.where(none[:, None], 0.0, triangles)))
     return np.where(none, np.nan, np.sqrt(np.maximum(eigenvalues[:, 2], 0.0)))

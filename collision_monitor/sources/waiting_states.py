@@ -49,8 +49,12 @@ class WaitingStates:
         self._waits = np.zeros(0, np.bool_)
 
     def put(self, states: States, stamp_ns: int, covariance: Floats | None, window: float) -> None:
-        """Store states (N,), each id once. window: as in `Scene.observe`."""
+        """Store states (N,), each id once, unless a newer one waits. window: as in `Scene.observe`."""
         slots = self._slots_of(states["id"].tolist())
+        newer = self._waits[slots] & (self._stamps[slots] > stamp_ns)  # two publishers, or messages out of order
+        if newer.any():
+            slots, states = slots[~newer], states[~newer]
+            covariance = None if covariance is None else covariance[~newer]
         self._states[slots] = self._twists.completed(states, slots, stamp_ns, window)
         self._stamps[slots] = stamp_ns
         self._covariances[slots] = np.nan if covariance is None else covariance

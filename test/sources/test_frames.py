@@ -147,10 +147,8 @@ def test_what_is_missing_or_too_old_is_named() -> None:
         str(tree.motion("map", "mars", 0)) == "no transform from 'map' to 'mars'; frames known from tf: base, map, odom"
     )
     text = str(tree.motion("map", "base", 10 * SECOND))
-    assert text.startswith(
-        "the transform from 'map' to 'odom' is 10.000 s older than the message; expected at most 0.5 s"
-    )
-    assert "'odom' to 'base' is 10.000 s newer" in str(tree.motion("map", "base", 0))
+    assert text.startswith("the transform from 'map' to 'odom' is older than the message by more than max_age, 0.5 s")
+    assert "'odom' to 'base' is newer than the message" in str(tree.motion("map", "base", 0))
     assert isinstance(tree.motion("odom", "base", 10 * SECOND), FrameMotion)
 
 

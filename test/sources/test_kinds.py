@@ -81,6 +81,7 @@ def test_covariances_of_odometry_are_turned_to_the_axes_of_the_map(seed: int) ->
         (np.full((6, 6), np.nan), False),
         (np.diag([1.0, -2.0, 1, 1, 1, 1]), False),
         (np.triu(np.ones((6, 6))), False),
+        (np.eye(6) + 1e300 * (1 - np.eye(6)), False),
     ],
 )
 def test_covariances_that_are_none(matrix: Any, valid: bool) -> None:
@@ -164,7 +165,7 @@ def test_stamps_of_another_clock_are_refused_until_a_second_one_agrees() -> None
     drive(START)
     drive(START + 3600 * SECOND)
     assert list(fed.refused.values()) == [1]
-    assert "stamp: expected one within 10 s of the others, got one that is 3600.000 s later" in next(iter(fed.refused))
+    assert "stamp: expected one within 10 s of the others, got one further away" in next(iter(fed.refused))
     drive(START + STEP)
     drive(START - 100 * SECOND)
     drive(START - 100 * SECOND + STEP)  # a bag that is played again
@@ -187,6 +188,21 @@ def test_bad_numbers_reach_the_monitor_which_refuses_and_counts_them() -> None:
     fed.give("/p", START, pose_stamped("map", at(2), (2, 0, 0)))
     assert np.isnan(fed.rows["position"][0, 0])
     assert fed.rows["linear"][2].tolist() == pytest.approx([20, 0, 0])
+
+
+def test_a_message_that_comes_late_does_not_replace_a_newer_one() -> None:
+    fed = Fed({"cart": {"topic": "/odom", "shape": SPHERE}, "clock": {"topic": "/c", "shape": SPHERE}}, step="/c")
+    for k in (2, 1):
+        fed.give("/odom", START, odometry("map", at(k), (k, 0, 0), (0, 0, 0, 1), (0, 0, 0), (0, 0, 0)))
+    fed.give("/c", START, pose_stamped("map", at(3), (0, 0, 0)))
+    assert fed.rows["position"][0].tolist() == [2, 0, 0]
+
+
+def test_lines_of_one_topic_that_do_not_fit_leave_the_others() -> None:
+    fed = Fed({"good": {"topic": "/p", "shape": SPHERE}, "bad": {"topic": "/p"}})
+    problems = fed.feed.bind("/p", "geometry_msgs/msg/PoseStamped")
+    assert list(problems) == ["bad"]
+    assert "bad, shape: expected one of sphere" in problems["bad"]
 
 
 # -- tracks
@@ -290,8 +306,8 @@ def test_tracks_without_a_transform_become_stale_and_do_not_vanish() -> None:
         fed.give("/t", at(k), tracked_objects("base", at(k), track(1, (k, 0, 0))))
     assert fed.names == ["traffic_car_1"]
     assert len(fed.steps) == 21  # up to max_age, 1 s
-    assert sum(fed.refused.values()) == 19
-    assert all("'map' to 'base' is 1." in text and "older" in text for text in fed.refused)
+    text = "traffic: the transform from 'map' to 'base' is older than the message by more than max_age, 1 s"
+    assert fed.refused == {text: 19}
 
 
 # -- detections
