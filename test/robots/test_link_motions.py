@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
@@ -73,6 +73,7 @@ def generator(kind: str, axis: Any) -> Any:
     return S
 
 
+@settings(max_examples=40)
 @given(st.lists(joint, min_size=1, max_size=8))
 def test_motions_are_products_of_exponentials_and_their_derivatives(joints: list[Any]) -> None:
     text, facts = random_urdf(joints)
