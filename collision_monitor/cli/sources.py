@@ -29,7 +29,7 @@ examples:
 docs/sources.md explains every type and key.
 
 exit codes:
-  0  done; with --check: every line gives states and nothing was refused
+  0  done; with --check: every line got messages and nothing was refused
   1  the file cannot be used
   3  with --check: a line has a problem
 """
@@ -82,20 +82,21 @@ def _check(path: Path, seconds: float) -> int:
         where = mapping.lines.get(line.name)
         head = f"line {where}" if where else "tf"
         print(f"{head:>8}  {line.name}: {line.topic} {line.type or '(no publisher)'}")
-        print(f"          {line.messages} messages, {line.states} states, {line.refused} refused: {line.text}")
+        text = line.text.removeprefix(f"{line.name}: ")
+        print(f"          {line.messages} messages, {line.states} states, {line.refused} refused: {text}")
     return ExitCode.DONE if good else ExitCode.NOT_AS_EXPECTED
 
 
 def _print_list(found: list[TopicFacts]) -> None:
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Column, Table
 
-    table = Table("topic", "type", "rate", "messages", "frames", box=None)
+    table = Table("topic", Column("type", no_wrap=True), "rate", "frames", box=None)
     for each in found:
         frames = sorted(each.frames) or [f"{parent} → {child}" for child, parent in sorted(each.parents.items())[:6]]
         rate = f"{each.rate:.1f} Hz" if each.rate else "–"
         missing = "" if each.installed else " (package not installed: make interfaces)"
-        table.add_row(each.topic, each.type + missing, rate, str(each.messages), ", ".join(frames))
+        table.add_row(each.topic, each.type.replace("/msg/", "/") + missing, rate, ", ".join(frames))
     console = Console(stderr=True)
     console.print(table if found else "no topic of a type that the monitor understands has a publisher")
 
