@@ -6,6 +6,7 @@ position is within `gate`; the nearest pairs are taken first.
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
 import numpy as np
@@ -114,7 +115,7 @@ class DetectionSource:
             for track, (last_ns, position, velocity) in self._last.items():
                 if isinstance(track[1], int) and track[0] == _class(found[k]):
                     expected = position + velocity * (stamp_ns - last_ns) * 1e-9
-                    distance = float(np.linalg.norm(positions[k] - expected))
+                    distance = math.dist(positions[k], expected)
                     if distance <= self._entry.gate:
                         pairs.append((distance, k, track))
         for _, k, nearest in sorted(pairs):

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.geometry.pose import from_rotation_vector, multiply, rotation_matrix
+from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 
 Floats = NDArray[np.float64]
 
@@ -109,8 +110,9 @@ class FrameTree:
         self, parent: str, child: str, position: Floats, quaternion: Floats, stamp_ns: int, *, static: bool
     ) -> str | None:
         """Add the pose of a frame in its parent at a stamp. Return the reason if it cannot be used."""
-        length = float(np.sqrt(quaternion @ quaternion))
-        if not (np.isfinite(position).all() and abs(length - 1.0) <= 1e-3):
+        usable = np.abs(position).max() <= LARGEST_INPUT and np.abs(quaternion).max() <= 2.0  # False for NaN
+        length = float(np.sqrt(quaternion @ quaternion)) if usable else 0.0
+        if abs(length - 1.0) > UNIT_QUATERNION:
             return f"transform from {parent!r} to {child!r}: expected finite numbers and a unit quaternion"
         if parent == child:
             return f"transform from {parent!r} to itself"
