@@ -11,6 +11,7 @@
     query.time_of_impact           time_of_impact, Impact                 time of impact of two shapes, as an interval
     query.time_of_impact_batch     time_of_impact_batch, Impacts          the same for many motions of two shapes
     query.feature_impact           vertex_face_impact, edge_edge_impact   the same for features in linear motion
+    response                       response.collide, reflect, …           what bodies do when they meet, for simulations
     records                        Model                                  the geometric models of an object
     errors                         CollisionMonitorError and subclasses   errors of the inputs
 
@@ -67,9 +68,11 @@ _HOME = {
     "SessionError": "errors",
     "Refusal": "errors",
 }
-__all__ = ["__version__", *_HOME]
+_MODULES = ("response",)
+__all__ = ["__version__", *_MODULES, *_HOME]
 
 if TYPE_CHECKING:
+    from collision_monitor import response as response
     from collision_monitor.errors import CollisionMonitorError as CollisionMonitorError
     from collision_monitor.errors import InputError as InputError
     from collision_monitor.errors import MessageError as MessageError
@@ -114,6 +117,8 @@ if TYPE_CHECKING:
 
 def __getattr__(name: str) -> Any:
     """Import the name at its first use, so that `collision-monitor --help` does not wait for the kernels."""
+    if name in _MODULES:
+        return import_module(f"{__name__}.{name}")
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
