@@ -43,8 +43,9 @@ def bodies_collide_together(
     Elastic part: the velocities are mirrored at the contacts that close, all at once, until none closes, so a row of
     balls passes a hit on and two balls that hit a middle one from both sides bounce back alike. Inelastic part: the
     least impulses with which no contact closes. The answer is their mean, weighted with the restitution. Momentum is
-    conserved, energy never grows, and no contact closes. (Generalized Reflections: Smith, Kaufman, Vouga, Tamstorf,
-    Grinspun, "Reflections on Simultaneous Impact", 2012) Slide "Additional issues": handling multiple collisions.
+    conserved, energy never grows, and no contact closes; wedged bodies that no velocity parts stop. (Generalized
+    Reflections: Smith, Kaufman, Vouga, Tamstorf, Grinspun, "Reflections on Simultaneous Impact", 2012; slide
+    "Additional issues": handling multiple collisions)
     Raises InputError.
     """
     contacts.check(len(bodies.inverse_mass))

@@ -64,7 +64,7 @@ def _spring_steps(
     moved: Any, turned: Any, change: Any,
 ) -> None:  # fmt: skip
     """Semi-implicit Euler: all forces of a step from its start, so that the order of the contacts does not matter."""
-    for _ in range(steps):
+    for step in range(steps):
         change[:] = 0.0
         for k in range(len(a)):
             i, j = a[k], b[k]
@@ -78,7 +78,8 @@ def _spring_steps(
                 )  # fmt: skip
                 speed += slip * normal[k, c]
                 square += slip * slip
-            gap[k] += h * speed
+            if step > 0:
+                gap[k] += h * speed
             if gap[k] >= 0.0:
                 continue
             push = max(mass * frequency * (-frequency * gap[k] - damping * speed), 0.0)
