@@ -93,7 +93,8 @@ def time_of_impact(
     certain = upper <= query.horizon
     at = upper if certain else lower
     meeting = contact(a.shapes, a.motion.at(at), b.shapes, b.motion.at(at))
-    return Impact("hit" if certain else "unresolved", lower, upper if certain else math.inf, meeting)
+    used = Method(int(events[0]["method"]))
+    return Impact("hit" if certain else "unresolved", lower, upper if certain else math.inf, meeting, used)
 
 
 def check_query(horizon: float, tolerance: float, separation: float, iterations: int) -> MotionQuery:

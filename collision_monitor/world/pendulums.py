@@ -152,6 +152,11 @@ class Pendulums(Scene):
         swing = 0.5 * (ROD * self.rate_of_turn) ** 2 + self.options.gravity * ROD * (1.0 - np.cos(self.angle))
         return float(MASS * swing.sum())
 
+    @property
+    def penetration(self) -> float:
+        """Depth (m) of the deepest overlap of two neighbours."""
+        return max(-float(self._contacts()[1].min(initial=0.0)), 0.0)
+
     def states(self) -> States:
         """Return the current states, with the accelerations of the swing. See Scene."""
         states, still = state_array(self._ids), np.zeros(len(self.angle))
