@@ -20,8 +20,8 @@ from collision_monitor.cli.progress import progress_bar
 from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.world import make_scene
 from collision_monitor.world.impulse_response import ImpulseResponse
-from collision_monitor.world.pendulums import Pendulums
 from collision_monitor.world.penalty_response import PenaltyResponse
+from collision_monitor.world.pendulums import Pendulums
 from collision_monitor.world.response_choice import METHODS
 from collision_monitor.world.responses import Response
 from collision_monitor.world.rigid_bodies import RigidBodies
@@ -48,7 +48,7 @@ def drop(response: Response, seconds: float) -> tuple[Array, float]:
     """Heights (n,) of a ball of 0.1 m dropped from 1 m, every millisecond (m), and the cost (s per s)."""
     shapes = [Sphere(0.1), Box((4, 4, 1))]
     world = RigidBodies(
-        shapes, np.array([[0, 0, 1.1], [0, 0, -0.5]]), np.tile([0, 0, 0, 1.0], (2, 1)), np.array([False, True]), np.ones(2)
+        shapes, np.array([[0, 0, 1.1], [0, 0, -0.5]]), np.tile([0, 0, 0, 1.0], (2, 1)), np.arange(2) == 1, np.ones(2)
     )
     response.advance(world, 1e-6)
     begin, heights = time.process_time(), []
@@ -62,7 +62,8 @@ def stack(response: Response, seconds: float) -> tuple[float, float, float]:
     """Ten boxes of 1 m on each other: largest motion, largest speed in the last second, cost (s per s)."""
     places = [(0.02 * (-1) ** i, 0.01 * (i % 3), 0.5 + i) for i in range(10)] + [(0.0, 0.0, -0.5)]
     shapes = [Box((1, 1, 1))] * 10 + [Box((10, 10, 1))]
-    world = RigidBodies(shapes, np.array(places), np.tile([0, 0, 0, 1.0], (11, 1)), np.arange(11) == 10, np.full(11, 0.5))
+    turned = np.tile([0, 0, 0, 1.0], (11, 1))
+    world = RigidBodies(shapes, np.array(places), turned, np.arange(11) == 10, np.full(11, 0.5))
     response.advance(world, 1e-6)
     start, begin, fastest = world.position.copy(), time.process_time(), 0.0
     steps = int(100 * seconds)
