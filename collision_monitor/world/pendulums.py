@@ -31,11 +31,11 @@ STEP: Final = 1e-3
 """Longest step (s) of the swing, whose energy oscillates by about (2 pi STEP / period)² / 8 of itself."""
 SHORTEST: Final = 1e-5
 """Shortest step (s), with which a ball stops at the next one."""
-TOUCH: Final = 1e-8
+TOUCH: Final = 1e-6
 """Gap (m) of balls that touch."""
-SLOW: Final = 1e-6
+SLOW: Final = 1e-3
 """Speed (m/s) below which two balls do not shorten a step: they close less than TOUCH in it."""
-DEPTH: Final = 0.02
+DEPTH: Final = 0.1
 """Depth of a spring at the fastest swing, as part of the radius (responses penalty and damped)."""
 
 
