@@ -84,6 +84,12 @@ class Contacts(NamedTuple):
         of_a = bodies.velocity[a] + np.cross(bodies.angular[a], self.arm_a)
         return np.asarray(bodies.velocity[b] + np.cross(bodies.angular[b], self.arm_b) - of_a)
 
+    def fastest(self, bodies: Bodies) -> float:
+        """Largest speed component (m/s) of a contact point of either body."""
+        sides = ((self.a, self.arm_a), (self.b, self.arm_b))
+        speeds = [np.abs(bodies.velocity[k] + np.cross(bodies.angular[k], arm)).max(initial=0.0) for k, arm in sides]
+        return float(max(speeds))
+
     def take(self, which: Any) -> Contacts:
         """The contacts that a mask (M,) or indices select."""
         return Contacts(*(column[which] for column in self))

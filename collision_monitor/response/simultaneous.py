@@ -52,8 +52,7 @@ def bodies_collide_together(
     e = restitutions(restitution)
     if e.shape != (1,):
         raise InputError(f"restitution: expected one number for all contacts, got an array of shape {e.shape[:-1]}")
-    speed = float(max(np.abs(contacts.closing(bodies)).max(initial=0.0), np.abs(bodies.velocity).max(initial=0.0)))
-    closed = CLOSED * speed
+    closed = CLOSED * contacts.fastest(bodies)
     stopped, impulse = _stop(bodies, contacts, iterations, 1e-3 * closed)
     if e[0] == 0.0:
         return stopped, impulse

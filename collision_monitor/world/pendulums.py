@@ -35,6 +35,8 @@ TOUCH: Final = 1e-6
 """Gap (m) of balls that touch."""
 SLOW: Final = 1e-3
 """Speed (m/s) below which two balls do not shorten a step: they close less than TOUCH in it."""
+REST: Final = 1e-7
+"""Speed (m/s) below which balls that touch count as resting on each other."""
 DEPTH: Final = 0.1
 """Depth of a spring at the fastest swing, as part of the radius (responses penalty and damped)."""
 
@@ -102,7 +104,7 @@ class Pendulums(Scene):
                 self._stuck |= new
                 self._stick()
                 closing = contacts.closing(self._bodies())
-        elif (near & (closing > 0.0)).any():
+        elif (near & (closing > REST)).any():
             after, _ = bodies_collide_together(bodies, contacts.take(near), self.options.restitution)
             self.rate_of_turn = -after.angular[:, 1]
             closing = contacts.closing(self._bodies())
