@@ -16,7 +16,7 @@ ITERATIONS: Final = 10_000
 """Default limit of the passes over the contacts; a row of 10 equal balls takes 500."""
 
 ROUNDS: Final = 200
-"""Limit of the reflections. A row of n balls takes n; more happen only where round-off cannot settle."""
+"""Default limit of the reflections. A row of n balls takes n; more happen only where round-off cannot settle."""
 
 CLOSED: Final = 1e-10
 """A contact that closes slower than this part of the fastest speed counts as closed."""
@@ -36,7 +36,11 @@ def collide_together(
 
 
 def bodies_collide_together(
-    bodies: Bodies, contacts: Contacts, restitution: float = 1.0, iterations: int = ITERATIONS
+    bodies: Bodies,
+    contacts: Contacts,
+    restitution: float = 1.0,
+    iterations: int = ITERATIONS,
+    rounds: int = ROUNDS,
 ) -> tuple[Bodies, Array]:
     """Bodies after the impacts of all contacts, and the normal impulses (M,) in N s; without friction.
 
@@ -57,7 +61,7 @@ def bodies_collide_together(
     if e[0] == 0.0:
         return stopped, impulse
     mirrored, total = bodies, np.zeros(len(contacts.a))
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         which = np.flatnonzero(contacts.closing(mirrored) > closed)
         if not len(which):
             break

@@ -21,7 +21,7 @@ LONGEST: Final = 1 / 240
 """Longest substep (s)."""
 
 PARTS: Final = 16
-"""Parts of the longest substep: the shortest one, by which an impact may come early."""
+"""Usual parts of the longest substep: the shortest one, by which an impact may come early."""
 
 TOUCH: Final = 1e-6
 """Bodies nearer than this part of the smallest half extent touch."""
@@ -35,6 +35,9 @@ PUSH_OUT: Final = 0.2
 PASSES: Final = 200
 """Limit of the passes over the contacts in a substep."""
 
+ROUNDS: Final = 20
+"""Limit of the reflections of simultaneous impacts; bodies that are wedged in a pile stop after them."""
+
 
 class ImpulseResponse:
     """Advances bodies in substeps that end when the next two bodies meet.
@@ -44,8 +47,8 @@ class ImpulseResponse:
     of the last substep as the start, so that bodies at rest stay at rest.
     """
 
-    def __init__(self, restitution: float, gravity: float) -> None:
-        self._restitution, self._gravity = restitution, gravity
+    def __init__(self, restitution: float, gravity: float, parts: int = PARTS) -> None:
+        self._restitution, self._gravity, self._shortest = restitution, gravity, LONGEST / parts
         self._last: Touching | None = None
         self._force: Array = np.zeros((0, 3))
         self.residual = 0.0
@@ -58,7 +61,7 @@ class ImpulseResponse:
             left -= self._substep(world, left)
 
     def _substep(self, world: RigidBodies, left: float) -> float:
-        shortest, touch = LONGEST / PARTS, TOUCH * world.size
+        shortest, touch = self._shortest, TOUCH * world.size
         slow = max(2.0 * self._gravity * LONGEST, 1e-9)  # m/s: the speed that gravity gives while bodies rest
         travel = 2.0 * (world.fastest() + self._gravity * LONGEST) * LONGEST
         near = world.touching(max(travel, 0.02 * world.size))
@@ -100,7 +103,7 @@ class ImpulseResponse:
         label = groups(len(world.mass), np.stack([a[moves], b[moves]], axis=1))
         of = np.where(world.movable[a], label[a], label[b])
         which = np.flatnonzero(joined & np.isin(of, of[hits]))
-        after, impulse = bodies_collide_together(bodies, near.contacts.take(which), self._restitution, PASSES)
+        after, impulse = bodies_collide_together(bodies, near.contacts.take(which), self._restitution, PASSES, ROUNDS)
         earlier[which] = impulse
         return after
 

@@ -64,6 +64,7 @@ class Pendulums(Scene):
         first = k[:-1][(k[:-1] % ROW) < ROW - 1]
         self._pairs = np.stack([first, first + 1], axis=1)
         self._stuck = np.zeros(len(first), bool)
+        bodies_collide_together(self._bodies(), self._contacts()[0])  # compiles the kernel before the time begins
         self.descriptions = [ObjectDescription(int(i), Sphere(RADIUS), f"ball_{i}") for i in self._ids]
 
     def _offset(self) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import ceil
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -30,12 +30,14 @@ ROOM_ABOVE: Final = 1.0
 class Pile(RigidScene):
     """Scene "pile": ids 1..n, boxes and spheres in turn; then four walls and the floor."""
 
+    parts: ClassVar[int] = 2
+
     def __init__(
         self, objects: int | None, seed: int, rate: float | None, choice: ResponseChoice = AS_USUAL
     ) -> None:
         self.name = "pile"
         self.rate = positive_rate(rate, 100.0)
-        count = object_count(objects, 30, 1, 500, self.name)
+        count = object_count(objects, 20, 1, 500, self.name)
         random = np.random.default_rng(seed)
         k = np.arange(count)
         side = max(SIDE, ceil((count / 4) ** (1 / 3)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from collision_monitor.world.impulse_response import ImpulseResponse
+from collision_monitor.world.impulse_response import PARTS, ImpulseResponse
 from collision_monitor.world.penalty_response import PenaltyResponse
 from collision_monitor.world.response_choice import ResponseOptions
 from collision_monitor.world.rigid_bodies import RigidBodies
@@ -18,8 +18,11 @@ class Response(Protocol):
         """Advance the bodies by `dt` seconds."""
 
 
-def make_response(options: ResponseOptions, speed: float) -> Response:
-    """The response of the options; speed (m/s): the fastest that the scene expects, for which springs are made."""
+def make_response(options: ResponseOptions, speed: float, parts: int = PARTS) -> Response:
+    """The response of the options; speed (m/s): the fastest that the scene expects, for which springs are made.
+
+    parts: of a substep, into which impulses divide it where bodies meet.
+    """
     match options.response:
         case "penalty":
             return PenaltyResponse(1.0, options.gravity, speed)
@@ -27,4 +30,4 @@ def make_response(options: ResponseOptions, speed: float) -> Response:
             return PenaltyResponse(options.restitution, options.gravity, speed)
         case "stick":
             return StickResponse(options.gravity)
-    return ImpulseResponse(options.restitution, options.gravity)
+    return ImpulseResponse(options.restitution, options.gravity, parts)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
+from collision_monitor.world.impulse_response import PARTS
 from collision_monitor.world.response_choice import ResponseOptions
 from collision_monitor.world.responses import make_response
 from collision_monitor.world.rigid_bodies import RigidBodies
@@ -21,8 +22,18 @@ GROUND: Final = 2
 """Group of the bodies that carry others. The moving ones do not look for them, as they always touch."""
 
 
+def _small_world() -> RigidBodies:
+    """Two boxes and a ball that touch; a step of them compiles all kernels, so that a scene does not wait later."""
+    places = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 2.0]])
+    shapes = (Box((1, 1, 1)), Box((1, 1, 1)), Sphere(0.5))
+    return RigidBodies(shapes, places, np.tile([0.0, 0.0, 0.0, 1.0], (3, 1)), np.arange(3) == 0, np.ones(3))
+
+
 class RigidScene(Scene):
     """Moving bodies with ids 1..n, followed by the static ones. `options` choose the response."""
+
+    parts: ClassVar[int] = PARTS
+    """Parts of a substep where bodies meet; few in a scene of many impacts, so that it runs in real time."""
 
     def _build(
         self, moving: Sequence[tuple[str, Sphere | Box]], position: Array, friction: Array,
@@ -33,7 +44,7 @@ class RigidScene(Scene):
         position (n, 3) m and friction (n,) of the moving ones; speed (m/s): the fastest that the scene expects.
         """
         count = len(moving)
-        self.options, self._response = options, make_response(options, speed)
+        self.options, self._response = options, make_response(options, speed, self.parts)
         shapes: list[Sphere | Box] = [shape for _, shape in moving] + [shape for _, shape, _, _ in static]
         poses = [pose for _, _, pose, _ in static]
         places = np.concatenate([position, [pose.position for pose in poses]])
@@ -41,6 +52,7 @@ class RigidScene(Scene):
         turned[count:] = [pose.quaternion for pose in poses]
         still: NDArray[np.bool_] = np.arange(len(shapes)) >= count
         self.world = RigidBodies(shapes, places, turned, still, np.concatenate([friction, np.ones(len(static))]))
+        make_response(options, speed).advance(_small_world(), 1e-6)
         self._ids = np.arange(1, count + 1, dtype=np.uint32)
         self.descriptions = [
             ObjectDescription(k + 1, shape, name, mask=1) for k, (name, shape) in enumerate(moving)

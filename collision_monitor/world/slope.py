@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import cos, radians, sin
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -31,6 +31,8 @@ LANES: Final = 8
 
 class Slope(RigidScene):
     """Scene "slope": ids 1..n, every third a sphere. Downhill is +x; the foot of the slope is the origin."""
+
+    parts: ClassVar[int] = 2
 
     def __init__(
         self, objects: int | None, seed: int, rate: float | None, choice: ResponseChoice = AS_USUAL
