@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from collision_monitor.cli.quantities import positive, whole
+from collision_monitor.cli.quantities import not_negative, positive, whole
 from collision_monitor.cli.ros_arguments import parameters
 from collision_monitor.errors import InputError
 from collision_monitor.pipeline.topics import NODE
@@ -57,10 +57,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="standard deviation of the states, which declare it (m, rad, m/s, rad/s)",
     )
     parser.add_argument(
-        "--restitution", type=float, metavar="E", help="bounce of bodies that respond, 0 (none) to 1 (elastic)"
+        "--restitution", type=not_negative, metavar="E", help="bounce of bodies that respond, 0 (none) to 1 (elastic)"
     )
     parser.add_argument(
-        "--gravity", type=float, metavar="G", help="gravity along -z in these scenes (m/s², default: 9.81)"
+        "--gravity", type=not_negative, metavar="G", help="gravity along -z in these scenes (m/s², default: 9.81)"
     )
     parser.add_argument(
         "--response", choices=METHODS, help="what bodies do when they meet in these scenes (default: impulse)"

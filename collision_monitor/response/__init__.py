@@ -5,7 +5,7 @@
     penalty        penalty_force, spring_stiffness, damping_for  a spring and a damper that push bodies apart
     mass           mass_properties, MassProperties               mass, centre and inertia of a shape
     rotation       collide_rotating, RigidBody                   impulse at the contact point, with friction
-    simultaneous   collide_together                              all contacts of one instant, symmetric
+    simultaneous   collide_together, bodies_collide_together     all contacts of one instant, symmetric
     resting        hold_contacts, ContactImpulses                contacts under load, with friction
     contact_set    Bodies, Contacts                              the arrays that the last two take
     bonded         move_as_one                                   bodies that stay together and turn as one
@@ -23,7 +23,7 @@ from collision_monitor.response.penalty import damping_for, penalty_force, sprin
 from collision_monitor.response.planes import clamp, last_free, reflect
 from collision_monitor.response.resting import ContactImpulses, hold_contacts
 from collision_monitor.response.rotation import RigidBody, collide_rotating
-from collision_monitor.response.simultaneous import collide_together
+from collision_monitor.response.simultaneous import bodies_collide_together, collide_together
 from collision_monitor.response.two_bodies import average, collide, stick, swap
 
 __all__ = [
@@ -33,6 +33,7 @@ __all__ = [
     "MassProperties",
     "RigidBody",
     "average",
+    "bodies_collide_together",
     "clamp",
     "collide",
     "collide_rotating",
