@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from collision_monitor.world.collision_response import bounce_between_walls, collide
+from collision_monitor.response.two_bodies import collide
+from collision_monitor.world.collision_response import bounce_between_walls
 from collision_monitor.world.hard_spheres.simulation import HardSpheres, carnahan_starling
 from collision_monitor.world.hard_spheres.starting_points import overlapping
 from collision_monitor.world.hard_spheres.time_step import step_spheres
