@@ -111,7 +111,8 @@ def _bench_hard_spheres(args: argparse.Namespace) -> int:
 
     for name in ("frames", "threads", "broad_phase"):
         if getattr(args, name) is not None:
-            raise InputError(f"--{name.replace('_', '-')}: expected no value with hard-spheres, which has one event list and one thread")
+            option = name.replace("_", "-")
+            raise InputError(f"--{option}: expected no value with hard-spheres, which has one event list and one thread")
     result = measure_collision_rate(args.n, PACKING if args.packing is None else args.packing, args.seed)
     if args.json:
         print(json.dumps(result))
