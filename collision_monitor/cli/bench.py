@@ -112,7 +112,7 @@ def _bench_hard_spheres(args: argparse.Namespace) -> int:
     for name in ("frames", "threads", "broad_phase"):
         if getattr(args, name) is not None:
             option = name.replace("_", "-")
-            raise InputError(f"--{option}: expected no value with hard-spheres, which has one event list and one thread")
+            raise InputError(f"--{option}: expected no value with hard-spheres: one event list, one thread")
     result = measure_collision_rate(args.n, PACKING if args.packing is None else args.packing, args.seed)
     if args.json:
         print(json.dumps(result))
