@@ -48,6 +48,10 @@ _HOME = {
     "Contact": "query.contact",
     "contact_features": "query.features",
     "overlap": "query.overlap",
+    "distance": "query.distance",
+    "contacts": "query.contacts",
+    "Contacts": "query.contacts",
+    "times_of_impact": "query.times_of_impact",
     "convex_decomposition": "objects.convex_decomposition",
     "Decomposition": "objects.convex_decomposition",
     "time_of_impact": "query.time_of_impact",
@@ -99,6 +103,9 @@ if TYPE_CHECKING:
     from collision_monitor.objects.description import ObjectDescription as ObjectDescription
     from collision_monitor.query.contact import Contact as Contact
     from collision_monitor.query.contact import contact as contact
+    from collision_monitor.query.contacts import Contacts as Contacts
+    from collision_monitor.query.contacts import contacts as contacts
+    from collision_monitor.query.distance import distance as distance
     from collision_monitor.query.feature_impact import FeatureImpact as FeatureImpact
     from collision_monitor.query.feature_impact import edge_edge_impact as edge_edge_impact
     from collision_monitor.query.feature_impact import vertex_face_impact as vertex_face_impact
@@ -108,6 +115,7 @@ if TYPE_CHECKING:
     from collision_monitor.query.time_of_impact import time_of_impact as time_of_impact
     from collision_monitor.query.time_of_impact_batch import Impacts as Impacts
     from collision_monitor.query.time_of_impact_batch import time_of_impact_batch as time_of_impact_batch
+    from collision_monitor.query.times_of_impact import times_of_impact as times_of_impact
     from collision_monitor.records import Model as Model
     from collision_monitor.settings.profile import Profile as Profile
 

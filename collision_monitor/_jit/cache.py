@@ -13,8 +13,6 @@ import os
 import sys
 from pathlib import Path
 
-import numba
-
 from collision_monitor._jit.imports import source_file, with_dependencies
 
 
@@ -27,6 +25,10 @@ def _file_digest(module: str) -> bytes:
 @functools.cache
 def folder(module: str) -> str:
     """Return the cache folder of the kernels of `module`, a dotted name."""
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        return str(Path(chosen) / module)
+    import numba
+
     digest = hashlib.blake2b(f"{numba.__version__} {sys.version_info[:2]}".encode(), digest_size=8)
     for name in with_dependencies(module):
         digest.update(name.encode() + _file_digest(name))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,10 @@ from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape
-from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, as_contacts
+from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B, as_contacts
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.objects.models import containing_model, parse_model
+from collision_monitor.query.convex_pairs import convex_contact
 from collision_monitor.query.nearest_pieces import NearestPieces
 from collision_monitor.query.piece_table import PieceTable, exact_piece_table, piece_table
 from collision_monitor.records import Model
@@ -31,6 +32,10 @@ Array = NDArray[np.float64]
 Compound = Shape | Sequence[tuple[Shape, Pose]]
 
 _DIRECTIONS: Final = [sign * np.array(d) / np.linalg.norm(d) for d in KDOP_DIRECTIONS[26] for sign in (1.0, -1.0)]
+
+_COLUMNS: Final = {"normal": NORMAL, "point_a": POINT_A, "point_b": POINT_B}
+_new, _set = object.__new__, object.__setattr__
+
 
 def _patch(found: NearestPieces, witness: Array) -> Array:
     """Corners (k, 3) on A of the patch of all pieces that touch in one plane; a floor of triangles is one face."""
@@ -68,7 +73,19 @@ class Contact:
     point_b: Array
     model_a: Model
     model_b: Model
-    _found: NearestPieces | None = field(repr=False)  # source of the patch; None: the two points alone
+    # source of the patch: the search, or for convex solids its arguments; None: the two points alone
+    _found: NearestPieces | tuple[Shape, Pose, Shape, Pose] | None = field(repr=False)
+
+    def __getattr__(self, name: str) -> Any:
+        """Read a field of the contact of two convex solids from its row, once."""
+        if name in ("model_a", "model_b"):
+            value: Any = Model.EXACT
+        elif name in _COLUMNS and "_row" in vars(self):
+            value = vars(self)["_row"][_COLUMNS[name] : _COLUMNS[name] + 3]
+        else:
+            raise AttributeError(name)
+        vars(self)[name] = value
+        return value
 
     @property
     def overlaps(self) -> bool:
@@ -81,7 +98,9 @@ class Contact:
 
         Otherwise `point_a` alone. Computed on first access.
         """
-        return self.point_a[None] if self._found is None else _patch(self._found, self.point_a)
+        if self._found is None:
+            return self.point_a[None]
+        return _patch(self._found if isinstance(self._found, NearestPieces) else _nearest(*self._found), self.point_a)
 
     @cached_property
     def points_b(self) -> Array:
@@ -110,6 +129,8 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
     bound extends to a translation that certainly parts them.
     Raises ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, or a model that is not available.
     """
+    if model == "exact" and (found := convex_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
+        return _of_row(found, (shape_a, pose_a, shape_b, pose_b))
     a, b = _posed(shape_a, pose_a, model, "A"), _posed(shape_b, pose_b, model, "B")
     planes = {is_planar(shape) for shape, _ in (*a.shapes, *b.shapes)}
     if len(planes) > 1:
@@ -148,6 +169,20 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
         model_b=b.model,
         _found=None if enclosed or unbounded else found,
     )
+
+
+def _of_row(found: tuple[float, float, Array], arguments: Any) -> Contact:
+    """Contact of two convex solids. Its arrays are made when they are read, which takes as long as the kernel."""
+    made = _new(Contact)
+    _set(made, "__dict__", {"signed_distance": found[0], "error_bound": found[1], "_row": found[2], "_found": arguments})
+    return made
+
+
+def _nearest(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -> NearestPieces:
+    """Search for the nearest pieces of exact shapes, relative to A's origin."""
+    a, b = _posed(shape_a, pose_a, Model.EXACT, "A"), _posed(shape_b, pose_b, Model.EXACT, "B")
+    offset = b.pose.position - a.pose.position
+    return NearestPieces(a.pieces, (a.rotation, np.zeros(3)), b.pieces, (b.rotation, offset))
 
 
 def _posed(shape: Compound, pose: Pose, model: Model | str, name: str) -> _Posed:

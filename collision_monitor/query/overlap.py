@@ -14,6 +14,7 @@ from collision_monitor.geometry.polyhedron_sat import sat_3d
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape
 from collision_monitor.query.contact import Compound, contact
+from collision_monitor.query.convex_pairs import convex_contact
 
 TESTS: Final = ("contact", "cascade", "sat")
 
@@ -27,6 +28,8 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
     shape that the test does not take.
     """
     if test == "contact":
+        if (found := convex_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
+            return found[0] <= 0.0
         return contact(shape_a, pose_a, shape_b, pose_b).overlaps
     if test not in TESTS:
         raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")

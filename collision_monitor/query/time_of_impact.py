@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from collision_monitor.geometry.shapes import HalfSpace
 from collision_monitor.prediction.impact_record import HIT
 from collision_monitor.query.arguments import finite_number, whole_number
 from collision_monitor.query.contact import Compound, Contact, contact
+from collision_monitor.query.convex_pairs import convex_impact
 from collision_monitor.query.moving_pair import MotionQuery, MovingShape, first_impacts, lay_out_pair, make_moving_shape
 from collision_monitor.query.touching import follow
 from collision_monitor.tolerances import GJK_TOUCHING
@@ -36,6 +37,16 @@ class Impact:
     lower: float
     upper: float
     contact: Contact | None
+
+    def __getattr__(self, name: str) -> Any:
+        """Compute the contact when it is first read: it takes as long as the search for the time."""
+        if name != "contact" or "_arguments" not in vars(self):
+            raise AttributeError(name)
+        shape_a, motion_a, shape_b, motion_b = vars(self)["_arguments"]
+        at = self.upper if self.upper < math.inf else self.lower
+        found = contact(shape_a, motion_a.at(at), shape_b, motion_b.at(at))
+        vars(self)["contact"] = found
+        return found
 
 
 _CLEAR: Final = Impact("clear", math.inf, math.inf, None)
@@ -60,6 +71,9 @@ def time_of_impact(
     Raises InputError, ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, two HalfSpaces.
     """
     query = check_query(horizon, tolerance, separation, iterations)
+    found = convex_impact(shape_a, motion_a, shape_b, motion_b, query)
+    if found is not None:
+        return _of_times(found, (shape_a, motion_a, shape_b, motion_b))
     a, b = make_moving_shape(shape_a, motion_a, "A"), make_moving_shape(shape_b, motion_b, "B")
     check_bounded(a, b)
     start = contact(a.shapes, a.motion.pose, b.shapes, b.motion.pose)
@@ -81,6 +95,17 @@ def time_of_impact(
     at = upper if certain else lower
     meeting = contact(a.shapes, a.motion.at(at), b.shapes, b.motion.at(at))
     return Impact("hit" if certain else "unresolved", lower, upper if certain else math.inf, meeting)
+
+
+def _of_times(times: tuple[float, float], arguments: tuple[Any, Any, Any, Any]) -> Impact:
+    lower, upper = times
+    if lower == math.inf:
+        return _CLEAR
+    made = object.__new__(Impact)
+    made.__dict__.update(
+        status="hit" if upper < math.inf else "unresolved", lower=lower, upper=upper, _arguments=arguments
+    )
+    return made
 
 
 def check_query(horizon: float, tolerance: float, separation: float, iterations: int) -> MotionQuery:

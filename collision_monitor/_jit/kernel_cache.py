@@ -1,0 +1,133 @@
+"""Cache of one function: a file for each combination of argument types and processor, in the folder of its module.
+
+numba's own cache first imports everything that a compilation needs (SciPy's linear algebra, 0.3 s), parses the
+intermediate code beside the machine code, and checks the time of the source file. Here a kernel from the cache is its
+machine code, and the folder's name stands for the source (`cache.py`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import pickle
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import llvmlite.binding as llvm
+from numba.core.caching import NullCache
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompileResult
+from numba.core.runtime import rtsys
+from numba.core.serialize import dumps
+
+from collision_monitor._jit.cache import folder
+
+DEVICE: Final = "device"
+
+
+class KernelCache(NullCache):  # type: ignore[misc]
+    """Loads and saves the overloads of a function; what cannot be read is compiled again."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._folder = Path(folder(function.__module__))
+        self._name = f"{function.__qualname__.replace('<locals>.', '')}-{function.__code__.co_firstlineno}"
+
+    @property
+    def cache_path(self) -> str:
+        """The folder of the module's kernels."""
+        return str(self._folder)
+
+    def _file(self, signature: Any, target: Any) -> Path:
+        types = getattr(signature, "args", signature)
+        key = repr((tuple(types), target.codegen().magic_tuple()))
+        return self._folder / f"{self._name}-{hashlib.blake2b(key.encode(), digest_size=8).hexdigest()}.kernel"
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the compiled function, or None if it has to be compiled."""
+        with contextlib.suppress(OSError, EOFError, ValueError, pickle.UnpicklingError):
+            data = self._file(sig, target_context).read_bytes()
+            digest, data = data[:16], data[16:]
+            if hashlib.blake2b(data, digest_size=16).digest() == digest:  # not cut off by a full disk
+                rtsys.initialize(target_context)
+                return _rebuild(target_context, pickle.loads(data))
+        target_context.refresh()
+        return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Save a compiled function; a disk without space costs only the next compilation."""
+        if data.library.has_dynamic_globals or any(not lifted.can_cache for lifted in data.lifted):
+            return
+        file = self._file(sig, data.target_context)
+        content = dumps(data._reduce())
+        with contextlib.suppress(OSError):
+            file.parent.mkdir(parents=True, exist_ok=True)
+            handle, temporary = tempfile.mkstemp(dir=file.parent, prefix=file.name)
+            try:
+                with os.fdopen(handle, "wb") as stream:
+                    stream.write(hashlib.blake2b(content, digest_size=16).digest() + content)
+                os.replace(temporary, file)
+            except OSError:
+                os.unlink(temporary)
+
+
+def _rebuild(target: Any, content: Any) -> Any:
+    """The compile result as numba's `CompileResult._rebuild` makes it, with a library that loads no more than needed."""
+    (name, kind, code), fndesc, env, signature, objectmode, lifted, annotation, reload_init, environments = content
+    library = LoadedLibrary(target.codegen(), name, kind, code)
+    entry_point = target.get_executable(library, fndesc, env)
+    result = CompileResult(
+        target_context=target,
+        typing_context=target.typing_context,
+        library=library,
+        environment=env,
+        entry_point=entry_point,
+        fndesc=fndesc,
+        type_annotation=annotation,
+        signature=signature,
+        objectmode=objectmode,
+        lifted=lifted,
+        typing_error=None,
+        call_helper=None,
+        metadata=None,
+        reload_init=reload_init,
+        referenced_envs=environments,
+    )
+    for environment in environments:
+        library.codegen.set_env(environment.env_name, environment)
+    return result
+
+
+class LoadedLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """A function from the cache: machine code of a kernel, or intermediate code of a device function."""
+
+    def __init__(self, codegen: Any, name: str, kind: str, code: Any) -> None:
+        super().__init__(codegen, name)
+        self._finalized = True
+        self._is_device = kind == DEVICE
+        self._bitcode = code if self._is_device else code[1]
+        if not self._is_device:
+            codegen._engine._ee.add_object_file(llvm.ObjectFileRef.from_data(code[0]))
+
+    @property
+    def codegen(self) -> Any:
+        """The code generator as numba's `get_executable` uses it."""
+        return self if self._is_device else self._codegen
+
+    def set_env(self, name: str, environment: Any) -> None:
+        """Without machine code there is no place for the environment."""
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return the address of a function of the machine code."""
+        return 0 if self._is_device else self._codegen._engine.get_function_address(name)
+
+    def _get_module_for_linking(self) -> Any:
+        if self._shared_module is None:
+            self._shared_module = llvm.parse_bitcode(self._bitcode)
+        return self._shared_module
+
+    def serialize_using_object_code(self) -> Any:
+        """Only compiled functions are saved."""
+        raise NotImplementedError
