@@ -61,6 +61,7 @@ _HOME = {
     "vertex_face_impact": "query.feature_impact",
     "edge_edge_impact": "query.feature_impact",
     "FeatureImpact": "query.feature_impact",
+    "plot": "report.contact_plot",
     "CollisionMonitorError": "errors",
     "InputError": "errors",
     "ShapeError": "errors",
@@ -70,6 +71,7 @@ _HOME = {
     "MessageError": "errors",
     "SessionError": "errors",
     "Refusal": "errors",
+    "RefusalWarning": "errors",
 }
 __all__ = ["__version__", *_HOME]
 
@@ -80,6 +82,7 @@ if TYPE_CHECKING:
     from collision_monitor.errors import PoseError as PoseError
     from collision_monitor.errors import ProfileError as ProfileError
     from collision_monitor.errors import Refusal as Refusal
+    from collision_monitor.errors import RefusalWarning as RefusalWarning
     from collision_monitor.errors import SessionError as SessionError
     from collision_monitor.errors import ShapeError as ShapeError
     from collision_monitor.errors import UnsupportedError as UnsupportedError
@@ -117,6 +120,7 @@ if TYPE_CHECKING:
     from collision_monitor.query.time_of_impact_batch import time_of_impact_batch as time_of_impact_batch
     from collision_monitor.query.times_of_impact import times_of_impact as times_of_impact
     from collision_monitor.records import Model as Model
+    from collision_monitor.report.contact_plot import plot as plot
     from collision_monitor.settings.profile import Profile as Profile
 
 

@@ -37,6 +37,10 @@ class SessionError(CollisionMonitorError):
     """A recording cannot be opened, read or written."""
 
 
+class RefusalWarning(UserWarning):
+    """A step refused an input; the text says what was expected."""
+
+
 class Refusal(Enum):
     """Reason for which the monitor refused an input; the status counts each as `refused_<value>`."""
 

@@ -50,7 +50,7 @@ def _step_uncertain(monitor: Monitor, poses: NDArray[np.float64]) -> None:
     states["position"], states["quaternion"] = poses[:, :3], poses[:, 3:]
     states["position_stddev"] = states["orientation_stddev"] = 0.1
     monitor.step(3_010_000_000, states)
-    monitor.add(2, Sphere(0.5), max_linear_acceleration=1.0)
+    monitor.add(2, Sphere(0.5), max_linear_acceleration=1.0, replace=True)
     monitor.step(3_020_000_000, states, covariance=np.zeros((len(poses), 12)))
 
 

@@ -13,19 +13,17 @@ import os
 import pickle
 import tempfile
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-import llvmlite.binding as llvm
 from numba.core.caching import NullCache
-from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompileResult
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from collision_monitor._jit.cache import folder
-
-DEVICE: Final = "device"
+from collision_monitor._jit.libraries import LoadedLibrary
 
 
 class KernelCache(NullCache):  # type: ignore[misc]
@@ -74,9 +72,12 @@ class KernelCache(NullCache):  # type: ignore[misc]
 
 
 def _rebuild(target: Any, content: Any) -> Any:
-    """The compile result as numba's `CompileResult._rebuild` makes it, with a library that loads no more than needed."""
-    (name, kind, code), fndesc, env, signature, objectmode, lifted, annotation, reload_init, environments = content
-    library = LoadedLibrary(target.codegen(), name, kind, code)
+    """The compile result as numba's `CompileResult._rebuild` makes it, with a library that loads what it needs."""
+    code, fndesc, env, signature, objectmode, lifted, annotation, reload_init, environments = content
+    library = LoadedLibrary(target.codegen(), *code)
+    for module, name, types in library.refers_to:
+        function = getattr(import_module(module), name)
+        function.dispatcher.compile(types)  # loads it, too
     entry_point = target.get_executable(library, fndesc, env)
     result = CompileResult(
         target_context=target,
@@ -98,36 +99,3 @@ def _rebuild(target: Any, content: Any) -> Any:
     for environment in environments:
         library.codegen.set_env(environment.env_name, environment)
     return result
-
-
-class LoadedLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """A function from the cache: machine code of a kernel, or intermediate code of a device function."""
-
-    def __init__(self, codegen: Any, name: str, kind: str, code: Any) -> None:
-        super().__init__(codegen, name)
-        self._finalized = True
-        self._is_device = kind == DEVICE
-        self._bitcode = code if self._is_device else code[1]
-        if not self._is_device:
-            codegen._engine._ee.add_object_file(llvm.ObjectFileRef.from_data(code[0]))
-
-    @property
-    def codegen(self) -> Any:
-        """The code generator as numba's `get_executable` uses it."""
-        return self if self._is_device else self._codegen
-
-    def set_env(self, name: str, environment: Any) -> None:
-        """Without machine code there is no place for the environment."""
-
-    def get_pointer_to_function(self, name: str) -> int:
-        """Return the address of a function of the machine code."""
-        return 0 if self._is_device else self._codegen._engine.get_function_address(name)
-
-    def _get_module_for_linking(self) -> Any:
-        if self._shared_module is None:
-            self._shared_module = llvm.parse_bitcode(self._bitcode)
-        return self._shared_module
-
-    def serialize_using_object_code(self) -> Any:
-        """Only compiled functions are saved."""
-        raise NotImplementedError

@@ -105,6 +105,10 @@ class Roster(Stage):
         """The ids of all described objects, ascending."""
         return sorted(self._slots)
 
+    def __contains__(self, object_id: int) -> bool:
+        """Whether an object with this id is described."""
+        return object_id in self._slots
+
     def __len__(self) -> int:
         """Number of described objects."""
         return len(self._slots)

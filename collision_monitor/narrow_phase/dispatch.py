@@ -215,7 +215,7 @@ def _mirror(out: Any, p: Vector) -> None:
 
 
 @merged
-def pair_contact(table: Any, a: int, b: int, pose: PairPose, out: Any, work: Any) -> None:
+def pair_contact(table: Any, a: Any, b: Any, pose: PairPose, out: Any, work: Any) -> None:
     """Write the contact of shapes a and b to `out` (see contact_row.py)."""
     contact_within(table, a, b, pose, inf, out, work)
 

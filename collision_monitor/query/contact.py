@@ -56,7 +56,7 @@ def _patch(found: NearestPieces, witness: Array) -> Array:
     return np.asarray(patch + (witness - best["point_a"] - found.position[found.pair[0]]))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Contact:
     """Contact of two shapes in the world frame, lengths in m.
 
@@ -73,19 +73,35 @@ class Contact:
     point_b: Array
     model_a: Model
     model_b: Model
-    # source of the patch: the search, or for convex solids its arguments; None: the two points alone
-    _found: NearestPieces | tuple[Shape, Pose, Shape, Pose] | None = field(repr=False)
+    _found: NearestPieces | None = field(repr=False)  # source of the patch; None: the two points alone
 
     def __getattr__(self, name: str) -> Any:
-        """Read a field of the contact of two convex solids from its row, once."""
-        if name in ("model_a", "model_b"):
-            value: Any = Model.EXACT
-        elif name in _COLUMNS and "_row" in vars(self):
-            value = vars(self)["_row"][_COLUMNS[name] : _COLUMNS[name] + 3]
+        """Make a field of the contact of two convex solids when it is first read."""
+        known = vars(self)
+        if "_row" not in known:
+            raise AttributeError(name)
+        if name in _COLUMNS:
+            value: Any = known["_row"][_COLUMNS[name] : _COLUMNS[name] + 3]
+        elif name in ("model_a", "model_b"):
+            value = Model.EXACT
+        elif name == "_found":
+            value = _nearest(*self.arguments)
         else:
             raise AttributeError(name)
-        vars(self)[name] = value
+        known[name] = value
         return value
+
+    @property
+    def arguments(self) -> tuple[Compound, Pose, Compound, Pose]:
+        """The two shapes with their poses, as they were given to `contact`."""
+        found: tuple[Compound, Pose, Compound, Pose] = vars(self)["_arguments"]
+        return found
+
+    def __repr__(self) -> str:
+        """Return the distance with its error and the features that are nearest, for a person."""
+        from collision_monitor.query.contact_text import contact_text
+
+        return contact_text(self)
 
     @property
     def overlaps(self) -> bool:
@@ -98,9 +114,7 @@ class Contact:
 
         Otherwise `point_a` alone. Computed on first access.
         """
-        if self._found is None:
-            return self.point_a[None]
-        return _patch(self._found if isinstance(self._found, NearestPieces) else _nearest(*self._found), self.point_a)
+        return self.point_a[None] if self._found is None else _patch(self._found, self.point_a)
 
     @cached_property
     def points_b(self) -> Array:
@@ -128,9 +142,13 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
     If one of them is concave and they overlap, the depth is that of the deepest pair of their convex pieces, and the
     bound extends to a translation that certainly parts them.
     Raises ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, or a model that is not available.
+
+    >>> import collision_monitor as cm
+    >>> cm.contact(cm.Box((1, 1, 1)), cm.Pose(), cm.Sphere(0.5), cm.Pose((2, 0, 0)))
+    Contact(1 m ± 5e-14, box face 0 – sphere surface)
     """
-    if model == "exact" and (found := convex_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
-        return _of_row(found, (shape_a, pose_a, shape_b, pose_b))
+    if model == "exact" and (quick := convex_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
+        return _of_row(quick, (shape_a, pose_a, shape_b, pose_b))
     a, b = _posed(shape_a, pose_a, model, "A"), _posed(shape_b, pose_b, model, "B")
     planes = {is_planar(shape) for shape, _ in (*a.shapes, *b.shapes)}
     if len(planes) > 1:
@@ -159,7 +177,7 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
     excess = a.excess + b.excess
     if distance <= 0.0 and excess > 0.0 and not all(len(exact_piece_table(side.shapes)) == 1 for side in (a, b)):
         bound -= distance  # the models may overlap deeply although the concave objects are apart
-    return Contact(
+    made = Contact(
         signed_distance=distance,
         error_bound=bound + excess,
         normal=normal,
@@ -169,12 +187,15 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
         model_b=b.model,
         _found=None if enclosed or unbounded else found,
     )
+    vars(made)["_arguments"] = shape_a, pose_a, shape_b, pose_b
+    return made
 
 
-def _of_row(found: tuple[float, float, Array], arguments: Any) -> Contact:
+def _of_row(quick: tuple[float, float, Array], arguments: tuple[Compound, Pose, Compound, Pose]) -> Contact:
     """Contact of two convex solids. Its arrays are made when they are read, which takes as long as the kernel."""
+    distance, bound, row = quick
     made = _new(Contact)
-    _set(made, "__dict__", {"signed_distance": found[0], "error_bound": found[1], "_row": found[2], "_found": arguments})
+    _set(made, "__dict__", {"signed_distance": distance, "error_bound": bound, "_row": row, "_arguments": arguments})
     return made
 
 

@@ -20,7 +20,8 @@ def write_contact(a, at_a, x_a, i, b, at_b, x_b, j, memory, row):
     quaternion_to_matrix(x_a[:, 3:7], i, R[0])
     quaternion_to_matrix(x_b[:, 3:7], j, R[1])
     p = (x_b[j, 0] - x_a[i, 0], x_b[j, 1] - x_a[i, 1], x_b[j, 2] - x_a[i, 2])
-    pair_contact(table, np.int32(0), np.int32(1), PairPose(R[0], R[1], p), row, work(memory))
+    first, second = np.int32(0), np.int32(1)  # the type of a slot in the other kernels, which thus share the pair test
+    pair_contact(table, first, second, PairPose(R[0], R[1], p), row, work(memory))
     for c in range(3):
         row[POINT_A + c] += x_a[i, c]
         row[POINT_B + c] = row[POINT_A + c] + row[DISTANCE] * row[NORMAL + c]

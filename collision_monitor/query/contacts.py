@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from collision_monitor.query.contact import contact
 from collision_monitor.query.contact_rows import contact_rows
 from collision_monitor.query.convex_pairs import MEMORY
 from collision_monitor.query.pair_arrays import Progress, Shapes, pack_shapes, pair_count, part, pose_rows, ranges
+from collision_monitor.records import data_frame
 
 Array = NDArray[np.float64]
 
@@ -49,9 +50,7 @@ class Contacts:
 
     def to_pandas(self) -> Any:
         """Return a pandas.DataFrame with a row for each pair. Raises ImportError without pandas."""
-        from collision_monitor.frames import data_frame
-
-        return data_frame(vars(self))
+        return data_frame({field.name: getattr(self, field.name) for field in fields(self)})
 
 
 def contacts(

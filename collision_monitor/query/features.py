@@ -30,12 +30,16 @@ def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Sh
     +x -x +y -y +z -z. Raises UnsupportedError for other shapes.
     """
     return FeatureContact(
-        _feature(shape_a, pose_a, contact.point_a, contact.normal),
-        _feature(shape_b, pose_b, contact.point_b, -contact.normal),
+        feature_of(shape_a, pose_a, contact.point_a, contact.normal),
+        feature_of(shape_b, pose_b, contact.point_b, -contact.normal),
     )
 
 
-def _feature(shape: Shape, pose: Pose, point: Array, normal: Array) -> Feature:
+def feature_of(shape: Shape, pose: Pose, point: Array, normal: Array) -> Feature:
+    """Feature of a Box, ConvexHull or Mesh at a point (3,) in m with an outward normal (3,), both in the world frame.
+
+    Numbered as in `contact_features`. Raises UnsupportedError for other shapes.
+    """
     at, towards = (point - pose.position) @ pose.rotation, normal @ pose.rotation
     match shape:
         case Mesh():

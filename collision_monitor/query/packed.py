@@ -80,8 +80,8 @@ def packed_motion(motion: Any) -> Array | None:
     """Pose, linear, angular velocity and acceleration (1, 16) of a Motion, kept as `packed_motion`; else None."""
     if type(motion) is not Motion:
         return None
-    pose = motion.pose
-    row: Array = np.concatenate([pose.position, pose.quaternion, motion.linear, motion.angular, motion.acceleration])[None]
+    vectors = motion.pose.position, motion.pose.quaternion, motion.linear, motion.angular, motion.acceleration
+    row: Array = np.concatenate(vectors)[None]
     vars(motion)["packed_motion"] = row
     return row
 
