@@ -11,7 +11,7 @@ unexport PYTHONPATH
 endif
 unexport PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup demo test test-core lint fuzz soak bench bench-peers clean
+.PHONY: help setup setup-demo demo test test-core lint fuzz soak bench bench-peers clean
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -20,7 +20,10 @@ help: ## list the targets
 setup: ## set up what is missing: environment, ROS 2, messages, package, compiled kernels
 	@sh scripts/set_up/start.sh
 
-demo: setup ## play a scene and show the monitor's answers, live in this terminal
+setup-demo: ## set up what the demo needs; the rest compiles in the background afterwards
+	@sh scripts/set_up/start.sh demo
+
+demo: setup-demo ## play a scene and show the monitor's answers, live in this terminal
 	@$(BIN)/collision-monitor demo
 
 test: ## set up, lint and run every test

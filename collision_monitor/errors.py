@@ -42,7 +42,11 @@ class RefusalWarning(UserWarning):
 
 
 class Refusal(Enum):
-    """Reason for which the monitor refused an input; the status counts each as `refused_<value>`."""
+    """Reason for which the monitor refused an input; the status counts each as `refused_<value>`.
+
+    >>> Refusal.TIME.value
+    'time'
+    """
 
     MALFORMED = "malformed"
     FRAME = "frame"

@@ -127,7 +127,11 @@ class Method(IntEnum):
 
 
 class Model(IntEnum):
-    """`ObjectDescription.model` and the `model_*` fields of contacts and predictions."""
+    """`ObjectDescription.model` and the `model_*` fields of contacts and predictions.
+
+    >>> Model.OBB.name
+    'OBB'
+    """
 
     AUTO = 0
     EXACT = 1

@@ -74,10 +74,13 @@ class KernelCache(NullCache):  # type: ignore[misc]
 def _rebuild(target: Any, content: Any) -> Any:
     """The compile result as numba's `CompileResult._rebuild` makes it, with a library that loads what it needs."""
     code, fndesc, env, signature, objectmode, lifted, annotation, reload_init, environments = content
+    for module, name, types, symbol in code[2]:
+        # first, because the machine code is bound to their addresses as soon as anything in it is looked up
+        dispatcher = getattr(import_module(module), name).dispatcher
+        dispatcher.compile(types)
+        if dispatcher.overloads[types].fndesc.mangled_name != symbol:
+            raise ValueError(f"{symbol} has another name now")
     library = LoadedLibrary(target.codegen(), *code)
-    for module, name, types in library.refers_to:
-        function = getattr(import_module(module), name)
-        function.dispatcher.compile(types)  # loads it, too
     entry_point = target.get_executable(library, fndesc, env)
     result = CompileResult(
         target_context=target,

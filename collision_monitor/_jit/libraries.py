@@ -16,20 +16,22 @@ LARGE: Final = 24_000
 """Bytes of intermediate code (before what it calls) from which a device function is machine code of its own. Larger:
 more copies are compiled. Smaller: functions become calls that LLVM would inline."""
 
+Reference = tuple[str, str, Any, str]
+
 
 class Library(JITCodeLibrary):  # type: ignore[misc]
     """Code of a kernel, or of a device function if `is_device`.
 
-    refers_to: (module, name, argument types) of the functions with machine code of their own that it calls.
+    refers_to: (module, name, argument types, symbol) of the functions with machine code of their own that it calls.
     """
 
-    def __init__(self, codegen: Any, name: str, key: tuple[str, str, Any], *, is_device: bool, inlines: bool) -> None:
+    def __init__(self, codegen: Any, name: str, key: Reference, *, is_device: bool, inlines: bool) -> None:
         super().__init__(codegen, name)
         self.enable_object_caching()
         self.key = key
         self.is_device = is_device
         self.has_machine_code = not is_device
-        self.refers_to: dict[tuple[str, str, Any], None] = {}
+        self.refers_to: dict[Reference, None] = {}
         self._inlines = inlines
 
     def finalize(self) -> None:
@@ -111,11 +113,11 @@ class LoadedLibrary(JITCodeLibrary):  # type: ignore[misc]
         return self._module
 
 
-def references(library: Any) -> dict[tuple[str, str, Any], None]:
+def references(library: Any) -> dict[Reference, None]:
     """The functions with machine code of their own that code with this library linked into it refers to."""
     if getattr(library, "is_device", False) and library.has_machine_code:
         return {library.key: None}
-    found: dict[tuple[str, str, Any], None] = getattr(library, "refers_to", {})
+    found: dict[Reference, None] = getattr(library, "refers_to", {})
     return found
 
 

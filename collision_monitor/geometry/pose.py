@@ -80,7 +80,11 @@ def rotation_matrix(quaternion: ArrayLike) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Pose of a body: position (m) and orientation (unit quaternion x, y, z, w). Raises PoseError."""
+    """Pose of a body: position (m) and orientation (unit quaternion x, y, z, w). Raises PoseError.
+
+    >>> (Pose((1, 0, 0)) @ Pose((0, 2, 0))).position
+    array([1., 2., 0.])
+    """
 
     position: Any = (0.0, 0.0, 0.0)
     quaternion: Any = (0.0, 0.0, 0.0, 1.0)
@@ -175,6 +179,9 @@ class Motion:
     """A pose, its twist and its linear acceleration, in the world frame. Raises PoseError.
 
     linear (m/s) and acceleration (m/s^2) refer to the body's origin; angular is in rad/s.
+
+    >>> Motion(Pose(), linear=(1, 0, 0), angular=(0, 0, 0.5)).at(2.0).position
+    array([2., 0., 0.])
     """
 
     pose: Pose

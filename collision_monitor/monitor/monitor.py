@@ -51,6 +51,14 @@ class Monitor:
     They use no clock and no random numbers, and are the same bytes on every run. A profile with `budget_ms` adds the
     clock, which decides only how many pairs a step examines: a monitor with timed=False and that number as
     `pairs_per_step` (`StepResult.cut`) gives the same answers again.
+
+    >>> import collision_monitor as cm
+    >>> monitor = cm.Monitor()
+    >>> monitor.add(1, cm.Box((1, 1, 1)), static=True, pose=cm.Pose())
+    >>> monitor.add(2, cm.Sphere(0.5))
+    >>> monitor.step(0, [2], [(3, 0, 0, 0, 0, 0, 1)], [(-1, 0, 0, 0, 0, 0)])
+    StepResult(step 1 at 0 ns: 0 contacts, 0 ended, 1 predictions)
+      prediction: 1 and 2 in 2 to 2 s
     """
 
     def __init__(self, profile: str | Profile = "balanced", *, timed: bool = True, warns: bool = True) -> None:

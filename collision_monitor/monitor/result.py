@@ -27,7 +27,12 @@ class Work:
 
 @dataclass(frozen=True)
 class StepStatus:
-    """Counts of objects, answers and work in a step; the fields are those of MonitorStatus.msg."""
+    """Counts of objects, answers and work in a step; the fields are those of MonitorStatus.msg.
+
+    >>> import collision_monitor as cm
+    >>> cm.Monitor().step(0, []).status.objects
+    0
+    """
 
     objects: int
     objects_static: int
@@ -68,6 +73,12 @@ class StepResult:
     accepted: False if the step was refused because of its stamp; there are no answers then, and stamp_ns, step and
     status are those of the last accepted step. cut: number of pairs that were examined before the budget ran out;
     None: all pairs were examined.
+
+    >>> import collision_monitor as cm
+    >>> monitor = cm.Monitor()
+    >>> monitor.add(1, cm.Sphere(0.5))
+    >>> monitor.step(0, [1], [(0, 0, 0, 0, 0, 0, 1)]).contacts.shape
+    (0,)
     """
 
     stamp_ns: int

@@ -64,6 +64,11 @@ class Contact:
     translation parts (both points are then one point inside both). error_bound: largest error of signed_distance.
     normal: unit vector from A to B. point_a, point_b: the nearest points, or the deepest points of an overlap;
     point_b - point_a is signed_distance * normal. model_a, model_b: the models that represent the shapes.
+
+    >>> import collision_monitor as cm
+    >>> c = cm.contact(cm.Box((1, 1, 1)), cm.Pose(), cm.Sphere(0.5), cm.Pose((2, 0, 0)))
+    >>> c.signed_distance, c.normal, c.point_a
+    (1.0, array([1., 0., 0.]), array([0.5, 0. , 0. ]))
     """
 
     signed_distance: float

@@ -21,7 +21,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """Contacts of N pairs in the world frame, with the meaning of the fields of `Contact`; lengths in m."""
+    """Contacts of N pairs in the world frame, with the meaning of the fields of `Contact`; lengths in m.
+
+    >>> import collision_monitor as cm
+    >>> cm.contacts(cm.Sphere(1), cm.Pose(), cm.Sphere(1), [(0, 0, z, 0, 0, 0, 1) for z in (1, 3)]).overlaps
+    array([ True, False])
+    """
 
     signed_distance: Array  # (N,)
     error_bound: Array  # (N,)

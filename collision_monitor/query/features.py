@@ -28,6 +28,11 @@ def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Sh
     A mesh keeps its own numbers of vertices and faces. A hull has the vertex numbers of its points and the face numbers
     of `convex_hull`. A box numbers its corners by their sides (bit 0: +x, 1: +y, 2: +z) and its faces in the order
     +x -x +y -y +z -z. Raises UnsupportedError for other shapes.
+
+    >>> import collision_monitor as cm
+    >>> box, pose, above = cm.Box((1, 1, 1)), cm.Pose(), cm.Pose((0, 0, 1.5))
+    >>> cm.contact_features(cm.contact(box, pose, box, above), box, pose, box, above).a.type.name
+    'FACE'
     """
     return FeatureContact(
         feature_of(shape_a, pose_a, contact.point_a, contact.normal),

@@ -26,6 +26,10 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
     tests (bounding volumes, vertices, edges against faces), exact for the placed corners; "sat" for convex polyhedra,
     by the separating axis test. Raises as `contact` does, InputError for an unknown test, and UnsupportedError for a
     shape that the test does not take.
+
+    >>> import collision_monitor as cm
+    >>> cm.overlap(cm.Sphere(1), cm.Pose(), cm.Sphere(1), cm.Pose((1.5, 0, 0)))
+    True
     """
     if test == "contact":
         if (found := convex_contact(shape_a, pose_a, shape_b, pose_b)) is not None:

@@ -23,7 +23,7 @@ ITERATIONS: Final = 1000
 """Default limit of distance queries for one pair of pieces; hardly any pair needs more than 20."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Impact:
     """First time at which two shapes are within the separation, in s from the given poses.
 
@@ -31,12 +31,23 @@ class Impact:
     "unresolved": there is none before lower, but the shapes come so near that round-off or the budget leaves open
     whether they meet; upper is infinite. Treat it as a hit.
     contact: the contact at upper, or at lower if upper is infinite; None if clear.
+
+    >>> import collision_monitor as cm
+    >>> still, aside = cm.Motion(cm.Pose()), cm.Motion(cm.Pose((0, 5, 0)), linear=(1, 0, 0))
+    >>> cm.time_of_impact(cm.Box((1, 1, 1)), still, cm.Box((1, 1, 1)), aside).status
+    'clear'
     """
 
     status: Literal["hit", "clear", "unresolved"]
     lower: float
     upper: float
     contact: Contact | None
+
+    def __repr__(self) -> str:
+        """Return status and times for a person."""
+        if self.status == "clear":
+            return "Impact(clear)"
+        return f"Impact({self.status} in {self.lower:.6g} to {self.upper:.6g} s)"
 
     def __getattr__(self, name: str) -> Any:
         """Compute the contact when it is first read: it takes as long as the search for the time."""
@@ -69,6 +80,11 @@ def time_of_impact(
     for spheres, in closed form. `iterations`: limit of distance queries for a pair of convex pieces.
     An overlap at the start is a hit at 0. Shapes that only touch and then part, slide, roll or rest have no impact.
     Raises InputError, ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, two HalfSpaces.
+
+    >>> import collision_monitor as cm
+    >>> still, towards = cm.Motion(cm.Pose()), cm.Motion(cm.Pose((3, 0, 0)), linear=(-1, 0, 0))
+    >>> cm.time_of_impact(cm.Sphere(1), still, cm.Sphere(1), towards)
+    Impact(hit in 1 to 1 s)
     """
     query = check_query(horizon, tolerance, separation, iterations)
     found = convex_impact(shape_a, motion_a, shape_b, motion_b, query)

@@ -29,7 +29,12 @@ _STILL: Final = Motion(Pose())
 
 @dataclass(frozen=True, eq=False)
 class Impacts:
-    """Results for N motions, with the meaning of `Impact`: status (N,) of str, lower and upper (N,) in s."""
+    """Results for N motions, with the meaning of `Impact`: status (N,) of str, lower and upper (N,) in s.
+
+    >>> import collision_monitor as cm
+    >>> cm.times_of_impact(cm.Sphere(1), cm.Pose((3, 0, 0)), (-1, 0, 0, 0, 0, 0), cm.Sphere(1), cm.Pose(), [(0,) * 6])
+    Impacts(1 hit, 0 clear, 0 unresolved; first: 0, 1 s)
+    """
 
     status: NDArray[np.str_]
     lower: Array
@@ -67,6 +72,11 @@ def time_of_impact_batch(
 
     A single row applies to all motions. A motion takes 1 to 2 µs, for spheres 0.1 µs; it takes 1 ms if the shapes touch
     at the start, and for plane shapes and concave meshes. Raises as `time_of_impact` does.
+
+    >>> import collision_monitor as cm
+    >>> poses, still = [(2, 0, 0, 0, 0, 0, 1), (3, 0, 0, 0, 0, 0, 1)], (0, 0, 0, 0, 0, 0)
+    >>> cm.time_of_impact_batch(cm.Sphere(0.5), poses, (-1, 0, 0, 0, 0, 0), cm.Sphere(0.5), poses[0], still).status
+    array(['hit', 'clear'], dtype='<U10')
     """
     query = check_query(horizon, tolerance, separation, iterations)
     a, b = make_moving_shape(shape_a, _STILL, "A"), make_moving_shape(shape_b, _STILL, "B")
