@@ -48,8 +48,10 @@ soak: setup ## simulate 24 h of objects that come, change and go, and compare wi
 
 QUICK := $(findstring --quick,$(ARGS))
 
-bench: setup ## time full detection and every installed peer, the event list, the node; ARGS=--quick takes 3 minutes
+bench: setup ## time single calls, a start, full detection and every installed peer, the event list, the node; ARGS=--quick takes 3 minutes
 	@$(BIN)/python benchmarks/run.py $(ARGS)
+	@$(BIN)/python benchmarks/single_calls.py $(QUICK)
+	@$(BIN)/python benchmarks/first_start.py
 	@$(BIN)/python benchmarks/event_list.py $(if $(QUICK),--seconds 1)
 	@$(BIN)/python benchmarks/through_node.py $(if $(QUICK),--duration 10)
 	@$(BIN)/python benchmarks/memory.py $(QUICK)

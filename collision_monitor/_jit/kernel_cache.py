@@ -1,8 +1,7 @@
 """Cache of one function: a file for each combination of argument types and processor, in the folder of its module.
 
-numba's own cache first imports everything that a compilation needs (SciPy's linear algebra, 0.3 s), parses the
-intermediate code beside the machine code, and checks the time of the source file. Here a kernel from the cache is its
-machine code, and the folder's name stands for the source (`cache.py`).
+numba's own cache first imports everything that a compilation needs (SciPy's linear algebra, 0.3 s) and checks the time
+of the source file. Here the folder's name stands for the source (`cache.py`).
 """
 
 from __future__ import annotations
@@ -13,7 +12,6 @@ import os
 import pickle
 import tempfile
 from collections.abc import Callable
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +21,7 @@ from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from collision_monitor._jit.cache import folder
-from collision_monitor._jit.libraries import LoadedLibrary
+from collision_monitor._jit.device_library import DeviceLibrary
 
 
 class KernelCache(NullCache):  # type: ignore[misc]
@@ -72,22 +70,17 @@ class KernelCache(NullCache):  # type: ignore[misc]
 
 
 def _rebuild(target: Any, content: Any) -> Any:
-    """The compile result as numba's `CompileResult._rebuild` makes it, with a library that loads what it needs."""
+    """The compile result of a kernel as numba makes it; that of a device function without machine code."""
     code, fndesc, env, signature, objectmode, lifted, annotation, reload_init, environments = content
-    for module, name, types, symbol in code[2]:
-        # first, because the machine code is bound to their addresses as soon as anything in it is looked up
-        dispatcher = getattr(import_module(module), name).dispatcher
-        dispatcher.compile(types)
-        if dispatcher.overloads[types].fndesc.mangled_name != symbol:
-            raise ValueError(f"{symbol} has another name now")
-    library = LoadedLibrary(target.codegen(), *code)
-    entry_point = target.get_executable(library, fndesc, env)
-    result = CompileResult(
+    if len(code) == 3:
+        return CompileResult._rebuild(target, *content)
+    library = DeviceLibrary.loaded(target.codegen(), *code)
+    return CompileResult(
         target_context=target,
         typing_context=target.typing_context,
         library=library,
         environment=env,
-        entry_point=entry_point,
+        entry_point=target.get_executable(library, fndesc, env),
         fndesc=fndesc,
         type_annotation=annotation,
         signature=signature,
@@ -99,6 +92,3 @@ def _rebuild(target: Any, content: Any) -> Any:
         reload_init=reload_init,
         referenced_envs=environments,
     )
-    for environment in environments:
-        library.codegen.set_env(environment.env_name, environment)
-    return result

@@ -57,9 +57,9 @@ class Monitor:
     >>> monitor = cm.Monitor()
     >>> monitor.add(1, cm.Box((1, 1, 1)), static=True, pose=cm.Pose())
     >>> monitor.add(2, cm.Sphere(0.5))
-    >>> monitor.step(0, [2], [(3, 0, 0, 0, 0, 0, 1)], [(-1, 0, 0, 0, 0, 0)])
+    >>> monitor.step(0, [2], [(2.5, 0, 0, 0, 0, 0, 1)], [(-1, 0, 0, 0, 0, 0)])
     StepResult(step 1 at 0 ns: 0 contacts, 0 ended, 1 predictions)
-      prediction: 1 and 2 in 2 to 2 s
+      prediction: 1 and 2 in 1... to 1.5... s
     """
 
     def __init__(self, profile: str | Profile = "balanced", *, timed: bool = True, warns: bool = True) -> None:

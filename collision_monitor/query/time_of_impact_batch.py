@@ -76,7 +76,7 @@ def time_of_impact_batch(
     >>> import collision_monitor as cm
     >>> poses, still = [(2, 0, 0, 0, 0, 0, 1), (3, 0, 0, 0, 0, 0, 1)], (0, 0, 0, 0, 0, 0)
     >>> cm.time_of_impact_batch(cm.Sphere(0.5), poses, (-1, 0, 0, 0, 0, 0), cm.Sphere(0.5), poses[0], still).status
-    array(['hit', 'clear'], dtype='<U10')
+    array(['hit', 'hit'], dtype='<U10')
     """
     query = check_query(horizon, tolerance, separation, iterations)
     a, b = make_moving_shape(shape_a, _STILL, "A"), make_moving_shape(shape_b, _STILL, "B")

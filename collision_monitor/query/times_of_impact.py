@@ -47,7 +47,7 @@ def times_of_impact(
     InputError if the lengths differ.
 
     >>> import collision_monitor as cm
-    >>> poses = [(x, 0, 0, 0, 0, 0, 1) for x in (2, 3, 9)]
+    >>> poses = [(x, 0, 0, 0, 0, 0, 1) for x in (2, 2.5, 9)]
     >>> still, towards = (0, 0, 0, 0, 0, 0), (-1, 0, 0, 0, 0, 0)
     >>> cm.times_of_impact(cm.Box((1, 1, 1)), cm.Pose(), still, cm.Sphere(0.5), poses, towards).status
     array(['hit', 'hit', 'clear'], dtype='<U10')

@@ -26,7 +26,7 @@ def plot(contact: Contact, axes: Any = None) -> Any:
     >>> import collision_monitor as cm
     >>> c = cm.contact(cm.Box((1, 1, 1)), cm.Pose(), cm.Capsule(0.2, 1), cm.Pose((1, 0, 0.5)))
     >>> cm.plot(c).get_title()
-    'Contact(0.3 m ± 8e-14, box face 0 – capsule surface)'
+    'Contact(0.3 m ± ..., box face 0 – capsule surface)'
     """
     shape_a, pose_a, shape_b, pose_b = contact.arguments
     sides = [
