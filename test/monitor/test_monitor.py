@@ -425,7 +425,7 @@ def test_a_new_description_ends_what_it_no_longer_allows_to_be_said() -> None:
     assert result.status.objects_unseen == 1 and len(result.predictions) == 0
     monitor.add(1, Sphere(0.5), group=2, mask=4, replace=True)
     assert touching(monitor.step(SECOND // 10, [1, 2], still(0.1, 1.0), moving)) == set()
-    monitor.add(1, Sphere(0.5))
+    monitor.add(1, Sphere(0.5), replace=True)
     result = monitor.step(SECOND // 5, [1, 2, 3], still(0.2, 1.1, 1.2), [*moving, [0] * 6])
     assert touching(result) == {(1, 2), (1, 3), (2, 3)}
     assert {int(c["phase"]) for c in result.contacts} == {records.Phase.BEGIN}
