@@ -11,7 +11,7 @@ unexport PYTHONPATH
 endif
 unexport PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup setup-demo demo test test-core lint fuzz fuzz-files soak bench bench-peers clean
+.PHONY: help setup setup-demo interfaces demo test test-core lint fuzz fuzz-files soak bench bench-peers clean
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -26,7 +26,10 @@ setup-demo: ## set up what the demo needs; the rest compiles in the background a
 demo: setup-demo ## play a scene and show the monitor's answers, live in this terminal
 	@$(BIN)/collision-monitor demo
 
-test: ## set up, lint and run every test
+interfaces: setup ## build the message packages that the wheels lack: tf2, vision, autoware, moveit
+	@$(BIN)/python scripts/set_up/interfaces.py
+
+test: interfaces ## set up, lint and run every test
 	@$(MAKE) --no-print-directory -j2 lint test-core
 	@$(BIN)/python -m pytest -n 3 --dist worksteal test/ros test/setup
 

@@ -48,6 +48,7 @@ FLOORS: tuple[tuple[tuple[str, str], ...], ...] = (
     (
         ("prediction", "motion, time of impact, uncertainty of a pair"),
         ("objects", "description of an object, its models"),
+        ("robots", "URDF, SRDF, forward kinematics"),
     ),
     (("broad_phase", "grids, trees, sweep and prune"), ("narrow_phase", "one file per pair test, dispatch")),
     (("geometry", "shapes, poses, bounds, feature tests"), ("settings", "settings and profiles")),

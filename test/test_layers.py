@@ -19,7 +19,7 @@ FLOORS: Final = (
     {"_jit", "errors", "tolerances", "records", "_version"},
     {"settings", "geometry"},
     {"broad_phase", "narrow_phase", "meshes"},
-    {"objects", "prediction"},
+    {"objects", "prediction", "robots"},
     {"query", "detection", "monitor", "codec", "world"},
     {"pipeline", "warm_up"},
     {"sources", "session"},

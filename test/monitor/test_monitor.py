@@ -429,7 +429,8 @@ def test_a_new_description_ends_what_it_no_longer_allows_to_be_said() -> None:
     result = monitor.step(SECOND // 5, [1, 2, 3], still(0.2, 1.1, 1.2), [*moving, [0] * 6])
     assert touching(result) == {(1, 2), (1, 3), (2, 3)}
     assert {int(c["phase"]) for c in result.contacts} == {records.Phase.BEGIN}
-    monitor.add(3, Box((0.1, 0.1, 0.1)))  # only another shape: the contact persists without a new BEGIN
+    # only another shape: the contact persists without a new BEGIN
+    monitor.add(3, Box((0.1, 0.1, 0.1)), replace=True)
     result = monitor.step(SECOND // 4, [1, 2, 3], still(0.25, 1.15, 0.7), [*moving, [0] * 6])
     assert {pair(c): int(c["phase"]) for c in result.contacts}[(2, 3)] == records.Phase.PERSIST
 
