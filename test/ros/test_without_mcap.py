@@ -16,8 +16,9 @@ class Blocked(importlib.abc.MetaPathFinder):
 sys.meta_path.insert(0, Blocked())
 import rclpy
 from collision_monitor.ros.node import MonitorNode
+from collision_monitor.ros.process import StopRequest
 rclpy.init(args=["--ros-args", *sys.argv[1:]])
-node = MonitorNode()
+node = MonitorNode(StopRequest())
 print(node._recording, node._recording.status().get("recording_error", ""))
 """
 
