@@ -133,9 +133,9 @@ def _of_times(times: tuple[float, float], arguments: tuple[Any, Any, Any, Any]) 
         return _CLEAR
     shape_a, motion_a, shape_b, motion_b = arguments
     used = Method.CONSERVATIVE_ADVANCEMENT
-    if lower > 0.0 and type(shape_a) is type(shape_b) is Sphere:
-        if (motion_a.acceleration == motion_b.acceleration).all():
-            used = Method.CLOSED_FORM
+    are_spheres = type(shape_a) is type(shape_b) is Sphere
+    if lower > 0.0 and are_spheres and (motion_a.acceleration == motion_b.acceleration).all():
+        used = Method.CLOSED_FORM
     made = object.__new__(Impact)
     made.__dict__.update(
         status="hit" if upper < math.inf else "unresolved", lower=lower, upper=upper, method=used, _arguments=arguments
