@@ -52,6 +52,10 @@ _HOME = {
     "Contact": "query.contact",
     "contact_features": "query.features",
     "overlap": "query.overlap",
+    "distance": "query.distance",
+    "contacts": "query.contacts",
+    "Contacts": "query.contacts",
+    "times_of_impact": "query.times_of_impact",
     "contains": "query.containment",
     "cast_ray": "query.rays",
     "RayHits": "query.rays",
@@ -64,6 +68,7 @@ _HOME = {
     "vertex_face_impact": "query.feature_impact",
     "edge_edge_impact": "query.feature_impact",
     "FeatureImpact": "query.feature_impact",
+    "plot": "report.contact_plot",
     "CollisionMonitorError": "errors",
     "InputError": "errors",
     "ShapeError": "errors",
@@ -73,6 +78,7 @@ _HOME = {
     "MessageError": "errors",
     "SessionError": "errors",
     "Refusal": "errors",
+    "RefusalWarning": "errors",
 }
 _MODULES = ("response", "world")
 __all__ = ["__version__", *_MODULES, *_HOME]
@@ -86,6 +92,7 @@ if TYPE_CHECKING:
     from collision_monitor.errors import PoseError as PoseError
     from collision_monitor.errors import ProfileError as ProfileError
     from collision_monitor.errors import Refusal as Refusal
+    from collision_monitor.errors import RefusalWarning as RefusalWarning
     from collision_monitor.errors import SessionError as SessionError
     from collision_monitor.errors import ShapeError as ShapeError
     from collision_monitor.errors import UnsupportedError as UnsupportedError
@@ -109,7 +116,10 @@ if TYPE_CHECKING:
     from collision_monitor.objects.description import ObjectDescription as ObjectDescription
     from collision_monitor.query.contact import Contact as Contact
     from collision_monitor.query.contact import contact as contact
+    from collision_monitor.query.contacts import Contacts as Contacts
+    from collision_monitor.query.contacts import contacts as contacts
     from collision_monitor.query.containment import contains as contains
+    from collision_monitor.query.distance import distance as distance
     from collision_monitor.query.feature_impact import FeatureImpact as FeatureImpact
     from collision_monitor.query.feature_impact import edge_edge_impact as edge_edge_impact
     from collision_monitor.query.feature_impact import vertex_face_impact as vertex_face_impact
@@ -121,7 +131,9 @@ if TYPE_CHECKING:
     from collision_monitor.query.time_of_impact import time_of_impact as time_of_impact
     from collision_monitor.query.time_of_impact_batch import Impacts as Impacts
     from collision_monitor.query.time_of_impact_batch import time_of_impact_batch as time_of_impact_batch
+    from collision_monitor.query.times_of_impact import times_of_impact as times_of_impact
     from collision_monitor.records import Model as Model
+    from collision_monitor.report.contact_plot import plot as plot
     from collision_monitor.settings.profile import Profile as Profile
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,9 +19,10 @@ from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape
-from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, as_contacts
+from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B, as_contacts
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.objects.models import containing_kdop, containing_model, parse_model
+from collision_monitor.query.convex_pairs import convex_contact
 from collision_monitor.query.nearest_pieces import NearestPieces
 from collision_monitor.query.piece_table import PieceTable, exact_piece_table, piece_table
 from collision_monitor.records import Model
@@ -31,6 +32,10 @@ Array = NDArray[np.float64]
 Compound = Shape | Sequence[tuple[Shape, Pose]]
 
 _DIRECTIONS: Final = [sign * np.array(d) / np.linalg.norm(d) for d in KDOP_DIRECTIONS[26] for sign in (1.0, -1.0)]
+
+_COLUMNS: Final = {"normal": NORMAL, "point_a": POINT_A, "point_b": POINT_B}
+_new, _set = object.__new__, object.__setattr__
+
 
 def _patch(found: NearestPieces, witness: Array) -> Array:
     """Corners (k, 3) on A of the patch of all pieces that touch in one plane; a floor of triangles is one face."""
@@ -51,7 +56,7 @@ def _patch(found: NearestPieces, witness: Array) -> Array:
     return np.asarray(patch + (witness - best["point_a"] - found.position[found.pair[0]]))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Contact:
     """Contact of two shapes in the world frame, lengths in m.
 
@@ -59,6 +64,11 @@ class Contact:
     translation parts (both points are then one point inside both). error_bound: largest error of signed_distance.
     normal: unit vector from A to B. point_a, point_b: the nearest points, or the deepest points of an overlap;
     point_b - point_a is signed_distance * normal. model_a, model_b: the models that represent the shapes.
+
+    >>> import collision_monitor as cm
+    >>> c = cm.contact(cm.Box((1, 1, 1)), cm.Pose(), cm.Sphere(0.5), cm.Pose((2, 0, 0)))
+    >>> c.signed_distance, c.normal, c.point_a
+    (1.0, array([ 1., -0., -0.]), array([0.5, 0. , 0. ]))
     """
 
     signed_distance: float
@@ -69,6 +79,34 @@ class Contact:
     model_a: Model
     model_b: Model
     _found: NearestPieces | None = field(repr=False)  # source of the patch; None: the two points alone
+
+    def __getattr__(self, name: str) -> Any:
+        """Make a field of the contact of two convex solids when it is first read."""
+        known = vars(self)
+        if "_row" not in known:
+            raise AttributeError(name)
+        if name in _COLUMNS:
+            value: Any = known["_row"][_COLUMNS[name] : _COLUMNS[name] + 3]
+        elif name in ("model_a", "model_b"):
+            value = Model.EXACT
+        elif name == "_found":
+            value = _nearest(*self.arguments)
+        else:
+            raise AttributeError(name)
+        known[name] = value
+        return value
+
+    @property
+    def arguments(self) -> tuple[Compound, Pose, Compound, Pose]:
+        """The two shapes with their poses, as they were given to `contact`."""
+        found: tuple[Compound, Pose, Compound, Pose] = vars(self)["_arguments"]
+        return found
+
+    def __repr__(self) -> str:
+        """Return the distance with its error and the features that are nearest, for a person."""
+        from collision_monitor.query.contact_text import contact_text
+
+        return contact_text(self)
 
     @property
     def overlaps(self) -> bool:
@@ -112,7 +150,15 @@ def contact(
     If one of them is concave and they overlap, the depth is that of the deepest pair of their convex pieces, and the
     bound extends to a translation that certainly parts them.
     Raises ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, or a model that is not available.
+
+    >>> import collision_monitor as cm
+    >>> cm.contact(cm.Box((1, 1, 1)), cm.Pose(), cm.Sphere(0.5), cm.Pose((2, 0, 0)))
+    Contact(1 m ± ..., box face 0 – sphere surface)
     """
+    if isinstance(model, str) and model == "exact":
+        quick = convex_contact(shape_a, pose_a, shape_b, pose_b)
+        if quick is not None:
+            return _of_row(quick, (shape_a, pose_a, shape_b, pose_b))
     a, b = _posed(shape_a, pose_a, model, "A"), _posed(shape_b, pose_b, model, "B")
     planes = {is_planar(shape) for shape, _ in (*a.shapes, *b.shapes)}
     if len(planes) > 1:
@@ -141,7 +187,7 @@ def contact(
     excess = a.excess + b.excess
     if distance <= 0.0 and excess > 0.0 and not all(len(exact_piece_table(side.shapes)) == 1 for side in (a, b)):
         bound -= distance  # the models may overlap deeply although the concave objects are apart
-    return Contact(
+    made = Contact(
         signed_distance=distance,
         error_bound=bound + excess,
         normal=normal,
@@ -151,6 +197,23 @@ def contact(
         model_b=b.model,
         _found=None if enclosed or unbounded else found,
     )
+    vars(made)["_arguments"] = shape_a, pose_a, shape_b, pose_b
+    return made
+
+
+def _of_row(quick: tuple[float, float, Array], arguments: tuple[Compound, Pose, Compound, Pose]) -> Contact:
+    """Contact of two convex solids. Its arrays are made when they are read, which takes as long as the kernel."""
+    distance, bound, row = quick
+    made = _new(Contact)
+    _set(made, "__dict__", {"signed_distance": distance, "error_bound": bound, "_row": row, "_arguments": arguments})
+    return made
+
+
+def _nearest(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -> NearestPieces:
+    """Search for the nearest pieces of exact shapes, relative to A's origin."""
+    a, b = _posed(shape_a, pose_a, Model.EXACT, "A"), _posed(shape_b, pose_b, Model.EXACT, "B")
+    offset = b.pose.position - a.pose.position
+    return NearestPieces(a.pieces, (a.rotation, np.zeros(3)), b.pieces, (b.rotation, offset))
 
 
 def _posed(shape: Compound, pose: Pose, model: Model | str | ArrayLike, name: str) -> _Posed:

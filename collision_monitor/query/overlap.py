@@ -17,6 +17,7 @@ from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Polygon, Shape
 from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.query.contact import Compound, contact
+from collision_monitor.query.convex_pairs import convex_contact
 
 TESTS: Final = ("contact", "cascade", "sat", "edges")
 
@@ -29,8 +30,14 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
     and for polygons, by the separating axis test, with concave polygons split; "edges" for polygons, by contained
     vertices and crossing edges, exact for the placed corners. Raises as `contact` does, InputError for an unknown
     test, and UnsupportedError for a shape that the test does not take.
+
+    >>> import collision_monitor as cm
+    >>> cm.overlap(cm.Sphere(1), cm.Pose(), cm.Sphere(1), cm.Pose((1.5, 0, 0)))
+    True
     """
     if test == "contact":
+        if (found := convex_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
+            return found[0] <= 0.0
         return contact(shape_a, pose_a, shape_b, pose_b).overlaps
     if test not in TESTS:
         raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")
