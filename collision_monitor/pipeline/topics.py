@@ -14,6 +14,8 @@ PARAMETER_SECTION: Final = f"/**/{NODE}"
 STATUS_PERIOD: Final = 50_000_000
 """ns between two statuses while steps arrive: 20 Hz is enough for people and supervisors, and 1 kHz too much."""
 
+SOURCES: Final = "~/sources"
+"""Topic of a DiagnosticArray about the other programs' topics that the node reads, about once a second."""
 
 LATCHED: Final = "transient_local"
 """The durability that delivers earlier messages to a late subscriber."""

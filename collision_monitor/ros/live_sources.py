@@ -15,6 +15,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from collision_monitor.errors import CollisionMonitorError, InputError
+from collision_monitor.pipeline.topics import SOURCES
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage
 from collision_monitor.sources.tf_objects import TRANSFORMS
@@ -63,7 +64,7 @@ class LiveSources:
         self._found: dict[str, str] = {}  # topic of the file -> type
         self._problems: dict[str, str] = {}  # the same, or the name of a line -> why it cannot be used
         self._messages: dict[str, int] = {}
-        self._out = node.create_publisher(DiagnosticArray, "~/sources", QoSProfile(depth=1))
+        self._out = node.create_publisher(DiagnosticArray, SOURCES, QoSProfile(depth=1))
         node.create_timer(SEARCH_PERIOD, self._search)
         node.create_timer(REPORT_PERIOD, self._report)
 
