@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -16,14 +16,15 @@ from rclpy.node import Node
 
 from collision_monitor.errors import InputError, ProfileError, SessionError
 from collision_monitor.pipeline.settings_event import PROFILE
+from collision_monitor.ros.diagnostics import DiagnosticsParameters
 from collision_monitor.session import ONE_FILE, Splitting
 from collision_monitor.settings.profile import Profile
 from collision_monitor.settings.setting import Setting
 
-T = TypeVar("T", str, int, float, str | int | float)
+T = TypeVar("T", str, int, float, bool, str | int | float)
 
 _BY_RCLPY = ("use_sim_time", "start_type_description_service", "qos_overrides.")
-_TYPES = {str: "a text", int: "a whole number", float: "a number"}
+_TYPES = {bool: "true or false", str: "a text", int: "a whole number", float: "a number"}
 
 
 class ParameterReader:
@@ -75,6 +76,9 @@ RECORD_MODES = ("always", "on_event")
 _RECORD = ("record", "record_mode", "record_before", "record_after", "record_split_size", "record_split_duration")
 
 
+_RUNNING = ("executor", "autostart", "diagnostic_updater.period", "diagnostic_updater.use_fqn")
+
+
 @dataclass(frozen=True)
 class MonitorParameters:
     """The checked parameters of the monitor."""
@@ -84,12 +88,14 @@ class MonitorParameters:
     record: str
     executor: str
     splitting: Splitting = ONE_FILE
+    autostart: bool = True
+    diagnostics: DiagnosticsParameters = field(default_factory=DiagnosticsParameters)
 
 
 def read_monitor_parameters(node: Node) -> MonitorParameters:
     """Read, check and declare the parameters. Raises InputError; ProfileError for a setting out of range."""
     settings = Profile.fields()
-    reader = ParameterReader(node, [PROFILE, *(s.name for s in settings), "frame_id", *_RECORD, "executor"])
+    reader = ParameterReader(node, [PROFILE, *(s.name for s in settings), "frame_id", *_RECORD, *_RUNNING])
     name = reader.value(PROFILE, "balanced")
     profile = Profile.named(name)
     given = {s.name: plain(reader.given(s.name), s) for s in settings if reader.given(s.name) is not None}
@@ -107,7 +113,20 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
         raise ProfileError("parameter frame_id: expected the name of a frame, got an empty text")
     if executor not in EXECUTORS:
         raise ProfileError(f"parameter executor: expected {' or '.join(EXECUTORS)}, got {executor!r}")
-    return MonitorParameters(profile, frame_id, record, executor, splitting)
+    text = "Whether the node configures and activates itself; false: a lifecycle manager or ros2 lifecycle does it."
+    autostart = reader.read("autostart", True, text)
+    return MonitorParameters(profile, frame_id, record, executor, splitting, autostart, _read_diagnostics(reader))
+
+
+def _read_diagnostics(reader: ParameterReader) -> DiagnosticsParameters:
+    """Read the parameters that diagnostic_updater has too. Raises InputError."""
+    default = DiagnosticsParameters()
+    period = reader.read("diagnostic_updater.period", default.period, "Time between two messages on /diagnostics [s].")
+    text = "Whether the names on /diagnostics begin with the node's full name, namespace included."
+    use_fqn = reader.read("diagnostic_updater.use_fqn", default.use_fqn, text)
+    if not 0.01 <= period <= 3600.0:
+        raise InputError(f"parameter diagnostic_updater.period: expected 0.01 to 3600 s, got {period:g}")
+    return DiagnosticsParameters(period, use_fqn)
 
 
 def _read_splitting(reader: ParameterReader) -> Splitting:
