@@ -39,6 +39,19 @@ def state(team):
     return call(team, GetState, "get_state", GetState.Request()).current_state.label
 
 
+def undocumented(team):
+    """Topics and services of the node that docs/node.md does not name; all nodes have /rosout and /parameter_events."""
+    page = (Path(__file__).parents[2] / "docs" / "node.md").read_text()
+    node = ("object_monitor", "/")
+    names = [name for name, _ in team.node.get_publisher_names_and_types_by_node(*node)]
+    names += [name for name, _ in team.node.get_subscriber_names_and_types_by_node(*node)]
+    services = [name for name, _ in team.node.get_service_names_and_types_by_node(*node)]
+    assert len(names) > 8 and len(services) > 9
+    documented = page + "`/rosout` `/parameter_events` `~/get_parameter_types` `~/set_parameters_atomically`"
+    private = [name.replace("/object_monitor/", "~/") for name in names + services]
+    return [name for name in private if f"`{name}`" not in documented]
+
+
 def approaching():
     rows = np.zeros(2, records.STATE)
     rows["id"], rows["quaternion"][:, 3] = (1, 2), 1.0
@@ -94,6 +107,7 @@ def test_a_manager_takes_it_through_every_state_and_the_recordings_replay(start,
     describe(team)
     team.status(lambda s: s.step == 0 and s.objects == 2)
     team.ask(*approaching())
+    assert undocumented(team) == []
     assert change(team, Transition.TRANSITION_ACTIVE_SHUTDOWN)
     assert state(team) == "finalized"
     assert replay(Session(tmp_path / "run_2.mcap")).verdict is Verdict.IDENTICAL
