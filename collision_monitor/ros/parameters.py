@@ -100,20 +100,24 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
     profile = Profile.named(name)
     given = {s.name: plain(reader.given(s.name), s) for s in settings if reader.given(s.name) is not None}
     profile = profile.replace(**given)
-    choices = f"Profile that the settings start from: {', '.join(Profile.names())}, or the path of a .yaml file."
+    choices = (
+        f"Name of the profile that the settings start from: {', '.join(Profile.names())}, or the path of a .yaml file."
+    )
     reader.declare(PROFILE, name, ParameterDescriptor(description=choices))
     for setting in settings:
         reader.declare(setting.name, getattr(profile, setting.name), _descriptor(setting))
 
     frame_id = reader.read("frame_id", "world", "Frame of all poses; messages in another frame are refused.")
-    record = reader.read("record", "", "Path of the session to write, a .mcap file or a folder; empty: no recording.")
+    record = reader.read(
+        "record", "", "Path of the session to write: a .mcap file or a folder. Without one, nothing is recorded."
+    )
     splitting = _read_splitting(reader)
-    executor = reader.read("executor", "single", f"rclpy executor: {' or '.join(EXECUTORS)}.")
+    executor = reader.read("executor", "single", f"Executor of rclpy that runs the node: {' or '.join(EXECUTORS)}.")
     if not frame_id:
         raise ProfileError("parameter frame_id: expected the name of a frame, got an empty text")
     if executor not in EXECUTORS:
         raise ProfileError(f"parameter executor: expected {' or '.join(EXECUTORS)}, got {executor!r}")
-    text = "Whether the node configures and activates itself; false: a lifecycle manager or ros2 lifecycle does it."
+    text = "Whether the node configures and activates itself. If not, a lifecycle manager or ros2 lifecycle does it."
     autostart = reader.read("autostart", True, text)
     return MonitorParameters(profile, frame_id, record, executor, splitting, autostart, _read_diagnostics(reader))
 
@@ -121,7 +125,9 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
 def _read_diagnostics(reader: ParameterReader) -> DiagnosticsParameters:
     """Read the parameters that diagnostic_updater has too. Raises InputError."""
     default = DiagnosticsParameters()
-    period = reader.read("diagnostic_updater.period", default.period, "Time between two messages on /diagnostics [s].")
+    period = reader.read(
+        "diagnostic_updater.period", default.period, "Time between two messages on /diagnostics. Unit: s."
+    )
     text = "Whether the names on /diagnostics begin with the node's full name, namespace included."
     use_fqn = reader.read("diagnostic_updater.use_fqn", default.use_fqn, text)
     if not 0.01 <= period <= 3600.0:
@@ -131,12 +137,26 @@ def _read_diagnostics(reader: ParameterReader) -> DiagnosticsParameters:
 
 def _read_splitting(reader: ParameterReader) -> Splitting:
     """Read the parameters of a recording in several files. Raises InputError."""
-    mode = reader.read("record_mode", RECORD_MODES[0], "always, or on_event: record only around collisions.")
-    before = reader.read("record_before", ONE_FILE.before, "on_event: time kept before each collision [s].")
-    after = reader.read("record_after", ONE_FILE.after, "on_event: time kept after the begin of each collision [s].")
-    size = reader.read("record_split_size", ONE_FILE.size, "Size at which a new file starts [bytes]; 0: never.")
+    mode = reader.read(
+        "record_mode",
+        RECORD_MODES[0],
+        "When to record: always, or on_event, which keeps only the time around collisions.",
+    )
+    before = reader.read(
+        "record_before", ONE_FILE.before, "Time kept before each collision with record_mode on_event. Unit: s."
+    )
+    after = reader.read(
+        "record_after",
+        ONE_FILE.after,
+        "Time kept after the begin of each collision with record_mode on_event. Unit: s.",
+    )
+    size = reader.read(
+        "record_split_size", ONE_FILE.size, "Size at which the recording starts a new file. With 0, never. Unit: bytes."
+    )
     duration = reader.read(
-        "record_split_duration", ONE_FILE.duration, "Duration after which a new file starts [s]; 0: never."
+        "record_split_duration",
+        ONE_FILE.duration,
+        "Duration after which the recording starts a new file. With 0, never. Unit: s.",
     )
     if mode not in RECORD_MODES:
         raise InputError(f"parameter record_mode: expected {' or '.join(RECORD_MODES)}, got {mode!r}")
@@ -152,7 +172,7 @@ def plain(value: Any, setting: Setting) -> Any:
 
 
 def _descriptor(setting: Setting) -> ParameterDescriptor:
-    unit = "" if setting.unit == "1" else f" [{setting.unit}]"
+    unit = "" if setting.unit == "1" else f" Unit: {setting.unit}."
     descriptor = ParameterDescriptor(description=f"{setting.description}{unit}")
     if setting.choices:
         descriptor.additional_constraints = f"one of {', '.join(setting.choices)}"

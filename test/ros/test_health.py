@@ -1,4 +1,4 @@
-"""The levels of the diagnostics: ERROR means that the answers must not be relied on, WARN that something needs attention."""
+"""The levels of the diagnostics: ERROR for answers that must not be relied on, WARN for what needs attention."""
 
 from __future__ import annotations
 
