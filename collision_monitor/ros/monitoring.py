@@ -79,8 +79,8 @@ class Monitoring:
         self._shapes_in, self._states_in = shapes.topic_name, states.topic_name
         self._refusals = RefusalLog(self._pipeline.monitor, self._logger.warning)
         node.create_timer(WATCHDOG_PERIOD, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        gc.unfreeze()  # what an earlier configuration kept
         _keep_from_collector()
-        resources.callback(gc.unfreeze)  # what was kept is of no more use
         resources.callback(self._publish_status)  # the last one of the recording
         self._logger.info(
             f"listening on {states.topic_name} and {shapes.topic_name}, "
