@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import PoseError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
@@ -21,7 +21,7 @@ from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, as_contacts
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
-from collision_monitor.objects.models import containing_model, parse_model
+from collision_monitor.objects.models import containing_kdop, containing_model, parse_model
 from collision_monitor.query.nearest_pieces import NearestPieces
 from collision_monitor.query.piece_table import PieceTable, exact_piece_table, piece_table
 from collision_monitor.records import Model
@@ -101,11 +101,14 @@ class _Posed(NamedTuple):
     excess: float
 
 
-def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, model: Model | str = "exact") -> Contact:
+def contact(
+    shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, model: Model | str | ArrayLike = "exact"
+) -> Contact:
     """Contact of two shapes, or compounds given as lists of (shape, pose), at two poses.
 
     model: model of both, "exact" or one that contains them ("sphere", "aabb", "obb", "kdop14", "convex_hull", …), which
-    is coarser; the error bound includes its error.
+    is coarser; the error bound includes its error. Directions (k/2, 3) in the frame of each object are a k-DOP of your
+    own, reported as CONVEX_HULL.
     If one of them is concave and they overlap, the depth is that of the deepest pair of their convex pieces, and the
     bound extends to a translation that certainly parts them.
     Raises ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, or a model that is not available.
@@ -150,13 +153,16 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
     )
 
 
-def _posed(shape: Compound, pose: Pose, model: Model | str, name: str) -> _Posed:
+def _posed(shape: Compound, pose: Pose, model: Model | str | ArrayLike, name: str) -> _Posed:
     shapes = shape_pairs(shape, f"shape {name}")
     if not isinstance(pose, Pose):
         raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
-    if parse_model(model) in (Model.AUTO, Model.EXACT):
-        return _Posed(shapes, pose, pose.rotation, exact_piece_table(shapes), shapes, Model.EXACT, 0.0)
-    modelled = containing_model(shapes, model)
+    if isinstance(model, str | int):
+        if parse_model(model) in (Model.AUTO, Model.EXACT):
+            return _Posed(shapes, pose, pose.rotation, exact_piece_table(shapes), shapes, Model.EXACT, 0.0)
+        modelled = containing_model(shapes, model)
+    else:
+        modelled = containing_kdop(shapes, model)
     pieces = piece_table(modelled.pieces)
     return _Posed(shapes, pose, pose.rotation, pieces, modelled.pieces, modelled.model, modelled.excess)
 

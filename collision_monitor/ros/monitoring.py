@@ -9,7 +9,7 @@ from __future__ import annotations
 import gc
 import time
 from contextlib import ExitStack
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -31,6 +31,10 @@ from collision_monitor.ros.status_line import status_line
 from collision_monitor.ros.step_peaks import StepPeaks
 from collision_monitor.ros.step_times import StepTimes
 from collision_monitor.settings.profile import Profile
+
+if TYPE_CHECKING:
+    from collision_monitor.ros.live_sources import LiveSources
+    from collision_monitor.sources import Input, Mapping
 
 WATCHDOG_PERIOD: Final = 0.5
 """s: without steps the status is still published at least this often, so that silence never means "clear"."""
@@ -78,10 +82,13 @@ class Monitoring:
         states = subscription(node, Topic.STATES, self._on_states)
         self._shapes_in, self._states_in = shapes.topic_name, states.topic_name
         self._refusals = RefusalLog(self._pipeline.monitor, self._logger.warning)
+        self._sources = self._live_sources(settings.sources)
         node.create_timer(WATCHDOG_PERIOD, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME))
         gc.unfreeze()  # what an earlier configuration kept
         _keep_from_collector()
         resources.callback(self._publish_status)  # the last one of the recording
+        if self._sources is not None:
+            self._sources.begin()
         self._logger.info(
             f"listening on {states.topic_name} and {shapes.topic_name}, "
             f"profile {profile.name}, frame {settings.frame_id}, {self._recording}"
@@ -102,6 +109,22 @@ class Monitoring:
     def deactivate(self) -> None:
         """Say that nothing is published from now on."""
         self._logger.info(f"inactive: nothing is published; the inputs are still monitored, {self._recording}")
+
+    # -- sources of other programs
+
+    def _live_sources(self, mapping: Mapping | None) -> LiveSources | None:
+        """Return the sources of the file, if one is given; their inputs take the way of the node's own topics."""
+        if mapping is None:
+            return None
+        from collision_monitor.ros.live_sources import LiveSources
+
+        def take(given: Input) -> None:
+            (self._on_states if given.topic is Topic.STATES else self._on_shapes)(given.data)
+
+        def warn(name: str, text: str, count: int) -> None:
+            self._refusals.note("sources", name, text, count, time.monotonic_ns())
+
+        return LiveSources(self._node, mapping, take, warn)
 
     # -- states: one step
 

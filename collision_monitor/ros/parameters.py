@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -20,6 +21,7 @@ from collision_monitor.ros.diagnostics import DiagnosticsParameters
 from collision_monitor.session import ONE_FILE, Splitting
 from collision_monitor.settings.profile import Profile
 from collision_monitor.settings.setting import Setting
+from collision_monitor.sources.mapping import Mapping, load_mapping
 
 T = TypeVar("T", str, int, float, bool, str | int | float)
 
@@ -71,6 +73,7 @@ class ParameterReader:
         return self._given.get(name)
 
 
+DEFAULT_FRAME = "world"
 EXECUTORS = ("single", "events")
 RECORD_MODES = ("always", "on_event")
 _RECORD = ("record", "record_mode", "record_before", "record_after", "record_split_size", "record_split_duration")
@@ -90,12 +93,13 @@ class MonitorParameters:
     splitting: Splitting = ONE_FILE
     autostart: bool = True
     diagnostics: DiagnosticsParameters = field(default_factory=DiagnosticsParameters)
+    sources: Mapping | None = None
 
 
 def read_monitor_parameters(node: Node) -> MonitorParameters:
     """Read, check and declare the parameters. Raises InputError; ProfileError for a setting out of range."""
     settings = Profile.fields()
-    reader = ParameterReader(node, [PROFILE, *(s.name for s in settings), "frame_id", *_RECORD, *_RUNNING])
+    reader = ParameterReader(node, [PROFILE, *(s.name for s in settings), "frame_id", "sources", *_RECORD, *_RUNNING])
     name = reader.value(PROFILE, "balanced")
     profile = Profile.named(name)
     given = {s.name: plain(reader.given(s.name), s) for s in settings if reader.given(s.name) is not None}
@@ -107,7 +111,9 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
     for setting in settings:
         reader.declare(setting.name, getattr(profile, setting.name), _descriptor(setting))
 
-    frame_id = reader.read("frame_id", "world", "Frame of all poses; messages in another frame are refused.")
+    text = "Frame of all poses; messages in another frame are refused. A sources file sets it."
+    frame_id = reader.read("frame_id", DEFAULT_FRAME, text)
+    sources = _read_sources(reader, frame_id)
     record = reader.read(
         "record", "", "Path of the session to write: a .mcap file or a folder. Without one, nothing is recorded."
     )
@@ -119,7 +125,16 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
         raise ProfileError(f"parameter executor: expected {' or '.join(EXECUTORS)}, got {executor!r}")
     text = "Whether the node configures and activates itself. If not, a lifecycle manager or ros2 lifecycle does it."
     autostart = reader.read("autostart", True, text)
-    return MonitorParameters(profile, frame_id, record, executor, splitting, autostart, _read_diagnostics(reader))
+    return MonitorParameters(
+        profile,
+        sources.frame if sources else frame_id,
+        record,
+        executor,
+        splitting,
+        sources=sources,
+        autostart=autostart,
+        diagnostics=_read_diagnostics(reader),
+    )
 
 
 def _read_diagnostics(reader: ParameterReader) -> DiagnosticsParameters:
@@ -133,6 +148,19 @@ def _read_diagnostics(reader: ParameterReader) -> DiagnosticsParameters:
     if not 0.01 <= period <= 3600.0:
         raise InputError(f"parameter diagnostic_updater.period: expected 0.01 to 3600 s, got {period:g}")
     return DiagnosticsParameters(period, use_fqn)
+
+
+def _read_sources(reader: ParameterReader, frame_id: str) -> Mapping | None:
+    """Read the sources file. Raises InputError."""
+    path = reader.read(
+        "sources", "", "Path of a YAML file with the topics of other programs to monitor. Without one, there are none."
+    )
+    if not path:
+        return None
+    mapping = load_mapping(Path(path))
+    if frame_id not in (DEFAULT_FRAME, mapping.frame):
+        raise InputError(f"parameter frame_id: expected that of {path}, {mapping.frame!r}, got {frame_id!r}")
+    return mapping
 
 
 def _read_splitting(reader: ParameterReader) -> Splitting:
