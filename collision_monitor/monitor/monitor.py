@@ -233,6 +233,12 @@ class Monitor:
             return []
         return self._roster.stale_ids(self._timeline.now, self._profile.stale_after)
 
+    @property
+    def unseen_ids(self) -> list[int]:
+        """Ids of the moving objects without any state, ascending."""
+        bodies, used = self._roster.bodies, self._roster.used()
+        return sorted(bodies.id[used[~bodies.seen[used] & ~bodies.static[used]]].tolist())
+
     def refuse(self, reason: Refusal, text: str, count: int = 1) -> None:
         """Count refused inputs, also those that the caller refuses."""
         self._intake.refuse(reason, text, count)

@@ -4,18 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any
+from typing import Any, Final
 
+from rclpy.duration import Duration
+from rclpy.lifecycle import LifecycleNode, LifecyclePublisher
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
 from collision_monitor.pipeline.topics import Topic
 
+ALIVE_S: Final = 0.8
+"""Deadline and lease of the liveliness (s) that the node offers on its answers, so that a subscriber that requests 1 s
+notices a dead node within it. The liveliness is asserted by each message and by the node twice a second, not by DDS
+itself, so it is lost as well if the node hangs. The deadline is missed as well if no states arrive."""
+
+_ANSWERS: Final = (Topic.CONTACTS, Topic.PREDICTIONS, Topic.STATUS)
+
 
 def quality_of(topic: Topic) -> QoSProfile:
-    """Return the quality of service, which is the same for the publisher and for every subscriber."""
+    """Return the quality of service that a subscriber needs, without a deadline."""
     depth, reliability, durability = topic.quality
     return QoSProfile(
         depth=depth,
@@ -33,6 +42,15 @@ def message_class(topic: Topic) -> Any:
 def publisher(node: Node, topic: Topic, name: str | None = None) -> Publisher:
     """Create a publisher. name: the topic's full name; None: below the node's own."""
     return node.create_publisher(message_class(topic), name or topic.private, quality_of(topic))
+
+
+def answer_publisher(node: LifecycleNode, topic: Topic) -> LifecyclePublisher:
+    """Create a publisher that is silent while the node is inactive; answers have a deadline and a liveliness."""
+    quality = quality_of(topic)
+    if topic in _ANSWERS:
+        quality.deadline = quality.liveliness_lease_duration = Duration(seconds=ALIVE_S)
+        quality.liveliness = LivelinessPolicy.MANUAL_BY_TOPIC
+    return node.create_lifecycle_publisher(message_class(topic), topic.private, quality)
 
 
 def subscription(

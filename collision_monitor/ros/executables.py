@@ -35,11 +35,13 @@ def _run(body: Callable[[StopRequest], None], args: Sequence[str] | None) -> int
 
 
 def _monitor(stop: StopRequest) -> None:
-    from collision_monitor.ros.node import MonitorNode
+    from collision_monitor.ros.monitor_node import MonitorNode
 
     node = MonitorNode(stop)
     stop.on_stuck = node.save
     try:
+        if node.settings.autostart:
+            node.start()
         spin(node, stop, events=node.settings.executor == "events")
     finally:
         node.close()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -17,15 +17,16 @@ from rclpy.node import Node
 
 from collision_monitor.errors import InputError, ProfileError, SessionError
 from collision_monitor.pipeline.settings_event import PROFILE
+from collision_monitor.ros.diagnostics import DiagnosticsParameters
 from collision_monitor.session import ONE_FILE, Splitting
 from collision_monitor.settings.profile import Profile
 from collision_monitor.settings.setting import Setting
 from collision_monitor.sources.mapping import Mapping, load_mapping
 
-T = TypeVar("T", str, int, float, str | int | float)
+T = TypeVar("T", str, int, float, bool, str | int | float)
 
 _BY_RCLPY = ("use_sim_time", "start_type_description_service", "qos_overrides.")
-_TYPES = {str: "a text", int: "a whole number", float: "a number"}
+_TYPES = {bool: "true or false", str: "a text", int: "a whole number", float: "a number"}
 
 
 class ParameterReader:
@@ -78,6 +79,9 @@ RECORD_MODES = ("always", "on_event")
 _RECORD = ("record", "record_mode", "record_before", "record_after", "record_split_size", "record_split_duration")
 
 
+_RUNNING = ("executor", "autostart", "diagnostic_updater.period", "diagnostic_updater.use_fqn")
+
+
 @dataclass(frozen=True)
 class MonitorParameters:
     """The checked parameters of the monitor."""
@@ -87,18 +91,22 @@ class MonitorParameters:
     record: str
     executor: str
     splitting: Splitting = ONE_FILE
+    autostart: bool = True
+    diagnostics: DiagnosticsParameters = field(default_factory=DiagnosticsParameters)
     sources: Mapping | None = None
 
 
 def read_monitor_parameters(node: Node) -> MonitorParameters:
     """Read, check and declare the parameters. Raises InputError; ProfileError for a setting out of range."""
     settings = Profile.fields()
-    reader = ParameterReader(node, [PROFILE, *(s.name for s in settings), "frame_id", "sources", *_RECORD, "executor"])
+    reader = ParameterReader(node, [PROFILE, *(s.name for s in settings), "frame_id", "sources", *_RECORD, *_RUNNING])
     name = reader.value(PROFILE, "balanced")
     profile = Profile.named(name)
     given = {s.name: plain(reader.given(s.name), s) for s in settings if reader.given(s.name) is not None}
     profile = profile.replace(**given)
-    choices = f"Profile that the settings start from: {', '.join(Profile.names())}, or the path of a .yaml file."
+    choices = (
+        f"Name of the profile that the settings start from: {', '.join(Profile.names())}, or the path of a .yaml file."
+    )
     reader.declare(PROFILE, name, ParameterDescriptor(description=choices))
     for setting in settings:
         reader.declare(setting.name, getattr(profile, setting.name), _descriptor(setting))
@@ -106,19 +114,47 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
     text = "Frame of all poses; messages in another frame are refused. A sources file sets it."
     frame_id = reader.read("frame_id", DEFAULT_FRAME, text)
     sources = _read_sources(reader, frame_id)
-    record = reader.read("record", "", "Path of the session to write, a .mcap file or a folder; empty: no recording.")
+    record = reader.read(
+        "record", "", "Path of the session to write: a .mcap file or a folder. Without one, nothing is recorded."
+    )
     splitting = _read_splitting(reader)
-    executor = reader.read("executor", "single", f"rclpy executor: {' or '.join(EXECUTORS)}.")
+    executor = reader.read("executor", "single", f"Executor of rclpy that runs the node: {' or '.join(EXECUTORS)}.")
     if not frame_id:
         raise ProfileError("parameter frame_id: expected the name of a frame, got an empty text")
     if executor not in EXECUTORS:
         raise ProfileError(f"parameter executor: expected {' or '.join(EXECUTORS)}, got {executor!r}")
-    return MonitorParameters(profile, sources.frame if sources else frame_id, record, executor, splitting, sources)
+    text = "Whether the node configures and activates itself. If not, a lifecycle manager or ros2 lifecycle does it."
+    autostart = reader.read("autostart", True, text)
+    return MonitorParameters(
+        profile,
+        sources.frame if sources else frame_id,
+        record,
+        executor,
+        splitting,
+        sources=sources,
+        autostart=autostart,
+        diagnostics=_read_diagnostics(reader),
+    )
+
+
+def _read_diagnostics(reader: ParameterReader) -> DiagnosticsParameters:
+    """Read the parameters that diagnostic_updater has too. Raises InputError."""
+    default = DiagnosticsParameters()
+    period = reader.read(
+        "diagnostic_updater.period", default.period, "Time between two messages on /diagnostics. Unit: s."
+    )
+    text = "Whether the names on /diagnostics begin with the node's full name, namespace included."
+    use_fqn = reader.read("diagnostic_updater.use_fqn", default.use_fqn, text)
+    if not 0.01 <= period <= 3600.0:
+        raise InputError(f"parameter diagnostic_updater.period: expected 0.01 to 3600 s, got {period:g}")
+    return DiagnosticsParameters(period, use_fqn)
 
 
 def _read_sources(reader: ParameterReader, frame_id: str) -> Mapping | None:
     """Read the sources file. Raises InputError."""
-    path = reader.read("sources", "", "Sources file (YAML): topics of other programs to monitor; empty: none.")
+    path = reader.read(
+        "sources", "", "Path of a YAML file with the topics of other programs to monitor. Without one, there are none."
+    )
     if not path:
         return None
     mapping = load_mapping(Path(path))
@@ -129,12 +165,26 @@ def _read_sources(reader: ParameterReader, frame_id: str) -> Mapping | None:
 
 def _read_splitting(reader: ParameterReader) -> Splitting:
     """Read the parameters of a recording in several files. Raises InputError."""
-    mode = reader.read("record_mode", RECORD_MODES[0], "always, or on_event: record only around collisions.")
-    before = reader.read("record_before", ONE_FILE.before, "on_event: time kept before each collision [s].")
-    after = reader.read("record_after", ONE_FILE.after, "on_event: time kept after the begin of each collision [s].")
-    size = reader.read("record_split_size", ONE_FILE.size, "Size at which a new file starts [bytes]; 0: never.")
+    mode = reader.read(
+        "record_mode",
+        RECORD_MODES[0],
+        "When to record: always, or on_event, which keeps only the time around collisions.",
+    )
+    before = reader.read(
+        "record_before", ONE_FILE.before, "Time kept before each collision with record_mode on_event. Unit: s."
+    )
+    after = reader.read(
+        "record_after",
+        ONE_FILE.after,
+        "Time kept after the begin of each collision with record_mode on_event. Unit: s.",
+    )
+    size = reader.read(
+        "record_split_size", ONE_FILE.size, "Size at which the recording starts a new file. With 0, never. Unit: bytes."
+    )
     duration = reader.read(
-        "record_split_duration", ONE_FILE.duration, "Duration after which a new file starts [s]; 0: never."
+        "record_split_duration",
+        ONE_FILE.duration,
+        "Duration after which the recording starts a new file. With 0, never. Unit: s.",
     )
     if mode not in RECORD_MODES:
         raise InputError(f"parameter record_mode: expected {' or '.join(RECORD_MODES)}, got {mode!r}")
@@ -150,7 +200,7 @@ def plain(value: Any, setting: Setting) -> Any:
 
 
 def _descriptor(setting: Setting) -> ParameterDescriptor:
-    unit = "" if setting.unit == "1" else f" [{setting.unit}]"
+    unit = "" if setting.unit == "1" else f" Unit: {setting.unit}."
     descriptor = ParameterDescriptor(description=f"{setting.description}{unit}")
     if setting.choices:
         descriptor.additional_constraints = f"one of {', '.join(setting.choices)}"

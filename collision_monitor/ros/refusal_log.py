@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,7 +13,7 @@ PERIOD: Final = 10_000_000_000
 """ns between two lines about the same problem: a flood of wrong messages must not become a flood of lines."""
 
 NAMED: Final = 5
-"""Stale objects that a line names."""
+"""Objects that a line names."""
 
 
 @dataclass
@@ -54,11 +54,9 @@ class RefusalLog:
         ids = self._monitor.stale_ids
         if not ids:
             return
-        named = ", ".join(f"{object_id} ({self._monitor.name(object_id)!r})" for object_id in ids[:NAMED])
-        more = f" and {len(ids) - NAMED} more" if len(ids) > NAMED else ""
         problem = self._problems.setdefault((topic, "stale"), _Problem())
         problem.count = 0  # one line is about all of them, however often they were found stale
-        self.note(topic, "stale", f"no usable new state of object {named}{more}: stale", 1, now)
+        self.note(topic, "stale", f"no usable new state of object {named(self._monitor, ids)}: stale", 1, now)
 
     def catch_up(self, now: int) -> None:
         """Log what has waited for its line. Call it regularly."""
@@ -80,6 +78,12 @@ class RefusalLog:
         times = f" ({problem.count} times{since})" if problem.count > 1 else ""
         problem.last_line, problem.count = now, 0
         self._warn(_printable(f"{topic}: {problem.text}{times}"))
+
+
+def named(monitor: Monitor, ids: Sequence[int]) -> str:
+    """Return the first NAMED of these objects with their names, and the number of the others."""
+    more = f" and {len(ids) - NAMED} more" if len(ids) > NAMED else ""
+    return ", ".join(f"{object_id} ({monitor.name(object_id)!r})" for object_id in ids[:NAMED]) + more
 
 
 def _printable(text: str) -> str:

@@ -40,23 +40,35 @@ class Profile:
 
     name: str = "balanced"
     horizon: float = number(
-        2.0, 0.0, 1e6, "s", "How far ahead collisions are predicted; 0: contacts only.", predictions=True
+        2.0,
+        0.0,
+        1e6,
+        "s",
+        "Time ahead for which collisions are predicted. With 0, only contacts are reported.",
+        predictions=True,
     )
-    contact_margin: float = number(
-        0.0, 0.0, 1e6, "m", "Pairs up to this far apart count as touching.", predictions=True
-    )
+    contact_margin: float = number(0.0, 0.0, 1e6, "m", "Gap up to which a pair counts as touching.", predictions=True)
     contact_points: int = number(
-        1, 1, MOST_POINTS, "1", "Largest number of points of a contact; above 1, touching faces have a row per corner."
+        1,
+        1,
+        MOST_POINTS,
+        "1",
+        "Largest number of points of one contact. Above 1, touching faces have a row for each corner.",
     )
     impact_tolerance: float = number(
-        1e-4, 1e-12, 1.0, "m", "Gap at which a predicted impact is settled.", predictions=True
+        1e-4,
+        1e-12,
+        1.0,
+        "m",
+        "Largest gap that may remain at a predicted impact. A smaller one gives tighter times and takes longer.",
+        predictions=True,
     )
     impact_iterations: int = number(
         64,
         1,
         100000,
         "1",
-        "Largest number of distance computations for one predicted impact; beyond it the pair is UNRESOLVED.",
+        "Largest number of distance computations for one predicted impact. A pair that needs more is UNRESOLVED.",
         predictions=True,
     )
     position_tolerance: float = number(
@@ -64,7 +76,7 @@ class Profile:
         0.0,
         1e3,
         "m",
-        "An object this close to its predicted position needs no new prediction.",
+        "Largest distance from its predicted position at which an object keeps its predictions.",
         predictions=True,
     )
     orientation_tolerance: float = number(
@@ -72,7 +84,7 @@ class Profile:
         0.0,
         math.pi,
         "rad",
-        "An object this close to its predicted orientation needs no new prediction.",
+        "Largest angle from its predicted orientation at which an object keeps its predictions.",
         predictions=True,
     )
     velocity_tolerance: float = number(
@@ -80,7 +92,7 @@ class Profile:
         0.0,
         1e3,
         "m/s",
-        "An object this close to its predicted linear velocity needs no new prediction.",
+        "Largest difference from its predicted linear velocity at which an object keeps its predictions.",
         predictions=True,
     )
     angular_velocity_tolerance: float = number(
@@ -88,22 +100,37 @@ class Profile:
         0.0,
         1e3,
         "rad/s",
-        "An object this close to its predicted angular velocity needs no new prediction.",
+        "Largest difference from its predicted angular velocity at which an object keeps its predictions.",
         predictions=True,
     )
     stale_after: float = number(
-        0.5, 0.0, 1e6, "s", "Age of an object's last state beyond which its predictions are flagged as stale."
+        0.5,
+        0.0,
+        1e6,
+        "s",
+        "Age of the last state of an object beyond which it is stale and its predictions are flagged.",
     )
     stale_acceleration: float = number(
-        1.0, 0.0, 1e4, "m/s^2", "Acceleration that an object may have since its last state; widens its bounds."
+        1.0,
+        0.0,
+        1e4,
+        "m/s^2",
+        "Acceleration that an object may have had since its last state. The bounds of its answers widen by it.",
     )
     uncertainty: bool = switch(
         True, "Whether to compute when and how likely pairs meet, if states declare an uncertainty.", predictions=True
     )
     uncertainty_samples: int = number(
-        1024, 16, 4096, "1", "Samples of the declared uncertainty, for each pair that may meet."
+        1024, 16, 4096, "1", "Number of samples of the declared uncertainty for each pair that may meet."
     )
-    confidence: float = number(0.95, 0.5, 0.9999, "1", "Confidence of the earliest and latest times.", predictions=True)
+    confidence: float = number(
+        0.95,
+        0.5,
+        0.9999,
+        "1",
+        "Confidence level of the earliest and latest time of a collision, if states declare an uncertainty.",
+        predictions=True,
+    )
     min_probability: float = number(
         0.01,
         1e-6,
@@ -113,35 +140,60 @@ class Profile:
         predictions=True,
     )
     max_time_step: float = number(
-        10.0, 1e-3, 1e9, "s", "A stamp that jumps by more is refused unless the next message confirms it."
+        10.0,
+        1e-3,
+        1e9,
+        "s",
+        "Largest jump of a stamp. A stamp that jumps further is refused unless the next message confirms it.",
     )
-    threads: int = number(1, 1, 64, "1", "Threads of the kernels; the answers are the same bytes for any number.")
+    threads: int = number(1, 1, 64, "1", "Number of threads of a step. The answers are the same bytes for any number.")
     budget_ms: float = number(
-        NO_BUDGET, 0.05, NO_BUDGET, "ms", "Time for a step: the most urgent pairs first; the others are UNRESOLVED."
+        NO_BUDGET,
+        0.05,
+        NO_BUDGET,
+        "ms",
+        "Time that a step may take. The most urgent pairs come first, and the others are UNRESOLVED.",
     )
     pairs_per_step: int = number(
-        NO_LIMIT, 1, NO_LIMIT, "1", "Largest number of pairs examined in a step; a limit that depends on no clock."
+        NO_LIMIT,
+        1,
+        NO_LIMIT,
+        "1",
+        "Largest number of pairs that a step examines, the most urgent first. It depends on no clock.",
     )
-    model_primitive: str = choice(_MODELS, "Model of boxes, capsules, cylinders and cones without one of their own.")
-    model_hull: str = choice(_MODELS, "Model of convex hulls without one of their own.")
+    model_primitive: str = choice(
+        _MODELS, "Model that represents boxes, capsules, cylinders and cones, if their description chooses none."
+    )
+    model_hull: str = choice(_MODELS, "Model that represents convex hulls, if their description chooses none.")
     model_mesh: str = choice(
-        _MODELS, "Model of meshes without one of their own; auto: the convex hull of concave meshes."
+        _MODELS,
+        "Model that represents meshes, if their description chooses none. With auto, concave ones become their hull.",
     )
-    model_compound: str = choice(_MODELS, "Model of objects of several shapes without one of their own.")
+    model_compound: str = choice(
+        _MODELS, "Model that represents objects of several shapes, if their description chooses none."
+    )
     region_min: tuple[float, float, float] = vector(
         (-EVERYWHERE, -EVERYWHERE, -EVERYWHERE),
         EVERYWHERE,
         "m",
-        "Lower corner of the region of interest; objects wholly outside of it are ignored.",
+        "Lower corner of the region of interest. Objects that are wholly outside the region are ignored.",
     )
     region_max: tuple[float, float, float] = vector(
         (EVERYWHERE, EVERYWHERE, EVERYWHERE),
         EVERYWHERE,
         "m",
-        "Upper corner of the region of interest; objects wholly outside of it are ignored.",
+        "Upper corner of the region of interest. Objects that are wholly outside the region are ignored.",
     )
-    min_closing_speed: float = number(0.0, 0.0, 1e6, "m/s", "Predictions with a lower closing speed are left out.")
-    ignore_separating: bool = switch(False, "Leave out predictions of pairs with origins that move apart now.")
+    min_closing_speed: float = number(
+        0.0,
+        0.0,
+        1e6,
+        "m/s",
+        "Smallest closing speed of a reported prediction. Predictions with an unknown speed are reported.",
+    )
+    ignore_separating: bool = switch(
+        False, "Whether to leave out predictions of pairs with origins that move apart now."
+    )
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:

@@ -14,6 +14,8 @@ from collision_monitor.session import Splitting
 from collision_monitor.settings.profile import Profile
 
 CONFIG = Path(__file__).parents[2] / "config" / "monitor.yaml"
+EVERY_LINE = re.sub(r"^( *)# (\w+: )", r"\1\2", CONFIG.read_text(), flags=re.MULTILINE)
+"""The file with the settings that are commented out."""
 
 
 @pytest.fixture
@@ -37,12 +39,11 @@ def test_the_file_as_it_is_gives_the_defaults(read):
 
 
 def test_the_file_with_every_line_in_force_gives_the_defaults(read, tmp_path):
-    text = re.sub(r"^( *)# (\w+: )", r"\1\2", CONFIG.read_text(), flags=re.MULTILINE)
-    values = next(iter(yaml.safe_load(text).values()))["ros__parameters"]
+    values = next(iter(yaml.safe_load(EVERY_LINE).values()))["ros__parameters"]
     recording = {"record", *(f"record_{n}" for n in ("mode", "before", "after", "split_size", "split_duration"))}
-    others = {"profile", "frame_id", "sources", "executor"}
-    assert set(values) == {*others, *recording, *(s.name for s in Profile.fields())}
-    (tmp_path / "all.yaml").write_text(text)
+    running = {"executor", "autostart", "diagnostic_updater.period", "diagnostic_updater.use_fqn"}
+    assert set(values) == {"profile", "frame_id", "sources", *running, *recording, *(s.name for s in Profile.fields())}
+    (tmp_path / "all.yaml").write_text(EVERY_LINE)
     assert read("--params-file", str(tmp_path / "all.yaml"))[0].profile == Profile()
 
 
@@ -68,6 +69,13 @@ def test_a_recording_that_cannot_be_is_named(read, given, text):
     with pytest.raises(InputError) as error:
         read("-p", given)
     assert text in str(error.value)
+
+
+def test_each_description_is_of_whole_sentences(read):
+    _, describe = read()
+    for name in next(iter(yaml.safe_load(EVERY_LINE).values()))["ros__parameters"]:
+        description = describe(name).description
+        assert re.fullmatch(r"[A-Z].*\w\S?\.", description) and len(description.split()) > 4, description
 
 
 def test_the_descriptors_say_unit_and_range(read):

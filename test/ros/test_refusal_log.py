@@ -140,7 +140,7 @@ def test_a_first_users_mistakes_are_in_the_log_with_object_topic_and_numbers(sta
         f"{states}: no usable new state of object 3 ('ball 3'): stale",
     ):
         assert words.count(line) == 1, line
-    assert words.count(f"{states}: ") == 7
+    assert words.count(f"]: {states}: ") == 7
     assert words.count(f"{shapes}: ") == 1
     assert "-0.5" in words.split(f"{shapes}: ")[1].splitlines()[0]
     assert words.count("[WARN]") - words.count("no newer states") == 8

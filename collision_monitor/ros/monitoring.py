@@ -1,40 +1,40 @@
-"""The monitor as a ROS 2 node: passes message bytes through the pipeline, publishes the answers and records everything.
+"""One configuration of the node: passes message bytes through the pipeline, publishes the answers, records everything.
 
-    ros2 run collision_monitor monitor --ros-args -p horizon:=1.0 -p record:=run.mcap
+It lasts from `configure` to `cleanup`. Inactive it does the same and publishes nothing, so that its objects and its
+recording have no gap.
 """
 
 from __future__ import annotations
 
 import gc
-import threading
 import time
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Final
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
-from rclpy.node import Node
+from rclpy.lifecycle import LifecycleNode
 
-from collision_monitor import codec, warm_up
-from collision_monitor.errors import CollisionMonitorError
+from collision_monitor import codec
 from collision_monitor.pipeline.pipeline import Outputs, Pipeline, TakenShapes
 from collision_monitor.pipeline.preparation import Preparation
-from collision_monitor.pipeline.topics import NODE, STATUS_PERIOD, Topic
+from collision_monitor.pipeline.topics import STATUS_PERIOD, Topic
 from collision_monitor.records import Phase
-from collision_monitor.ros.endpoints import publisher, subscription
-from collision_monitor.ros.live_settings import LiveSettings
+from collision_monitor.ros.endpoints import answer_publisher, subscription
+from collision_monitor.ros.health import Facts
 from collision_monitor.ros.markers import MarkerView
 from collision_monitor.ros.name_conflict import NameConflict
 from collision_monitor.ros.node_recording import NodeRecording
-from collision_monitor.ros.parameters import read_monitor_parameters
-from collision_monitor.ros.process import StopRequest
-from collision_monitor.ros.refusal_log import RefusalLog
+from collision_monitor.ros.parameters import MonitorParameters
+from collision_monitor.ros.refusal_log import RefusalLog, named
 from collision_monitor.ros.status_line import status_line
+from collision_monitor.ros.step_peaks import StepPeaks
 from collision_monitor.ros.step_times import StepTimes
 from collision_monitor.settings.profile import Profile
 
 if TYPE_CHECKING:
     from collision_monitor.ros.live_sources import LiveSources
-    from collision_monitor.sources import Input
+    from collision_monitor.sources import Input, Mapping
 
 WATCHDOG_PERIOD: Final = 0.5
 """s: without steps the status is still published at least this often, so that silence never means "clear"."""
@@ -45,29 +45,25 @@ MARKER_PERIOD: Final = 100_000_000
 LOG_PERIOD: Final = 5_000_000_000
 """ns between two status lines in the log."""
 
-COMPILER_PATIENCE: Final = 3.0
-"""s until the log explains the wait. Loading compiled kernels takes much less."""
 
-
-class MonitorNode(Node):
+class Monitoring:
     """Subscribes to shapes and states, publishes contacts, predictions, status and markers.
 
-    Raises InputError or ProfileError for impossible parameters.
+    node: a managed node, which destroys what is made here. resources: gets what has to end with the configuration, also
+    when it fails halfway. profile: the settings in force. record: as the parameter; empty: no recording.
     """
 
-    def __init__(self, stop: StopRequest) -> None:
-        super().__init__(NODE, automatically_declare_parameters_from_overrides=True)
-        try:
-            self.settings = settings = read_monitor_parameters(self)
-        except CollisionMonitorError:
-            self.destroy_node()
-            raise
-        self._warm_up(stop)
-        self._name = self.get_fully_qualified_name()
-        self._name_conflict = NameConflict(self)
+    def __init__(
+        self, node: LifecycleNode, resources: ExitStack, settings: MonitorParameters, profile: Profile, record: str
+    ) -> None:
+        self._node, self._logger = node, node.get_logger()
+        self._name = node.get_fully_qualified_name()
+        self._name_conflict = NameConflict(node)
         self._preparation = Preparation()
-        self._pipeline = Pipeline(settings.profile, frame_id=settings.frame_id, preparation=self._preparation)
-        self._times = StepTimes(settings.profile.max_time_step)
+        resources.callback(self._preparation.close)
+        self._pipeline = Pipeline(profile, frame_id=settings.frame_id, preparation=self._preparation)
+        self._times = StepTimes(profile.max_time_step)
+        self._peaks = StepPeaks()
         self._markers = MarkerView(self._pipeline.catalogue, settings.frame_id)
         self._last_status = self._last_markers = self._last_log = time.monotonic_ns()
         self._last_step: int | None = None  # when the monitor's time last changed
@@ -75,46 +71,50 @@ class MonitorNode(Node):
         self._was_silent = False
         self._is_event_wanted = settings.splitting.on_event
 
-        self._contacts_out = publisher(self, Topic.CONTACTS)
-        self._predictions_out = publisher(self, Topic.PREDICTIONS)
-        self._status_out = publisher(self, Topic.STATUS)
-        self._markers_out = publisher(self, Topic.MARKERS)
-        self._recording = NodeRecording(
-            self, settings.record, lambda: self._pipeline.metadata(self._name), settings.splitting
-        )
-        self._live_settings = LiveSettings(self, settings.profile, self._on_settings)
+        self._contacts_out = answer_publisher(node, Topic.CONTACTS)
+        self._predictions_out = answer_publisher(node, Topic.PREDICTIONS)
+        self._status_out = answer_publisher(node, Topic.STATUS)
+        self._markers_out = answer_publisher(node, Topic.MARKERS)
+        self._recording = NodeRecording(node, record, lambda: self._pipeline.metadata(self._name), settings.splitting)
+        resources.callback(self._recording.close)
         # Shapes first: if both wait, the executor takes them in this order.
-        shapes = subscription(self, Topic.SHAPES, self._on_shapes)
-        states = subscription(self, Topic.STATES, self._on_states)
+        shapes = subscription(node, Topic.SHAPES, self._on_shapes)
+        states = subscription(node, Topic.STATES, self._on_states)
         self._shapes_in, self._states_in = shapes.topic_name, states.topic_name
-        self._refusals = RefusalLog(self._pipeline.monitor, self.get_logger().warning)
-        self._sources = self._live_sources()
-        self.create_timer(WATCHDOG_PERIOD, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._refusals = RefusalLog(self._pipeline.monitor, self._logger.warning)
+        self._sources = self._live_sources(settings.sources)
+        node.create_timer(WATCHDOG_PERIOD, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        gc.unfreeze()  # what an earlier configuration kept
         _keep_from_collector()
-        self._publish_status()
+        resources.callback(self._publish_status)  # the last one of the recording
         if self._sources is not None:
             self._sources.begin()
-        self.get_logger().info(
+        self._logger.info(
             f"listening on {states.topic_name} and {shapes.topic_name}, "
-            f"profile {settings.profile.name}, frame {settings.frame_id}, {self._recording}"
+            f"profile {profile.name}, frame {settings.frame_id}, {self._recording}"
         )
 
-    def _warm_up(self, stop: StopRequest) -> None:
-        """Load or compile the kernels before messages arrive, because messages that wait for the compiler are lost."""
-        text = "compiling the kernels, once for this machine and version: this takes a minute or two"
-        patience = threading.Timer(COMPILER_PATIENCE, self.get_logger().info, [text])
-        patience.start()
-        try:
-            with stop.ending():
-                warm_up.warm_up_monitor()
-        finally:
-            patience.cancel()
+    # -- activation
+
+    @property
+    def is_active(self) -> bool:
+        """Whether the answers are published."""
+        return bool(self._contacts_out.is_activated)
+
+    def activate(self) -> None:
+        """Publish the status at once, now that the publishers are active."""
+        self._publish_status()
+        self._logger.info("active: answers are published")
+
+    def deactivate(self) -> None:
+        """Say that nothing is published from now on."""
+        self._logger.info(f"inactive: nothing is published; the inputs are still monitored, {self._recording}")
 
     # -- sources of other programs
 
-    def _live_sources(self) -> LiveSources | None:
+    def _live_sources(self, mapping: Mapping | None) -> LiveSources | None:
         """Return the sources of the file, if one is given; their inputs take the way of the node's own topics."""
-        if self.settings.sources is None:
+        if mapping is None:
             return None
         from collision_monitor.ros.live_sources import LiveSources
 
@@ -124,7 +124,7 @@ class MonitorNode(Node):
         def warn(name: str, text: str, count: int) -> None:
             self._refusals.note("sources", name, text, count, time.monotonic_ns())
 
-        return LiveSources(self, self.settings.sources, take, warn)
+        return LiveSources(self._node, mapping, take, warn)
 
     # -- states: one step
 
@@ -140,6 +140,7 @@ class MonitorNode(Node):
         if outputs.result.stamp_ns != self._last_stamp:  # a stamp that stands still is no news, however often it comes
             self._last_step, self._last_stamp = ended, outputs.result.stamp_ns
         self._times.add(began, ended, self._now() - outputs.result.stamp_ns)
+        self._peaks.add(outputs.result.status)
         self._record_step(data, outputs, received)
         self._publish_status_if_due(ended)
         self._publish_markers_if_due(data, outputs, ended)
@@ -165,7 +166,9 @@ class MonitorNode(Node):
         self._recording.write(Topic.PREDICTIONS, outputs.predictions, received, stamp)
 
     def _publish_markers_if_due(self, states: bytes, outputs: Outputs, now: int) -> None:
-        if now - self._last_markers < MARKER_PERIOD or not self._markers_out.get_subscription_count():
+        if now - self._last_markers < MARKER_PERIOD or not self.is_active:
+            return
+        if not self._markers_out.get_subscription_count():
             return
         self._last_markers = now
         self._markers_out.publish(self._markers.draw(codec.decode_states(states).states, outputs.result))
@@ -191,9 +194,9 @@ class MonitorNode(Node):
         for each in taken:
             self._note_shapes(each, self._now())
         for text in texts:
-            self.get_logger().warning(text)
+            self._logger.warning(text)
 
-    def _on_settings(self, profile: Profile) -> None:
+    def change_settings(self, profile: Profile) -> None:
         """Change the settings. Like all callbacks, this runs between two steps."""
         now = self._now()
         change = self._pipeline.change_settings(profile, now, self._name)
@@ -201,7 +204,7 @@ class MonitorNode(Node):
         if change.shapes is not None:
             self._record_shapes(change.shapes, now)
         self._times.longest_latency = profile.max_time_step
-        self.get_logger().info(f"settings changed, profile {profile.name}")
+        self._logger.info(f"settings changed, profile {profile.name}")
 
     def _record_shapes(self, data: bytes, received: int) -> None:
         """Record an ObjectDescriptionArray that the pipeline has processed, with all objects described since then."""
@@ -211,6 +214,8 @@ class MonitorNode(Node):
     # -- status
 
     def _on_watchdog(self) -> None:
+        for each in (self._contacts_out, self._predictions_out, self._status_out):
+            each.assert_liveliness()
         self._recording.log_problems()
         self._name_conflict.look()
         self._take_prepared()
@@ -224,7 +229,8 @@ class MonitorNode(Node):
         self._publish_status_if_due(now)
         if now - self._last_log >= LOG_PERIOD and not silent and self._last_step is not None:
             self._last_log = now
-            self.get_logger().info(status_line(codec.decode_status(self._publish_status())))
+            line = status_line(codec.decode_status(self._publish_status()))
+            self._logger.info(line if self.is_active else f"inactive, nothing is published: {line}")
 
     def _is_silent(self, now: int) -> bool:
         """Return whether newer states once arrived and no longer arrive, by the steady clock."""
@@ -233,37 +239,49 @@ class MonitorNode(Node):
     def _log_silence(self, silent: bool) -> None:
         self._was_silent = silent
         if silent:
-            self.get_logger().warning(f"no newer states on {self._states_in}: all moving objects are stale")
+            self._logger.warning(f"no newer states on {self._states_in}: all moving objects are stale")
         else:
-            self.get_logger().info("newer states arrive again")
+            self._logger.info("newer states arrive again")
 
     def _publish_status_if_due(self, now: int) -> None:
         if now - self._last_status >= STATUS_PERIOD:
             self._publish_status()
 
+    def _status(self, now: int) -> bytes:
+        live = self._times.summary(now)
+        return self._pipeline.status(silent=self._is_silent(now), **live, **self._recording.status())
+
     def _publish_status(self) -> bytes:
         self._last_status = time.monotonic_ns()
-        live = self._times.summary(self._last_status)
-        data = self._pipeline.status(silent=self._is_silent(self._last_status), **live, **self._recording.status())
+        data = self._status(self._last_status)
         self._status_out.publish(data)
         now = self._now()
         self._recording.write(Topic.STATUS, data, now, now)
         return data
 
+    def facts(self) -> Facts:
+        """Return what the diagnostics report on. The peaks are those since the last call."""
+        now, monitor = time.monotonic_ns(), self._pipeline.monitor
+        deferred, unresolved = self._peaks.take()
+        return Facts(
+            status=codec.decode_status(self._status(now)),
+            topic=self._states_in,
+            silence=None if self._last_step is None else (now - self._last_step) * 1e-9,
+            stale_after=monitor.profile.stale_after,
+            stale=named(monitor, monitor.stale_ids),
+            unseen=named(monitor, monitor.unseen_ids),
+            deferred=deferred,
+            unresolved=unresolved,
+            other_nodes=self._name_conflict.others,
+        )
+
     def _now(self) -> int:
-        nanoseconds: int = self.get_clock().now().nanoseconds
+        nanoseconds: int = self._node.get_clock().now().nanoseconds
         return nanoseconds
 
     def save(self) -> None:
         """Finish the session file, from another thread: this one is stuck and the process is about to end."""
         self._recording.finish()
-
-    def close(self) -> None:
-        """Publish and record the last status, and finish the session file."""
-        self._preparation.close()
-        self._publish_status()
-        self._recording.close()
-        self.destroy_node()
 
 
 def _keep_from_collector() -> None:

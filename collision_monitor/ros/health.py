@@ -1,0 +1,199 @@
+"""What the diagnostics report: the state of the node, its inputs, its steps and its recording.
+
+OK: nothing to do. WARN: the published answers are right, and something needs attention. ERROR: do not rely on the
+answers; they may miss a collision, or they are missing though they should be there. docs/safety.md has the table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Final
+
+from collision_monitor.codec import MonitorStatus
+from collision_monitor.errors import Refusal
+from collision_monitor.session import Recording
+
+HISTORY: Final = 10
+"""Reports over which counters are compared: a single refusal stays visible for about 10 s."""
+
+UNMONITORED: Final = (Refusal.UNKNOWN_ID, Refusal.SHAPE)
+"""Refusals that mean an object which no answer covers and no other report mentions. An object whose states are refused
+for another reason is unseen or becomes stale."""
+
+
+class Level(IntEnum):
+    """The levels of DiagnosticStatus."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+    STALE = 3
+
+
+@dataclass(frozen=True)
+class Report:
+    """One DiagnosticStatus without its node."""
+
+    task: str
+    level: Level
+    text: str
+    values: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What the reports rest on.
+
+    topic: of the states. silence: s since newer states arrived, by the steady clock; None: none arrived yet.
+    stale, unseen: the names of such objects. deferred, unresolved: most pairs in one step since the last report.
+    other_nodes: nodes of the same name.
+    """
+
+    status: MonitorStatus
+    topic: str
+    silence: float | None
+    stale_after: float
+    stale: str
+    unseen: str
+    deferred: int
+    unresolved: int
+    other_nodes: int
+
+
+@dataclass
+class History:
+    """The statuses at the last reports of one configuration."""
+
+    _statuses: deque[MonitorStatus] = field(default_factory=lambda: deque(maxlen=HISTORY))
+
+    def increase(self, status: MonitorStatus, counters: Iterable[str]) -> dict[str, int]:
+        """Return by how much counters of the status grew since the oldest report; the ones that did not are left out.
+
+        Before the first report they were 0.
+        """
+        first = self._statuses[0] if len(self._statuses) == HISTORY else MonitorStatus()
+        grown = {name: getattr(status, name) - getattr(first, name) for name in counters}
+        return {name: count for name, count in grown.items() if count}
+
+    def add(self, status: MonitorStatus) -> None:
+        """Remember the status of this report."""
+        self._statuses.append(status)
+
+
+class _Findings:
+    """Collects what is wrong; the report has the highest level, and the texts with the worst first."""
+
+    def __init__(self) -> None:
+        self._found: list[tuple[Level, str]] = []
+
+    def add(self, level: Level, text: str) -> None:
+        self._found.append((level, text))
+
+    def report(self, task: str, otherwise: str, values: dict[str, object]) -> Report:
+        found = sorted(self._found, key=lambda each: -each[0])
+        text = "; ".join(text for _, text in found) or otherwise
+        return Report(task, max((level for level, _ in found), default=Level.OK), text, _texts(values))
+
+
+def reports(state: str, failure: str, facts: Facts | None, history: History) -> list[Report]:
+    """Return the reports of the node. facts: None if it is not configured. Adds the status to the history."""
+    if facts is None:
+        absent = [
+            Report(task, Level.STALE, f"none: the node is {state}", {}) for task in ("inputs", "steps", "recording")
+        ]
+        return [_state(state, failure, 0), *absent]
+    found = [
+        _state(state, failure, facts.other_nodes),
+        _inputs(facts, history),
+        _steps(facts),
+        _recording(facts.status, history),
+    ]
+    history.add(facts.status)
+    return found
+
+
+def _state(state: str, failure: str, other_nodes: int) -> Report:
+    findings = _Findings()
+    if failure:
+        findings.add(Level.ERROR, failure)
+    if other_nodes:
+        findings.add(Level.ERROR, "another node of this name publishes on the same topics")
+    if state != "active":
+        findings.add(Level.WARN, f"{state}: no answers are published")
+    return findings.report("state", "active", {"state": state, "nodes of the same name": other_nodes})
+
+
+def _inputs(facts: Facts, history: History) -> Report:
+    status, findings = facts.status, _Findings()
+    moving = status.objects - status.objects_static
+    if facts.silence is not None and facts.silence >= facts.stale_after and moving:
+        findings.add(Level.ERROR, f"silent: no newer states on {facts.topic} for {facts.silence:.1f} s")
+    elif facts.stale:
+        findings.add(Level.ERROR, f"stale: no usable new state of object {facts.stale}")
+    if status.objects_unseen:
+        findings.add(Level.ERROR, f"unseen: no state yet of object {facts.unseen}")
+    refused = history.increase(status, [f"refused_{reason.value}" for reason in Refusal])
+    if refused:
+        is_unmonitored = any(f"refused_{reason.value}" in refused for reason in UNMONITORED)
+        counts = ", ".join(f"{count} {name.removeprefix('refused_')}" for name, count in refused.items())
+        level = Level.ERROR if is_unmonitored else Level.WARN
+        findings.add(level, f"refused lately: {counts} (last: {status.last_refusal})")
+    for count in history.increase(status, ["messages_lost"]).values():
+        findings.add(Level.WARN, f"lost lately: {count} messages on {facts.topic}")
+    if not status.objects:
+        findings.add(Level.WARN, "no object is described")
+    names = ("objects", "objects_static", "objects_unseen", "objects_stale", "messages_lost")
+    counters = (*names, *(f"refused_{reason.value}" for reason in Refusal))
+    values = {"silence [s]": facts.silence, **{name: getattr(status, name) for name in counters}}
+    return findings.report("inputs", f"{status.objects} objects, all up to date", values)
+
+
+def _steps(facts: Facts) -> Report:
+    status, findings = facts.status, _Findings()
+    if status.latency > facts.stale_after:
+        findings.add(Level.ERROR, f"late: the answers are {status.latency:.2f} s behind the stamps of their states")
+    elif math.isnan(status.latency) and status.step:
+        findings.add(Level.WARN, "the latency is unknown, because the stamps of the states are from another clock")
+    if facts.unresolved:
+        findings.add(Level.WARN, f"unresolved: up to {facts.unresolved} pairs in a step; treat them as colliding")
+    if facts.deferred:
+        findings.add(Level.WARN, f"deferred: the budget ran out, up to {facts.deferred} pairs in a step")
+    if status.rate > 1.0 and status.step_duration_p99 * status.rate > 1.0:
+        findings.add(
+            Level.WARN,
+            f"slow: 1 % of the steps take {status.step_duration_p99 * 1e3:.1f} ms or more at {status.rate:.0f} Hz",
+        )
+    values = {
+        "step": status.step,
+        "rate [Hz]": status.rate,
+        "latency [s]": status.latency,
+        "step_duration_p99 [s]": status.step_duration_p99,
+        "deferred": facts.deferred,
+        "unresolved": facts.unresolved,
+        "contacts": status.contacts,
+        "predictions": status.predictions,
+        "profile": status.profile,
+        "version": status.version,
+    }
+    return findings.report("steps", f"{status.rate:.0f} steps/s" if status.step else "no step yet", values)
+
+
+def _recording(status: MonitorStatus, history: History) -> Report:
+    findings = _Findings()
+    if status.recording == Recording.FAILED:
+        findings.add(Level.WARN, f"the recording failed, the monitoring goes on: {status.recording_error}")
+    else:
+        for count in history.increase(status, ["recording_dropped"]).values():
+            findings.add(Level.WARN, f"the disk is too slow: {count} messages dropped lately")
+    is_on = status.recording == Recording.ON
+    names = ("recording_path", "recorded_messages", "recorded_bytes", "recording_dropped")
+    values = {name: getattr(status, name) for name in names}
+    return findings.report("recording", f"recording to {status.recording_path}" if is_on else "not recording", values)
+
+
+def _texts(values: dict[str, object]) -> dict[str, str]:
+    return {key: f"{value:.6g}" if isinstance(value, float) else str(value) for key, value in values.items()}

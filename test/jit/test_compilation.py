@@ -1,0 +1,35 @@
+"""A compilation is noticed, and the loading of a cached kernel is not."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+PROGRAM = """
+from collision_monitor._jit import kernel
+from collision_monitor._jit.compilation import on_first_compilation
+
+@kernel
+def double(x):
+    return 2.0 * x
+
+@kernel
+def triple(x):
+    return 3.0 * x
+
+with on_first_compilation(lambda: print("compiling")):
+    assert double(1.0) + triple(1.0) == 5.0
+double(1)  # another type: compiled outside of the block
+"""
+
+
+def test_only_a_compilation_is_noticed_and_only_the_first(tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    environment = {"PYTHONPATH": ":".join(filter(None, sys.path)), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    outputs = [
+        subprocess.run([sys.executable, program], env=environment, capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    ]
+    assert outputs == ["compiling\n", ""]
