@@ -1,0 +1,283 @@
+"""Nearest triangles of two trees, and whether two trees have a point in common.
+
+Pairs of boxes wait on a stack, the nearest on top; a pair is dropped if its bound exceeds the best distance so far.
+(Larsen, Gottschalk, Lin, Manocha, 1999; Ericson, Real-Time Collision Detection, 6.3)
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor._jit import device, inlined, kernel
+from collision_monitor.meshes.boxes import Placing, box_bounds, inverse, seen_from
+from collision_monitor.meshes.layout import AXES, CENTER, CHILD, CORNERS, HALF, RADIUS, WIDTH
+from collision_monitor.meshes.triangle_pair import Triangle, closest_points, crossing_point
+from collision_monitor.narrow_phase.vector import dot, minus
+
+DEEPEST: Final = 24
+"""Largest number of levels of two trees together: each level has eight times as many triangles."""
+
+_WAITING: Final = 3 * WIDTH * DEEPEST
+"""Numbers for the pairs of boxes that wait: bound, box of A, box of B, each box as WIDTH * block + member."""
+_BOUNDS: Final = _WAITING
+_TRIANGLES: Final = _BOUNDS + WIDTH
+_NEAR_A: Final = _TRIANGLES + 9 * WIDTH
+_NEAR_B: Final = _NEAR_A + WIDTH
+MEMORY: Final = _NEAR_B + WIDTH
+"""Numbers of scratch memory of a query."""
+
+# columns of an answer
+SQUARED: Final = 0
+ON_A: Final = 1
+ON_B: Final = 4
+PLACE_A: Final = 7
+PLACE_B: Final = 8
+ANSWER: Final = 9
+"""Numbers of an answer: distance of the surfaces (m), closest points on both in A's frame (m), and the places of the two
+triangles, WIDTH * block + member, which serve as a hint for a later query."""
+
+
+def answer_row() -> NDArray[np.float64]:
+    """Make an answer without a hint."""
+    row = np.zeros(ANSWER)
+    row[PLACE_A] = row[PLACE_B] = -1.0
+    return row
+
+
+@inlined
+def triangle_at(blocks, block, k):
+    """Triangle k of a block."""
+    return Triangle(
+        (blocks[block, CORNERS, k], blocks[block, CORNERS + 1, k], blocks[block, CORNERS + 2, k]),
+        (blocks[block, CORNERS + 3, k], blocks[block, CORNERS + 4, k], blocks[block, CORNERS + 5, k]),
+        (blocks[block, CORNERS + 6, k], blocks[block, CORNERS + 7, k], blocks[block, CORNERS + 8, k]),
+    )
+
+
+@inlined
+def place_point(X, p):
+    """A point of the other tree in this tree's frame."""
+    return (
+        X.r00 * p[0] + X.r01 * p[1] + X.r02 * p[2] + X.x,
+        X.r10 * p[0] + X.r11 * p[1] + X.r12 * p[2] + X.y,
+        X.r20 * p[0] + X.r21 * p[1] + X.r22 * p[2] + X.z,
+    )
+
+
+@inlined
+def place_triangle(X, T):
+    """A triangle of the other tree in this tree's frame."""
+    return Triangle(place_point(X, T.a), place_point(X, T.b), place_point(X, T.c))
+
+
+@inlined
+def size_of(blocks, block, member):
+    """Sum of the half extents of a box (m)."""
+    return blocks[block, HALF, member] + blocks[block, HALF + 1, member] + blocks[block, HALF + 2, member]
+
+
+@device
+def _write_triangles(blocks, block, X, work):
+    """Write the corners of the triangles of a block, placed by X, into the scratch memory."""
+    for i in range(3):
+        for k in range(WIDTH):
+            x = blocks[block, CORNERS + 3 * i, k]
+            y = blocks[block, CORNERS + 3 * i + 1, k]
+            z = blocks[block, CORNERS + 3 * i + 2, k]
+            work[_TRIANGLES + WIDTH * (3 * i) + k] = X.r00 * x + X.r01 * y + X.r02 * z + X.x
+            work[_TRIANGLES + WIDTH * (3 * i + 1) + k] = X.r10 * x + X.r11 * y + X.r12 * z + X.y
+            work[_TRIANGLES + WIDTH * (3 * i + 2) + k] = X.r20 * x + X.r21 * y + X.r22 * z + X.z
+
+
+@inlined
+def _written_triangle(work, k):
+    return Triangle(
+        (work[_TRIANGLES + k], work[_TRIANGLES + WIDTH + k], work[_TRIANGLES + 2 * WIDTH + k]),
+        (work[_TRIANGLES + 3 * WIDTH + k], work[_TRIANGLES + 4 * WIDTH + k], work[_TRIANGLES + 5 * WIDTH + k]),
+        (work[_TRIANGLES + 6 * WIDTH + k], work[_TRIANGLES + 7 * WIDTH + k], work[_TRIANGLES + 8 * WIDTH + k]),
+    )
+
+
+@inlined
+def _gap(low, high, half):
+    return max(max(low - half, -half - high), 0.0)
+
+
+@device
+def _triangle_bounds(blocks, block, M, box_blocks, box, member, out, begin):
+    """Write lower bounds on the squared distances of the triangles of a block from a box into out[begin:].
+
+    M: pose of the triangles' tree in the frame of the box.
+    """
+    e0, e1, e2 = (
+        box_blocks[box, HALF, member],
+        box_blocks[box, HALF + 1, member],
+        box_blocks[box, HALF + 2, member],
+    )
+    for k in range(WIDTH):
+        ax, ay, az = blocks[block, CORNERS, k], blocks[block, CORNERS + 1, k], blocks[block, CORNERS + 2, k]
+        bx, by, bz = blocks[block, CORNERS + 3, k], blocks[block, CORNERS + 4, k], blocks[block, CORNERS + 5, k]
+        cx, cy, cz = blocks[block, CORNERS + 6, k], blocks[block, CORNERS + 7, k], blocks[block, CORNERS + 8, k]
+        r = blocks[block, RADIUS, k]
+        u = M.r00 * ax + M.r01 * ay + M.r02 * az + M.x
+        v = M.r00 * bx + M.r01 * by + M.r02 * bz + M.x
+        w = M.r00 * cx + M.r01 * cy + M.r02 * cz + M.x
+        g0 = _gap(min(u, min(v, w)) - r, max(u, max(v, w)) + r, e0)
+        u = M.r10 * ax + M.r11 * ay + M.r12 * az + M.y
+        v = M.r10 * bx + M.r11 * by + M.r12 * bz + M.y
+        w = M.r10 * cx + M.r11 * cy + M.r12 * cz + M.y
+        g1 = _gap(min(u, min(v, w)) - r, max(u, max(v, w)) + r, e1)
+        u = M.r20 * ax + M.r21 * ay + M.r22 * az + M.z
+        v = M.r20 * bx + M.r21 * by + M.r22 * bz + M.z
+        w = M.r20 * cx + M.r21 * cy + M.r22 * cz + M.z
+        g2 = _gap(min(u, min(v, w)) - r, max(u, max(v, w)) + r, e2)
+        out[begin + k] = g0 * g0 + g1 * g1 + g2 * g2
+
+
+@inlined
+def _push(work, waiting, bound, a, b):
+    """Put a pair of boxes on the stack, below those of its expansion that are nearer."""
+    work[3 * waiting], work[3 * waiting + 1], work[3 * waiting + 2] = bound, a, b
+
+
+@device
+def _push_nearest_last(blocks, block, work, waiting, limit, fixed, fixed_is_a):
+    """Push the pairs of a box and the members of a block with bounds below the limit; return the stack's new length."""
+    first = waiting
+    for k in range(WIDTH):
+        bound = work[_BOUNDS + k]
+        if blocks[block, CHILD, k] == 0.0 or not bound < limit:
+            continue
+        place = float(WIDTH * block + k)
+        at = waiting
+        while at > first and work[3 * (at - 1)] < bound:
+            for c in range(3):
+                work[3 * at + c] = work[3 * (at - 1) + c]
+            at -= 1
+        work[3 * at] = bound
+        work[3 * at + 1] = fixed if fixed_is_a else place
+        work[3 * at + 2] = place if fixed_is_a else fixed
+        waiting += 1
+    return waiting
+
+
+@inlined
+def opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
+    """Whether to open the box of B rather than that of A: the one that is not a leaf, or the larger."""
+    if child_b < 0.0:
+        return False
+    return child_a < 0.0 or size_of(blocks_b, b, j) >= size_of(blocks_a, a, i)
+
+
+@device
+def _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, best, answer, work):
+    """Improve the answer by the triangles of two leaves; return the best distance. a, i and b, j: their boxes."""
+    B = inverse(X)
+    limit = best * best if best < inf else inf
+    _triangle_bounds(blocks_b, leaf_b, seen_from(blocks_a, a, i, X), blocks_a, a, i, work, _NEAR_B)
+    _triangle_bounds(blocks_a, leaf_a, seen_from(blocks_b, b, j, B), blocks_b, b, j, work, _NEAR_A)
+    _write_triangles(blocks_b, leaf_b, X, work)
+    for m in range(WIDTH):
+        if not work[_NEAR_B + m] < limit or (m > 0 and blocks_b[leaf_b, 9, m] == blocks_b[leaf_b, 9, m - 1]):
+            continue
+        T = _written_triangle(work, m)
+        for k in range(WIDTH):
+            if not work[_NEAR_A + k] < limit or (k > 0 and blocks_a[leaf_a, 9, k] == blocks_a[leaf_a, 9, k - 1]):
+                continue
+            S = triangle_at(blocks_a, leaf_a, k)
+            radius = blocks_a[leaf_a, RADIUS, k] + blocks_b[leaf_b, RADIUS, m]
+            if best < inf and best > 0.0:
+                # the direction of the nearest pair so far separates most others
+                n = minus((answer[ON_B], answer[ON_B + 1], answer[ON_B + 2]), (answer[ON_A], answer[ON_A + 1], answer[ON_A + 2]))
+                far = max(dot(S.a, n), max(dot(S.b, n), dot(S.c, n)))
+                near = min(dot(T.a, n), min(dot(T.b, n), dot(T.c, n)))
+                if near - far >= (best + radius) * sqrt(dot(n, n)):
+                    continue
+            found = closest_points(S, T)
+            distance = max(sqrt(found.squared) - radius, 0.0)
+            if distance < best:
+                best = distance
+                limit = best * best
+                answer[0] = distance
+                for c in range(3):
+                    answer[ON_A + c], answer[ON_B + c] = found.on_a[c], found.on_b[c]
+                answer[PLACE_A], answer[PLACE_B] = WIDTH * leaf_a + k, WIDTH * leaf_b + m
+                if best == 0.0:
+                    return best
+    return best
+
+
+@device
+def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
+    """Write the nearest triangles of two trees into the answer if they are nearer than `limit` (m); return the distance.
+
+    blocks_a, root_a: the array of a tree and its block 0 there. X (Placing): pose of B in A's frame. answer: may hold
+    the places of two triangles as a hint, else -1. work (MEMORY,). The distance is at least 0; inf: none below the limit.
+    """
+    best = limit
+    found = inf
+    if answer[PLACE_A] >= 0.0:
+        a, b = int(answer[PLACE_A]), int(answer[PLACE_B])
+        S = triangle_at(blocks_a, a // WIDTH, a % WIDTH)
+        closest = closest_points(S, place_triangle(X, triangle_at(blocks_b, b // WIDTH, b % WIDTH)))
+        radius = blocks_a[a // WIDTH, RADIUS, a % WIDTH] + blocks_b[b // WIDTH, RADIUS, b % WIDTH]
+        distance = max(sqrt(closest.squared) - radius, 0.0)
+        if distance < best:
+            best = found = distance
+            answer[0] = distance
+            for c in range(3):
+                answer[ON_A + c], answer[ON_B + c] = closest.on_a[c], closest.on_b[c]
+    Y = inverse(X)
+    work[0], work[1], work[2] = 0.0, WIDTH * root_a, WIDTH * root_b
+    waiting = 1
+    while waiting > 0 and best > 0.0:  # terminates: each pair of boxes is opened once
+        waiting -= 1
+        if not work[3 * waiting] < best * best:
+            continue
+        place_a, place_b = int(work[3 * waiting + 1]), int(work[3 * waiting + 2])
+        a, i, b, j = place_a // WIDTH, place_a % WIDTH, place_b // WIDTH, place_b % WIDTH
+        child_a, child_b = blocks_a[a, CHILD, i], blocks_b[b, CHILD, j]
+        if child_a < 0.0 and child_b < 0.0:
+            leaf_a, leaf_b = root_a - int(child_a), root_b - int(child_b)
+            distance = _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, best, answer, work)
+            if distance < best:
+                best = found = distance
+        elif opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
+            block = root_b + int(child_b)
+            box_bounds(blocks_a, a, i, blocks_b, block, X, work[_BOUNDS:])
+            waiting = _push_nearest_last(blocks_b, block, work, waiting, best * best, float(place_a), True)
+        else:
+            block = root_a + int(child_a)
+            box_bounds(blocks_b, b, j, blocks_a, block, Y, work[_BOUNDS:])
+            waiting = _push_nearest_last(blocks_a, block, work, waiting, best * best, float(place_b), False)
+    return found
+
+
+@inlined
+def relative(R_a, R_b, p):
+    """Pose (Placing) of B in A's frame from rotations to world axes and B's origin relative to A's (m)."""
+    return Placing(
+        R_a[0, 0] * R_b[0, 0] + R_a[1, 0] * R_b[1, 0] + R_a[2, 0] * R_b[2, 0],
+        R_a[0, 0] * R_b[0, 1] + R_a[1, 0] * R_b[1, 1] + R_a[2, 0] * R_b[2, 1],
+        R_a[0, 0] * R_b[0, 2] + R_a[1, 0] * R_b[1, 2] + R_a[2, 0] * R_b[2, 2],
+        R_a[0, 1] * R_b[0, 0] + R_a[1, 1] * R_b[1, 0] + R_a[2, 1] * R_b[2, 0],
+        R_a[0, 1] * R_b[0, 1] + R_a[1, 1] * R_b[1, 1] + R_a[2, 1] * R_b[2, 1],
+        R_a[0, 1] * R_b[0, 2] + R_a[1, 1] * R_b[1, 2] + R_a[2, 1] * R_b[2, 2],
+        R_a[0, 2] * R_b[0, 0] + R_a[1, 2] * R_b[1, 0] + R_a[2, 2] * R_b[2, 0],
+        R_a[0, 2] * R_b[0, 1] + R_a[1, 2] * R_b[1, 1] + R_a[2, 2] * R_b[2, 1],
+        R_a[0, 2] * R_b[0, 2] + R_a[1, 2] * R_b[1, 2] + R_a[2, 2] * R_b[2, 2],
+        R_a[0, 0] * p[0] + R_a[1, 0] * p[1] + R_a[2, 0] * p[2],
+        R_a[0, 1] * p[0] + R_a[1, 1] * p[1] + R_a[2, 1] * p[2],
+        R_a[0, 2] * p[0] + R_a[1, 2] * p[1] + R_a[2, 2] * p[2],
+    )
+
+
+@kernel
+def tree_distance(tree_a, R_a, p_a, tree_b, R_b, p_b, limit, answer, work):
+    """`nearest` of two trees at poses given by rotations (3, 3) and positions (3,) (m)."""
+    p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
+    return nearest(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), limit, answer, work)
