@@ -1,44 +1,22 @@
-"""Lower bounds on the distance of a box from the eight boxes of a block.
+"""Lower bounds on the distances of a box from eight boxes, or from eight triangles, of a block at once.
 
 In the axes of either box, the other one has an axis-aligned bound; the gaps of the two along the axes give a lower bound
-on the distance, also where the boxes are apart along several axes. The loop has no branch, so the processor computes
-several members at once.
+on the distance. A third bound is the gap along a given direction, such as that between the nearest points so far.
+LLVM does not vectorise these loops, so the formulas are written in vectors (`_jit.lanes`).
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
+
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.meshes.layout import AXES, CENTER, HALF, WIDTH
-
-
-class Placing(NamedTuple):
-    """Pose of a tree in another tree's frame: rotation, row by row, and position (m)."""
-
-    r00: Any
-    r01: Any
-    r02: Any
-    r10: Any
-    r11: Any
-    r12: Any
-    r20: Any
-    r21: Any
-    r22: Any
-    x: Any
-    y: Any
-    z: Any
-
-
-@inlined
-def inverse(X):
-    """The inverse of a pose."""
-    return Placing(
-        X.r00, X.r10, X.r20, X.r01, X.r11, X.r21, X.r02, X.r12, X.r22,
-        -(X.r00 * X.x + X.r10 * X.y + X.r20 * X.z),
-        -(X.r01 * X.x + X.r11 * X.y + X.r21 * X.z),
-        -(X.r02 * X.x + X.r12 * X.y + X.r22 * X.z),
-    )  # fmt: skip
+from collision_monitor._jit.lanes import Lanes, load, store
+from collision_monitor.meshes.layout import AXES, CENTER, CORNERS, HALF, RADIUS, ROWS, WIDTH
+from collision_monitor.meshes.placing import Placing, turned_back
 
 
 @inlined
@@ -60,44 +38,108 @@ def seen_from(blocks, block, member, X):
     )  # fmt: skip
 
 
-@device
-def box_bounds(blocks_a, a, member, blocks_b, b, X, out):
-    """Write lower bounds on the squared distances of a box from the eight boxes of block b into out[0:8] (m^2).
+@inlined
+def half_of(blocks, block, member):
+    """Half extents of a box (m)."""
+    return blocks[block, HALF, member], blocks[block, HALF + 1, member], blocks[block, HALF + 2, member]
 
-    blocks_a, a, member: the box. X: pose of the tree of b in the frame of the box's tree. A bound of 0 says that the
-    boxes may overlap. An unused member of the block gets the bound of its zeros.
+
+class _Block:
+    """The vectors of a block while a kernel is compiled."""
+
+    def __init__(self, context: Any, builder: Any, array_type: Any, array: Any, block: Any) -> None:
+        self._load = lambda row: load(
+            context, builder, array_type, array, builder.mul(block, block.type(ROWS * WIDTH)), WIDTH * row
+        )
+
+    def vector(self, row: int) -> list[Lanes]:
+        """Three rows: x, y and z of eight vectors."""
+        return [self._load(row + k) for k in range(3)]
+
+    def matrix(self, row: int) -> list[list[Lanes]]:
+        """Nine rows: eight matrices."""
+        return [self.vector(row + 3 * k) for k in range(3)]
+
+    def row(self, row: int) -> Lanes:
+        """One row."""
+        return self._load(row)
+
+
+def _dot(a: list[Lanes], b: list[Lanes]) -> Lanes:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _column(m: list[list[Lanes]], k: int) -> list[Lanes]:
+    return [m[0][k], m[1][k], m[2][k]]
+
+
+def _gaps(x: list[Lanes], own: list[Lanes], shadow: list[Lanes], zero: Lanes) -> Lanes:
+    """Squared distance of two axis-aligned boxes, x apart, with these half extents."""
+    gap = [(abs(x[k]) - own[k] - shadow[k]).largest(zero) for k in range(3)]
+    return _dot(gap, gap)
+
+
+@intrinsic
+def _bounds(typing_context, half, M, n, blocks, block, out, at):
+    signature = types.void(half, M, n, blocks, types.int64, out, types.int64)
+
+    def codegen(context, builder, signature, arguments):
+        def vectors(k: int) -> list[Lanes]:
+            return [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[k])]
+
+        zero = Lanes.constant(builder, 0.0)
+        e, placing, n = vectors(0), vectors(1), vectors(2)
+        turn, shift = [placing[0:3], placing[3:6], placing[6:9]], placing[9:12]
+        members = _Block(context, builder, signature.args[3], arguments[3], arguments[4])
+        axes, center, f = members.matrix(AXES), members.vector(CENTER), members.vector(HALF)
+        R = [[_dot(turn[r], _column(axes, c)) for c in range(3)] for r in range(3)]
+        x = [_dot(turn[r], center) + shift[r] for r in range(3)]
+        size = [[abs(R[r][c]) for c in range(3)] for r in range(3)]
+        bound = _gaps(x, e, [_dot(size[r], f) for r in range(3)], zero)
+        y = [_dot(_column(R, c), x) for c in range(3)]
+        bound = bound.largest(_gaps(y, f, [_dot(_column(size, c), e) for c in range(3)], zero))
+        along = [abs(_dot(_column(R, c), n)) for c in range(3)]
+        gap = (_dot(n, x) - _dot([abs(each) for each in n], e) - _dot(along, f)).largest(zero)
+        store(context, builder, bound.largest(gap * gap), signature.args[5], arguments[5], arguments[6])
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@intrinsic
+def _triangle_bounds(typing_context, half, M, blocks, block, out, at):
+    signature = types.void(half, M, blocks, types.int64, out, types.int64)
+
+    def codegen(context, builder, signature, arguments):
+        zero = Lanes.constant(builder, 0.0)
+        e = [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[0])]
+        placing = [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[1])]
+        members = _Block(context, builder, signature.args[2], arguments[2], arguments[3])
+        corners, radius = [members.vector(CORNERS + 3 * i) for i in range(3)], members.row(RADIUS)
+        bound = zero
+        for r in range(3):
+            a, b, c = [_dot(placing[3 * r : 3 * r + 3], corner) + placing[9 + r] for corner in corners]
+            low, high = a.least(b).least(c) - radius, a.largest(b).largest(c) + radius
+            gap = (low - e[r]).largest(zero - e[r] - high).largest(zero)
+            bound = bound + gap * gap
+        store(context, builder, bound, signature.args[4], arguments[4], arguments[5])
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@device
+def box_bounds(blocks_a, a, member, blocks_b, b, X, n, out, at):
+    """Write lower bounds on the squared distances of a box from the eight boxes of block b to out[at: at + 8] (m^2).
+
+    blocks_a, a, member: the box. X: pose of the tree of b in the frame of the box's tree. n: unit direction from the
+    box's tree to that of b in the former's frame, or 0. A bound of 0 says that the boxes may overlap.
     """
-    M = seen_from(blocks_a, a, member, X)
-    e0, e1, e2 = blocks_a[a, HALF, member], blocks_a[a, HALF + 1, member], blocks_a[a, HALF + 2, member]
-    for k in range(WIDTH):
-        b00, b01, b02 = blocks_b[b, AXES, k], blocks_b[b, AXES + 1, k], blocks_b[b, AXES + 2, k]
-        b10, b11, b12 = blocks_b[b, AXES + 3, k], blocks_b[b, AXES + 4, k], blocks_b[b, AXES + 5, k]
-        b20, b21, b22 = blocks_b[b, AXES + 6, k], blocks_b[b, AXES + 7, k], blocks_b[b, AXES + 8, k]
-        cx, cy, cz = blocks_b[b, CENTER, k], blocks_b[b, CENTER + 1, k], blocks_b[b, CENTER + 2, k]
-        f0, f1, f2 = blocks_b[b, HALF, k], blocks_b[b, HALF + 1, k], blocks_b[b, HALF + 2, k]
-        r00, r01, r02 = (
-            M.r00 * b00 + M.r01 * b10 + M.r02 * b20,
-            M.r00 * b01 + M.r01 * b11 + M.r02 * b21,
-            M.r00 * b02 + M.r01 * b12 + M.r02 * b22,
-        )
-        r10, r11, r12 = (
-            M.r10 * b00 + M.r11 * b10 + M.r12 * b20,
-            M.r10 * b01 + M.r11 * b11 + M.r12 * b21,
-            M.r10 * b02 + M.r11 * b12 + M.r12 * b22,
-        )
-        r20, r21, r22 = (
-            M.r20 * b00 + M.r21 * b10 + M.r22 * b20,
-            M.r20 * b01 + M.r21 * b11 + M.r22 * b21,
-            M.r20 * b02 + M.r21 * b12 + M.r22 * b22,
-        )
-        x = M.r00 * cx + M.r01 * cy + M.r02 * cz + M.x
-        y = M.r10 * cx + M.r11 * cy + M.r12 * cz + M.y
-        z = M.r20 * cx + M.r21 * cy + M.r22 * cz + M.z
-        g0 = max(abs(x) - e0 - (abs(r00) * f0 + abs(r01) * f1 + abs(r02) * f2), 0.0)
-        g1 = max(abs(y) - e1 - (abs(r10) * f0 + abs(r11) * f1 + abs(r12) * f2), 0.0)
-        g2 = max(abs(z) - e2 - (abs(r20) * f0 + abs(r21) * f1 + abs(r22) * f2), 0.0)
-        u, v, w = r00 * x + r10 * y + r20 * z, r01 * x + r11 * y + r21 * z, r02 * x + r12 * y + r22 * z
-        h0 = max(abs(u) - f0 - (abs(r00) * e0 + abs(r10) * e1 + abs(r20) * e2), 0.0)
-        h1 = max(abs(v) - f1 - (abs(r01) * e0 + abs(r11) * e1 + abs(r21) * e2), 0.0)
-        h2 = max(abs(w) - f2 - (abs(r02) * e0 + abs(r12) * e1 + abs(r22) * e2), 0.0)
-        out[k] = max(g0 * g0 + g1 * g1 + g2 * g2, h0 * h0 + h1 * h1 + h2 * h2)
+    m = turned_back(blocks_a, a, member, n)
+    _bounds(half_of(blocks_a, a, member), seen_from(blocks_a, a, member, X), m, blocks_b, b, out, at)
+
+
+@device
+def triangle_bounds(blocks_a, a, member, blocks_b, b, X, out, at):
+    """Write lower bounds on the squared distances of a box from the triangles of block b to out[at: at + 8] (m^2)."""
+    _triangle_bounds(half_of(blocks_a, a, member), seen_from(blocks_a, a, member, X), blocks_b, b, out, at)

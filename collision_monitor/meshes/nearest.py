@@ -13,21 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.meshes.boxes import Placing, box_bounds, inverse, seen_from
-from collision_monitor.meshes.layout import AXES, CENTER, CHILD, CORNERS, HALF, RADIUS, WIDTH
-from collision_monitor.meshes.triangle_pair import Triangle, closest_points, crossing_point
-from collision_monitor.narrow_phase.vector import dot, minus
+from collision_monitor.meshes.boxes import box_bounds, triangle_bounds
+from collision_monitor.meshes.layout import CHILD, CORNERS, FACE, HALF, RADIUS, WIDTH
+from collision_monitor.meshes.placing import inverse, place_triangle, relative, turn_back
+from collision_monitor.meshes.triangle_pair import Triangle, closest_points
+from collision_monitor.narrow_phase.vector import dot, minus, opposite
+from collision_monitor.tolerances import EPSILON
 
 DEEPEST: Final = 24
 """Largest number of levels of two trees together: each level has eight times as many triangles."""
 
-_WAITING: Final = 3 * WIDTH * DEEPEST
+WAITING: Final = 3 * WIDTH * DEEPEST
 """Numbers for the pairs of boxes that wait: bound, box of A, box of B, each box as WIDTH * block + member."""
-_BOUNDS: Final = _WAITING
-_TRIANGLES: Final = _BOUNDS + WIDTH
-_NEAR_A: Final = _TRIANGLES + 9 * WIDTH
-_NEAR_B: Final = _NEAR_A + WIDTH
-MEMORY: Final = _NEAR_B + WIDTH
+BOUNDS: Final = WAITING
+_TRIANGLES: Final = BOUNDS + WIDTH
+NEAR_A: Final = _TRIANGLES + 9 * WIDTH
+NEAR_B: Final = NEAR_A + WIDTH
+MEMORY: Final = NEAR_B + WIDTH
 """Numbers of scratch memory of a query."""
 
 # columns of an answer
@@ -59,22 +61,6 @@ def triangle_at(blocks, block, k):
 
 
 @inlined
-def place_point(X, p):
-    """A point of the other tree in this tree's frame."""
-    return (
-        X.r00 * p[0] + X.r01 * p[1] + X.r02 * p[2] + X.x,
-        X.r10 * p[0] + X.r11 * p[1] + X.r12 * p[2] + X.y,
-        X.r20 * p[0] + X.r21 * p[1] + X.r22 * p[2] + X.z,
-    )
-
-
-@inlined
-def place_triangle(X, T):
-    """A triangle of the other tree in this tree's frame."""
-    return Triangle(place_point(X, T.a), place_point(X, T.b), place_point(X, T.c))
-
-
-@inlined
 def size_of(blocks, block, member):
     """Sum of the half extents of a box (m)."""
     return blocks[block, HALF, member] + blocks[block, HALF + 1, member] + blocks[block, HALF + 2, member]
@@ -102,54 +88,12 @@ def _written_triangle(work, k):
     )
 
 
-@inlined
-def _gap(low, high, half):
-    return max(max(low - half, -half - high), 0.0)
-
-
-@device
-def _triangle_bounds(blocks, block, M, box_blocks, box, member, out, begin):
-    """Write lower bounds on the squared distances of the triangles of a block from a box into out[begin:].
-
-    M: pose of the triangles' tree in the frame of the box.
-    """
-    e0, e1, e2 = (
-        box_blocks[box, HALF, member],
-        box_blocks[box, HALF + 1, member],
-        box_blocks[box, HALF + 2, member],
-    )
-    for k in range(WIDTH):
-        ax, ay, az = blocks[block, CORNERS, k], blocks[block, CORNERS + 1, k], blocks[block, CORNERS + 2, k]
-        bx, by, bz = blocks[block, CORNERS + 3, k], blocks[block, CORNERS + 4, k], blocks[block, CORNERS + 5, k]
-        cx, cy, cz = blocks[block, CORNERS + 6, k], blocks[block, CORNERS + 7, k], blocks[block, CORNERS + 8, k]
-        r = blocks[block, RADIUS, k]
-        u = M.r00 * ax + M.r01 * ay + M.r02 * az + M.x
-        v = M.r00 * bx + M.r01 * by + M.r02 * bz + M.x
-        w = M.r00 * cx + M.r01 * cy + M.r02 * cz + M.x
-        g0 = _gap(min(u, min(v, w)) - r, max(u, max(v, w)) + r, e0)
-        u = M.r10 * ax + M.r11 * ay + M.r12 * az + M.y
-        v = M.r10 * bx + M.r11 * by + M.r12 * bz + M.y
-        w = M.r10 * cx + M.r11 * cy + M.r12 * cz + M.y
-        g1 = _gap(min(u, min(v, w)) - r, max(u, max(v, w)) + r, e1)
-        u = M.r20 * ax + M.r21 * ay + M.r22 * az + M.z
-        v = M.r20 * bx + M.r21 * by + M.r22 * bz + M.z
-        w = M.r20 * cx + M.r21 * cy + M.r22 * cz + M.z
-        g2 = _gap(min(u, min(v, w)) - r, max(u, max(v, w)) + r, e2)
-        out[begin + k] = g0 * g0 + g1 * g1 + g2 * g2
-
-
-@inlined
-def _push(work, waiting, bound, a, b):
-    """Put a pair of boxes on the stack, below those of its expansion that are nearer."""
-    work[3 * waiting], work[3 * waiting + 1], work[3 * waiting + 2] = bound, a, b
-
-
 @device
 def _push_nearest_last(blocks, block, work, waiting, limit, fixed, fixed_is_a):
     """Push the pairs of a box and the members of a block with bounds below the limit; return the stack's new length."""
     first = waiting
     for k in range(WIDTH):
-        bound = work[_BOUNDS + k]
+        bound = work[BOUNDS + k]
         if blocks[block, CHILD, k] == 0.0 or not bound < limit:
             continue
         place = float(WIDTH * block + k)
@@ -176,17 +120,16 @@ def opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
 @device
 def _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, best, answer, work):
     """Improve the answer by the triangles of two leaves; return the best distance. a, i and b, j: their boxes."""
-    B = inverse(X)
-    limit = best * best if best < inf else inf
-    _triangle_bounds(blocks_b, leaf_b, seen_from(blocks_a, a, i, X), blocks_a, a, i, work, _NEAR_B)
-    _triangle_bounds(blocks_a, leaf_a, seen_from(blocks_b, b, j, B), blocks_b, b, j, work, _NEAR_A)
+    limit = best * best
+    triangle_bounds(blocks_a, a, i, blocks_b, leaf_b, X, work, NEAR_B)
+    triangle_bounds(blocks_b, b, j, blocks_a, leaf_a, inverse(X), work, NEAR_A)
     _write_triangles(blocks_b, leaf_b, X, work)
     for m in range(WIDTH):
-        if not work[_NEAR_B + m] < limit or (m > 0 and blocks_b[leaf_b, 9, m] == blocks_b[leaf_b, 9, m - 1]):
+        if not work[NEAR_B + m] < limit or (m > 0 and blocks_b[leaf_b, FACE, m] == blocks_b[leaf_b, FACE, m - 1]):
             continue
         T = _written_triangle(work, m)
         for k in range(WIDTH):
-            if not work[_NEAR_A + k] < limit or (k > 0 and blocks_a[leaf_a, 9, k] == blocks_a[leaf_a, 9, k - 1]):
+            if not work[NEAR_A + k] < limit or (k > 0 and blocks_a[leaf_a, FACE, k] == blocks_a[leaf_a, FACE, k - 1]):
                 continue
             S = triangle_at(blocks_a, leaf_a, k)
             radius = blocks_a[leaf_a, RADIUS, k] + blocks_b[leaf_b, RADIUS, m]
@@ -209,6 +152,16 @@ def _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, best, answer, 
                 if best == 0.0:
                     return best
     return best
+
+
+@inlined
+def _direction(answer, distance):
+    """Unit vector between the closest points of an answer; 0 if there is none."""
+    if not 0.0 < distance < inf:
+        return 0.0, 0.0, 0.0
+    n = minus((answer[ON_B], answer[ON_B + 1], answer[ON_B + 2]), (answer[ON_A], answer[ON_A + 1], answer[ON_A + 2]))
+    length = sqrt(dot(n, n)) * (1.0 + 4.0 * EPSILON)
+    return n[0] / length, n[1] / length, n[2] / length
 
 
 @device
@@ -234,6 +187,7 @@ def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
     Y = inverse(X)
     work[0], work[1], work[2] = 0.0, WIDTH * root_a, WIDTH * root_b
     waiting = 1
+    n = _direction(answer, found)
     while waiting > 0 and best > 0.0:  # terminates: each pair of boxes is opened once
         waiting -= 1
         if not work[3 * waiting] < best * best:
@@ -246,34 +200,16 @@ def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
             distance = _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, best, answer, work)
             if distance < best:
                 best = found = distance
+                n = _direction(answer, found)
         elif opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
             block = root_b + int(child_b)
-            box_bounds(blocks_a, a, i, blocks_b, block, X, work[_BOUNDS:])
+            box_bounds(blocks_a, a, i, blocks_b, block, X, n, work, BOUNDS)
             waiting = _push_nearest_last(blocks_b, block, work, waiting, best * best, float(place_a), True)
         else:
             block = root_a + int(child_a)
-            box_bounds(blocks_b, b, j, blocks_a, block, Y, work[_BOUNDS:])
+            box_bounds(blocks_b, b, j, blocks_a, block, Y, opposite(turn_back(X, n)), work, BOUNDS)
             waiting = _push_nearest_last(blocks_a, block, work, waiting, best * best, float(place_b), False)
     return found
-
-
-@inlined
-def relative(R_a, R_b, p):
-    """Pose (Placing) of B in A's frame from rotations to world axes and B's origin relative to A's (m)."""
-    return Placing(
-        R_a[0, 0] * R_b[0, 0] + R_a[1, 0] * R_b[1, 0] + R_a[2, 0] * R_b[2, 0],
-        R_a[0, 0] * R_b[0, 1] + R_a[1, 0] * R_b[1, 1] + R_a[2, 0] * R_b[2, 1],
-        R_a[0, 0] * R_b[0, 2] + R_a[1, 0] * R_b[1, 2] + R_a[2, 0] * R_b[2, 2],
-        R_a[0, 1] * R_b[0, 0] + R_a[1, 1] * R_b[1, 0] + R_a[2, 1] * R_b[2, 0],
-        R_a[0, 1] * R_b[0, 1] + R_a[1, 1] * R_b[1, 1] + R_a[2, 1] * R_b[2, 1],
-        R_a[0, 1] * R_b[0, 2] + R_a[1, 1] * R_b[1, 2] + R_a[2, 1] * R_b[2, 2],
-        R_a[0, 2] * R_b[0, 0] + R_a[1, 2] * R_b[1, 0] + R_a[2, 2] * R_b[2, 0],
-        R_a[0, 2] * R_b[0, 1] + R_a[1, 2] * R_b[1, 1] + R_a[2, 2] * R_b[2, 1],
-        R_a[0, 2] * R_b[0, 2] + R_a[1, 2] * R_b[1, 2] + R_a[2, 2] * R_b[2, 2],
-        R_a[0, 0] * p[0] + R_a[1, 0] * p[1] + R_a[2, 0] * p[2],
-        R_a[0, 1] * p[0] + R_a[1, 1] * p[1] + R_a[2, 1] * p[2],
-        R_a[0, 2] * p[0] + R_a[1, 2] * p[1] + R_a[2, 2] * p[2],
-    )
 
 
 @kernel
