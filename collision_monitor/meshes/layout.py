@@ -35,3 +35,9 @@ CLOSED: Final = 0
 """1: the surface bounds a solid."""
 REACH: Final = 1
 """Distance of the farthest point from the mesh's origin."""
+PARTS: Final = 2
+"""Number of connected parts; a block behind the others holds a point x, y, z of each."""
+FIRST_PART: Final = 3
+"""The first of these blocks, relative to block 0."""
+MOST_PARTS: Final = 64
+"""Most parts with a point in the tree. More: a soup of a million triangles would take a million rays."""

@@ -29,7 +29,11 @@ BOUNDS: Final = WAITING
 _TRIANGLES: Final = BOUNDS + WIDTH
 NEAR_A: Final = _TRIANGLES + 9 * WIDTH
 NEAR_B: Final = NEAR_A + WIDTH
-MEMORY: Final = NEAR_B + WIDTH
+PAIRS: Final = NEAR_B + WIDTH
+MOST_PAIRS: Final = 4096
+"""Most pairs of triangles that touch which are remembered: more than two meshes of a million triangles usually have
+along the curve where they cross. The depth of the others is not known then."""
+MEMORY: Final = PAIRS + 2 * MOST_PAIRS
 """Numbers of scratch memory of a query."""
 
 # columns of an answer
@@ -117,8 +121,18 @@ def opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
     return child_a < 0.0 or size_of(blocks_b, b, j) >= size_of(blocks_a, a, i)
 
 
+@inlined
+def _direction(answer, distance):
+    """Unit vector between the closest points of an answer; 0 if there is none."""
+    if not 0.0 < distance < inf:
+        return 0.0, 0.0, 0.0
+    n = minus((answer[ON_B], answer[ON_B + 1], answer[ON_B + 2]), (answer[ON_A], answer[ON_A + 1], answer[ON_A + 2]))
+    length = sqrt(dot(n, n)) * (1.0 + 4.0 * EPSILON)
+    return n[0] / length, n[1] / length, n[2] / length
+
+
 @device
-def _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, best, answer, work):
+def _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, n, best, answer, work):
     """Improve the answer by the triangles of two leaves; return the best distance. a, i and b, j: their boxes."""
     limit = best * best
     triangle_bounds(blocks_a, a, i, blocks_b, leaf_b, X, work, NEAR_B)
@@ -133,13 +147,11 @@ def _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, best, answer, 
                 continue
             S = triangle_at(blocks_a, leaf_a, k)
             radius = blocks_a[leaf_a, RADIUS, k] + blocks_b[leaf_b, RADIUS, m]
-            if best < inf and best > 0.0:
-                # the direction of the nearest pair so far separates most others
-                n = minus((answer[ON_B], answer[ON_B + 1], answer[ON_B + 2]), (answer[ON_A], answer[ON_A + 1], answer[ON_A + 2]))
-                far = max(dot(S.a, n), max(dot(S.b, n), dot(S.c, n)))
-                near = min(dot(T.a, n), min(dot(T.b, n), dot(T.c, n)))
-                if near - far >= (best + radius) * sqrt(dot(n, n)):
-                    continue
+            # the direction between the nearest pair so far separates most others
+            far = max(dot(S.a, n), max(dot(S.b, n), dot(S.c, n)))
+            near = min(dot(T.a, n), min(dot(T.b, n), dot(T.c, n)))
+            if near - far >= best + radius:
+                continue
             found = closest_points(S, T)
             distance = max(sqrt(found.squared) - radius, 0.0)
             if distance < best:
@@ -149,19 +161,10 @@ def _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, best, answer, 
                 for c in range(3):
                     answer[ON_A + c], answer[ON_B + c] = found.on_a[c], found.on_b[c]
                 answer[PLACE_A], answer[PLACE_B] = WIDTH * leaf_a + k, WIDTH * leaf_b + m
+                n = _direction(answer, best)
                 if best == 0.0:
                     return best
     return best
-
-
-@inlined
-def _direction(answer, distance):
-    """Unit vector between the closest points of an answer; 0 if there is none."""
-    if not 0.0 < distance < inf:
-        return 0.0, 0.0, 0.0
-    n = minus((answer[ON_B], answer[ON_B + 1], answer[ON_B + 2]), (answer[ON_A], answer[ON_A + 1], answer[ON_A + 2]))
-    length = sqrt(dot(n, n)) * (1.0 + 4.0 * EPSILON)
-    return n[0] / length, n[1] / length, n[2] / length
 
 
 @device
@@ -197,7 +200,7 @@ def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
         child_a, child_b = blocks_a[a, CHILD, i], blocks_b[b, CHILD, j]
         if child_a < 0.0 and child_b < 0.0:
             leaf_a, leaf_b = root_a - int(child_a), root_b - int(child_b)
-            distance = _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, best, answer, work)
+            distance = _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, n, best, answer, work)
             if distance < best:
                 best = found = distance
                 n = _direction(answer, found)

@@ -8,13 +8,17 @@ from typing import Any, Final
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.meshes.boxes import box_bounds, triangle_bounds
 from collision_monitor.meshes.layout import CHILD, FACE, RADIUS, WIDTH
-from collision_monitor.meshes.nearest import BOUNDS, NEAR_A, NEAR_B, WAITING, opens_b, triangle_at
+from collision_monitor.meshes.nearest import BOUNDS, NEAR_A, NEAR_B, PAIRS, opens_b, triangle_at
 from collision_monitor.meshes.placing import inverse, place_triangle, relative
 from collision_monitor.meshes.triangle_pair import Triangle, closest_points, crossing_point
 from collision_monitor.narrow_phase.vector import Vector, along, cross, dot, minus
 from collision_monitor.tolerances import PARALLEL_SIN2
 
 NOWHERE: Final = (0.0, 0.0, 0.0)
+
+MOST_LEAVES: Final = 100_000
+"""Most pairs of leaves to examine, about 50 ms. Hostile meshes, such as a million triangles in a point, need more; the
+answer then says that it is not complete."""
 
 
 @device
@@ -30,18 +34,18 @@ def _push_meeting(blocks: Any, block: int, work: Any, waiting: int, fixed: float
 
 
 @inlined
-def _repeats(blocks: Any, block: int, k: int) -> bool:
+def repeats(blocks: Any, block: int, k: int) -> bool:
     """Whether a member of a block of triangles repeats the one before."""
     return k > 0 and blocks[block, FACE, k] == blocks[block, FACE, k - 1]
 
 
 @device
 def touching(
-    blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, X: Any, limit: float, pairs: Any, work: Any
+    blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, X: Any, most: int, work: Any
 ) -> tuple[int, bool]:
-    """Write the places (P, 2) of the pairs of triangles that meet; return their number, and whether these are all.
+    """Find pairs of triangles that meet, `most` at most; return their number, and whether these are all.
 
-    limit: largest number of pairs of leaves to examine. Arguments as in `nearest`.
+    Pair k is at work[PAIRS + 2 k]: the places of both triangles. Other arguments as in `nearest`.
     """
     Y = inverse(X)
     work[0], work[1] = WIDTH * root_a, WIDTH * root_b
@@ -54,22 +58,22 @@ def touching(
         if child_a < 0.0 and child_b < 0.0:
             leaf_a, leaf_b = root_a - int(child_a), root_b - int(child_b)
             leaves += 1
-            if leaves > limit:
+            if leaves > MOST_LEAVES:
                 return found, False
             triangle_bounds(blocks_a, a, i, blocks_b, leaf_b, X, work, NEAR_B)
             triangle_bounds(blocks_b, b, j, blocks_a, leaf_a, Y, work, NEAR_A)
             for m in range(WIDTH):
-                if work[NEAR_B + m] > 0.0 or _repeats(blocks_b, leaf_b, m):
+                if work[NEAR_B + m] > 0.0 or repeats(blocks_b, leaf_b, m):
                     continue
                 T = place_triangle(X, triangle_at(blocks_b, leaf_b, m))
                 for k in range(WIDTH):
-                    if work[NEAR_A + k] > 0.0 or _repeats(blocks_a, leaf_a, k):
+                    if work[NEAR_A + k] > 0.0 or repeats(blocks_a, leaf_a, k):
                         continue
                     radius = blocks_a[leaf_a, RADIUS, k] + blocks_b[leaf_b, RADIUS, m]
                     if meet(triangle_at(blocks_a, leaf_a, k), T, radius):
-                        if found == len(pairs):
+                        if found == most:
                             return found, False
-                        pairs[found, 0], pairs[found, 1] = WIDTH * leaf_a + k, WIDTH * leaf_b + m
+                        work[PAIRS + 2 * found], work[PAIRS + 2 * found + 1] = WIDTH * leaf_a + k, WIDTH * leaf_b + m
                         found += 1
         elif opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
             block = root_b + int(child_b)
@@ -133,11 +137,11 @@ def triangle_depth(S: Triangle, T: Triangle) -> tuple[float, Vector]:
 
 
 @device
-def deepest(blocks_a: Any, blocks_b: Any, X: Any, pairs: Any, count: int) -> tuple[float, Vector, Vector, int]:
-    """Depth (m) of the deepest of the pairs (P, 2) of `touching`, its direction, a point on A, and its index."""
+def deepest(blocks_a: Any, blocks_b: Any, X: Any, work: Any, count: int) -> tuple[float, Vector, Vector, int]:
+    """Depth (m) of the deepest of the first pairs of `touching`, its direction and a point on A, and its index."""
     best, direction, point, which = -1.0, (0.0, 0.0, 1.0), NOWHERE, 0
     for k in range(count):
-        a, b = pairs[k, 0], pairs[k, 1]
+        a, b = int(work[PAIRS + 2 * k]), int(work[PAIRS + 2 * k + 1])
         S = triangle_at(blocks_a, a // WIDTH, a % WIDTH)
         T = place_triangle(X, triangle_at(blocks_b, b // WIDTH, b % WIDTH))
         radius = blocks_a[a // WIDTH, RADIUS, a % WIDTH] + blocks_b[b // WIDTH, RADIUS, b % WIDTH]
@@ -160,7 +164,7 @@ def deepest(blocks_a: Any, blocks_b: Any, X: Any, pairs: Any, count: int) -> tup
 
 
 @kernel
-def trees_touch(tree_a, R_a, p_a, tree_b, R_b, p_b, limit, pairs, work):
+def trees_touch(tree_a, R_a, p_a, tree_b, R_b, p_b, most, work):
     """`touching` of two trees at poses given by rotations (3, 3) and positions (3,) (m)."""
     p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
-    return touching(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), limit, pairs, work)
+    return touching(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), most, work)

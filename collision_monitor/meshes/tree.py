@@ -20,7 +20,10 @@ from collision_monitor.meshes.layout import (
     CLOSED,
     CORNERS,
     FACE,
+    FIRST_PART,
     HALF,
+    MOST_PARTS,
+    PARTS,
     RADIUS,
     REACH,
     ROWS,
@@ -40,19 +43,27 @@ CONTAINED: Final = 64 * EPSILON
 """Part of a box's coordinates by which it is enlarged against the round-off of its fit and of later rotations."""
 
 
-def tree_of(corners: Array, radius: float | Array = 0.0, closed: bool = False) -> Array:
+def tree_of(
+    corners: Array, radius: float | Array = 0.0, closed: bool = False, parts: Array | None = None
+) -> Array:
     """Build the tree (n, ROWS, WIDTH) over triangles (m, 3, 3) in m, m >= 1, in any order and place.
 
     radius: by which the triangles are enlarged (m), one number or (m,). A cloud of points is triangles with equal
-    corners. closed: the triangles bound a solid.
+    corners. closed: the triangles bound a solid. parts (k, 3): a point of each connected part; the first corner if None.
     """
     corners = np.ascontiguousarray(corners, dtype=np.float64)
     radii = np.broadcast_to(np.asarray(radius, dtype=np.float64), len(corners)).copy()
-    blocks = np.zeros((most_blocks(len(corners)), ROWS, WIDTH))
+    inner = corners[:1, 0] if parts is None else parts
+    blocks = np.empty((most_blocks(len(corners)), ROWS, WIDTH))
+    blocks[0] = 0.0
     used = _build(corners, radii, blocks)
+    stored = np.zeros((-(-min(len(inner), MOST_PARTS) // WIDTH), ROWS, WIDTH))
+    for k, point in enumerate(inner[:MOST_PARTS]):
+        stored[k // WIDTH, :3, k % WIDTH] = point
     far = np.sqrt(np.einsum("nij,nij->ni", corners, corners).max(axis=1)) + radii
     blocks[0, CLOSED, 1], blocks[0, REACH, 1] = closed, np.nextafter(far.max() * (1.0 + CONTAINED), np.inf)
-    return blocks[:used].copy()
+    blocks[0, PARTS, 1], blocks[0, FIRST_PART, 1] = len(inner), used
+    return np.concatenate([blocks[:used], stored])
 
 
 def most_blocks(triangles: int) -> int:
@@ -80,6 +91,7 @@ def _build(corners, radius, blocks):
         begin, end, parent, member = stack[waiting]
         block = used
         used += 1
+        blocks[block] = 0.0
         if end - begin <= WIDTH:
             blocks[parent, CHILD, member] = -block
             for lane in range(WIDTH):
