@@ -37,12 +37,28 @@ class Lanes:
         """Product."""
         return Lanes(self.builder, self.builder.fmul(self.value, other.value))
 
+    def __truediv__(self, other: Lanes) -> Lanes:
+        """Quotient."""
+        return Lanes(self.builder, self.builder.fdiv(self.value, other.value))
+
     def __abs__(self) -> Lanes:
         """Absolute value."""
-        kind = ir.FunctionType(DOUBLES, [DOUBLES])
-        name = f"llvm.fabs.v{LANES}f64"
-        function = self.builder.module.globals.get(name) or ir.Function(self.builder.module, kind, name)
-        return Lanes(self.builder, self.builder.call(function, [self.value]))
+        return self._applied("fabs")
+
+    def root(self) -> Lanes:
+        """Square root."""
+        return self._applied("sqrt")
+
+    def where(self, condition: Lanes, other: Lanes) -> Lanes:
+        """The number itself where the condition is above 0, else the other's."""
+        yes = self.builder.fcmp_ordered(">", condition.value, ir.Constant(DOUBLES, [0.0] * LANES))
+        return Lanes(self.builder, self.builder.select(yes, self.value, other.value))
+
+    def _applied(self, function: str) -> Lanes:
+        name = f"llvm.{function}.v{LANES}f64"
+        known = self.builder.module.globals.get(name)
+        intrinsic = known or ir.Function(self.builder.module, ir.FunctionType(DOUBLES, [DOUBLES]), name)
+        return Lanes(self.builder, self.builder.call(intrinsic, [self.value]))
 
     def largest(self, other: Lanes) -> Lanes:
         """The larger of each two numbers."""

@@ -44,7 +44,7 @@ def half_of(blocks, block, member):
     return blocks[block, HALF, member], blocks[block, HALF + 1, member], blocks[block, HALF + 2, member]
 
 
-class _Block:
+class Block:
     """The vectors of a block while a kernel is compiled."""
 
     def __init__(self, context: Any, builder: Any, array_type: Any, array: Any, block: Any) -> None:
@@ -65,7 +65,8 @@ class _Block:
         return self._load(row)
 
 
-def _dot(a: list[Lanes], b: list[Lanes]) -> Lanes:
+def inner(a: list[Lanes], b: list[Lanes]) -> Lanes:
+    """Dot products of eight pairs of vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -76,7 +77,7 @@ def _column(m: list[list[Lanes]], k: int) -> list[Lanes]:
 def _gaps(x: list[Lanes], own: list[Lanes], shadow: list[Lanes], zero: Lanes) -> Lanes:
     """Squared distance of two axis-aligned boxes, x apart, with these half extents."""
     gap = [(abs(x[k]) - own[k] - shadow[k]).largest(zero) for k in range(3)]
-    return _dot(gap, gap)
+    return inner(gap, gap)
 
 
 @intrinsic
@@ -90,16 +91,16 @@ def _bounds(typing_context, half, M, n, blocks, block, out, at):
         zero = Lanes.constant(builder, 0.0)
         e, placing, n = vectors(0), vectors(1), vectors(2)
         turn, shift = [placing[0:3], placing[3:6], placing[6:9]], placing[9:12]
-        members = _Block(context, builder, signature.args[3], arguments[3], arguments[4])
+        members = Block(context, builder, signature.args[3], arguments[3], arguments[4])
         axes, center, f = members.matrix(AXES), members.vector(CENTER), members.vector(HALF)
-        R = [[_dot(turn[r], _column(axes, c)) for c in range(3)] for r in range(3)]
-        x = [_dot(turn[r], center) + shift[r] for r in range(3)]
+        R = [[inner(turn[r], _column(axes, c)) for c in range(3)] for r in range(3)]
+        x = [inner(turn[r], center) + shift[r] for r in range(3)]
         size = [[abs(R[r][c]) for c in range(3)] for r in range(3)]
-        bound = _gaps(x, e, [_dot(size[r], f) for r in range(3)], zero)
-        y = [_dot(_column(R, c), x) for c in range(3)]
-        bound = bound.largest(_gaps(y, f, [_dot(_column(size, c), e) for c in range(3)], zero))
-        along = [abs(_dot(_column(R, c), n)) for c in range(3)]
-        gap = (_dot(n, x) - _dot([abs(each) for each in n], e) - _dot(along, f)).largest(zero)
+        bound = _gaps(x, e, [inner(size[r], f) for r in range(3)], zero)
+        y = [inner(_column(R, c), x) for c in range(3)]
+        bound = bound.largest(_gaps(y, f, [inner(_column(size, c), e) for c in range(3)], zero))
+        along = [abs(inner(_column(R, c), n)) for c in range(3)]
+        gap = (inner(n, x) - inner([abs(each) for each in n], e) - inner(along, f)).largest(zero)
         store(context, builder, bound.largest(gap * gap), signature.args[5], arguments[5], arguments[6])
         return context.get_dummy_value()
 
@@ -114,11 +115,11 @@ def _triangle_bounds(typing_context, half, M, blocks, block, out, at):
         zero = Lanes.constant(builder, 0.0)
         e = [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[0])]
         placing = [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[1])]
-        members = _Block(context, builder, signature.args[2], arguments[2], arguments[3])
+        members = Block(context, builder, signature.args[2], arguments[2], arguments[3])
         corners, radius = [members.vector(CORNERS + 3 * i) for i in range(3)], members.row(RADIUS)
         bound = zero
         for r in range(3):
-            a, b, c = [_dot(placing[3 * r : 3 * r + 3], corner) + placing[9 + r] for corner in corners]
+            a, b, c = [inner(placing[3 * r : 3 * r + 3], corner) + placing[9 + r] for corner in corners]
             low, high = a.least(b).least(c) - radius, a.largest(b).largest(c) + radius
             gap = (low - e[r]).largest(zero - e[r] - high).largest(zero)
             bound = bound + gap * gap

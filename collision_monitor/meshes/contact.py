@@ -5,6 +5,9 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.meshes.inside import INSIDE, UNKNOWN, is_in
 from collision_monitor.meshes.layout import RADIUS, REACH, WIDTH
@@ -25,9 +28,14 @@ FACE_TO_FACE: Final = (0.0, 0.0, 1.0)
 
 
 @inlined
-def reach_of(blocks: Any, root: int) -> float:
+def reach_in(blocks: Any, root: int) -> float:
     """Distance (m) of the farthest point of a tree from its origin."""
     return blocks[root, REACH, 1]
+
+
+def reach_of(tree: NDArray[np.float64]) -> float:
+    """Distance (m) of the farthest point of a tree from its origin."""
+    return float(tree[0, REACH, 1])
 
 
 @device
@@ -40,7 +48,7 @@ def tree_contact(
     deepest pair of triangles. The bound holds round-off only: what parts concave solids may be longer.
     """
     X = relative(pose.R_A, pose.R_B, pose.p)
-    round_off = SAT_ROUND_OFF * (reach_of(blocks_a, root_a) + reach_of(blocks_b, root_b) + sum_of_sizes(pose.p))
+    round_off = SAT_ROUND_OFF * (reach_in(blocks_a, root_a) + reach_in(blocks_b, root_b) + sum_of_sizes(pose.p))
     distance = nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work)
     if distance == 0.0:
         count, _ = touching(blocks_a, root_a, blocks_b, root_b, X, MOST_PAIRS, work)

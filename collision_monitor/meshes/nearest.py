@@ -93,7 +93,7 @@ def _written_triangle(work, k):
 
 
 @device
-def _push_nearest_last(blocks, block, work, waiting, limit, fixed, fixed_is_a):
+def push_nearest_last(blocks, block, work, waiting, limit, fixed, fixed_is_a):
     """Push the pairs of a box and the members of a block with bounds below the limit; return the stack's new length."""
     first = waiting
     for k in range(WIDTH):
@@ -207,11 +207,11 @@ def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
         elif opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
             block = root_b + int(child_b)
             box_bounds(blocks_a, a, i, blocks_b, block, X, n, work, BOUNDS)
-            waiting = _push_nearest_last(blocks_b, block, work, waiting, best * best, float(place_a), True)
+            waiting = push_nearest_last(blocks_b, block, work, waiting, best * best, float(place_a), True)
         else:
             block = root_a + int(child_a)
             box_bounds(blocks_b, b, j, blocks_a, block, Y, opposite(turn_back(X, n)), work, BOUNDS)
-            waiting = _push_nearest_last(blocks_a, block, work, waiting, best * best, float(place_b), False)
+            waiting = push_nearest_last(blocks_a, block, work, waiting, best * best, float(place_b), False)
     return found
 
 

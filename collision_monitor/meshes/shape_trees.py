@@ -25,13 +25,13 @@ def shape_tree(shape: Shape) -> Array | None:
     """
     tree = _TREES.get(shape)
     if tree is None:
-        tree = _made(shape)
+        tree = made_tree(shape)
         if tree is not None:
             _TREES[shape] = tree
     return tree
 
 
-def _made(shape: Shape) -> Array | None:
+def made_tree(shape: Shape) -> Array | None:
     match shape:
         case Mesh():
             parts = shape.vertices[shape.faces[one_of_each_part(shape.faces, len(shape.vertices)), 0]]

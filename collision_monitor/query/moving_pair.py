@@ -13,8 +13,10 @@ from collision_monitor.geometry.compound import shape_pairs
 from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shape_table import ShapeTableBuilder
-from collision_monitor.geometry.shapes import HalfSpace, Shape
-from collision_monitor.objects.models import PosedShapes, containing_model
+from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape
+from collision_monitor.meshes.shape_trees import shape_tree
+from collision_monitor.meshes.slot_trees import plant_trees
+from collision_monitor.objects.models import PosedShapes, containing_model, monitored_model
 from collision_monitor.prediction.bodies import Bodies, Multibody, make_bodies, make_parts
 from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.body_layout import lay_out_body
@@ -33,7 +35,7 @@ class MotionQuery(NamedTuple):
 
 
 class MovingShape(NamedTuple):
-    """One of two moving objects: its shapes, and the convex pieces that represent them, with poses in its frame."""
+    """One of two moving objects: its shapes, and the convex pieces or meshes that represent them, with poses in its frame."""
 
     shapes: Sequence[tuple[Shape, Pose]]
     pieces: PosedShapes
@@ -55,8 +57,18 @@ def make_moving_shape(shape: Compound, motion: Motion, name: str) -> MovingShape
         x, y, _ = motion.linear
         level = (*motion.acceleration[:2], 0.0)
         motion = Motion(flat_pose(motion.pose), (x, y, 0.0), (0.0, 0.0, motion.angular[2]), level)
-    modelled = containing_model(shapes, "exact")
+    modelled = monitored_model(shapes, "exact")
     return MovingShape(shapes, modelled.pieces, modelled.shapes, motion)
+
+
+def in_convex_pieces(moving: MovingShape) -> MovingShape:
+    """The same object with the triangles of a concave mesh as pieces of their own."""
+    modelled = containing_model(moving.shapes, "exact")
+    return moving._replace(pieces=modelled.pieces, shape_of=modelled.shapes)
+
+
+def _tree(piece: Shape) -> NDArray[np.float64] | None:
+    return shape_tree(piece) if isinstance(piece, Mesh) else None
 
 
 def lay_out_pair(a: MovingShape, b: MovingShape, horizon: float, apart: bool = False) -> Multibody:
@@ -66,7 +78,8 @@ def lay_out_pair(a: MovingShape, b: MovingShape, horizon: float, apart: bool = F
     """
     count = len(a.pieces) + len(b.pieces)
     builder = ShapeTableBuilder(slots=count)
-    slots = [[builder.append(piece, pose) for piece, pose in shape.pieces] for shape in (a, b)]
+    slots = [[builder.append(piece, pose, tree=_tree(piece)) for piece, pose in shape.pieces] for shape in (a, b)]
+    plant_trees(builder)
     multibody = Multibody(builder.table, make_parts(count), make_bodies(count if apart else 2))
     k = 0
     for moving, own in zip((a, b), slots, strict=True):
