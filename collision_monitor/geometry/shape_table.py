@@ -16,7 +16,7 @@ from collision_monitor._jit import device
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.geometry import shapes
-from collision_monitor.geometry.forest import Forest
+from collision_monitor.geometry.forest import REACH, Forest
 from collision_monitor.geometry.polygons import corners, is_convex, is_counter_clockwise
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.qhull import hull_vertices
@@ -138,21 +138,22 @@ def convex_ring(points: Array) -> NDArray[np.int32]:
 class ShapeTableBuilder:
     """Builds a ShapeTable. `table` is the current table and must be read again after `append`."""
 
-    def __init__(self, slots: int = 64, vertices: int = 512) -> None:
-        self.table = _empty(max(slots, 1), max(vertices, LANES))
+    def __init__(self, slots: int = 64, vertices: int = 512, forest: Forest | None = None) -> None:
+        self._forest = forest or Forest()
+        self.table = _empty(max(slots, 1), max(vertices, LANES))._replace(blocks=self._forest.blocks)
         self._slots = 0
         self._vertices = 0
         self._free_slots: list[int] = []
         self._free_blocks: dict[int, list[int]] = {}
         self._blocks: dict[bytes, tuple[int, int]] = {}  # bytes of the points -> start, count
         self._users: dict[int, tuple[bytes, int]] = {}  # start -> key of the block, number of slots that share it
-        self._forest = Forest(self.table.blocks)
 
     @classmethod
     def restored(cls, table: ShapeTable, free_slots: list[int], free_blocks: dict[int, list[int]]) -> ShapeTableBuilder:
         """Restore a builder from its `used` table and its `free` slots and blocks."""
         slots, vertices = len(table.kind), len(table.vertex_index)
         builder = cls()
+        table = table._replace(blocks=builder.table.blocks)
         builder.table = _resized(table, max(slots, len(builder.table.kind)), max(vertices, LANES))
         builder._slots, builder._vertices = slots, vertices
         builder._free_slots, builder._free_blocks = free_slots, free_blocks
@@ -224,7 +225,7 @@ class ShapeTableBuilder:
                 kind, size, radius = POLYGON, (len(ring),), float(np.linalg.norm(shape.points, axis=1).max())
                 start, count = self._share(np.pad(shape.points, ((0, 0), (0, 1))), ring)
             case shapes.Mesh() if tree is not None:
-                kind, size, radius = MESH, (), float(np.linalg.norm(shape.vertices[np.unique(shape.faces)], axis=1).max())
+                kind, size, radius = MESH, (), float(tree[REACH])
             case _:
                 raise UnsupportedError(f"{type(shape).__name__} has no narrow phase; supported are {SUPPORTED_SHAPES}")
         slot = self._new_slot()

@@ -18,7 +18,7 @@ from collision_monitor._jit import device, inlined
 from collision_monitor._jit.lanes import Lanes, store
 from collision_monitor.meshes.boxes import Block, half_of, inner, seen_from
 from collision_monitor.meshes.layout import AXES, CENTER, HALF
-from collision_monitor.meshes.placing import Placing, turned_back
+from collision_monitor.meshes.placing import turned_back
 from collision_monitor.meshes.triangle_pair import Triangle
 from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus
 

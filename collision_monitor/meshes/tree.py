@@ -6,8 +6,9 @@ Triangles are halved at the median along the longest side of their centres' boun
 
 from __future__ import annotations
 
+from hashlib import blake2b
 from math import copysign, sqrt
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from collision_monitor.meshes.layout import (
     FACE,
     FIRST_PART,
     HALF,
+    KEY,
     MOST_PARTS,
     PARTS,
     RADIUS,
@@ -63,7 +65,9 @@ def tree_of(
     far = np.sqrt(np.einsum("nij,nij->ni", corners, corners).max(axis=1)) + radii
     blocks[0, CLOSED, 1], blocks[0, REACH, 1] = closed, np.nextafter(far.max() * (1.0 + CONTAINED), np.inf)
     blocks[0, PARTS, 1], blocks[0, FIRST_PART, 1] = len(inner), used
-    return np.concatenate([blocks[:used], stored])
+    tree = np.concatenate([blocks[:used], stored])
+    tree[0, KEY : KEY + 2, 1] = np.frombuffer(blake2b(tree.data, digest_size=16).digest())
+    return tree
 
 
 def most_blocks(triangles: int) -> int:

@@ -14,8 +14,8 @@ import numpy as np
 
 from collision_monitor._jit import device, inlined
 from collision_monitor._jit.vectors import LANES
-from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.meshes.nearest import MEMORY, PLACE_A, PLACE_B, answer_row
+from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.dispatch import separation
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.work_memory import WORK_SIZE

@@ -21,6 +21,7 @@ from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import Capsule, HalfSpace, Mesh, Shape, Sphere
 from collision_monitor.meshes.contact import APART, ENCLOSED, OPEN, contact_of_trees, reach_of
+from collision_monitor.meshes.extent import extents
 from collision_monitor.meshes.nearest import MEMORY, answer_row
 from collision_monitor.meshes.shape_trees import shape_tree
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, as_contacts
@@ -264,5 +265,14 @@ def _parting_translation(a: _Posed, b: _Posed, offset: Array, normal: Array) -> 
     directions = np.array([normal, *axes, *planes])
     if is_planar(a.shapes[0][0]):
         directions = directions[directions[:, 2] == 0.0]
-    ends = reach(a.outline, directions @ a.rotation) - directions @ offset
-    return float((ends + reach(b.outline, -directions @ b.rotation)).min())
+    ends = _reach(a, directions @ a.rotation) - directions @ offset
+    return float((ends + _reach(b, -directions @ b.rotation)).min())
+
+
+def _reach(side: _Posed, directions: Array) -> Array:
+    """How far an object reaches in directions (n, 3) in its own frame (m)."""
+    shape, pose = side.outline[0]
+    tree = shape_tree(shape) if len(side.outline) == 1 and isinstance(shape, Mesh) else None
+    if tree is None:
+        return reach(side.outline, directions)
+    return extents(tree, directions @ pose.rotation) + directions @ pose.position
