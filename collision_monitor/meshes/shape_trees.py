@@ -32,6 +32,7 @@ def shape_tree(shape: Shape) -> Array | None:
 
 
 def made_tree(shape: Shape) -> Array | None:
+    """As `shape_tree`, but made anew."""
     match shape:
         case Mesh():
             parts = shape.vertices[shape.faces[one_of_each_part(shape.faces, len(shape.vertices)), 0]]
