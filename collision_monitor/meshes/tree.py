@@ -232,14 +232,14 @@ def _principal_axes(xx, xy, xz, yy, yz, zz, R):
             second = yy if q == 1 else zz
             theta = 0.5 * (second - first) / off
             t = copysign(1.0, theta) / (abs(theta) + sqrt(theta * theta + 1.0))
-            c = 1.0 / sqrt(t * t + 1.0)
-            s = t * c
+            cosine = 1.0 / sqrt(t * t + 1.0)
+            sine = t * cosine
             if pair == 0:
-                xx, yy, xy, xz, yz = xx - t * xy, yy + t * xy, 0.0, c * xz - s * yz, s * xz + c * yz
+                xx, yy, xy, xz, yz = xx - t * xy, yy + t * xy, 0.0, cosine * xz - sine * yz, sine * xz + cosine * yz
             elif pair == 1:
-                xx, zz, xz, xy, yz = xx - t * xz, zz + t * xz, 0.0, c * xy - s * yz, s * xy + c * yz
+                xx, zz, xz, xy, yz = xx - t * xz, zz + t * xz, 0.0, cosine * xy - sine * yz, sine * xy + cosine * yz
             else:
-                yy, zz, yz, xy, xz = yy - t * yz, zz + t * yz, 0.0, c * xy - s * xz, s * xy + c * xz
+                yy, zz, yz, xy, xz = yy - t * yz, zz + t * yz, 0.0, cosine * xy - sine * xz, sine * xy + cosine * xz
             for r in range(3):
                 a, b = R[r, p], R[r, q]
-                R[r, p], R[r, q] = c * a - s * b, s * a + c * b
+                R[r, p], R[r, q] = cosine * a - sine * b, sine * a + cosine * b
