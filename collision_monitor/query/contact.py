@@ -35,7 +35,9 @@ from collision_monitor.tolerances import FEATURE_TIE, UNIT_QUATERNION
 Array = NDArray[np.float64]
 Compound = Shape | Sequence[tuple[Shape, Pose]]
 
-_DIRECTIONS: Final = [sign * np.array(d) / np.linalg.norm(d) for d in KDOP_DIRECTIONS[26] for sign in (1.0, -1.0)]
+_DIRECTIONS: Final = np.array(
+    [sign * np.array(d) / np.linalg.norm(d) for d in KDOP_DIRECTIONS[26] for sign in (1.0, -1.0)]
+)
 
 def _patch(found: NearestPieces, witness: Array) -> Array:
     """Corners (k, 3) on A of the patch of all pieces that touch in one plane; a floor of triangles is one face."""
@@ -284,14 +286,14 @@ def _holds(outer: _Posed, inner: _Posed, offset: Array) -> bool:
 
 def _parting_translation(a: _Posed, b: _Posed, offset: Array, normal: Array) -> float:
     """Length (m) of the shortest translation that certainly parts the two, along the normal or an axis of either."""
-    axes = [side.rotation @ direction for side in (a, b) for direction in _DIRECTIONS]
     planes = [
         sign * side.rotation @ pose.rotation @ shape.normal
         for side, sign in ((a, 1.0), (b, -1.0))
         for shape, pose in side.outline
         if isinstance(shape, HalfSpace)
     ]
-    directions = np.array([normal, *axes, *planes])
+    axes = [_DIRECTIONS @ side.rotation.T for side in (a, b)]
+    directions = np.concatenate([normal[None], *axes, np.reshape(planes, (-1, 3))])
     if is_planar(a.shapes[0][0]):
         directions = directions[directions[:, 2] == 0.0]
     ends = _reach(a, directions @ a.rotation) - directions @ offset
