@@ -187,12 +187,18 @@ class ShapeTableBuilder:
         return self._slots - len(self._free_slots)
 
     def append(
-        self, shape: shapes.Shape, pose: Pose | None = None, margin: float = 0.0, tree: Array | None = None
+        self,
+        shape: shapes.Shape,
+        pose: Pose | None = None,
+        margin: float = 0.0,
+        corners: NDArray[np.int32] | None = None,
+        tree: Array | None = None,
     ) -> int:
         """Add a shape at a pose in its object's frame, enlarged by `margin` (m); return its slot.
 
-        tree: of a mesh, which is needed (`meshes.shape_trees`). Raises UnsupportedError for a kind without kernels,
-        ShapeError for an invalid margin.
+        corners: the `hull_vertices` of a ConvexHull, if they are known already. tree: of a mesh, which is needed
+        (`meshes.shape_trees`).
+        Raises UnsupportedError for a kind without kernels, ShapeError for an invalid margin.
         """
         if not (np.isfinite(margin) and margin >= 0.0):
             raise ShapeError(f"margin: expected a finite number of metres >= 0, got {margin!r}")
@@ -216,8 +222,9 @@ class ShapeTableBuilder:
                 kind, size, radius = HALF_SPACE, (*shape.normal, shape.offset), inf
             case shapes.ConvexHull() | shapes.Triangle():
                 kind, size, radius = CONVEX_HULL, (), float(np.linalg.norm(shape.points, axis=1).max())
-                flat = isinstance(shape, shapes.Triangle)
-                start, count = self._share(shape.points, _TRIANGLE if flat else hull_vertices(shape.points))
+                if corners is None:
+                    corners = _TRIANGLE if isinstance(shape, shapes.Triangle) else hull_vertices(shape.points)
+                start, count = self._share(shape.points, corners)
             case shapes.Circle():
                 kind, size, radius = CIRCLE, (shape.radius,), shape.radius
             case shapes.Polygon():
@@ -265,7 +272,7 @@ class ShapeTableBuilder:
             self._forest.drop(int(self.table.size[slot, TREE]) - 1)
         self.table.size[slot] = 0.0
         self.table.kind[slot] = 0
-        self.table.vertex_count[slot] = 0
+        self.table.vertex_start[slot] = self.table.vertex_count[slot] = 0
         self._free_slots.append(slot)
 
     def _new_slot(self) -> int:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
 from collision_monitor._jit.vectors import LANES
-from collision_monitor.errors import CollisionMonitorError, InputError, UnsupportedError
+from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.shape_table import POLYGON, SHARED, TREE, ShapeTable, ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, array_bytes
@@ -19,7 +19,7 @@ from collision_monitor.meshes.slot_trees import plant_trees
 from collision_monitor.monitor.mesh_snapshot import mesh_arrays, plant_meshes
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.objects.models import monitored_model
+from collision_monitor.objects.models import Modelled, monitored_model
 from collision_monitor.prediction.bodies import Bodies, Multibody, Parts, enlarge, make_bodies, make_parts
 from collision_monitor.prediction.body_layout import lay_out_body
 from collision_monitor.prediction.impact_record import pair_keys
@@ -42,10 +42,16 @@ COPIES: Final = 4
 the table has up to twice the room that it needs."""
 
 
+TREE_BYTES: Final = 300
+"""Memory of a triangle in the tree of its mesh: 150 to 220 bytes, and the array of all trees may have half as much room
+again."""
+
+
 def memory(d: ObjectDescription) -> int:
     """Return the memory that a described object needs (bytes), rounded up."""
     shapes = sum(SHAPE_BYTES + COPIES * array_bytes(shape) for shape, _ in d.shapes)
-    return OBJECT_BYTES + shapes + ALLOWED_BYTES * len(d.allowed)
+    trees = TREE_BYTES * sum(len(shape.faces) for shape, _ in d.shapes if isinstance(shape, Mesh))
+    return OBJECT_BYTES + shapes + trees + ALLOWED_BYTES * len(d.allowed)
 
 
 class Roster(Stage):
@@ -108,6 +114,10 @@ class Roster(Stage):
         """The ids of all described objects, ascending."""
         return sorted(self._slots)
 
+    def __contains__(self, object_id: int) -> bool:
+        """Whether the object is described."""
+        return object_id in self._slots
+
     def __len__(self) -> int:
         """Number of described objects."""
         return len(self._slots)
@@ -153,9 +163,10 @@ class Roster(Stage):
 
     # ------------------------------------------------------------------ changing
 
-    def describe(self, d: ObjectDescription, model: Model) -> int:
+    def describe(self, d: ObjectDescription, model: Model, prepared: Modelled | None = None) -> int:
         """Add a new object, or replace the description of a known one and keep its state. Return its slot.
 
+        prepared: the model of the object, if it is known already.
         Raises InputError, also if all objects together would need more than MOST_MEMORY; ShapeError; UnsupportedError
         for an unsupported shape or model.
         """
@@ -171,13 +182,15 @@ class Roster(Stage):
             raise UnsupportedError(f"object {d.object_id}: a HalfSpace has no end and can only be static")
         planar = self._is_planar(d)
         pose = flat_pose(d.pose) if planar and d.pose is not None else d.pose
-        modelled = monitored_model(d.shapes, model)
+        modelled = monitored_model(d.shapes, model) if prepared is None else prepared
+        corners = modelled.corners or (None,) * len(modelled.pieces)
         slots: list[int] = []
         try:
-            for shape, offset in modelled.pieces:
+            for (shape, offset), chosen in zip(modelled.pieces, corners, strict=True):
                 tree = shape_tree(shape) if isinstance(shape, Mesh) else None
-                slots.append(self._shapes.append(shape, flat_pose(offset) if planar else offset, d.padding, tree))
-        except CollisionMonitorError:
+                placed = flat_pose(offset) if planar else offset
+                slots.append(self._shapes.append(shape, placed, d.padding, chosen, tree))
+        except Exception:
             for slot in slots:
                 self._shapes.remove(slot)
             raise
@@ -231,9 +244,14 @@ class Roster(Stage):
         """Mark every object to be predicted anew in the next step."""
         self.renewed.update(self.used().tolist())
 
-    def forget_states(self) -> None:
-        """Forget all states: every object that is not static is unseen until its next state."""
+    def forget_states(self, which: NDArray[np.int32] | None = None) -> None:
+        """Forget the states of the bodies `which`, of all by default: those that move are unseen until the next one."""
         bodies = self.bodies
+        if which is not None:
+            bodies.seen[which] = False
+            bodies.version[which] += 1
+            self.renewed.update(which.tolist())
+            return
         bodies.seen[:] = bodies.static & bodies.used
         bodies.version[:] += 1
         self.renewed = set(self.used().tolist())
