@@ -40,9 +40,9 @@ def model_tradeoff(
     models: Sequence[Model | str] = MODELS,
     progress: Callable[[int], None] = lambda done: None,
 ) -> list[Measurement]:
-    """Return a row for `exact`, which is `contact` of the exact shapes, then a row for each model in the monitor. Raises InputError.
+    """Return a row for `exact`, which is `contact` of the exact shapes, then a row for each model in the monitor.
 
-    Pairs up to NEAR apart are compared. An alarm is a pair that is reported to touch. A miss is a pair that touches and
+    Raises InputError. Pairs up to NEAR apart are compared. An alarm is a pair that is reported to touch. A miss is a pair that touches and
     is not reported. progress: called with the number of steps just done; the total is
     len(steps) * len(models) + min(COMPARED_STEPS, len(steps)).
     """

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.hashed_grid import GRID_LEVELS, LEVEL_OFFSET, HashedGrid
-from collision_monitor.monitor.roster import Roster
 from collision_monitor.geometry.shape_table import MESH
+from collision_monitor.monitor.roster import Roster
 from collision_monitor.narrow_phase.dispatch import KIND_NAMES, TEST_METHODS, pair_test
-
 
 _NAMES: Final = {**KIND_NAMES, MESH: "mesh"}
 _METHODS: Final = {**TEST_METHODS, "meshes": "trees of triangles"}
