@@ -133,9 +133,8 @@ def test_a_restored_monitor_goes_on_with_the_same_bytes(profile):
 def test_a_snapshot_with_damaged_meshes_is_refused():
     monitor = scene(Profile())
     snapshot = monitor.snapshot()
-    for name, value in (
-        ("meshes.of", 7), ("meshes.triangles", 5), ("meshes.triangles", -1), ("meshes.parts", 0), ("meshes.corners", np.nan)
-    ):  # fmt: skip
+    damages = {"meshes.of": 7, "meshes.triangles": 5, "meshes.parts": 0, "meshes.corners": np.nan}
+    for name, value in damages.items():
         arrays = {key: array.copy() for key, array in snapshot.arrays.items()}
         arrays[name].reshape(-1)[0] = value
         with pytest.raises(cm.InputError, match="snapshot"):
