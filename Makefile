@@ -11,7 +11,7 @@ unexport PYTHONPATH
 endif
 unexport PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup interfaces demo test test-core lint fuzz fuzz-files soak bench bench-peers clean
+.PHONY: help setup setup-demo interfaces demo test test-core lint fuzz fuzz-files soak bench bench-peers clean
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -20,7 +20,10 @@ help: ## list the targets
 setup: ## set up what is missing: environment, ROS 2, messages, package, compiled kernels
 	@sh scripts/set_up/start.sh
 
-demo: setup ## play a scene and show the monitor's answers, live in this terminal
+setup-demo: ## set up what the demo needs; the rest compiles in the background afterwards
+	@sh scripts/set_up/start.sh demo
+
+demo: setup-demo ## play a scene and show the monitor's answers, live in this terminal
 	@$(BIN)/collision-monitor demo
 
 interfaces: setup ## build the message packages that the wheels lack: tf2, vision, autoware, moveit
@@ -48,9 +51,11 @@ soak: setup ## simulate 24 h of objects that come, change and go, and compare wi
 
 QUICK := $(findstring --quick,$(ARGS))
 
-bench: setup ## time full detection and every installed peer, the event list, the node; ARGS=--quick takes 3 minutes
+bench: setup ## time single calls, a start, full detection and every installed peer, the event list, the node; ARGS=--quick takes 3 minutes
 	@$(BIN)/python benchmarks/run.py $(ARGS)
 	@$(BIN)/python benchmarks/mesh_pairs.py $(QUICK)
+	@$(BIN)/python benchmarks/single_calls.py $(QUICK)
+	@$(BIN)/python benchmarks/first_start.py
 	@$(BIN)/python benchmarks/event_list.py $(if $(QUICK),--seconds 1)
 	@$(BIN)/python benchmarks/through_node.py $(if $(QUICK),--duration 10)
 	@$(BIN)/python benchmarks/memory.py $(QUICK)

@@ -16,6 +16,7 @@
     response                       response.collide, reflect, …           what bodies do when they meet, for simulations
     records                        Model                                  the geometric models of an object
     errors                         CollisionMonitorError and subclasses   errors of the inputs
+    world                          world.HardSpheres, world.make_scene    simulated worlds to monitor
 
 This module exports the names in the second column, such as `collision_monitor.contact`. Each name is imported at its
 first use.
@@ -51,6 +52,10 @@ _HOME = {
     "Contact": "query.contact",
     "contact_features": "query.features",
     "overlap": "query.overlap",
+    "distance": "query.distance",
+    "contacts": "query.contacts",
+    "Contacts": "query.contacts",
+    "times_of_impact": "query.times_of_impact",
     "contains": "query.containment",
     "cast_ray": "query.rays",
     "RayHits": "query.rays",
@@ -63,6 +68,7 @@ _HOME = {
     "vertex_face_impact": "query.feature_impact",
     "edge_edge_impact": "query.feature_impact",
     "FeatureImpact": "query.feature_impact",
+    "plot": "report.contact_plot",
     "CollisionMonitorError": "errors",
     "InputError": "errors",
     "ShapeError": "errors",
@@ -72,18 +78,21 @@ _HOME = {
     "MessageError": "errors",
     "SessionError": "errors",
     "Refusal": "errors",
+    "RefusalWarning": "errors",
 }
-_MODULES = ("response",)
+_MODULES = ("response", "world")
 __all__ = ["__version__", *_MODULES, *_HOME]
 
 if TYPE_CHECKING:
     from collision_monitor import response as response
+    from collision_monitor import world as world
     from collision_monitor.errors import CollisionMonitorError as CollisionMonitorError
     from collision_monitor.errors import InputError as InputError
     from collision_monitor.errors import MessageError as MessageError
     from collision_monitor.errors import PoseError as PoseError
     from collision_monitor.errors import ProfileError as ProfileError
     from collision_monitor.errors import Refusal as Refusal
+    from collision_monitor.errors import RefusalWarning as RefusalWarning
     from collision_monitor.errors import SessionError as SessionError
     from collision_monitor.errors import ShapeError as ShapeError
     from collision_monitor.errors import UnsupportedError as UnsupportedError
@@ -107,7 +116,10 @@ if TYPE_CHECKING:
     from collision_monitor.objects.description import ObjectDescription as ObjectDescription
     from collision_monitor.query.contact import Contact as Contact
     from collision_monitor.query.contact import contact as contact
+    from collision_monitor.query.contacts import Contacts as Contacts
+    from collision_monitor.query.contacts import contacts as contacts
     from collision_monitor.query.containment import contains as contains
+    from collision_monitor.query.distance import distance as distance
     from collision_monitor.query.feature_impact import FeatureImpact as FeatureImpact
     from collision_monitor.query.feature_impact import edge_edge_impact as edge_edge_impact
     from collision_monitor.query.feature_impact import vertex_face_impact as vertex_face_impact
@@ -119,7 +131,9 @@ if TYPE_CHECKING:
     from collision_monitor.query.time_of_impact import time_of_impact as time_of_impact
     from collision_monitor.query.time_of_impact_batch import Impacts as Impacts
     from collision_monitor.query.time_of_impact_batch import time_of_impact_batch as time_of_impact_batch
+    from collision_monitor.query.times_of_impact import times_of_impact as times_of_impact
     from collision_monitor.records import Model as Model
+    from collision_monitor.report.contact_plot import plot as plot
     from collision_monitor.settings.profile import Profile as Profile
 
 

@@ -37,6 +37,10 @@ class SessionError(CollisionMonitorError):
     """A recording cannot be opened, read or written."""
 
 
+class RefusalWarning(UserWarning):
+    """A step refused an input; the text says what was expected."""
+
+
 def reason_of(error: Exception) -> str:
     """Return the text with which one object of a message is refused, so that the others go on.
 
@@ -55,7 +59,11 @@ class TooCostlyError(CollisionMonitorError):
 
 
 class Refusal(Enum):
-    """Reason for which the monitor refused an input; the status counts each as `refused_<value>`."""
+    """Reason for which the monitor refused an input; the status counts each as `refused_<value>`.
+
+    >>> Refusal.TIME.value
+    'time'
+    """
 
     MALFORMED = "malformed"
     FRAME = "frame"

@@ -6,8 +6,9 @@ recorded without conversion. `collision_monitor_msgs/msg/*.msg` documents units,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import IntEnum, IntFlag
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,7 +127,11 @@ class Method(IntEnum):
 
 
 class Model(IntEnum):
-    """`ObjectDescription.model` and the `model_*` fields of contacts and predictions."""
+    """`ObjectDescription.model` and the `model_*` fields of contacts and predictions.
+
+    >>> Model.OBB.name
+    'OBB'
+    """
 
     AUTO = 0
     EXACT = 1
@@ -163,3 +168,24 @@ def joined(parts: Sequence[Rows]) -> Rows:
     """Concatenate arrays of one structured dtype."""
     kind = parts[0].dtype
     return np.concatenate([part.view(f"V{kind.itemsize}") for part in parts]).view(kind)
+
+
+def data_frame(columns: NDArray[np.void] | Mapping[str, NDArray[Any]]) -> Any:
+    """Return a pandas.DataFrame of a structured array or of arrays by name; a vector of three has columns _x, _y, _z.
+
+    Raises ImportError without pandas.
+    """
+    try:
+        from pandas import DataFrame
+    except ImportError:
+        raise ImportError("expected pandas, which this package does not require: pip install pandas") from None
+    names = columns.dtype.names or () if isinstance(columns, np.ndarray) else tuple(columns)
+    frame = {}
+    for name in names:
+        values = columns[name]
+        if values.ndim == 1:
+            frame[name] = values
+        else:
+            axes = "xyz" if values.shape[1] == 3 else [str(k) for k in range(values.shape[1])]
+            frame |= {f"{name}_{axis}": values[:, k] for k, axis in enumerate(axes)}
+    return DataFrame(frame)

@@ -53,7 +53,7 @@ def _step_uncertain(monitor: Monitor, poses: NDArray[np.float64]) -> None:
     states["position"], states["quaternion"] = poses[:, :3], poses[:, 3:]
     states["position_stddev"] = states["orientation_stddev"] = 0.1
     monitor.step(3_010_000_000, states)
-    monitor.add(2, Sphere(0.5), max_linear_acceleration=1.0)
+    monitor.add(2, Sphere(0.5), max_linear_acceleration=1.0, replace=True)
     monitor.step(3_020_000_000, states, covariance=np.zeros((len(poses), 12)))
 
 
@@ -62,6 +62,7 @@ def warm_up_functions() -> None:
     # imported here because a node, which warms up the monitor at its start, needs none of it
     from collision_monitor.detection.detector import WORTH_THREADS, Detector, default_threads
     from collision_monitor.query.contact import contact
+    from collision_monitor.query.contacts import contacts
     from collision_monitor.query.feature_impact import vertex_face_impact
     from collision_monitor.query.overlap import overlap
     from collision_monitor.query.time_of_impact import time_of_impact
@@ -73,9 +74,11 @@ def warm_up_functions() -> None:
         positions = np.arange(3.0 * len(shapes)).reshape(-1, 3)
         Detector(shapes, threads=threads).detect(positions, np.tile([0.0, 0.0, 0.0, 1.0], (len(shapes), 1)))
     contact(box, Pose(), ball, Pose())
+    contact([(box, Pose())], Pose(), ball, Pose())  # the general search
     time_of_impact(box, Motion(Pose(), angular=(0, 0, 1)), ball, Motion(Pose((3, 0, 0)), acceleration=(-1, 0, 0)))
     poses, twists = np.zeros((2, 7)), np.zeros((2, 6))
     poses[:, 6] = 1.0
+    contacts(box, poses, ball, poses + np.eye(1, 7))
     for shape in (box, ball):
         time_of_impact_batch(shape, poses, twists, shape, poses + np.eye(1, 7), twists)
     vertex_face_impact(np.arange(24.0).reshape(8, 3))

@@ -184,7 +184,7 @@ def stamp_samples() -> Iterator[Sample]:
         for k in range(20):
             poses = [(0.05 * k, 0, 0, 0, 0, 0, 1), (3, 0.1, 0, 0, 0, 0, 1)]
             result = monitor.step(begin + k * 50_000_000, [1, 2], poses, [(1, 0, 0, 0, 0, 0), (0, 0, 0, 0, 0, 1)])
-            rows += result.predictions["lower"].tolist() + result.contacts["signed_distance"].tolist()
+            rows += result.predictions["lower"].tolist() + result.contact_rows["signed_distance"].tolist()
         answers.append(np.array(rows))
     early, late = answers
     same = early.shape == late.shape

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.records import Phase
 
 Step = tuple[int, NDArray[np.void]]
 """Stamp (ns) and states (records.STATE)."""
@@ -60,4 +59,4 @@ def by_pair(answers: NDArray[np.void]) -> dict[tuple[int, int], Any]:
 def contacts_by_pair(answer: StepResult) -> dict[tuple[int, int], Any]:
     """Return the row with the distance of each pair in contact or within the contact margin."""
     rows = answer.contacts
-    return by_pair(rows.compress((rows["phase"] != Phase.END) & (rows["point_index"] == 0)))
+    return by_pair(rows.compress(rows["point_index"] == 0))

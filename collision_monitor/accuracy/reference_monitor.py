@@ -10,7 +10,7 @@ from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.monitor.tracking import Slots, Tracking
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
-from collision_monitor.records import Phase, PredictionStatus
+from collision_monitor.records import PredictionStatus
 from collision_monitor.settings.profile import Profile
 
 
@@ -46,7 +46,7 @@ def disagreements(mine: StepResult, reference: StepResult, horizon: float) -> li
     two intervals of its time must overlap. Near the horizon (s) one of them may not report it yet.
     """
     found = []
-    touching = [by_pair(result.contacts[result.contacts["phase"] != Phase.END]).keys() for result in (mine, reference)]
+    touching = [by_pair(result.contacts).keys() for result in (mine, reference)]
     found += [f"{pair} touches in one answer only" for pair in sorted(touching[0] ^ touching[1])]
     stated, true = by_pair(mine.predictions), by_pair(reference.predictions)
     found += [f"{pair} touches and is predicted" for pair in sorted(stated.keys() & touching[0])]

@@ -9,7 +9,10 @@ from typing import Any
 
 from collision_monitor.accuracy.detection_time import WARM_UP_FRAMES
 from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.quantities import whole
+from collision_monitor.cli.quantities import positive, whole
+from collision_monitor.errors import InputError
+
+HARD_SPHERES = ("hard-spheres", "hard_spheres")
 
 DESCRIPTION = """\
 Measure how long it takes to find all contacts of N moving bodies.
@@ -18,6 +21,9 @@ Every pose is new in every frame. The input is NumPy arrays of poses; the output
 pairs, signed distances, normals and points. The bodies move and turn at random, and the density of
 contacts does not depend on N. The command prints the median and the 99th percentile of the time
 per frame, and the number of colliding pairs.
+
+The scene hard-spheres measures the event-driven simulation instead: collisions per second on one
+core, the relative drift of the energy, and the pressure, with that of Carnahan and Starling.
 """
 EPILOG = """\
 examples:
@@ -25,6 +31,7 @@ examples:
   collision-monitor bench --scene hulls --n 1000 --threads 1 --json
   collision-monitor bench --n 2000 --broad-phase all        why the grid is the default
   collision-monitor bench --scene-file scene.npz --json
+  collision-monitor bench --scene hard-spheres --n 4000 --packing 0.25 --json
 
 exit codes:
   0  done
@@ -41,7 +48,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--scene", default="boxes", metavar="NAME", help="boxes (default), spheres, mixed or hulls")
+    parser.add_argument(
+        "--scene", default="boxes", metavar="NAME", help="boxes (default), spheres, mixed, hulls or hard-spheres"
+    )
     parser.add_argument("--n", type=whole(1), default=10_000, metavar="N", help="number of bodies (default: 10000)")
     parser.add_argument("--seed", type=whole(0), default=1, metavar="S", help="seed of the random scene (default: 1)")
     parser.add_argument("--scene-file", type=Path, metavar="FILE", help="measure a saved scene (.npz) instead")
@@ -53,6 +62,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument(
         "--threads", type=whole(1), metavar="T", help="number of threads (default: 2, or 1 on a single core)"
+    )
+    parser.add_argument(
+        "--packing",
+        type=positive,
+        metavar="P",
+        help="part of space that hard spheres fill (default: 0.45); for hard-spheres only",
     )
     parser.add_argument(
         "--broad-phase",
@@ -70,6 +85,10 @@ def bench_command(args: argparse.Namespace) -> int:
     from collision_monitor.detection.partitioned import BROAD_PHASES, MOST_FOR_BRUTE_FORCE
     from collision_monitor.world.moving_bodies import FRAMES, load_moving_bodies, make_moving_bodies
 
+    if args.scene_file is None and args.scene in HARD_SPHERES:
+        return _bench_hard_spheres(args)
+    if args.packing is not None:
+        raise InputError("--packing: expected the scene hard-spheres, other scenes have a fixed density")
     if args.scene_file is None:
         scene = make_moving_bodies(args.scene, args.n, args.seed, args.frames or FRAMES)
     else:
@@ -84,6 +103,26 @@ def bench_command(args: argparse.Namespace) -> int:
             continue
         result = time_detection(scene, threads if name == "grid" else 1, args.frames, name)
         _print({**result, "broad_phase": name}, args.json)
+    return ExitCode.DONE
+
+
+def _bench_hard_spheres(args: argparse.Namespace) -> int:
+    from collision_monitor.accuracy.collision_rate import PACKING, measure_collision_rate
+
+    for name in ("frames", "threads", "broad_phase"):
+        if getattr(args, name) is not None:
+            option = name.replace("_", "-")
+            raise InputError(f"--{option}: expected no value with hard-spheres: one event list, one thread")
+    result = measure_collision_rate(args.n, PACKING if args.packing is None else args.packing, args.seed)
+    if args.json:
+        print(json.dumps(result))
+    else:
+        print(
+            f"hard spheres, {result['n']} at packing {result['packing']:g}: "
+            f"{result['collisions_per_s']:,.0f} collisions per second, energy drift {result['energy_drift']:.1e}, "
+            f"pressure {result['pressure']:.4f} Pa, compressibility {result['compressibility']:.4f} "
+            f"(Carnahan-Starling {result['carnahan_starling']:.4f})"
+        )
     return ExitCode.DONE
 
 

@@ -14,6 +14,10 @@ from numpy.typing import ArrayLike
 from collision_monitor.geometry.closest_points import closest_points
 from collision_monitor.geometry.coordinates import Array, Booleans, coordinates, numbers
 from collision_monitor.geometry.lines import LineKind
+from collision_monitor.tolerances import EPSILON
+
+ROUND_OFF = 8 * EPSILON
+"""Distances that differ by less than this part of the particles' offset are equal: the round-off of both."""
 
 
 class ParticleEncounter(NamedTuple):
@@ -41,10 +45,10 @@ def particle_particle(
     """
     position_a, velocity_a = _in_space(p_a, "p_a"), _in_space(v_a, "v_a")
     position_b, velocity_b = _in_space(p_b, "p_b"), _in_space(v_b, "v_b")
-    nearest = closest_points(position_a, velocity_a, position_b, velocity_b, LineKind.RAY, LineKind.RAY)
+    offset = position_b - position_a  # seen from A, so that distance from the origin costs no accuracy
+    nearest = closest_points(np.zeros(3), velocity_a, offset, velocity_b, LineKind.RAY, LineKind.RAY)
     time, distance = closest_approach(p_a, v_a, p_b, v_b)
-    size = np.abs(position_a).max() + np.abs(position_b).max()
-    at_once = distance <= nearest.distance + 1e-15 * size
+    at_once = distance <= nearest.distance + ROUND_OFF * np.linalg.norm(offset, axis=-1)
     alpha, beta = np.where(at_once, time, nearest.alpha), np.where(at_once, time, nearest.beta)
     near = nearest.distance <= numbers(distance_threshold, "distance_threshold", 0.0)
     together = np.abs(alpha - beta) <= numbers(time_threshold, "time_threshold", 0.0)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -80,7 +80,11 @@ def rotation_matrix(quaternion: ArrayLike) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Pose of a body: position (m) and orientation (unit quaternion x, y, z, w). Raises PoseError."""
+    """Pose of a body: position (m) and orientation (unit quaternion x, y, z, w). Raises PoseError.
+
+    >>> (Pose((1, 0, 0)) @ Pose((0, 2, 0))).position
+    array([1., 2., 0.])
+    """
 
     position: Any = (0.0, 0.0, 0.0)
     quaternion: Any = (0.0, 0.0, 0.0, 1.0)
@@ -88,6 +92,75 @@ class Pose:
     def __post_init__(self) -> None:
         object.__setattr__(self, "position", vector(self.position, "position"))
         object.__setattr__(self, "quaternion", unit_quaternion(self.quaternion))
+
+    @classmethod
+    def from_matrix(cls, matrix: ArrayLike) -> Self:
+        """Pose of a homogeneous matrix (4, 4), or of a rotation matrix (3, 3) at the origin. Raises PoseError.
+
+        >>> Pose.from_matrix([[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]).position
+        array([1., 2., 3.])
+        """
+        try:
+            X = np.array(matrix, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise PoseError(f"matrix: expected numbers (4, 4) or (3, 3), got {matrix!r}") from None
+        if X.shape not in ((4, 4), (3, 3)):
+            raise PoseError(f"matrix: expected shape (4, 4) or (3, 3), got {X.shape}")
+        if X.shape == (4, 4) and (X[3] != (0.0, 0.0, 0.0, 1.0)).any():
+            raise PoseError(f"matrix: expected the last row 0 0 0 1, got {X[3].tolist()}")
+        R, position = X[:3, :3], X[:3, 3] if X.shape == (4, 4) else (0.0, 0.0, 0.0)
+        if not np.abs(R @ R.T - np.eye(3)).max() <= UNIT_QUATERNION or not np.linalg.det(R) > 0.0:
+            raise PoseError(f"matrix: expected a rotation (orthonormal, determinant 1), got {R.tolist()}")
+        # the largest of 4 w^2, 4 x^2, 4 y^2, 4 z^2 loses no digits (Shepperd, 1978)
+        K = np.array(
+            [
+                [1 + R[0, 0] - R[1, 1] - R[2, 2], R[0, 1] + R[1, 0], R[0, 2] + R[2, 0], R[2, 1] - R[1, 2]],
+                [R[0, 1] + R[1, 0], 1 - R[0, 0] + R[1, 1] - R[2, 2], R[1, 2] + R[2, 1], R[0, 2] - R[2, 0]],
+                [R[0, 2] + R[2, 0], R[1, 2] + R[2, 1], 1 - R[0, 0] - R[1, 1] + R[2, 2], R[1, 0] - R[0, 1]],
+                [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 1 + R[0, 0] + R[1, 1] + R[2, 2]],
+            ]
+        )
+        q = K[K.diagonal().argmax()]
+        return cls(position, q / np.linalg.norm(q))
+
+    @classmethod
+    def from_euler(
+        cls, roll: float, pitch: float, yaw: float, position: ArrayLike = (0.0, 0.0, 0.0), *, degrees: bool = False
+    ) -> Self:
+        """Pose turned about the fixed axes x, then y, then z, as in URDF and tf2; rad, or degrees. Raises PoseError.
+
+        >>> Pose.from_euler(0, 0, 90, degrees=True).rotation.round(3)[:, 0]
+        array([0., 1., 0.])
+        """
+        angles = vector((roll, pitch, yaw), "roll, pitch, yaw")
+        x, y, z = from_rotation_vector(np.diag(np.radians(angles) if degrees else angles))
+        return cls(position, multiply(z, multiply(y, x)))
+
+    @classmethod
+    def from_wxyz(cls, position: ArrayLike, quaternion: ArrayLike) -> Self:
+        """Pose with a quaternion w, x, y, z, the order of Eigen's constructor, MuJoCo and Drake. Raises PoseError.
+
+        >>> Pose.from_wxyz((1, 2, 3), (1, 0, 0, 0)).quaternion
+        array([0., 0., 0., 1.])
+        """
+        w, x, y, z = vector(quaternion, "quaternion w, x, y, z", 4)
+        return cls(position, (x, y, z, w))
+
+    @property
+    def matrix(self) -> Array:
+        """X_WA (4, 4): takes homogeneous points of the body to the world."""
+        X = np.eye(4)
+        X[:3, :3], X[:3, 3] = self.rotation, self.position
+        return X
+
+    def inverse(self) -> Pose:
+        """X_AW of this X_WA.
+
+        >>> (Pose((1, 2, 3)) @ Pose((1, 2, 3)).inverse()).position
+        array([0., 0., 0.])
+        """
+        back = self.quaternion * (-1.0, -1.0, -1.0, 1.0)
+        return Pose(-self.rotation.T @ self.position, back)
 
     @cached_property
     def rotation(self) -> Array:
@@ -106,6 +179,9 @@ class Motion:
     """A pose, its twist and its linear acceleration, in the world frame. Raises PoseError.
 
     linear (m/s) and acceleration (m/s^2) refer to the body's origin; angular is in rad/s.
+
+    >>> Motion(Pose(), linear=(1, 0, 0), angular=(0, 0, 0.5)).at(2.0).position
+    array([2., 0., 0.])
     """
 
     pose: Pose

@@ -53,7 +53,11 @@ def array_bytes(shape: Shape) -> int:
 
 @dataclass(frozen=True)
 class Sphere(Shape):
-    """Sphere; radius in m."""
+    """Sphere; radius in m.
+
+    >>> Sphere(0.5)
+    Sphere(radius=0.5)
+    """
 
     radius: float
 
@@ -63,7 +67,11 @@ class Sphere(Shape):
 
 @dataclass(frozen=True)
 class Box(Shape):
-    """Box; size: full extents (x, y, z) in m. Zero extents are allowed (a plate, a needle), but not all three."""
+    """Box; size: full extents (x, y, z) in m. Zero extents are allowed (a plate, a needle), but not all three.
+
+    >>> Box((1, 2, 3)).size
+    (1.0, 2.0, 3.0)
+    """
 
     size: Any
 
@@ -84,7 +92,11 @@ class Box(Shape):
 
 @dataclass(frozen=True)
 class Capsule(Shape):
-    """Capsule; radius and length of the core segment (without the caps) in m."""
+    """Capsule; radius and length of the core segment (without the caps) in m.
+
+    >>> Capsule(radius=0.2, length=1)  # 1.4 m from end to end
+    Capsule(radius=0.2, length=1.0)
+    """
 
     radius: float
     length: float
@@ -96,7 +108,11 @@ class Capsule(Shape):
 
 @dataclass(frozen=True)
 class Cylinder(Shape):
-    """Cylinder; radius and height (length) in m."""
+    """Cylinder; radius and height (length) in m.
+
+    >>> Cylinder(radius=0.2, length=1)
+    Cylinder(radius=0.2, length=1.0)
+    """
 
     radius: float
     length: float
@@ -108,7 +124,11 @@ class Cylinder(Shape):
 
 @dataclass(frozen=True)
 class Cone(Shape):
-    """Cone; radius of the base and height (length) in m. The apex is at +length/2."""
+    """Cone; radius of the base and height (length) in m. The apex is at +length/2.
+
+    >>> Cone(radius=0.2, length=1)
+    Cone(radius=0.2, length=1.0)
+    """
 
     radius: float
     length: float
@@ -120,7 +140,11 @@ class Cone(Shape):
 
 @dataclass(frozen=True, eq=False)
 class ConvexHull(Shape):
-    """Convex hull of points (n, 3) in m, n >= 4 and not all in one plane; interior points are allowed."""
+    """Convex hull of points (n, 3) in m, n >= 4 and not all in one plane; interior points are allowed.
+
+    >>> ConvexHull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]).points.shape
+    (4, 3)
+    """
 
     points: Any
 
@@ -138,6 +162,9 @@ class Mesh(Shape):
     """Triangle surface, convex or not: vertices (n, 3) in m, faces (m, 3) of vertex indices.
 
     Faces are counter-clockwise seen from outside.
+
+    >>> Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]).faces.shape
+    (1, 3)
     """
 
     vertices: Any
@@ -174,7 +201,11 @@ class Triangle(Shape):
 
 @dataclass(frozen=True, eq=False)
 class HalfSpace(Shape):
-    """Half-space {x : normal . x <= offset}, offset in m. The normal points out of the solid; both get normalised."""
+    """Half-space {x : normal . x <= offset}, offset in m. The normal points out of the solid; both get normalised.
+
+    >>> HalfSpace(normal=(0, 0, 2), offset=1).normal  # the floor z <= 0.5
+    array([0., 0., 1.])
+    """
 
     normal: Any
     offset: float = 0.0
@@ -202,7 +233,11 @@ class HalfSpace(Shape):
 
 @dataclass(frozen=True)
 class Circle(Shape):
-    """Circle in the x-y plane; radius in m."""
+    """Circle in the x-y plane; radius in m.
+
+    >>> Circle(0.5)
+    Circle(radius=0.5)
+    """
 
     radius: float
 
@@ -212,7 +247,11 @@ class Circle(Shape):
 
 @dataclass(frozen=True, eq=False)
 class Polygon(Shape):
-    """Polygon in the x-y plane: points (n, 2) in m around the boundary of a simple polygon, convex or concave."""
+    """Polygon in the x-y plane: points (n, 2) in m around the boundary of a simple polygon, convex or concave.
+
+    >>> Polygon([(0, 0), (1, 0), (0, 1)]).points.shape
+    (3, 2)
+    """
 
     points: Any
 

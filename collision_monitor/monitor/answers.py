@@ -93,22 +93,25 @@ class Answers(Stage):
 
     def finish(self, result: StepResult) -> StepResult:
         """Store this as the last result and add it to the digest. Return it."""
-        for part in (result.contacts, result.predictions):
+        for part in (result.contact_rows, result.predictions):
             self.digest = int(chain_digest(np.uint64(self.digest), part.view(np.uint64)))
         self.last, self.step_count = result, result.step
         return result
 
-    def repeated(self) -> StepResult:
-        """Return the last result as that of a refused step."""
-        assert self.last is not None, "the first stamp is always accepted"
-        return dataclasses.replace(self.last, accepted=False, cut=None)
+    def none(self) -> StepResult:
+        """Return the result of a refused step, without answers: those of the last step would be of another time."""
+        last = self.last
+        assert last is not None, "the first stamp is always accepted"
+        empty = last.contact_rows[:0], last.predictions[:0]
+        return StepResult(last.stamp_ns, last.step, *empty, last.status, accepted=False)
 
     def save(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
         last = self.last
         facts |= {"step": self.step_count, "digest": self.digest, "last": None}
         if last is not None:
-            snapshot.arrays.update(contacts=last.contacts, predictions=last.predictions)  # every step makes new arrays
+            # every step makes new arrays
+            snapshot.arrays.update(contacts=last.contact_rows, predictions=last.predictions)
             facts["last"] = [last.stamp_ns, last.step, dataclasses.asdict(last.status)]
 
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:

@@ -12,6 +12,7 @@ from collision_monitor import records
 from collision_monitor._jit import device, kernel
 from collision_monitor.errors import InputError, Refusal
 from collision_monitor.geometry.planar import flat_states
+from collision_monitor.monitor.result import Refused
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.timeline import Order
@@ -62,12 +63,14 @@ class Intake(Stage):
     """Stores states in the roster, counts the refused inputs by reason, and keeps the texts of the last refusals."""
 
     SAVED = ("refused", "texts", "last_refusal")
-    CACHES = ("_buffer",)
+    CACHES = ("_buffer", "of_step")
 
     def __init__(self) -> None:
         self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
         self.texts: dict[Refusal, str] = dict.fromkeys(Refusal, "")
         self.last_refusal = ""
+        self.of_step: dict[Refusal, Refused] = {}
+        """The refusals since the last step began."""
         self._buffer = np.empty(64, records.STATE)
 
     def refuse(self, reason: Refusal, text: str, count: int = 1) -> None:
@@ -75,6 +78,8 @@ class Intake(Stage):
         self.refused[reason] += count
         self.last_refusal = text if len(text) <= MOST_REFUSAL_TEXT else f"{text[: MOST_REFUSAL_TEXT - 1]}…"
         self.texts[reason] = self.last_refusal
+        before = self.of_step[reason].count if reason in self.of_step else 0
+        self.of_step[reason] = Refused(reason, before + count, self.last_refusal)
 
     def order(self, states: States, time: float, late: bool, roster: Roster) -> Order:
         """Return how a message of these states stands to what the roster has. late: its `time` (s) is stale already."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from collision_monitor.errors import InputError, Refusal
+from collision_monitor.errors import InputError, Refusal, RefusalWarning
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.monitor.active_pairs import ActivePairs
@@ -50,9 +52,19 @@ class Monitor:
     They use no clock and no random numbers, and are the same bytes on every run. A profile with `budget_ms` adds the
     clock, which decides only how many pairs a step examines: a monitor with timed=False and that number as
     `pairs_per_step` (`StepResult.cut`) gives the same answers again.
+
+    >>> import collision_monitor as cm
+    >>> monitor = cm.Monitor()
+    >>> monitor.add(1, cm.Box((1, 1, 1)), static=True, pose=cm.Pose())
+    >>> monitor.add(2, cm.Sphere(0.5))
+    >>> monitor.step(0, [2], [(2.5, 0, 0, 0, 0, 0, 1)], [(-1, 0, 0, 0, 0, 0)])
+    StepResult(step 1 at 0 ns: 0 contacts, 0 ended, 1 predictions)
+      prediction: 1 and 2 in 1... to 1.5... s
     """
 
-    def __init__(self, profile: str | Profile = "balanced", *, timed: bool = True) -> None:
+    def __init__(self, profile: str | Profile = "balanced", *, timed: bool = True, warns: bool = True) -> None:
+        """Make a monitor without objects. warns: whether the first refusal of each kind is a RefusalWarning too."""
+        self._unwarned = set(Refusal) if warns else set()
         self._profile = Profile.named(profile) if isinstance(profile, str) else profile
         self._settings = KernelSettings.of(self._profile)
         self._roster = Roster()
@@ -125,13 +137,22 @@ class Monitor:
         is_uncertain = self._uncertain.counts(self._profile)
         return scene_plan(self._roster, self._candidates.grid, uncertain=is_uncertain, outside=self._tracking.outside)
 
-    def add(self, object_id: int, shape: Shape | Sequence[tuple[Shape, Pose]], **fields: Any) -> None:
-        """Describe an object of one shape, or of several with their poses in its frame.
+    def add(
+        self, object_id: int, shape: Shape | Sequence[tuple[Shape, Pose]], *, replace: bool = False, **fields: Any
+    ) -> None:
+        """Add an object of one shape, or of several with their poses in its frame.
 
-        The other fields are those of `ObjectDescription`: name, static, pose, group, mask, padding, model, allowed,
-        max_linear_acceleration, max_angular_acceleration. Raises the errors of `describe`.
+        replace: describe a known object anew; it keeps its state. The other fields are those of `ObjectDescription`:
+        name, static, pose, group, mask, padding, model, allowed, max_linear_acceleration, max_angular_acceleration.
+        Raises InputError for a known id without replace, and the errors of `describe`.
         """
-        self.describe(ObjectDescription(object_id, shape, **fields))
+        description = ObjectDescription(object_id, shape, **fields)
+        if not replace and object_id in self._roster:
+            raise InputError(
+                f"object {object_id}: expected a new id, got that of {self.name(object_id)!r}; "
+                "write replace=True to describe it anew, or remove it first"
+            )
+        self.describe(description)
 
     def describe(self, description: ObjectDescription, prepared: Modelled | None = None) -> None:
         """Add a new object, or replace the description of a known one and keep its state.
@@ -233,18 +254,24 @@ class Monitor:
         a structured array of records.STATE as `ids`. World frame, SI units.
         covariance (N, 12): upper triangles, row by row, of the covariances of position and linear velocity. They
         replace the standard deviations in the states.
-        Unusable rows are refused and counted (`refused`); they raise nothing. Raises InputError for arrays of
-        another shape.
+        Unusable rows and stamps that jump are refused: the result lists them (`refused`), they raise nothing, and the
+        first of each kind is a RefusalWarning. Raises InputError for arrays of another shape.
         """
         if not isinstance(stamp_ns, int | np.integer) or isinstance(stamp_ns, bool):
             raise InputError(f"stamp_ns: expected an integer number of nanoseconds, got {stamp_ns!r}")
         states, covariances = self._intake.states(ids, poses, twists, covariance)
+        self._intake.of_step = {}
         with self.clock:
-            return self._take_step(int(stamp_ns), states, covariances)
+            result = self._take_step(int(stamp_ns), states, covariances)
+        for each in result.refused:
+            if each.reason in self._unwarned:
+                self._unwarned.discard(each.reason)
+                warnings.warn(f"{each.text} (later ones: see StepResult.refused)", RefusalWarning, stacklevel=2)
+        return result
 
     def _take_step(self, stamp_ns: int, states: NDArray[np.void], covariances: NDArray[np.float64]) -> StepResult:
         if not self._advance(stamp_ns, states):
-            return self._answers.repeated()
+            return replace(self._answers.none(), refused=tuple(self._intake.of_step.values()))
         roster, timeline = self._roster, self._timeline
         self._intake.take(states, covariances, timeline.seconds(stamp_ns), roster, self._uncertain)
         step = StepContext(roster, self._profile, self._settings, timeline.now, self._answers.step_count + 1)
@@ -256,7 +283,8 @@ class Monitor:
         status = step_status(step, self._active_pairs, self._events, contacts, predictions)
         self._time_critical.end_step(step)
         cut = budget.done if budget is not None and step.work.deferred else None
-        result = StepResult(timeline.now_ns, step.number, contacts, predictions, status, cut=cut)
+        refused = tuple(self._intake.of_step.values())
+        result = StepResult(timeline.now_ns, step.number, contacts, predictions, status, cut=cut, refused=refused)
         return self._answers.finish(result)
 
     def _advance(self, stamp_ns: int, states: NDArray[np.void]) -> bool:

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from collision_monitor.errors import Refusal
+from collision_monitor.records import Phase, data_frame
 
 
 @dataclass
@@ -22,7 +27,12 @@ class Work:
 
 @dataclass(frozen=True)
 class StepStatus:
-    """Counts of objects, answers and work in a step; the fields are those of MonitorStatus.msg."""
+    """Counts of objects, answers and work in a step; the fields are those of MonitorStatus.msg.
+
+    >>> import collision_monitor as cm
+    >>> cm.Monitor().step(0, []).status.objects
+    0
+    """
 
     objects: int
     objects_static: int
@@ -40,20 +50,75 @@ class StepStatus:
     deferred: int
 
 
+SHOWN: Final = 5
+"""Rows of each kind that the text of a result shows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """Inputs that a step refused for one reason."""
+
+    reason: Refusal
+    count: int
+    text: str  # of the last of these: what was expected, and what was there
+
+
 @dataclass(frozen=True, eq=False)
 class StepResult:
     """The answers of one step: `contacts` (records.CONTACT) by ids, `predictions` (records.PREDICTION) soonest first.
 
     If the profile's `contact_points` is larger than 1, a contact has `point_count` rows, numbered by `point_index`.
 
-    accepted: False if the step was refused because of its stamp; the answers are then those of the last accepted step.
-    cut: number of pairs that were examined before the budget ran out; None: all pairs were examined.
+    contact_rows: `contacts` and `ended` together, as the message has them. refused: what the step refused, by reason.
+    accepted: False if the step was refused because of its stamp; there are no answers then, and stamp_ns, step and
+    status are those of the last accepted step. cut: number of pairs that were examined before the budget ran out;
+    None: all pairs were examined.
+
+    >>> import collision_monitor as cm
+    >>> monitor = cm.Monitor()
+    >>> monitor.add(1, cm.Sphere(0.5))
+    >>> monitor.step(0, [1], [(0, 0, 0, 0, 0, 0, 1)]).contacts.shape
+    (0,)
     """
 
     stamp_ns: int
     step: int
-    contacts: NDArray[np.void]
+    contact_rows: NDArray[np.void]
     predictions: NDArray[np.void]
     status: StepStatus
     accepted: bool = True
     cut: int | None = None
+    refused: tuple[Refused, ...] = ()
+
+    @cached_property
+    def contacts(self) -> NDArray[np.void]:
+        """The contacts (records.CONTACT) that begin or last, by ids."""
+        return self.contact_rows.compress(self.contact_rows["phase"] != Phase.END)
+
+    @cached_property
+    def ended(self) -> NDArray[np.void]:
+        """The contacts (records.CONTACT) that have ended since the last step; only ids and duration are known."""
+        return self.contact_rows.compress(self.contact_rows["phase"] == Phase.END)
+
+    def __repr__(self) -> str:
+        """Return the answers as lines for a person; refusals first."""
+        lines = [f"refused: {each.text}" + f" ({each.count} of these)" * (each.count > 1) for each in self.refused]
+        lines += [
+            f"contact: {c['id_a']} and {c['id_b']}, {c['signed_distance']:.4g} m ± {c['error_bound']:.1g}"
+            for c in self.contacts[:SHOWN]
+        ]
+        lines += [f"ended: {c['id_a']} and {c['id_b']}" for c in self.ended[:SHOWN]]
+        lines += [
+            f"prediction: {p['id_a']} and {p['id_b']} in {p['lower']:.4g} to {p['upper']:.4g} s"
+            for p in self.predictions[:SHOWN]
+        ]
+        what = "" if self.accepted else ", refused"
+        counts = f"{len(self.contacts)} contacts, {len(self.ended)} ended, {len(self.predictions)} predictions"
+        return "\n  ".join([f"StepResult(step {self.step} at {self.stamp_ns} ns{what}: {counts})", *lines])
+
+    def to_pandas(self, which: str = "contacts") -> Any:
+        """Return "contacts", "ended" or "predictions" as a pandas.DataFrame; a vector has three columns.
+
+        Raises ImportError without pandas.
+        """
+        return data_frame(getattr(self, which))

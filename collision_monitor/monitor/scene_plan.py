@@ -63,9 +63,12 @@ class ScenePlan:
     def unneeded(self) -> list[str]:
         """The features that the scene does not require, each with the reason."""
         used = set(self.tests.values())
+        convex = bool(used & {"convex_convex", "cylinder_cylinder"})
+        boxes = "box_box" in used  # GJK answers for separated boxes that are nearest elsewhere than along the SAT axis
         reasons = (
-            ("box_box" not in used, "SAT: no two boxes can meet"),
-            (not used & {"convex_convex", "cylinder_cylinder"}, "GJK and EPA: no pair needs them"),
+            (not boxes, "SAT: no two boxes can meet"),
+            (not convex and not boxes, "GJK and EPA: no pair needs them"),
+            (not convex and boxes, "EPA: no pair needs it; separated boxes use GJK"),
             (self.turning == 0, "rotation: a sphere looks the same turned"),
             (self.planar, "the third dimension: all are shapes of the plane"),
             (self.modelled == 0, "models: every object is tested as it is"),

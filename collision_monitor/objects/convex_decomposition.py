@@ -57,6 +57,9 @@ class Decomposition(NamedTuple):
     """parts: convex, together they contain the mesh. surface_error (m): bound on their points' distance from it.
 
     volume_error: excess of the sum of the parts' volumes, as a fraction of the mesh's volume.
+
+    >>> Decomposition((), surface_error=0.0, volume_error=0.0).surface_error
+    0.0
     """
 
     parts: tuple[ConvexHull, ...]
@@ -78,6 +81,12 @@ def convex_decomposition(mesh: Mesh, concavity: float = CONCAVITY) -> Decomposit
 
     Raises UnsupportedError if CoACD is not installed or leaves a hollow, ShapeError for a mesh that is not closed,
     InputError for a concavity out of range.
+
+    >>> corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    >>> quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    >>> cube = Mesh(corners, [(q[0], q[k], q[k + 1]) for q in quads for k in (1, 2)])
+    >>> len(convex_decomposition(cube).parts)  # with CoACD installed
+    1
     """
     if not 0.01 <= concavity <= 1.0:
         raise InputError(f"concavity: expected a number from 0.01 to 1, got {concavity}")

@@ -64,6 +64,10 @@ class ObjectDescription:
     pose of a static object in the world frame, None otherwise. `name` has at most MOST_NAME_BYTES of UTF-8. Values that
     the message may omit get their defaults here: an empty name, a group or mask of 0, an acceleration of NaN.
     Raises InputError; ShapeError for the shapes.
+
+    >>> from collision_monitor.geometry.shapes import Sphere
+    >>> ObjectDescription(7, Sphere(0.5), name="ball").name
+    'ball'
     """
 
     object_id: int

@@ -93,7 +93,7 @@ class Pipeline:
         kept: Collection[str] = (),
         preparation: Preparation | None = None,
     ) -> None:
-        self.monitor = Monitor(profile, timed=timed)
+        self.monitor = Monitor(profile, timed=timed, warns=False)
         self.catalogue = Catalogue()
         self.frame_id = frame_id
         self._preparation = preparation
@@ -136,7 +136,7 @@ class Pipeline:
     def _encode(self, result: StepResult) -> Outputs:
         header = result.stamp_ns, self.frame_id, result.step
         horizon = self.monitor.profile.horizon
-        contacts = encode_contacts(*header, result.contacts, *self._mentioned(result.contacts))
+        contacts = encode_contacts(*header, result.contact_rows, *self._mentioned(result.contact_rows))
         predictions = encode_predictions(*header, horizon, result.predictions, *self._mentioned(result.predictions))
         self.catalogue.end_step()
         return Outputs(contacts, predictions, result, self.monitor.digest, self._limit_of(result))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,9 +24,18 @@ from collision_monitor.meshes.contact import APART, ENCLOSED, OPEN, contact_of_t
 from collision_monitor.meshes.extent import extents
 from collision_monitor.meshes.nearest import MEMORY, answer_row
 from collision_monitor.meshes.shape_trees import shape_tree, trees_of_pair
-from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, as_contacts
+from collision_monitor.narrow_phase.contact_row import (
+    BOUND,
+    CONTACT_SIZE,
+    DISTANCE,
+    NORMAL,
+    POINT_A,
+    POINT_B,
+    as_contacts,
+)
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.objects.models import containing_kdop, containing_model, parse_model
+from collision_monitor.query.convex_pairs import convex_contact
 from collision_monitor.query.nearest_pieces import NearestPieces
 from collision_monitor.query.piece_table import PieceTable, exact_piece_table, piece_table
 from collision_monitor.records import Model
@@ -38,6 +47,10 @@ Compound = Shape | Sequence[tuple[Shape, Pose]]
 _DIRECTIONS: Final = np.array(
     [sign * np.array(d) / np.linalg.norm(d) for d in KDOP_DIRECTIONS[26] for sign in (1.0, -1.0)]
 )
+
+_COLUMNS: Final = {"normal": NORMAL, "point_a": POINT_A, "point_b": POINT_B}
+_new, _set = object.__new__, object.__setattr__
+
 
 def _patch(found: NearestPieces, witness: Array) -> Array:
     """Corners (k, 3) on A of the patch of all pieces that touch in one plane; a floor of triangles is one face."""
@@ -58,7 +71,7 @@ def _patch(found: NearestPieces, witness: Array) -> Array:
     return np.asarray(patch + (witness - best["point_a"] - found.position[found.pair[0]]))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Contact:
     """Contact of two shapes in the world frame, lengths in m.
 
@@ -66,6 +79,11 @@ class Contact:
     translation parts (both points are then one point inside both). error_bound: largest error of signed_distance.
     normal: unit vector from A to B. point_a, point_b: the nearest points, or the deepest points of an overlap;
     point_b - point_a is signed_distance * normal. model_a, model_b: the models that represent the shapes.
+
+    >>> import collision_monitor as cm
+    >>> c = cm.contact(cm.Box((1, 1, 1)), cm.Pose(), cm.Sphere(0.5), cm.Pose((2, 0, 0)))
+    >>> c.signed_distance, c.normal, c.point_a
+    (1.0, array([ 1., -0., -0.]), array([0.5, 0. , 0. ]))
     """
 
     signed_distance: float
@@ -76,6 +94,35 @@ class Contact:
     model_a: Model
     model_b: Model
     _find: Callable[[], NearestPieces] | None = field(repr=False)  # source of the patch; None: the two points alone
+
+    def __getattr__(self, name: str) -> Any:
+        """Make a field of the contact of two convex solids when it is first read."""
+        known = vars(self)
+        if "_row" not in known:
+            raise AttributeError(name)
+        if name in _COLUMNS:
+            value: Any = known["_row"][_COLUMNS[name] : _COLUMNS[name] + 3]
+        elif name in ("model_a", "model_b"):
+            value = Model.EXACT
+        elif name == "_find":
+            arguments = self.arguments
+            value = lambda: _nearest(*arguments)  # noqa: E731
+        else:
+            raise AttributeError(name)
+        known[name] = value
+        return value
+
+    @property
+    def arguments(self) -> tuple[Compound, Pose, Compound, Pose]:
+        """The two shapes with their poses, as they were given to `contact`."""
+        found: tuple[Compound, Pose, Compound, Pose] = vars(self)["_arguments"]
+        return found
+
+    def __repr__(self) -> str:
+        """Return the distance with its error and the features that are nearest, for a person."""
+        from collision_monitor.query.contact_text import contact_text
+
+        return contact_text(self)
 
     @property
     def overlaps(self) -> bool:
@@ -133,11 +180,18 @@ def contact(
     If one of them is concave and they overlap, the depth is that of the deepest pair of their convex pieces, and the
     bound extends to a translation that certainly parts them.
     Raises ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, or a model that is not available.
+
+    >>> import collision_monitor as cm
+    >>> cm.contact(cm.Box((1, 1, 1)), cm.Pose(), cm.Sphere(0.5), cm.Pose((2, 0, 0)))
+    Contact(1 m ± ..., box face 0 – sphere surface)
     """
-    is_exact = isinstance(model, str | int) and model in ("exact", Model.EXACT)
-    quick = _meshes_apart(shape_a, pose_a, shape_b, pose_b) if is_exact else None
-    if quick is not None:
-        return quick
+    if isinstance(model, str | int) and model in ("exact", Model.EXACT):
+        quick = convex_contact(shape_a, pose_a, shape_b, pose_b)
+        if quick is not None:
+            return _of_row(quick, (shape_a, pose_a, shape_b, pose_b))
+        apart = _meshes_apart(shape_a, pose_a, shape_b, pose_b)
+        if apart is not None:
+            return apart
     a, b = _posed(shape_a, pose_a, model, "A"), _posed(shape_b, pose_b, model, "B")
     planes = {is_planar(shape) for shape, _ in (*a.shapes, *b.shapes)}
     if len(planes) > 1:
@@ -164,7 +218,7 @@ def contact(
     excess = a.excess + b.excess
     if distance <= 0.0 and excess > 0.0 and not all(len(exact_piece_table(side.shapes)) == 1 for side in (a, b)):
         bound -= distance  # the models may overlap deeply although the concave objects are apart
-    return Contact(
+    made = Contact(
         signed_distance=distance,
         error_bound=bound + excess,
         normal=normal,
@@ -174,6 +228,23 @@ def contact(
         model_b=b.model,
         _find=None if enclosed or unbounded else deepest.pieces,
     )
+    vars(made)["_arguments"] = shape_a, pose_a, shape_b, pose_b
+    return made
+
+
+def _of_row(quick: tuple[float, float, Array], arguments: tuple[Compound, Pose, Compound, Pose]) -> Contact:
+    """Contact of two convex solids. Its arrays are made when they are read, which takes as long as the kernel."""
+    distance, bound, row = quick
+    made = _new(Contact)
+    _set(made, "__dict__", {"signed_distance": distance, "error_bound": bound, "_row": row, "_arguments": arguments})
+    return made
+
+
+def _nearest(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -> NearestPieces:
+    """Search for the nearest pieces of exact shapes, relative to A's origin."""
+    a, b = _posed(shape_a, pose_a, Model.EXACT, "A"), _posed(shape_b, pose_b, Model.EXACT, "B")
+    offset = b.pose.position - a.pose.position
+    return NearestPieces(a.pieces, (a.rotation, np.zeros(3)), b.pieces, (b.rotation, offset))
 
 
 def _meshes_apart(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -> Contact | None:
@@ -192,14 +263,15 @@ def _meshes_apart(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Po
     if contact_of_trees(trees[0], *X, trees[1], *Y, np.inf, row, answer, work) != APART:
         return None
 
-    def pieces() -> NearestPieces:
-        a, b = _posed(shape_a, pose_a, Model.EXACT, "A"), _posed(shape_b, pose_b, Model.EXACT, "B")
-        return _by_pieces(a, b, b.pose.position - a.pose.position).pieces()
-
     distance, normal = float(row[DISTANCE]), row[NORMAL : NORMAL + 3]
     point = pose_a.position + row[POINT_A : POINT_A + 3]
     far = point + distance * normal
-    return Contact(distance, float(row[BOUND]), normal, point, far, Model.EXACT, Model.EXACT, pieces)
+    arguments = shape_a, pose_a, shape_b, pose_b
+    made = Contact(
+        distance, float(row[BOUND]), normal, point, far, Model.EXACT, Model.EXACT, lambda: _nearest(*arguments)
+    )
+    vars(made)["_arguments"] = arguments
+    return made
 
 
 class _Deepest(NamedTuple):

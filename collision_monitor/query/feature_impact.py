@@ -64,6 +64,9 @@ class FeatureImpact:
     status: "hit": within [lower, upper] they come within separation + tolerance. "clear": they do not come within the
     separation, and the times are infinite. "unresolved": the budget ran out, upper is infinite; treat it as a hit.
     lower, upper: parts of the step, from 0 to 1. There is no contact before lower.
+
+    >>> FeatureImpact("clear", math.inf, math.inf).status
+    'clear'
     """
 
     status: Any
@@ -79,6 +82,11 @@ def vertex_face_impact(
     separation (m): distance below which they are in contact. tolerance (m): largest distance of a hit beyond that, by
     default 1e-6 of the largest difference of coordinates. budget: boxes for one query. Round-off hides no contact.
     Raises InputError for another shape of the array, or for numbers that are not finite.
+
+    >>> face = [(-1, -1, 0), (1, -1, 0), (0, 1, 0)]
+    >>> found = vertex_face_impact([(0, 0, 1), *face, (0, 0, -1), *face])
+    >>> found.status, round(found.lower, 3)
+    ('hit', 0.5)
     """
     return _impacts(x, True, separation, tolerance, budget)
 
@@ -86,7 +94,12 @@ def vertex_face_impact(
 def edge_edge_impact(
     x: ArrayLike, separation: float = 0.0, tolerance: float | None = None, budget: int = MOST_BOXES
 ) -> FeatureImpact:
-    """Whether two edges meet. x (..., 8, 3): a0, a1, b0, b1 at the start, then at the end; see `vertex_face_impact`."""
+    """Whether two edges meet. x (..., 8, 3): a0, a1, b0, b1 at the start, then at the end; see `vertex_face_impact`.
+
+    >>> a, above, below = [(-1, 0, 0), (1, 0, 0)], [(0, -1, 3), (0, 1, 3)], [(0, -1, -1), (0, 1, -1)]
+    >>> round(edge_edge_impact([*a, *above, *a, *below]).upper, 3)
+    0.75
+    """
     return _impacts(x, False, separation, tolerance, budget)
 
 

@@ -28,14 +28,23 @@ def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Sh
     A mesh keeps its own numbers of vertices and faces. A hull has the vertex numbers of its points and the face numbers
     of `convex_hull`. A box numbers its corners by their sides (bit 0: +x, 1: +y, 2: +z) and its faces in the order
     +x -x +y -y +z -z. Raises UnsupportedError for other shapes.
+
+    >>> import collision_monitor as cm
+    >>> box, pose, above = cm.Box((1, 1, 1)), cm.Pose(), cm.Pose((0, 0, 1.5))
+    >>> cm.contact_features(cm.contact(box, pose, box, above), box, pose, box, above).a.type.name
+    'FACE'
     """
     return FeatureContact(
-        _feature(shape_a, pose_a, contact.point_a, contact.normal),
-        _feature(shape_b, pose_b, contact.point_b, -contact.normal),
+        feature_of(shape_a, pose_a, contact.point_a, contact.normal),
+        feature_of(shape_b, pose_b, contact.point_b, -contact.normal),
     )
 
 
-def _feature(shape: Shape, pose: Pose, point: Array, normal: Array) -> Feature:
+def feature_of(shape: Shape, pose: Pose, point: Array, normal: Array) -> Feature:
+    """Feature of a Box, ConvexHull or Mesh at a point (3,) in m with an outward normal (3,), both in the world frame.
+
+    Numbered as in `contact_features`. Raises UnsupportedError for other shapes.
+    """
     at, towards = (point - pose.position) @ pose.rotation, normal @ pose.rotation
     match shape:
         case Mesh():

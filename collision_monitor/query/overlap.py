@@ -22,6 +22,7 @@ from collision_monitor.meshes.contact import trees_overlap
 from collision_monitor.meshes.nearest import MEMORY
 from collision_monitor.meshes.shape_trees import trees_of_pair
 from collision_monitor.query.contact import Compound, contact
+from collision_monitor.query.convex_pairs import convex_contact
 
 TESTS: Final = ("contact", "cascade", "sat", "edges")
 
@@ -34,8 +35,14 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
     and for polygons, by the separating axis test, with concave polygons split; "edges" for polygons, by contained
     vertices and crossing edges, exact for the placed corners. Raises as `contact` does, InputError for an unknown
     test, and UnsupportedError for a shape that the test does not take.
+
+    >>> import collision_monitor as cm
+    >>> cm.overlap(cm.Sphere(1), cm.Pose(), cm.Sphere(1), cm.Pose((1.5, 0, 0)))
+    True
     """
     if test == "contact":
+        if (found := convex_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
+            return found[0] <= 0.0
         if type(shape_a) is Mesh or type(shape_b) is Mesh:
             posed = isinstance(pose_a, Pose) and isinstance(pose_b, Pose)
             if posed and isinstance(shape_a, Shape) and isinstance(shape_b, Shape):

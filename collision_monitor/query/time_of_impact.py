@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.pose import Motion
-from collision_monitor.geometry.shapes import HalfSpace
+from collision_monitor.geometry.shapes import HalfSpace, Sphere
 from collision_monitor.prediction.impact_record import HIT
 from collision_monitor.query.arguments import finite_number, whole_number
 from collision_monitor.query.contact import Compound, Contact, contact
+from collision_monitor.query.convex_pairs import convex_impact
 from collision_monitor.query.moving_pair import (
     MotionQuery,
     MovingShape,
@@ -30,7 +31,7 @@ ITERATIONS: Final = 1000
 """Default limit of distance queries for one pair of pieces; hardly any pair needs more than 20."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Impact:
     """First time at which two shapes are within the separation, in s from the given poses.
 
@@ -38,6 +39,11 @@ class Impact:
     "unresolved": there is none before lower, but the shapes come so near that round-off or the budget leaves open
     whether they meet; upper is infinite. Treat it as a hit.
     contact: the contact at upper, or at lower if upper is infinite; None if clear. method: what found the interval.
+
+    >>> import collision_monitor as cm
+    >>> still, aside = cm.Motion(cm.Pose()), cm.Motion(cm.Pose((0, 5, 0)), linear=(1, 0, 0))
+    >>> cm.time_of_impact(cm.Box((1, 1, 1)), still, cm.Box((1, 1, 1)), aside).status
+    'clear'
     """
 
     status: Literal["hit", "clear", "unresolved"]
@@ -45,6 +51,22 @@ class Impact:
     upper: float
     contact: Contact | None
     method: Method = Method.CONSERVATIVE_ADVANCEMENT
+
+    def __repr__(self) -> str:
+        """Return status and times for a person."""
+        if self.status == "clear":
+            return "Impact(clear)"
+        return f"Impact({self.status} in {self.lower:.6g} to {self.upper:.6g} s)"
+
+    def __getattr__(self, name: str) -> Any:
+        """Compute the contact when it is first read: it takes as long as the search for the time."""
+        if name != "contact" or "_arguments" not in vars(self):
+            raise AttributeError(name)
+        shape_a, motion_a, shape_b, motion_b = vars(self)["_arguments"]
+        at = self.upper if self.upper < math.inf else self.lower
+        found = contact(shape_a, motion_a.at(at), shape_b, motion_b.at(at))
+        vars(self)["contact"] = found
+        return found
 
 
 _CLEAR: Final = Impact("clear", math.inf, math.inf, None)
@@ -73,6 +95,11 @@ def time_of_impact(
     backs up and bisects; "end_of_step": the end of that step. Both may miss a contact within a step, so lower is that
     of the bounding spheres, and the answer without an overlap is unresolved. "swept_bounds": the bounding spheres only.
     Raises InputError, ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, two HalfSpaces.
+
+    >>> import collision_monitor as cm
+    >>> still, towards = cm.Motion(cm.Pose()), cm.Motion(cm.Pose((3, 0, 0)), linear=(-1, 0, 0))
+    >>> cm.time_of_impact(cm.Sphere(1), still, cm.Sphere(1), towards)
+    Impact(hit in 1 to 1 s)
     """
     query = check_query(horizon, tolerance, separation, iterations)
     if method != "conservative_advancement":
@@ -80,6 +107,9 @@ def time_of_impact(
 
         duration = finite_number("step", step, positive=True)
         return impact_by_method(shape_a, motion_a, shape_b, motion_b, query, method, duration)
+    found = convex_impact(shape_a, motion_a, shape_b, motion_b, query)
+    if found is not None:
+        return _of_times(found, (shape_a, motion_a, shape_b, motion_b))
     a, b = make_moving_shape(shape_a, motion_a, "A"), make_moving_shape(shape_b, motion_b, "B")
     check_bounded(a, b)
     start = contact(a.shapes, a.motion.pose, b.shapes, b.motion.pose)
@@ -102,6 +132,22 @@ def time_of_impact(
     meeting = contact(a.shapes, a.motion.at(at), b.shapes, b.motion.at(at))
     used = Method(int(events[0]["method"]))
     return Impact("hit" if certain else "unresolved", lower, upper if certain else math.inf, meeting, used)
+
+
+def _of_times(times: tuple[float, float], arguments: tuple[Any, Any, Any, Any]) -> Impact:
+    lower, upper = times
+    if lower == math.inf:
+        return _CLEAR
+    shape_a, motion_a, shape_b, motion_b = arguments
+    used = Method.CONSERVATIVE_ADVANCEMENT
+    are_spheres = type(shape_a) is type(shape_b) is Sphere
+    if lower > 0.0 and are_spheres and (motion_a.acceleration == motion_b.acceleration).all():
+        used = Method.CLOSED_FORM
+    made = object.__new__(Impact)
+    made.__dict__.update(
+        status="hit" if upper < math.inf else "unresolved", lower=lower, upper=upper, method=used, _arguments=arguments
+    )
+    return made
 
 
 def check_query(horizon: float, tolerance: float, separation: float, iterations: int) -> MotionQuery:

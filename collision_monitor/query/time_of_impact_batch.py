@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, fields
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,7 @@ from collision_monitor.query.contact import Compound
 from collision_monitor.query.impact_rows import ImpactTimes, impacts_of_rows, impacts_of_spheres, normalise_states
 from collision_monitor.query.moving_pair import MotionQuery, MovingShape, lay_out_pair, make_moving_shape
 from collision_monitor.query.time_of_impact import ITERATIONS, check_bounded, check_query, time_of_impact
+from collision_monitor.records import data_frame
 from collision_monitor.tolerances import GJK_TOUCHING, LARGEST_INPUT, UNIT_QUATERNION
 
 Array = NDArray[np.float64]
@@ -28,11 +29,31 @@ _STILL: Final = Motion(Pose())
 
 @dataclass(frozen=True, eq=False)
 class Impacts:
-    """Results for N motions, with the meaning of `Impact`: status (N,) of str, lower and upper (N,) in s."""
+    """Results for N motions, with the meaning of `Impact`: status (N,) of str, lower and upper (N,) in s.
+
+    >>> import collision_monitor as cm
+    >>> cm.times_of_impact(cm.Sphere(1), cm.Pose((3, 0, 0)), (-1, 0, 0, 0, 0, 0), cm.Sphere(1), cm.Pose(), [(0,) * 6])
+    Impacts(1 hit, 0 clear, 0 unresolved; first: 0, 1 s)
+    """
 
     status: NDArray[np.str_]
     lower: Array
     upper: Array
+
+    def __len__(self) -> int:
+        """Number of motions."""
+        return len(self.status)
+
+    def __repr__(self) -> str:
+        """Return a line for a person."""
+        counts = ", ".join(f"{np.count_nonzero(self.status == each)} {each}" for each in ("hit", "clear", "unresolved"))
+        if (self.lower < math.inf).any():
+            counts += f"; first: {int(self.lower.argmin())}, {self.lower.min():.6g} s"
+        return f"Impacts({counts})"
+
+    def to_pandas(self) -> Any:
+        """Return a pandas.DataFrame with a row for each motion. Raises ImportError without pandas."""
+        return data_frame({field.name: getattr(self, field.name) for field in fields(self)})
 
 
 def time_of_impact_batch(
@@ -51,6 +72,11 @@ def time_of_impact_batch(
 
     A single row applies to all motions. A motion takes 1 to 2 µs, for spheres 0.1 µs; it takes 1 ms if the shapes touch
     at the start, and for plane shapes and concave meshes. Raises as `time_of_impact` does.
+
+    >>> import collision_monitor as cm
+    >>> poses, still = [(2, 0, 0, 0, 0, 0, 1), (3, 0, 0, 0, 0, 0, 1)], (0, 0, 0, 0, 0, 0)
+    >>> cm.time_of_impact_batch(cm.Sphere(0.5), poses, (-1, 0, 0, 0, 0, 0), cm.Sphere(0.5), poses[0], still).status
+    array(['hit', 'hit'], dtype='<U10')
     """
     query = check_query(horizon, tolerance, separation, iterations)
     a, b = make_moving_shape(shape_a, _STILL, "A"), make_moving_shape(shape_b, _STILL, "B")

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from collision_monitor.codec import Change, Removal
 from collision_monitor.geometry.pose import Pose, rotation_matrix
+from collision_monitor.geometry.surfaces import surface_triangles
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.pipeline.catalogue import Catalogue
-from collision_monitor.records import Phase
 from collision_monitor.ros.marker_bytes import Color, Kind, Marker, encode
-from collision_monitor.ros.surfaces import surface_triangles
 
 _STATIC: Final[Color] = (0.55, 0.57, 0.60, 0.35)
 _CALM: Final[Color] = (0.35, 0.55, 0.85, 0.9)
@@ -88,7 +87,7 @@ class MarkerView:
             self._build()
         for state in states[np.isin(states["id"], self._ids)]:  # refused states may have any id
             self._poses[int(state["id"])] = np.r_[state["position"], state["quaternion"]]
-        contacts = result.contacts[result.contacts["phase"] != Phase.END]
+        contacts = result.contacts
         touching = np.isin(self._ids, [contacts["id_a"], contacts["id_b"]])
         predicted = np.isin(self._ids, [result.predictions["id_a"], result.predictions["id_b"]]) & ~touching
         seen = np.array([int(i) in self._poses for i in self._ids], bool)

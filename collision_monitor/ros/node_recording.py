@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rclpy.node import Node
 
 from collision_monitor.errors import SessionError
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.pipeline.topics import RECORDED, Topic
-from collision_monitor.session import Recorder, Recording, Splitting
+from collision_monitor.session import Recording, Splitting
+
+if TYPE_CHECKING:
+    from collision_monitor.session import Recorder
 
 
 class NodeRecording:
@@ -30,10 +33,17 @@ class NodeRecording:
     def _start(self, path: str, metadata: dict[str, str], splitting: Splitting) -> None:
         types = {name: topic.message for topic, name in self._names.items()}
         try:
+            from collision_monitor.session import Recorder  # needs packages that rosdep does not install
+
             self._recorder = Recorder(path, types, metadata, splitting=splitting, snapshots=True)
+        except ModuleNotFoundError as error:
+            self._fail(path, f"expected the Python packages for MCAP, got no {error.name}: pip install mcap")
         except SessionError as error:
-            self._logger.error(f"not recording: {error}")
-            self._last = {"recording": Recording.FAILED, "recording_path": path, "recording_error": str(error)}
+            self._fail(path, str(error))
+
+    def _fail(self, path: str, reason: str) -> None:
+        self._logger.error(f"not recording: {reason}")
+        self._last = {"recording": Recording.FAILED, "recording_path": path, "recording_error": reason}
 
     def __str__(self) -> str:
         return f"recording to {self._recorder.path}" if self._recorder else "not recording"

@@ -32,7 +32,11 @@ _MODELS: Final = [model.name.lower() for model in Model if model is not Model.EX
 
 @dataclass(frozen=True)
 class Profile:
-    """The settings of a monitor, immutable. Raises ProfileError for a wrong value or a wrong combination of values."""
+    """The settings of a monitor, immutable. Raises ProfileError for a wrong value or a wrong combination of values.
+
+    >>> Profile.named("fast").replace(horizon=1.0).horizon
+    1.0
+    """
 
     name: str = "balanced"
     horizon: float = number(

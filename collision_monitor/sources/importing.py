@@ -13,7 +13,8 @@ from collision_monitor.codec import decode_states
 from collision_monitor.errors import CollisionMonitorError, InputError, MessageError, Refusal, SessionError
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.topics import NODE, RECORDED, STATUS_PERIOD, Topic
-from collision_monitor.session.recording.recorder import Recorder, Recording
+from collision_monitor.session.recording.recorder import Recorder
+from collision_monitor.session.recording.recording_state import Recording
 from collision_monitor.settings.profile import Profile
 from collision_monitor.sources.bag import Bag
 from collision_monitor.sources.decoding import Decoder

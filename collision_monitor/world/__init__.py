@@ -1,6 +1,20 @@
-"""Simulated worlds for demos, tests and benchmarks: scenes, and the collision response of bodies."""
+"""Simulated worlds for demos, tests and benchmarks: scenes, collision response, and event-driven hard spheres."""
+
+from typing import TYPE_CHECKING, Any
 
 from collision_monitor.world.scene import Scene
 from collision_monitor.world.scenes import describe, make_scene, scene_names
 
-__all__ = ["Scene", "describe", "make_scene", "scene_names"]
+if TYPE_CHECKING:
+    from collision_monitor.world.hard_spheres.simulation import HardSpheres as HardSpheres
+
+__all__ = ["HardSpheres", "Scene", "describe", "make_scene", "scene_names"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import `HardSpheres` at its first use, so that names and help of the scenes do not wait for its kernels."""
+    if name != "HardSpheres":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from collision_monitor.world.hard_spheres.simulation import HardSpheres
+
+    return HardSpheres

@@ -33,6 +33,12 @@ def _particles(objects: int | None, seed: int, rate: float | None, _path: Path |
     return Particles(objects, seed, rate)
 
 
+def _hard_spheres(objects: int | None, seed: int, rate: float | None, _path: Path | None) -> Scene:
+    from collision_monitor.world.hard_spheres.scene import HardSpheresScene  # here for the same reason
+
+    return HardSpheresScene(objects, seed, rate)
+
+
 def _responding(module: str, scene: str, description: str) -> _RegisteredScene:
     """Register a scene with options of the response; imported when it is made, as it loads kernels."""
 
@@ -51,6 +57,10 @@ _SCENES = {
     "particles": _RegisteredScene(
         _particles,
         "spheres in a closed box that bounce off the walls and off each other",
+    ),
+    "hard_spheres": _RegisteredScene(
+        _hard_spheres,
+        "the same with every collision at its exact time, simulated from event to event",
     ),
     "clutter": _RegisteredScene(
         lambda objects, seed, rate, path: Clutter(objects, seed, rate),

@@ -21,6 +21,7 @@ import stages
 
 STAMPS = stages.VENV / ".set_up"
 LOG = stages.BUILD / "set_up.log"
+REST_LOG = stages.BUILD / "functions.log"
 
 HINTS = {
     "Temporary failure in name resolution": "no network: the first set-up downloads from the Python package index",
@@ -34,9 +35,9 @@ def _stamp(stage: stages.Stage) -> Path:
     return STAMPS / stage.name
 
 
-def stages_to_run(ros: machine.RosInstall | None) -> tuple[list[stages.Stage], str]:
+def stages_to_run(ros: machine.RosInstall | None, *, for_demo: bool = False) -> tuple[list[stages.Stage], str]:
     """Return the stages to run, in order (none if all are valid), and the reason for the first of them."""
-    everything = list(stages.STAGES)
+    everything = [stage for stage in stages.STAGES if stage.for_demo or not for_demo]
     stale: list[stages.Stage] = []
     reason = ""
     for stage in everything:
@@ -52,7 +53,7 @@ def stages_to_run(ros: machine.RosInstall | None) -> tuple[list[stages.Stage], s
                 return everything, "environment: it is of another place or another ROS 2"
             stale.append(stage)
             reason = reason or f"{stage.name}: its inputs changed or it was not finished"
-    if not stale and (broken := stages.first_broken_stage(ros)):
+    if not stale and (broken := stages.first_broken_stage(ros, for_demo=for_demo)):
         name, reason = broken
         if name in ("environment", "packages"):
             return everything, reason
@@ -115,8 +116,43 @@ def _finish(stage: stages.Stage, ros: machine.RosInstall | None, log: IO[str]) -
     _stamp(stage).write_text(inputs)
 
 
+def _compile_the_rest() -> None:
+    """Compile in the background what the demo does not need; what an interrupted run has compiled is kept."""
+    rest = next(stage for stage in stages.STAGES if stage.name == "functions")
+    if _stamp(rest).is_file() and _stamp(rest).read_text() == rest.inputs(None):
+        return
+    command = [sys.executable, "-I", "-S", "-B", str(Path(__file__).parent), "functions"]
+    with REST_LOG.open("w") as log:
+        subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
+    print(
+        f"  {rest.name:<12} compiling in the background, at low priority (log: build/{REST_LOG.name}); "
+        "an interrupted run continues at the next make",
+        flush=True,
+    )
+
+
+def _run_functions() -> int:
+    """Compile the functions at the lowest priority, unless another set-up runs; return the exit code."""
+    os.nice(19)
+    if hasattr(os, "SCHED_IDLE"):
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+    with (stages.BUILD / "set_up.lock").open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            stage = next(stage for stage in stages.STAGES if stage.name == "functions")
+            _finish(stage, machine.ros_install(os.environ, stages.VENV), sys.stdout)
+        except (OSError, subprocess.CalledProcessError) as error:
+            print(error, flush=True)
+            return 1
+    return 0
+
+
 def main() -> int:
-    """Bring the environment up to date; return the exit code."""
+    """Bring the environment up to date; return the exit code. Argument `demo`: only what the demo needs."""
+    for_demo = sys.argv[1:] == ["demo"]
+    if sys.argv[1:] == ["functions"]:
+        os.chdir(stages.ROOT)
+        return _run_functions()
     os.chdir(stages.ROOT)
     stages.BUILD.mkdir(exist_ok=True)
     with (stages.BUILD / "set_up.lock").open("w") as lock:
@@ -128,19 +164,22 @@ def main() -> int:
         try:
             ros = machine.ros_install(os.environ, stages.VENV)
             for _ in range(2):  # the second pass is for stages found broken only when all stamps were right
-                pending, reason = stages_to_run(ros)
+                pending, reason = stages_to_run(ros, for_demo=for_demo)
                 if not pending:
-                    return 0
+                    break
                 _require(pending, ros)
                 _run(pending, reason, ros)
-            if broken := stages.first_broken_stage(ros):
-                raise machine.SetupError(f"finished, but does not work: {broken[1]} (log: build/{LOG.name})")
+            else:
+                if broken := stages.first_broken_stage(ros, for_demo=for_demo):
+                    raise machine.SetupError(f"finished, but does not work: {broken[1]} (log: build/{LOG.name})")
         except machine.SetupError as error:
             print(f"set-up: {error}", file=sys.stderr)
             return 1
         except KeyboardInterrupt:
             print("\nset-up: interrupted; the next run goes on from here", file=sys.stderr)
             return 130
+    if for_demo:
+        _compile_the_rest()
     return 0
 
 

@@ -12,7 +12,7 @@ import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import machine
 
@@ -30,7 +30,7 @@ _IMPORT = re.compile(rf"^\s*from ({PACKAGE}[\w.]*) import (\([^)]*\)|[^\n]*)", r
 class Stage:
     """One stage: its name, the text shown while it runs, the digest of its inputs, and its work.
 
-    alongside: it may run in parallel with the next stage.
+    alongside: it may run in parallel with the next stage. for_demo: the demo needs it.
     """
 
     name: str
@@ -38,6 +38,7 @@ class Stage:
     inputs: Callable[[machine.RosInstall | None], str]
     run: Callable[[machine.RosInstall | None, IO[str]], None]
     alongside: bool = False
+    for_demo: bool = True
 
 
 def _digest(*parts: str, files: Iterable[Path] = ()) -> str:
@@ -91,13 +92,22 @@ def _make_environment(ros: machine.RosInstall | None, log: IO[str]) -> None:
 # packages ------------------------------------------------------------------------------------------------------------
 
 
+def _project() -> dict[str, Any]:
+    return tomllib.loads((ROOT / "pyproject.toml").read_text())
+
+
 def requirements(ros: machine.RosInstall | None) -> list[str]:
-    """Everything that pip installs: the project's own requirements, and ROS 2 unless an install is sourced."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    """What the program and its set-up need: the project's own requirements, and ROS 2 unless an install is sourced."""
+    project = _project()
     wanted: list[str] = list(project["build-system"]["requires"])
-    wanted += project["project"]["dependencies"]
-    wanted += [name for group in project["project"]["optional-dependencies"].values() for name in group]
+    wanted += project["project"]["dependencies"] + project["project"]["optional-dependencies"]["messages"]
     return wanted + ([] if ros else ros_wheels())
+
+
+def tools() -> list[str]:
+    """What only the tests, the lint and some options need: 40 % of all downloads."""
+    groups: dict[str, list[str]] = _project()["project"]["optional-dependencies"]
+    return [name for group, names in groups.items() if group != "messages" for name in names]
 
 
 def ros_wheels() -> list[str]:
@@ -116,6 +126,15 @@ def _install_packages(ros: machine.RosInstall | None, log: IO[str]) -> None:
     _call(log, ros, *pip, *requirements(ros))
     if not ros:
         correct_exported_paths(log)
+
+
+def _tools_inputs(ros: machine.RosInstall | None) -> str:
+    return _digest(*tools())
+
+
+def _install_tools(ros: machine.RosInstall | None, log: IO[str]) -> None:
+    pip = (PYTHON, "-m", "pip", "install", "--no-user", "--no-compile", "--disable-pip-version-check")
+    _call(log, ros, *pip, *tools())
 
 
 def correct_exported_paths(log: IO[str]) -> None:
@@ -258,13 +277,12 @@ STAGES = (
     Stage("package", "installing collision-monitor", _package_inputs, _install_package),
     Stage("messages", "building collision_monitor_msgs", _messages_inputs, _build_messages, alongside=True),
     Stage("monitor", "compiling the monitor", _kernel_inputs, _compile_monitor, alongside=True),
-    Stage("functions", "compiling the functions beside it", _kernel_inputs, _compile_functions),
+    Stage("functions", "compiling the functions beside it", _kernel_inputs, _compile_functions, for_demo=False),
+    Stage("tools", "installing tools for the tests", _tools_inputs, _install_tools, for_demo=False),
 )
 
-MODULES = (
-    *("scipy", "numba", "trimesh", "fcl", "mcap", "rich", "matplotlib", "yaml"),
-    *("pytest", "hypothesis", "rosbags", "mypy", "colcon_core"),
-)
+MODULES = ("scipy", "numba", "mcap", "rich", "matplotlib", "yaml", "rosbags", "colcon_core")
+TOOL_MODULES = ("trimesh", "fcl", "pytest", "hypothesis", "mypy")
 
 _HEALTH = """
 import importlib.util, sys
@@ -279,6 +297,10 @@ try:
     stage = "messages"
     from collision_monitor_msgs.msg import ObjectStateArray
     serialize_message(ObjectStateArray())
+    stage = "tools"
+    for name in {tools}:
+        if importlib.util.find_spec(name) is None:
+            raise ImportError(name)
     stage = "package"
     found = importlib.util.find_spec("collision_monitor")
     if found is None or {package!r} not in found.submodule_search_locations:
@@ -288,17 +310,18 @@ except Exception as error:
 """
 
 
-def first_broken_stage(ros: machine.RosInstall | None) -> tuple[str, str] | None:
+def first_broken_stage(ros: machine.RosInstall | None, *, for_demo: bool = False) -> tuple[str, str] | None:
     """Import what the stages installed; return the first broken stage and the reason, or None."""
     if not os.access(PYTHON, os.X_OK):
         return "environment", f"{PYTHON} is not there"
-    code = _HEALTH.format(modules=MODULES, package=str(ROOT / "collision_monitor"))
+    tool_modules = () if for_demo else TOOL_MODULES
+    code = _HEALTH.format(modules=MODULES, tools=tool_modules, package=str(ROOT / "collision_monitor"))
     env = environment_variables(ros)
     answer = subprocess.run([PYTHON, "-P", "-c", code], env=env, capture_output=True, text=True, check=False)
     if answer.returncode:
         lines = answer.stderr.strip().splitlines() or [f"Python ended with {answer.returncode}"]
         stage = lines[-1].partition(":")[0]
-        return (stage if stage in {"packages", "messages", "package"} else "environment"), lines[-1]
+        return (stage if stage in {"packages", "tools", "messages", "package"} else "environment"), lines[-1]
     if (place := missing_ros_file()) is not None:
         return "package", f"{place.relative_to(VENV)} is not there"
     return None

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from collision_monitor._version import VERSION
+from collision_monitor.accuracy import collision_rate
 from collision_monitor.cli.main import main
 from collision_monitor.detection.partitioned import BROAD_PHASES
 from collision_monitor.errors import InputError
@@ -28,6 +30,21 @@ def test_json_is_one_line_with_everything(scene: str, capsys: pytest.CaptureFixt
     assert (result["frames"], result["version"]) == (10, VERSION)
     assert 0 < result["min_ms"] <= result["median_ms"] <= result["p99_ms"]
     assert 20 <= result["pairs"] <= 80  # about a quarter of the objects, less at the open boundary
+
+
+def test_hard_spheres_report_their_rate_energy_and_pressure(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(collision_rate, "COLLISIONS", 200_000)
+    assert main(["bench", "--scene", "hard-spheres", "--n", "500", "--packing", "0.25", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["scene"], result["n"], result["packing"]) == ("hard-spheres", 500, 0.25)
+    assert result["best_collisions_per_s"] >= result["collisions_per_s"] > 0
+    assert abs(result["energy_drift"]) < 1e-12 and abs(result["momentum_drift"]) < 1e-12
+    assert result["compressibility"] == pytest.approx(result["carnahan_starling"], rel=0.03)
+    assert result["pressure"] == pytest.approx(6 * 0.25 / math.pi * result["compressibility"], rel=1e-9)
+    assert main(["bench", "--scene", "hard_spheres", "--n", "100", "--packing", "0.1"]) == 0
+    assert "collisions per second" in capsys.readouterr().out
 
 
 def test_a_line_for_people(capsys: pytest.CaptureFixture[str]) -> None:
@@ -66,6 +83,9 @@ def test_bad_arguments_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixtur
     np.savez(partial, kind=np.zeros(3, np.uint8))
     for arguments, expected in (
         (["--scene", "rabbits"], "scene: expected one of boxes, spheres, mixed, hulls, got 'rabbits'"),
+        (["--packing", "0.3"], "--packing: expected the scene hard-spheres"),
+        (["--scene", "hard-spheres", "--threads", "2"], "--threads: expected no value"),
+        (["--scene", "hard-spheres", "--n", "10"], "reflecting walls"),
         (["--n", "5", "--threads", "1000"], "threads: expected 1 to"),
         (["--scene-file", str(tmp_path / "none.npz")], "none.npz: expected a scene"),
         (["--scene-file", str(text)], "text.npz: expected a scene"),

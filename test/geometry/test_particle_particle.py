@@ -63,6 +63,25 @@ def test_the_closest_approach_beats_a_fine_sampling(seed):
     assert time >= 0 and distance <= sampled + 1e-12
 
 
+@pytest.mark.parametrize("far", [0.0, 1e6, 1e10, 1e15])
+def test_far_from_the_origin_the_times_are_the_same(far):
+    meet = particle_particle([far, 0], [1, 1], [far + 4, 0], [-2, 2], 1e-9, 0.5)
+    assert not meet.collides and (meet.alpha, meet.beta) == (2, 1)
+
+
+@settings(max_examples=50)
+@given(st.integers(0, 2**32 - 1))
+def test_a_row_does_not_change_the_answer_of_another(seed):
+    random = np.random.default_rng(seed)
+    scale = 10.0 ** random.integers(-3, 16, size=(6, 1))
+    rows = [scale * random.integers(-4, 5, size=(6, 3)) for _ in range(2)]
+    speeds = random.integers(-2, 3, size=(2, 6, 3)).astype(float)
+    batch = particle_particle(rows[0], speeds[0], rows[1], speeds[1], 1e-3, 1e-3)
+    for i in range(6):
+        alone = particle_particle(rows[0][i], speeds[0][i], rows[1][i], speeds[1][i], 1e-3, 1e-3)
+        assert tuple(field[i] for field in batch) == tuple(alone)
+
+
 def test_bad_thresholds_are_refused():
     with pytest.raises(InputError, match="distance_threshold"):
         particle_particle([0, 0], [1, 1], [4, 0], [-1, 1], -1.0, 1.0)

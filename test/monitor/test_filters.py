@@ -104,7 +104,7 @@ def test_region_of_interest() -> None:
             assert np.array_equal(touching[name], expected[name])
         pairs = {(int(c["id_a"]), int(c["id_b"])) for c in touching}
         begun = {(int(c["id_a"]), int(c["id_b"])) for c in plain.contacts if c["phase"] == records.Phase.BEGIN}
-        ended = {(int(c["id_a"]), int(c["id_b"])) for c in plain.contacts if c["phase"] == records.Phase.END}
+        ended = {(int(c["id_a"]), int(c["id_b"])) for c in plain.ended}
         assert (begun, ended) == (pairs - before, before - pairs), "who enters begins, who leaves ends"
         before = pairs
         assert disagreements(mine, plain, 2.0) == []
@@ -125,7 +125,7 @@ def test_a_region_that_changes_takes_objects_in_and_out() -> None:
     regions = [(-100.0, 100.0), (10.0, 20.0), (-100.0, 100.0), (-1.0, 0.1), (-1e18, 1e18), (29.9, 100.0)]
     for step, (low, high) in enumerate(regions):
         monitor.profile = monitor.profile.replace(region_min=(low, -9, -9), region_max=(high, 9, 9))
-        contacts = monitor.step(step, [1, 2], poses).contacts
+        contacts = monitor.step(step, [1, 2], poses).contact_rows
         found.append([(int(c["id_a"]), int(c["id_b"]), int(c["phase"])) for c in contacts])
     everything = [(1, 2), (1, 3), (2, 3)]
     begin, persist, end = records.Phase.BEGIN, records.Phase.PERSIST, records.Phase.END

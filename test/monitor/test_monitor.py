@@ -221,10 +221,10 @@ def test_contacts_begin_persist_and_end_once() -> None:
         x = -1.5 + 0.05 * step
         poses = [[x, 0, 0, 0, 0, 0, 1], [0, 0, 0, 0, 0, 0, 1]]
         result = monitor.step(step * SECOND // 20, [1, 2], poses, [[1, 0, 0, 0, 0, 0], [0] * 6])
-        for contact in result.contacts:
+        for contact in result.contact_rows:
             phases.append(int(contact["phase"]))
             durations.append(float(contact["duration"]))
-        assert not (len(result.contacts) and len(result.predictions))
+        assert not (len(result.contact_rows) and len(result.predictions))
     assert phases == [records.Phase.BEGIN, *[records.Phase.PERSIST] * (len(phases) - 2), records.Phase.END]
     assert np.allclose(durations, np.arange(len(phases)) * 0.05)
     assert len(phases) == 42  # touching from x = -1 to x = 1, both included, and the END
@@ -321,7 +321,7 @@ class TestRefusals:
         monitor.step(-50 * SECOND, [1, 2], still(0, 0.9))
         result = monitor.step(-49 * SECOND, [1, 2], still(0, 9))
         assert result.accepted and result.stamp_ns == -49 * SECOND
-        assert [int(c["phase"]) for c in result.contacts] == [records.Phase.END]
+        assert len(result.ended) == 1 and not len(result.contacts)
         assert result.status.objects_unseen == 1
 
     def test_arrays_of_another_shape_raise(self, monitor: Monitor) -> None:
@@ -347,7 +347,7 @@ class TestRefusals:
         monitor.remove(1)
         monitor.add(1, Sphere(0.5))
         result = monitor.step(SECOND // 100, [1, 2], still(0, 0.9))
-        assert [int(c["phase"]) for c in result.contacts] == [records.Phase.END, records.Phase.BEGIN]
+        assert [int(c["phase"]) for c in result.contact_rows] == [records.Phase.END, records.Phase.BEGIN]
 
     @pytest.mark.parametrize("big", [1e200, np.inf])
     def test_what_is_too_large_to_compute_with_is_refused(self, monitor: Monitor, big: float) -> None:
@@ -361,7 +361,7 @@ class TestRefusals:
         with pytest.raises(ShapeError):
             monitor.add(1, Sphere(-1))
         with pytest.raises(UnsupportedError, match="Circle"):
-            monitor.add(1, [(Sphere(1), Pose()), (Circle(1), Pose())])
+            monitor.add(1, [(Sphere(1), Pose()), (Circle(1), Pose())], replace=True)
         with pytest.raises(UnsupportedError, match="static"):
             monitor.add(4, HalfSpace((0, 0, 1)))
         with pytest.raises(UnsupportedError, match="scene in the plane"):
@@ -393,17 +393,17 @@ def test_masks_allowed_pairs_and_new_descriptions() -> None:
     monitor.add(3, Sphere(0.5), group=4, allowed=(2,))
     poses = still(0, 0.1, 0.2)
     assert touching(monitor.step(0, [1, 2, 3], poses)) == {(1, 2)}
-    monitor.add(3, Sphere(0.5), group=4)
+    monitor.add(3, Sphere(0.5), group=4, replace=True)
     assert touching(monitor.step(1, [1, 2, 3], poses)) == {(1, 2), (2, 3)}
-    monitor.add(1, Sphere(0.01), group=1)
+    monitor.add(1, Sphere(0.01), group=1, replace=True)
     poses[0, 0] = 2.0
     assert touching(monitor.step(2, [1, 2, 3], poses)) == {(2, 3)}
-    monitor.add(1, Sphere(1.9), group=1)
+    monitor.add(1, Sphere(1.9), group=1, replace=True)
     assert touching(monitor.step(3, [1, 2, 3], poses)) == {(1, 2), (1, 3), (2, 3)}
     monitor.remove(2)
     result = monitor.step(4, [1, 3], poses[[0, 2]])
     assert touching(result) == {(1, 3)}
-    ended = [c for c in result.contacts if c["phase"] == records.Phase.END]
+    ended = list(result.ended)
     assert [pair(c) for c in ended] == [(1, 2), (2, 3)] and np.isnan(ended[0]["signed_distance"])
 
 
@@ -415,21 +415,22 @@ def test_a_new_description_ends_what_it_no_longer_allows_to_be_said() -> None:
     moving = [[1, 0, 0, 0, 0, 0]] * 2
     result = monitor.step(0, [1, 2], still(0, 0.9), moving)
     assert touching(result) == {(1, 2)} and [pair(p) for p in result.predictions] == [(2, 3)]
-    monitor.add(1, Sphere(0.5), allowed=(2,))
+    monitor.add(1, Sphere(0.5), allowed=(2,), replace=True)
     result = monitor.step(SECOND // 100, [1, 2], still(0.01, 0.91), moving)
-    assert [(pair(c), int(c["phase"])) for c in result.contacts] == [((1, 2), records.Phase.END)]
+    assert [pair(c) for c in result.ended] == [(1, 2)] and not len(result.contacts)
     assert len(monitor.step(SECOND // 50, [1, 2], still(0.02, 0.92), moving).contacts) == 0
     # a static object that becomes a moving one has no state: its old place gives no answers
-    monitor.add(3, Sphere(0.5))
+    monitor.add(3, Sphere(0.5), replace=True)
     result = monitor.step(SECOND // 20, [1, 2], still(0.05, 0.95), moving)
     assert result.status.objects_unseen == 1 and len(result.predictions) == 0
-    monitor.add(1, Sphere(0.5), group=2, mask=4)
+    monitor.add(1, Sphere(0.5), group=2, mask=4, replace=True)
     assert touching(monitor.step(SECOND // 10, [1, 2], still(0.1, 1.0), moving)) == set()
-    monitor.add(1, Sphere(0.5))
+    monitor.add(1, Sphere(0.5), replace=True)
     result = monitor.step(SECOND // 5, [1, 2, 3], still(0.2, 1.1, 1.2), [*moving, [0] * 6])
     assert touching(result) == {(1, 2), (1, 3), (2, 3)}
     assert {int(c["phase"]) for c in result.contacts} == {records.Phase.BEGIN}
-    monitor.add(3, Box((0.1, 0.1, 0.1)))  # only another shape: the contact persists without a new BEGIN
+    # only another shape: the contact persists without a new BEGIN
+    monitor.add(3, Box((0.1, 0.1, 0.1)), replace=True)
     result = monitor.step(SECOND // 4, [1, 2, 3], still(0.25, 1.15, 0.7), [*moving, [0] * 6])
     assert {pair(c): int(c["phase"]) for c in result.contacts}[(2, 3)] == records.Phase.PERSIST
 

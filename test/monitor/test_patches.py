@@ -24,7 +24,7 @@ FOUR = Profile(contact_points=4)
 
 def rows_of(result: StepResult, a: int, b: int) -> NDArray[np.void]:
     """Rows of one pair; checks their numbers, that only the points differ, and that the points fit together."""
-    rows = result.contacts[(result.contacts["id_a"] == a) & (result.contacts["id_b"] == b)]
+    rows = result.contact_rows[(result.contact_rows["id_a"] == a) & (result.contact_rows["id_b"] == b)]
     assert rows["point_index"].tolist() == list(range(len(rows)))
     assert set(rows["point_count"].tolist()) <= {len(rows)}
     for name in rows.dtype.names:
@@ -115,21 +115,21 @@ def test_as_many_points_as_wanted_and_nothing_else_changes(most: int) -> None:
         states[-1]["id"], states[-1]["quaternion"] = 9001, (0, 0, 0, 1)
         states[-1]["position"] = (0, 0, -49.31 if 4 <= step < 12 else -40)
         mine, expected = (each.step(step * 20_000_000, states) for each in (monitor, one))
-        first = mine.contacts[mine.contacts["point_index"] == 0]
+        first = mine.contact_rows[mine.contact_rows["point_index"] == 0]
         for name in first.dtype.names:
             if name not in ("point_a", "point_b", "closing_speed", "point_count"):
-                assert np.array_equal(first[name], expected.contacts[name], equal_nan=True)
+                assert np.array_equal(first[name], expected.contact_rows[name], equal_nan=True)
         assert np.array_equal(mine.predictions.view(np.uint8), expected.predictions.view(np.uint8))
         assert mine.status == expected.status
         if most == 1:
-            assert np.array_equal(mine.contacts.view(np.uint8), expected.contacts.view(np.uint8))
+            assert np.array_equal(mine.contact_rows.view(np.uint8), expected.contact_rows.view(np.uint8))
         lying = rows_of(mine, 9000, 9001)
         phase = {4: Phase.BEGIN, 12: Phase.END}.get(step, Phase.PERSIST)
         assert len(lying) == (most if 4 <= step < 12 else step == 12)
         assert set(lying["phase"].tolist()) <= {phase}
         if most == 2:
             assert all(np.linalg.norm(a - b) == pytest.approx(1.0) for a, b in pairwise(lying["point_a"]))
-        seen |= set(mine.contacts["point_count"].tolist())
+        seen |= set(mine.contact_rows["point_count"].tolist())
     assert seen == {1, most}
 
 

@@ -33,6 +33,14 @@ def test_spheres_alone_need_neither_sat_nor_rotation() -> None:
     }  # fmt: skip
 
 
+def test_separated_boxes_need_gjk() -> None:
+    monitor = Monitor()
+    for object_id in range(2):
+        monitor.add(object_id, Box((1, 1, 1)))
+    assert "EPA: no pair needs it; separated boxes use GJK" in monitor.plan.unneeded
+    assert not any(reason.startswith("GJK") for reason in monitor.plan.unneeded)
+
+
 def test_it_follows_what_is_added_and_removed() -> None:
     monitor = Monitor()
     monitor.add(1, Sphere(0.5))

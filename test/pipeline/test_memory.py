@@ -243,7 +243,7 @@ def test_a_touching_pair_ends_when_it_is_allowed_by_either_object() -> None:
         describe(pipeline, ObjectDescription(object_id, BALL, allowed=(other,)))
         outputs = pipeline.on_states(encode_states(STAMP + 10_000_000, "world", 2, states(1, 2, 3)))
         assert outputs is not None
-        ended = outputs.result.contacts[outputs.result.contacts["phase"] == records.Phase.END]
+        ended = outputs.result.ended
         assert [(c["id_a"], c["id_b"]) for c in ended] == [(1, 2)]
 
 

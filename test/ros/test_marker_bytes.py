@@ -18,8 +18,8 @@ from collision_monitor.geometry.shapes import (
     Polygon,
     Sphere,
 )
+from collision_monitor.geometry.surfaces import surface_triangles
 from collision_monitor.ros.marker_bytes import Kind, Marker, encode
-from collision_monitor.ros.surfaces import surface_triangles
 
 
 def test_rclpy_reads_what_was_written():

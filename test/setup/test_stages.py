@@ -63,13 +63,13 @@ def test_an_interrupted_installation_starts_anew(stamps: Path, name: str) -> Non
     assert pending() == NAMES
 
 
-@pytest.mark.parametrize("name", ["messages", "package", "monitor", "functions"])
+@pytest.mark.parametrize("name", ["messages", "package", "monitor", "functions", "tools"])
 def test_an_interrupted_later_stage_runs_alone(stamps: Path, name: str) -> None:
     (stamps / name).unlink()
     assert pending() == [name]
 
 
-@pytest.mark.parametrize("name", ["packages", "messages", "package", "monitor", "functions"])
+@pytest.mark.parametrize("name", ["packages", "messages", "package", "monitor", "functions", "tools"])
 def test_changed_inputs_run_their_stage_alone(stamps: Path, name: str) -> None:
     (stamps / name).write_text("the digest of something else")
     assert pending() == [name]
@@ -206,3 +206,10 @@ def test_a_second_run_only_checks() -> None:
     subprocess.run(["make", "-s", "setup"], cwd=ROOT, capture_output=True, timeout=600, check=True)
     answer = subprocess.run(["make", "-s", "setup"], cwd=ROOT, capture_output=True, text=True, timeout=600)
     assert (answer.returncode, answer.stdout, answer.stderr) == (0, "", "")
+
+
+def test_a_demo_waits_only_for_what_it_shows(stamps: Path) -> None:
+    for name in ("functions", "tools"):
+        (stamps / name).unlink()
+    assert set_up.stages_to_run(ROS, for_demo=True)[0] == []
+    assert pending() == ["functions", "tools"]

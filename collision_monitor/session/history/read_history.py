@@ -126,7 +126,7 @@ class _Gathered:
     def _answer(self, outputs: Outputs) -> None:
         result = outputs.result
         step = self._step(result.stamp_ns, result.step)
-        self._take_contacts(step, result.contacts)
+        self._take_contacts(step, result.contact_rows)
         self._predictions.append(step, result.predictions)
 
     def _take_contacts(self, step: int, rows: Records) -> None:

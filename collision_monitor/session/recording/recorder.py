@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Mapping, Sequence
-from enum import IntEnum
 from pathlib import Path
 from types import TracebackType
 from typing import Final
@@ -17,6 +16,7 @@ from collision_monitor.session.mcap.layout import SEQUENCE_MASK
 from collision_monitor.session.mcap.rosbag2 import RECORDED_TYPES
 from collision_monitor.session.recording.queue_entry import QueueEntry
 from collision_monitor.session.recording.recording_files import SNAPSHOT_PERIOD, RecordingFiles
+from collision_monitor.session.recording.recording_state import Recording
 from collision_monitor.session.recording.splitting import ONE_FILE, Splitting
 
 FLUSH_PERIOD: Final = 0.25
@@ -46,14 +46,6 @@ size. Otherwise it returns each chunk's memory to the system and gets it back pa
 
 _PAUSE: Final = 20e-6
 """s; long enough that a thread which waits for the lock wakes up and takes it."""
-
-
-class Recording(IntEnum):
-    """Values of `MonitorStatus.recording`."""
-
-    OFF = 0
-    ON = 1
-    FAILED = 2
 
 
 class Recorder:

@@ -1,0 +1,33 @@
+"""The text of a contact: its distance, its error, and the features of both shapes that are nearest."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from collision_monitor.geometry.contact_features import FeatureType
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape
+from collision_monitor.query.features import feature_of
+
+if TYPE_CHECKING:
+    from collision_monitor.geometry.coordinates import Array
+    from collision_monitor.query.contact import Compound, Contact
+
+
+def contact_text(contact: Contact) -> str:
+    """Text such as `Contact(0.0123 m ± 1e-12, box face 3 – capsule surface)`."""
+    shape_a, pose_a, shape_b, pose_b = contact.arguments
+    a = _feature(shape_a, pose_a, contact.point_a, contact.normal)
+    b = _feature(shape_b, pose_b, contact.point_b, -contact.normal)
+    return f"Contact({contact.signed_distance:.4g} m ± {contact.error_bound:.1g}, {a} – {b})"
+
+
+def _feature(shape: Compound, pose: Pose, point: Array, normal: Array) -> str:
+    if not isinstance(shape, Shape):
+        return "compound"
+    kind = type(shape).__name__.lower()
+    if not isinstance(shape, Box | ConvexHull | Mesh):
+        return f"{kind} surface"
+    found = feature_of(shape, pose, point, normal)
+    number = found.face if found.type is FeatureType.FACE else "-".join(map(str, found.vertices))
+    return f"{kind} {found.type.name.lower()} {number}"

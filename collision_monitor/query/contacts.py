@@ -1,0 +1,103 @@
+"""`contacts`: `contact` for arrays of pairs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
+from collision_monitor.query.contact import contact
+from collision_monitor.query.contact_rows import contact_rows
+from collision_monitor.query.convex_pairs import MEMORY
+from collision_monitor.query.pair_arrays import Progress, Shapes, pack_shapes, pair_count, part, pose_rows, ranges
+from collision_monitor.records import data_frame
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Contacts of N pairs in the world frame, with the meaning of the fields of `Contact`; lengths in m.
+
+    >>> import collision_monitor as cm
+    >>> cm.contacts(cm.Sphere(1), cm.Pose(), cm.Sphere(1), [(0, 0, z, 0, 0, 0, 1) for z in (1, 3)]).overlaps
+    array([ True, False])
+    """
+
+    signed_distance: Array  # (N,)
+    error_bound: Array  # (N,)
+    normal: Array  # (N, 3), from A to B
+    point_a: Array  # (N, 3)
+    point_b: Array  # (N, 3)
+
+    @property
+    def overlaps(self) -> NDArray[np.bool_]:
+        """Whether each pair (N,) overlaps or touches; uncertain if |signed_distance| <= error_bound."""
+        return self.signed_distance <= 0.0
+
+    def __len__(self) -> int:
+        """Number of pairs."""
+        return len(self.signed_distance)
+
+    def __repr__(self) -> str:
+        """Return a line for a person."""
+        if not len(self):
+            return "Contacts(0 pairs)"
+        k = int(self.signed_distance.argmin())
+        return (
+            f"Contacts({len(self)} pairs, {np.count_nonzero(self.overlaps)} overlap, "
+            f"nearest: pair {k}, {self.signed_distance[k]:.4g} m)"
+        )
+
+    def to_pandas(self) -> Any:
+        """Return a pandas.DataFrame with a row for each pair. Raises ImportError without pandas."""
+        return data_frame({field.name: getattr(self, field.name) for field in fields(self)})
+
+
+def contacts(
+    shapes_a: Shapes, poses_a: Any, shapes_b: Shapes, poses_b: Any, progress: Progress | None = None
+) -> Contacts:
+    """`contact` for N pairs: of the shapes A at the poses A with the shapes B at the poses B.
+
+    shapes: one for all pairs, or a list of N; poses: (N, 7) x y z qx qy qz qw (m), a list of N Pose, or one for all.
+    progress: called with the number of pairs that are done. Convex solids run in one kernel, 0.1 to 1 µs a pair; a pair
+    with another shape takes as long as `contact`. Raises as `contact` does, and InputError if the lengths differ.
+
+    >>> import collision_monitor as cm
+    >>> poses = [(x, 0, 0, 0, 0, 0, 1) for x in (0.5, 1.5, 2.5)]
+    >>> found = cm.contacts(cm.Box((1, 1, 1)), cm.Pose(), cm.Sphere(0.5), poses)
+    >>> found.signed_distance
+    array([-0.5,  0.5,  1.5])
+    >>> found
+    Contacts(3 pairs, 1 overlap, nearest: pair 0, -0.5 m)
+    """
+    a, b = pack_shapes(shapes_a, "shapes A"), pack_shapes(shapes_b, "shapes B")
+    x_a, x_b = pose_rows(poses_a, "poses A"), pose_rows(poses_b, "poses B")
+    count = pair_count(shapes_a=len(a), poses_a=len(x_a), shapes_b=len(b), poses_b=len(x_b))
+    special = np.flatnonzero(np.broadcast_to((a.at < 0) | (b.at < 0), (count,)))
+    at_a, at_b = np.maximum(a.at, 0), np.maximum(b.at, 0)
+    memory = MEMORY.enlarge(a.rows, b.rows)
+    rows = np.zeros((count, CONTACT_SIZE))
+    for which in ranges(count, progress):
+        begin, end = np.searchsorted(special, (which.start, which.stop))
+        if end - begin < which.stop - which.start and len(a.rows) and len(b.rows):
+            contact_rows(
+                a.rows, part(at_a, which), part(x_a, which), b.rows, part(at_b, which), part(x_b, which),
+                memory, rows[which],
+            )  # fmt: skip
+        for k in special[begin:end].tolist():
+            poses = (_pose(x[k if len(x) > 1 else 0]) for x in (x_a, x_b))
+            one = contact(a.of(k), next(poses), b.of(k), next(poses))
+            rows[k, DISTANCE], rows[k, BOUND] = one.signed_distance, one.error_bound
+            for column, value in ((NORMAL, one.normal), (POINT_A, one.point_a), (POINT_B, one.point_b)):
+                rows[k, column : column + 3] = value
+    vectors = (rows[:, column : column + 3] for column in (NORMAL, POINT_A, POINT_B))
+    return Contacts(rows[:, DISTANCE], rows[:, BOUND], *vectors)
+
+
+def _pose(row: Array) -> Pose:
+    return Pose(row[:3], row[3:])

@@ -1,0 +1,85 @@
+"""`times_of_impact`: `time_of_impact` for arrays of pairs."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from collision_monitor.geometry.pose import Motion, Pose
+from collision_monitor.query.convex_pairs import MEMORY
+from collision_monitor.query.pair_arrays import (
+    Progress,
+    Shapes,
+    number_rows,
+    pack_shapes,
+    pair_count,
+    part,
+    pose_rows,
+    ranges,
+)
+from collision_monitor.query.pair_impact_rows import DECIDED, pair_impact_rows
+from collision_monitor.query.time_of_impact import ITERATIONS, check_query, time_of_impact
+from collision_monitor.query.time_of_impact_batch import Impacts
+
+
+def times_of_impact(
+    shapes_a: Shapes,
+    poses_a: Any,
+    twists_a: ArrayLike,
+    shapes_b: Shapes,
+    poses_b: Any,
+    twists_b: ArrayLike,
+    horizon: float = 2.0,
+    tolerance: float = 1e-6,
+    separation: float = 0.0,
+    iterations: int = ITERATIONS,
+    progress: Progress | None = None,
+) -> Impacts:
+    """`time_of_impact` for N pairs of moving shapes.
+
+    shapes: one for all pairs, or a list of N; poses: (N, 7) x y z qx qy qz qw (m), a list of N Pose, or one for all;
+    twists: (N, 6) vx vy vz wx wy wz (m/s, rad/s), or one for all. progress: called with the number of pairs that are
+    done. Convex solids take 0.3 to 5 µs a pair; other shapes, and those that touch at the start, 0.1 to 1 ms.
+    `time_of_impact_batch` is faster for one pair of spheres in many motions. Raises as `time_of_impact` does, and
+    InputError if the lengths differ.
+
+    >>> import collision_monitor as cm
+    >>> poses = [(x, 0, 0, 0, 0, 0, 1) for x in (2, 2.5, 9)]
+    >>> still, towards = (0, 0, 0, 0, 0, 0), (-1, 0, 0, 0, 0, 0)
+    >>> cm.times_of_impact(cm.Box((1, 1, 1)), cm.Pose(), still, cm.Sphere(0.5), poses, towards).status
+    array(['hit', 'hit', 'clear'], dtype='<U10')
+    """
+    query = check_query(horizon, tolerance, separation, iterations)
+    a, b = pack_shapes(shapes_a, "shapes A"), pack_shapes(shapes_b, "shapes B")
+    states = []
+    for poses, twists, name in ((poses_a, twists_a, "A"), (poses_b, twists_b, "B")):
+        x, v = pose_rows(poses, f"poses {name}"), number_rows(twists, 6, f"twists {name}")
+        state = np.zeros((pair_count(poses=len(x), twists=len(v)), 16))
+        state[:, :7], state[:, 7:13] = x, v
+        states.append(state)
+    s_a, s_b = states
+    count = pair_count(shapes_a=len(a), motions_a=len(s_a), shapes_b=len(b), motions_b=len(s_b))
+    special = np.broadcast_to((a.at < 0) | (b.at < 0), (count,))
+    at_a, at_b = np.maximum(a.at, 0), np.maximum(b.at, 0)
+    memory, wanted = MEMORY.enlarge(a.rows, b.rows), np.array(query, dtype=np.float64)
+    rows = np.full((count, 3), math.inf)
+    for which in ranges(count, progress):
+        if not special[which].all():
+            pair_impact_rows(
+                a.rows, part(at_a, which), part(s_a, which), b.rows, part(at_b, which), part(s_b, which),
+                wanted, MEMORY.impact, memory, rows[which],
+            )  # fmt: skip
+        for k in (which.start + np.flatnonzero(special[which] | (rows[which, 2] != DECIDED))).tolist():
+            motions = [_motion(s[k if len(s) > 1 else 0]) for s in states]
+            one = time_of_impact(a.of(k), motions[0], b.of(k), motions[1], *query)
+            rows[k, :2] = one.lower, one.upper
+    lower, upper, _ = rows.T
+    status = np.where(lower == math.inf, "clear", np.where(upper == math.inf, "unresolved", "hit"))
+    return Impacts(status, lower.copy(), upper.copy())
+
+
+def _motion(state: Any) -> Motion:
+    return Motion(Pose(state[:3], state[3:7]), state[7:10], state[10:13], state[13:])

@@ -1,0 +1,101 @@
+"""Tests that the batches over arrays of pairs agree with one call for each pair."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import collision_monitor as cm
+
+RNG = np.random.default_rng(2)
+TETRAHEDRON = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+CORNER = cm.Mesh([*TETRAHEDRON, (0.2, 0.2, 0.2)], [(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 2, 4), (2, 3, 4), (3, 1, 4)])
+SHAPES = [
+    cm.Box((1, 0.5, 0.7)),
+    cm.Sphere(0.4),
+    cm.ConvexHull(RNG.normal(size=(60, 3)) / 3),
+    CORNER,
+    [(cm.Sphere(0.3), cm.Pose((1, 0, 0))), (cm.Box((1, 1, 1)), cm.Pose())],
+    cm.HalfSpace((0, 0, 1), -1.0),
+]
+COUNT = 40
+
+
+def poses(count: int = COUNT) -> NDArray[np.float64]:
+    rows = RNG.normal(size=(count, 7))
+    rows[:, 3:] /= np.linalg.norm(rows[:, 3:], axis=1)[:, None]
+    return rows
+
+
+def pose(row: NDArray[np.float64]) -> cm.Pose:
+    return cm.Pose(row[:3], row[3:])
+
+
+def test_contacts_agree_with_single_calls() -> None:
+    a = [SHAPES[k % 5] for k in range(COUNT)]
+    b = [SHAPES[k // 2 % 6] for k in range(COUNT)]
+    poses_a, poses_b = poses(), poses()
+    found = cm.contacts(a, poses_a, b, poses_b)
+    for k in range(COUNT):
+        one = cm.contact(a[k], pose(poses_a[k]), b[k], pose(poses_b[k]))
+        assert found.signed_distance[k] == pytest.approx(one.signed_distance, abs=1e-12)
+        assert found.error_bound[k] == pytest.approx(one.error_bound, rel=1e-3, abs=1e-12)
+        if abs(one.signed_distance) > 1e-3:
+            np.testing.assert_allclose(found.normal[k], one.normal, atol=1e-9)
+        np.testing.assert_allclose(
+            found.point_b[k] - found.point_a[k], found.signed_distance[k] * found.normal[k], atol=1e-12
+        )
+    assert found.overlaps.any() and not found.overlaps.all()
+
+
+def test_one_shape_and_one_pose_apply_to_all_pairs() -> None:
+    many = poses()
+    found = cm.contacts(SHAPES[0], cm.Pose(), SHAPES[2], many)
+    listed = cm.contacts([SHAPES[0]] * COUNT, [cm.Pose()] * COUNT, [SHAPES[2]] * COUNT, [pose(row) for row in many])
+    np.testing.assert_allclose(found.signed_distance, listed.signed_distance, atol=1e-14)
+    compound = cm.contacts(SHAPES[4], cm.Pose(), SHAPES[1], many)
+    assert len(compound) == COUNT
+
+
+def test_times_of_impact_agree_with_single_calls() -> None:
+    a = [SHAPES[k % 5] for k in range(COUNT)]
+    b = [SHAPES[k // 2 % 3] for k in range(COUNT)]
+    poses_a, poses_b = poses(), poses() + np.r_[4, np.zeros(6)]
+    twists = RNG.normal(size=(COUNT, 6)) - np.r_[3, np.zeros(5)]
+    found = cm.times_of_impact(a, poses_a, np.zeros(6), b, poses_b, twists, horizon=3.0)
+    for k in range(COUNT):
+        still, moving = cm.Motion(pose(poses_a[k])), cm.Motion(pose(poses_b[k]), twists[k, :3], twists[k, 3:])
+        one = cm.time_of_impact(a[k], still, b[k], moving, horizon=3.0)
+        assert found.status[k] == one.status
+        assert found.lower[k] == pytest.approx(one.lower, abs=1e-9)
+        assert found.upper[k] == pytest.approx(one.upper, abs=1e-9)
+    assert set(found.status) >= {"hit", "clear"}
+
+
+def test_progress_reports_every_part() -> None:
+    done: list[int] = []
+    count = 40_000
+    cm.contacts(cm.Sphere(1), cm.Pose(), cm.Sphere(1), poses(count), progress=done.append)
+    assert done == sorted(done) and len(done) == 3 and done[-1] == count
+
+
+def test_no_pairs_are_no_error() -> None:
+    assert len(cm.contacts(cm.Sphere(1), cm.Pose(), cm.Sphere(1), np.zeros((0, 7)))) == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (([SHAPES[0]] * 3, poses(2), SHAPES[1], cm.Pose()), "expected one length of all arguments"),
+        ((SHAPES[0], np.zeros((2, 7)), SHAPES[1], cm.Pose()), "unit length .* got one of length 0 in row 0"),
+        ((SHAPES[0], np.full((1, 7), np.nan), SHAPES[1], cm.Pose()), "finite numbers .* in row 0"),
+        ((SHAPES[0], np.zeros((2, 6)), SHAPES[1], cm.Pose()), r"an array \(N, 7\)"),
+        (("box", cm.Pose(), SHAPES[1], cm.Pose()), "shape A: expected a shape"),
+        (([], cm.Pose(), SHAPES[1], cm.Pose()), "shapes A: expected a shape"),
+        (([SHAPES[0], 7], cm.Pose(), SHAPES[1], cm.Pose()), "expected a shape"),
+    ],
+)
+def test_other_arguments_are_refused(arguments: tuple[object, ...], words: str) -> None:
+    with pytest.raises(cm.CollisionMonitorError, match=words):
+        cm.contacts(*arguments)  # type: ignore[arg-type]

@@ -1,0 +1,39 @@
+"""Runs the examples in the docstrings of the public names, and compares what they print."""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+from typing import Any
+
+import matplotlib
+import pytest
+
+import collision_monitor as cm
+
+matplotlib.use("agg")
+
+WITHOUT = {"__version__", "response", "contains", "cast_ray", "RayHits"} | {name for name in cm.__all__ if inspect.isclass(getattr(cm, name)) and (
+    issubclass(getattr(cm, name), Exception)
+)}  # fmt: skip
+"""Names that need no example."""
+
+FINDER = doctest.DocTestFinder(recurse=True)
+FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+
+
+def examples(name: str) -> list[doctest.DocTest]:
+    """Examples of a public name, and of the methods of a class."""
+    value: Any = getattr(cm, name)
+    globs = {**vars(inspect.getmodule(value)), "cm": cm} if inspect.getmodule(value) else {"cm": cm}
+    return [test for test in FINDER.find(value, name, globs=globs) if test.examples]
+
+
+@pytest.mark.parametrize("name", [name for name in cm.__all__ if name not in WITHOUT])
+def test_the_example_of_a_public_name_prints_what_it_says(name: str) -> None:
+    found = examples(name)
+    assert found, f"cm.{name}: expected an example in its docstring"
+    runner = doctest.DocTestRunner(optionflags=FLAGS, verbose=False)
+    for each in found:
+        runner.run(each)
+    assert runner.failures == 0
