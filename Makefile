@@ -53,6 +53,7 @@ QUICK := $(findstring --quick,$(ARGS))
 
 bench: setup ## time single calls, a start, full detection and every installed peer, the event list, the node; ARGS=--quick takes 3 minutes
 	@$(BIN)/python benchmarks/run.py $(ARGS)
+	@$(BIN)/python benchmarks/mesh_pairs.py $(QUICK)
 	@$(BIN)/python benchmarks/single_calls.py $(QUICK)
 	@$(BIN)/python benchmarks/first_start.py
 	@$(BIN)/python benchmarks/event_list.py $(if $(QUICK),--seconds 1)

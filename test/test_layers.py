@@ -18,7 +18,8 @@ PACKAGE = Path(__file__).parents[1] / NAME
 FLOORS: Final = (
     {"_jit", "errors", "tolerances", "records", "_version"},
     {"settings", "geometry"},
-    {"broad_phase", "narrow_phase", "meshes", "response"},
+    {"broad_phase", "narrow_phase", "response"},
+    {"meshes"},
     {"objects", "prediction", "robots"},
     {"query", "detection", "monitor", "codec", "world"},
     {"pipeline", "warm_up"},

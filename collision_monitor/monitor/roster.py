@@ -12,8 +12,11 @@ from collision_monitor._jit import kernel
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.planar import flat_pose, is_planar
-from collision_monitor.geometry.shape_table import POLYGON, ShapeTable, ShapeTableBuilder
-from collision_monitor.geometry.shapes import HalfSpace, array_bytes
+from collision_monitor.geometry.shape_table import POLYGON, SHARED, TREE, ShapeTable, ShapeTableBuilder
+from collision_monitor.geometry.shapes import HalfSpace, Mesh, array_bytes
+from collision_monitor.meshes.shape_trees import shape_tree
+from collision_monitor.meshes.slot_trees import plant_trees
+from collision_monitor.monitor.mesh_snapshot import mesh_arrays, plant_meshes
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled, monitored_model
@@ -39,10 +42,16 @@ COPIES: Final = 4
 the table has up to twice the room that it needs."""
 
 
+TREE_BYTES: Final = 300
+"""Memory of a triangle in the tree of its mesh: 150 to 220 bytes, and the array of all trees may have half as much room
+again."""
+
+
 def memory(d: ObjectDescription) -> int:
     """Return the memory that a described object needs (bytes), rounded up."""
     shapes = sum(SHAPE_BYTES + COPIES * array_bytes(shape) for shape, _ in d.shapes)
-    return OBJECT_BYTES + shapes + ALLOWED_BYTES * len(d.allowed)
+    trees = TREE_BYTES * sum(len(shape.faces) for shape, _ in d.shapes if isinstance(shape, Mesh))
+    return OBJECT_BYTES + shapes + trees + ALLOWED_BYTES * len(d.allowed)
 
 
 class Roster(Stage):
@@ -178,11 +187,14 @@ class Roster(Stage):
         slots: list[int] = []
         try:
             for (shape, offset), chosen in zip(modelled.pieces, corners, strict=True):
-                slots.append(self._shapes.append(shape, flat_pose(offset) if planar else offset, d.padding, chosen))
+                tree = shape_tree(shape) if isinstance(shape, Mesh) else None
+                placed = flat_pose(offset) if planar else offset
+                slots.append(self._shapes.append(shape, placed, d.padding, chosen, tree))
         except Exception:
             for slot in slots:
                 self._shapes.remove(slot)
             raise
+        plant_trees(self._shapes)
         i = self._slots.get(d.object_id)
         if i is None:
             i = self._slots[d.object_id] = self._new_body()
@@ -290,12 +302,16 @@ class Roster(Stage):
         """See Stage."""
         top, shapes = self.top, self._shapes.used
         free_shapes, free_blocks = self._shapes.free
+        size = shapes.size.copy()
+        size[shapes.kind != ShapeType.HALF_SPACE, TREE] = 0.0  # `restore` builds the trees again
         snapshot.arrays.update(
             {
                 **{f"bodies.{name}": column[:top].copy() for name, column in self.bodies._asdict().items()},
                 **{f"parts.{name}": column[: len(shapes.kind)].copy() for name, column in self.parts._asdict().items()},
-                **{f"shapes.{name}": column.copy() for name, column in shapes._asdict().items()},
+                **{f"shapes.{name}": getattr(shapes, name).copy() for name in shapes._fields if name != "blocks"},
                 "shapes.vertices": shapes.vertices.T.copy(),
+                "shapes.size": size,
+                **mesh_arrays(shapes),
             }
         )
         facts |= {
@@ -343,9 +359,10 @@ class Roster(Stage):
         rows = {
             name: snapshot.array(f"shapes.{name}", column, len(kind))
             for name, column in like._asdict().items()
-            if name not in ("vertices", "vertex_index")
+            if name not in SHARED
         }
-        table = ShapeTable(**rows, vertices=vertices, vertex_index=index)
+        table = ShapeTable(**rows, vertices=vertices, vertex_index=index, blocks=like.blocks)
+        table.size[table.kind != ShapeType.HALF_SPACE, TREE] = 0.0
         check_range("shapes.kind", table.kind, 0, max(ShapeType) + 1)
         check_range("shapes.vertex_start", table.vertex_start, 0, len(index) + 1)
         check_range("shapes.vertex_count", table.vertex_count, 0, len(index) + 1)
@@ -358,6 +375,7 @@ class Roster(Stage):
             raise InputError(f"snapshot, shapes.size: expected as many corners as there are, got {corners.tolist()}")
         free_blocks = {count: list(starts) for count, starts in facts["free_blocks"]}
         self._shapes = ShapeTableBuilder.restored(table, list(facts["free_shapes"]), free_blocks)
+        plant_meshes(self._shapes, snapshot)
 
 
 def _check_chains(bodies: Bodies, parts: Parts, kind: NDArray[Any]) -> None:

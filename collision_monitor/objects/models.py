@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.geometry.bounding_spheres import minimal_sphere
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
-from collision_monitor.geometry.convex_pieces import convex_pieces
+from collision_monitor.geometry.convex_pieces import convex_pieces, is_concave_mesh
 from collision_monitor.geometry.coordinates import coordinates
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
 from collision_monitor.geometry.planar import is_planar
@@ -120,27 +120,24 @@ def containing_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | 
     return Modelled([(piece, pose)], [0], chosen, _excess(shapes, pieces, piece, pose), convex)
 
 
-def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model) -> Modelled:
-    """Compute the model that a monitor uses: AUTO means EXACT, but the convex hull for each concave mesh.
-
-    Raises UnsupportedError for a concave mesh with the model EXACT.
-    """
-    concave = [isinstance(shape, Mesh) and len(convex_pieces(shape)) > 1 for shape, _ in shapes]
-    if model is Model.EXACT and any(concave):
-        raise UnsupportedError("a concave Mesh is not tested exactly; supported are auto (its convex hull) and coarser")
-    if model is not Model.AUTO or not any(concave):
-        return containing_model(shapes, model)
-    parts = [
-        containing_model([pair], Model.CONVEX_HULL if bent else Model.EXACT)
-        for pair, bent in zip(shapes, concave, strict=True)
-    ]
-    return Modelled(
-        pieces=[piece for part in parts for piece in part.pieces],
-        shapes=[k for k, part in enumerate(parts) for _ in part.pieces],
-        model=Model.CONVEX_HULL,
-        excess=max(part.excess for part in parts),
-        convex=False,
-    )
+def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | int) -> Modelled:
+    """Compute the model that a monitor uses, as `containing_model`; but an exact concave mesh stays one piece."""
+    chosen = parse_model(model)
+    if chosen not in (Model.AUTO, Model.EXACT):
+        return containing_model(shapes, chosen)
+    pieces: PosedShapes = []
+    index = []
+    for k, (shape, pose) in enumerate(shapes):
+        if is_concave_mesh(shape):
+            pieces.append((shape, pose))
+            index.append(k)
+            continue
+        placed = pose.position.any() or pose.quaternion[3] != 1.0
+        for part, offset in convex_pieces(shape):
+            pieces.append((part, pose @ offset if placed else offset))
+            index.append(k)
+    convex = len(pieces) == 1 and not isinstance(pieces[0][0], Mesh)
+    return Modelled(pieces, index, Model.EXACT, 0.0, convex)
 
 
 def _decomposed(shapes: Sequence[tuple[Shape, Pose]], convex: bool) -> Modelled:

@@ -6,6 +6,7 @@ constructor would normalise the quaternion again and could change the last bit, 
 
 from __future__ import annotations
 
+from dataclasses import fields
 from io import BytesIO
 from typing import Any, Final
 from zipfile import BadZipFile
@@ -38,7 +39,7 @@ def encode_model(model: Modelled | str) -> bytes:
         "corners": np.array([corners is not None for corners in model.corners], np.bool_),
     }
     for k, (piece, _) in enumerate(model.pieces):
-        arrays |= {f"{k}.{name}": np.asarray(value) for name, value in vars(piece).items()}
+        arrays |= {f"{k}.{field.name}": np.asarray(getattr(piece, field.name)) for field in fields(piece)}
     arrays |= {f"{k}/corners": corners for k, corners in enumerate(model.corners) if corners is not None}
     np.savez(buffer, allow_pickle=False, **arrays)
     return buffer.getvalue()

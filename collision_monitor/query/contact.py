@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Final, NamedTuple
@@ -13,13 +13,26 @@ from numpy.typing import ArrayLike, NDArray
 from collision_monitor.errors import PoseError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
 from collision_monitor.geometry.compound import shape_pairs
+from collision_monitor.geometry.convex_pieces import is_concave_mesh
 from collision_monitor.geometry.planar import is_planar
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
-from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape
-from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B, as_contacts
+from collision_monitor.geometry.shapes import Capsule, HalfSpace, Mesh, Shape, Sphere
+from collision_monitor.meshes.contact import APART, ENCLOSED, OPEN, contact_of_trees, reach_of
+from collision_monitor.meshes.extent import extents
+from collision_monitor.meshes.nearest import MEMORY, answer_row
+from collision_monitor.meshes.shape_trees import shape_tree, trees_of_pair
+from collision_monitor.narrow_phase.contact_row import (
+    BOUND,
+    CONTACT_SIZE,
+    DISTANCE,
+    NORMAL,
+    POINT_A,
+    POINT_B,
+    as_contacts,
+)
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.objects.models import containing_kdop, containing_model, parse_model
 from collision_monitor.query.convex_pairs import convex_contact
@@ -31,7 +44,9 @@ from collision_monitor.tolerances import FEATURE_TIE, UNIT_QUATERNION
 Array = NDArray[np.float64]
 Compound = Shape | Sequence[tuple[Shape, Pose]]
 
-_DIRECTIONS: Final = [sign * np.array(d) / np.linalg.norm(d) for d in KDOP_DIRECTIONS[26] for sign in (1.0, -1.0)]
+_DIRECTIONS: Final = np.array(
+    [sign * np.array(d) / np.linalg.norm(d) for d in KDOP_DIRECTIONS[26] for sign in (1.0, -1.0)]
+)
 
 _COLUMNS: Final = {"normal": NORMAL, "point_a": POINT_A, "point_b": POINT_B}
 _new, _set = object.__new__, object.__setattr__
@@ -78,7 +93,7 @@ class Contact:
     point_b: Array
     model_a: Model
     model_b: Model
-    _found: NearestPieces | None = field(repr=False)  # source of the patch; None: the two points alone
+    _find: Callable[[], NearestPieces] | None = field(repr=False)  # source of the patch; None: the two points alone
 
     def __getattr__(self, name: str) -> Any:
         """Make a field of the contact of two convex solids when it is first read."""
@@ -89,8 +104,9 @@ class Contact:
             value: Any = known["_row"][_COLUMNS[name] : _COLUMNS[name] + 3]
         elif name in ("model_a", "model_b"):
             value = Model.EXACT
-        elif name == "_found":
-            value = _nearest(*self.arguments)
+        elif name == "_find":
+            arguments = self.arguments
+            value = lambda: _nearest(*arguments)  # noqa: E731
         else:
             raise AttributeError(name)
         known[name] = value
@@ -119,24 +135,38 @@ class Contact:
 
         Otherwise `point_a` alone. Computed on first access.
         """
-        return self.point_a[None] if self._found is None else _patch(self._found, self.point_a)
+        return self.point_a[None] if self._find is None else _patch(self._find(), self.point_a)
 
     @cached_property
     def points_b(self) -> Array:
         """The same points on B: those on A plus the signed distance along the normal."""
-        return self.point_b[None] if self._found is None else self.points_a + self.signed_distance * self.normal
+        return self.point_b[None] if self._find is None else self.points_a + self.signed_distance * self.normal
 
 
-class _Posed(NamedTuple):
-    """One of the two objects at its pose, with the pieces that represent it."""
+@dataclass(frozen=True, eq=False)
+class _Posed:
+    """One of the two objects at its pose. outline: shapes that reach as far as its pieces."""
 
     shapes: Sequence[tuple[Shape, Pose]]
     pose: Pose
-    rotation: Array  # (3, 3), that of the pose
-    pieces: PieceTable
-    outline: Sequence[tuple[Shape, Pose]]  # shapes that reach as far as the pieces
-    model: Model
-    excess: float
+    outline: Sequence[tuple[Shape, Pose]]
+    model: Model = Model.EXACT
+    excess: float = 0.0
+
+    @property
+    def rotation(self) -> Array:
+        """That of the pose, (3, 3)."""
+        return self.pose.rotation
+
+    @cached_property
+    def pieces(self) -> PieceTable:
+        """Convex pieces that represent it."""
+        return exact_piece_table(self.shapes) if self.model is Model.EXACT else piece_table(self.outline)
+
+    @cached_property
+    def is_concave(self) -> bool:
+        """Whether it has several pieces."""
+        return any(is_concave_mesh(shape) for shape, _ in self.outline) or len(self.pieces) > 1
 
 
 def contact(
@@ -155,10 +185,13 @@ def contact(
     >>> cm.contact(cm.Box((1, 1, 1)), cm.Pose(), cm.Sphere(0.5), cm.Pose((2, 0, 0)))
     Contact(1 m ± ..., box face 0 – sphere surface)
     """
-    if isinstance(model, str) and model == "exact":
+    if isinstance(model, str | int) and model in ("exact", Model.EXACT):
         quick = convex_contact(shape_a, pose_a, shape_b, pose_b)
         if quick is not None:
             return _of_row(quick, (shape_a, pose_a, shape_b, pose_b))
+        apart = _meshes_apart(shape_a, pose_a, shape_b, pose_b)
+        if apart is not None:
+            return apart
     a, b = _posed(shape_a, pose_a, model, "A"), _posed(shape_b, pose_b, model, "B")
     planes = {is_planar(shape) for shape, _ in (*a.shapes, *b.shapes)}
     if len(planes) > 1:
@@ -171,16 +204,14 @@ def contact(
         _check_in_plane(a)
         _check_in_plane(b)
     offset = b.pose.position - a.pose.position
-    found = NearestPieces(a.pieces, (a.rotation, np.zeros(3)), b.pieces, (b.rotation, offset))
-    row = found.best
+    deepest = _by_trees(a, b)
+    if deepest is None:
+        deepest = _by_pieces(a, b, offset)
+    row, enclosed = deepest.row, deepest.enclosed
     distance, bound = float(row[DISTANCE]), float(row[BOUND])
     normal = row[NORMAL : NORMAL + 3].copy()
-    enclosed = distance > 0.0 and (_holds(a, b, offset) or _holds(b, a, -offset))
-    if enclosed:
-        # no surfaces meet, but one object is inside the other, at least this deep
-        distance, normal = -distance, -normal
-    point = a.pose.position + (row[POINT_A : POINT_A + 3] + found.position[found.pair[0]])
-    convex = len(a.pieces) == len(b.pieces) == 1
+    point = a.pose.position + row[POINT_A : POINT_A + 3]
+    convex = not (a.is_concave or b.is_concave)
     unbounded = distance == -np.inf  # exact: no length is involved that could be wrong
     if distance <= 0.0 and not convex and not unbounded:
         bound += max(_parting_translation(a, b, offset, normal) + distance, 0.0)
@@ -195,7 +226,7 @@ def contact(
         point_b=point.copy() if unbounded else point + distance * normal,
         model_a=a.model,
         model_b=b.model,
-        _found=None if enclosed or unbounded else found,
+        _find=None if enclosed or unbounded else deepest.pieces,
     )
     vars(made)["_arguments"] = shape_a, pose_a, shape_b, pose_b
     return made
@@ -216,18 +247,98 @@ def _nearest(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -
     return NearestPieces(a.pieces, (a.rotation, np.zeros(3)), b.pieces, (b.rotation, offset))
 
 
+def _meshes_apart(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -> Contact | None:
+    """The contact of two single shapes, one of which is a concave mesh, if they are apart; else None."""
+    if not (type(shape_a) is Mesh or type(shape_b) is Mesh):
+        return None
+    if not (isinstance(shape_a, Shape) and isinstance(shape_b, Shape)):
+        return None
+    if not (isinstance(pose_a, Pose) and isinstance(pose_b, Pose)):
+        return None
+    trees = trees_of_pair(shape_a, shape_b)
+    if trees is None:
+        return None
+    row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
+    X, Y = (pose_a.rotation, pose_a.position), (pose_b.rotation, pose_b.position)
+    if contact_of_trees(trees[0], *X, trees[1], *Y, np.inf, row, answer, work) != APART:
+        return None
+
+    distance, normal = float(row[DISTANCE]), row[NORMAL : NORMAL + 3]
+    point = pose_a.position + row[POINT_A : POINT_A + 3]
+    far = point + distance * normal
+    arguments = shape_a, pose_a, shape_b, pose_b
+    made = Contact(
+        distance, float(row[BOUND]), normal, point, far, Model.EXACT, Model.EXACT, lambda: _nearest(*arguments)
+    )
+    vars(made)["_arguments"] = arguments
+    return made
+
+
+class _Deepest(NamedTuple):
+    """The nearest or deepest contact of two objects, about A's origin in world axes.
+
+    pieces: finds the pieces that touch in one plane. enclosed: no surfaces meet, but one object is inside the other.
+    """
+
+    row: Array
+    pieces: Callable[[], NearestPieces]
+    enclosed: bool
+
+
+def _by_pieces(a: _Posed, b: _Posed, offset: Array) -> _Deepest:
+    found = NearestPieces(a.pieces, (a.rotation, np.zeros(3)), b.pieces, (b.rotation, offset))
+    row = found.best.copy()
+    row[POINT_A : POINT_A + 3] += found.position[found.pair[0]]
+    enclosed = bool(row[DISTANCE] > 0.0 and (_holds(a, b, offset) or _holds(b, a, -offset)))
+    if enclosed:  # at least this deep
+        row[DISTANCE] *= -1.0
+        row[NORMAL : NORMAL + 3] *= -1.0
+    return _Deepest(row, lambda: found, enclosed)
+
+
+def _by_trees(a: _Posed, b: _Posed) -> _Deepest | None:
+    """The contact through the trees of two single shapes, one of which is a concave mesh; None for others.
+
+    The pieces also know how deep a triangle is inside a convex solid, so an overlap with one is left to them.
+    """
+    pair = a.outline[0][0], b.outline[0][0]
+    if len(a.outline) > 1 or len(b.outline) > 1 or not any(is_concave_mesh(shape) for shape in pair):
+        return None
+    trees = shape_tree(pair[0]), shape_tree(pair[1])
+    if trees[0] is None or trees[1] is None:
+        return None
+    row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
+    (R_a, p_a), (R_b, p_b) = _place(a), _place(b)
+    p_b = p_b + (b.pose.position - a.pose.position)
+    known = contact_of_trees(trees[0], R_a, p_a, trees[1], R_b, p_b, np.inf, row, answer, work)
+    if known != APART and not all(isinstance(shape, Mesh | Sphere | Capsule) for shape in pair):
+        return None
+    if known == OPEN:
+        row[BOUND] += reach_of(trees[0]) + reach_of(trees[1]) + float(np.linalg.norm(p_b - p_a))
+    row[POINT_A : POINT_A + 3] += p_a
+    offset = b.pose.position - a.pose.position
+    return _Deepest(row, lambda: _by_pieces(a, b, offset).pieces(), known == ENCLOSED)
+
+
+def _place(side: _Posed) -> tuple[Array, Array]:
+    """Rotation (3, 3) and position (3,), about the object's origin, of its only shape, in world axes."""
+    own = side.outline[0][1]
+    if own.quaternion[3] == 1.0 and not own.position.any():
+        return side.rotation, np.zeros(3)
+    return side.rotation @ own.rotation, side.rotation @ own.position
+
+
 def _posed(shape: Compound, pose: Pose, model: Model | str | ArrayLike, name: str) -> _Posed:
     shapes = shape_pairs(shape, f"shape {name}")
     if not isinstance(pose, Pose):
         raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
     if isinstance(model, str | int):
         if parse_model(model) in (Model.AUTO, Model.EXACT):
-            return _Posed(shapes, pose, pose.rotation, exact_piece_table(shapes), shapes, Model.EXACT, 0.0)
+            return _Posed(shapes, pose, shapes)
         modelled = containing_model(shapes, model)
     else:
         modelled = containing_kdop(shapes, model)
-    pieces = piece_table(modelled.pieces)
-    return _Posed(shapes, pose, pose.rotation, pieces, modelled.pieces, modelled.model, modelled.excess)
+    return _Posed(shapes, pose, modelled.pieces, modelled.model, modelled.excess)
 
 
 def _check_in_plane(side: _Posed) -> None:
@@ -237,7 +348,7 @@ def _check_in_plane(side: _Posed) -> None:
 
 def _holds(outer: _Posed, inner: _Posed, offset: Array) -> bool:
     """Whether a closed mesh of `outer` contains a piece of `inner`, at `offset` (m) from it; no surfaces meet."""
-    if outer.model is not Model.EXACT or len(outer.pieces) == 1:
+    if outer.model is not Model.EXACT or not outer.is_concave:
         return False
     points = offset + inner.pieces.inner @ inner.rotation.T
     for shape, pose in outer.shapes:
@@ -254,15 +365,24 @@ def _holds(outer: _Posed, inner: _Posed, offset: Array) -> bool:
 
 def _parting_translation(a: _Posed, b: _Posed, offset: Array, normal: Array) -> float:
     """Length (m) of the shortest translation that certainly parts the two, along the normal or an axis of either."""
-    axes = [side.rotation @ direction for side in (a, b) for direction in _DIRECTIONS]
     planes = [
         sign * side.rotation @ pose.rotation @ shape.normal
         for side, sign in ((a, 1.0), (b, -1.0))
         for shape, pose in side.outline
         if isinstance(shape, HalfSpace)
     ]
-    directions = np.array([normal, *axes, *planes])
+    axes = [_DIRECTIONS @ side.rotation.T for side in (a, b)]
+    directions = np.concatenate([normal[None], *axes, np.reshape(planes, (-1, 3))])
     if is_planar(a.shapes[0][0]):
         directions = directions[directions[:, 2] == 0.0]
-    ends = reach(a.outline, directions @ a.rotation) - directions @ offset
-    return float((ends + reach(b.outline, -directions @ b.rotation)).min())
+    ends = _reach(a, directions @ a.rotation) - directions @ offset
+    return float((ends + _reach(b, -directions @ b.rotation)).min())
+
+
+def _reach(side: _Posed, directions: Array) -> Array:
+    """How far an object reaches in directions (n, 3) in its own frame (m)."""
+    shape, pose = side.outline[0]
+    tree = shape_tree(shape) if len(side.outline) == 1 and isinstance(shape, Mesh) else None
+    if tree is None:
+        return reach(side.outline, directions)
+    return extents(tree, directions @ pose.rotation) + directions @ pose.position

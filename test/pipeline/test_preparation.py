@@ -18,6 +18,7 @@ from collision_monitor.pipeline.pipeline import Pipeline, TakenShapes
 from collision_monitor.pipeline.preparation import STAYS, Preparation
 from collision_monitor.records import STATE, Model
 from collision_monitor.session.replaying.difference import compare_status
+from collision_monitor.settings.profile import Profile
 
 PATIENCE = 30.0
 """s for the process to start and to make a model; on a loaded machine."""
@@ -36,6 +37,7 @@ def dented(subdivisions: int, phase: float = 0.0) -> Mesh:
 
 
 HEAVY = dented(3)
+HULLS = Profile.named("balanced").replace(model_mesh="convex_hull")  # an exact mesh is not heavy
 BALL = ObjectDescription(2, Sphere(0.5))
 
 
@@ -52,7 +54,7 @@ class Run:
 
     def __init__(self, preparation: Preparation) -> None:
         self.preparation = preparation
-        self.pipeline = Pipeline("balanced", preparation=self.preparation)
+        self.pipeline = Pipeline(HULLS, preparation=self.preparation)
         self.inputs: list[tuple[str, bytes]] = []
         self.answers: list[tuple[bytes, bytes]] = []
         self.texts: list[str] = []
@@ -86,7 +88,7 @@ class Run:
 
     def replayed(self) -> list[tuple[bytes, bytes]]:
         """The answers to the inputs as they were taken, of a pipeline without a preparation and without a clock."""
-        pipeline, answers = Pipeline("balanced", timed=False), []
+        pipeline, answers = Pipeline(HULLS, timed=False), []
         for kind, data in self.inputs:
             if kind == "shapes":
                 pipeline.on_shapes(data)
@@ -169,7 +171,7 @@ def test_a_model_that_takes_too_long_is_given_up_and_said():
         (text,) = run.texts
         assert text == f"object 1: the model takes longer than 0.05 s; it {STAYS}"
         assert run.last_refusal == text
-        pipeline = Pipeline("balanced", timed=False)
+        pipeline = Pipeline(HULLS, timed=False)
         pipeline.on_shapes(run.inputs[0][1])
         recorded, replayed = run.pipeline.status(), pipeline.status()
         assert recorded != replayed and compare_status("status", 0, recorded, replayed) is None
@@ -358,6 +360,6 @@ def test_one_megabyte_holds_the_thread_for_a_tenth_of_a_second(run, make):
 
 def test_a_half_space_with_a_heavy_mesh_is_refused_with_a_text(run):
     both = [(HEAVY, Pose()), (HalfSpace((0, 0, 1)), Pose())]
-    run.describe(ObjectDescription(1, both, static=True, pose=Pose()), BALL)
+    run.describe(ObjectDescription(1, both, static=True, pose=Pose(), model=Model.CONVEX_HULL), BALL)
     assert run.pipeline.monitor.ids == [2]
     assert "describe its other shapes alone" in run.last_refusal
