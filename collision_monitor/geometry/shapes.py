@@ -6,6 +6,7 @@ Every constructor raises ShapeError for impossible values.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import ShapeError
+from collision_monitor.geometry.surface import Surface
 from collision_monitor.tolerances import LARGEST_INPUT
 
 Array = NDArray[np.float64]
@@ -133,11 +135,12 @@ class ConvexHull(Shape):
         object.__setattr__(self, "points", points)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Mesh(Shape):
     """Triangle surface, convex or not: vertices (n, 3) in m, faces (m, 3) of vertex indices.
 
-    Faces are counter-clockwise seen from outside.
+    Faces are counter-clockwise seen from outside. Vertices with equal coordinates are one point. Where the surface is
+    not closed, the bounds of answers include what its unknown inside may change (see `surface`).
     """
 
     vertices: Any
@@ -160,6 +163,15 @@ class Mesh(Shape):
         faces.setflags(write=False)
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces)
+
+    @cached_property
+    def surface(self) -> Surface:
+        """Welded faces, and whether they close and are oriented. Computed on first access, 2 s for 10^6 faces."""
+        return Surface(self.vertices, self.faces)
+
+    def __repr__(self) -> str:
+        welded = f", {self.surface.welded} of them welded" if self.surface.welded else ""
+        return f"Mesh({len(self.vertices)} vertices{welded}, {len(self.faces)} faces: {self.surface})"
 
 
 @dataclass(frozen=True, eq=False)

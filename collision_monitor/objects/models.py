@@ -16,9 +16,10 @@ from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.geometry.bounding_spheres import minimal_sphere
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
 from collision_monitor.geometry.convex_pieces import convex_pieces
+from collision_monitor.geometry.inside import locate_in_surface
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
 from collision_monitor.geometry.planar import is_planar
-from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
+from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shape_table import ShapeTableBuilder, take
@@ -260,9 +261,10 @@ def _excess_around_concave(
         centres = centres[_distances(centres, [(model, pose)]) <= slack]
     inside = np.zeros(len(centres), bool)
     for shape, offset in shapes:
-        if isinstance(shape, Mesh) and is_closed(shape.faces):
+        if isinstance(shape, Mesh):
             own = (centres - offset.position) @ offset.rotation
-            inside |= locate_in_polyhedron(own, shape.vertices, shape.faces) >= 0
+            location = locate_in_surface(own, shape.surface)
+            inside |= (location == Location.INSIDE) | (location == Location.BOUNDARY)
     centres = centres[~inside]
     if not len(centres):
         return slack

@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 from collision_monitor.errors import PoseError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
 from collision_monitor.geometry.compound import shape_pairs
+from collision_monitor.geometry.inside import UNKNOWN, locate_in_surface
 from collision_monitor.geometry.planar import is_planar
 from collision_monitor.geometry.point_in_polygon import Location
-from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, as_contacts
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.objects.models import containing_model, parse_model
+from collision_monitor.query.fillings import fillings
 from collision_monitor.query.nearest_pieces import NearestPieces
 from collision_monitor.query.piece_table import PieceTable, exact_piece_table, piece_table
 from collision_monitor.records import Model
@@ -99,6 +100,7 @@ class _Posed(NamedTuple):
     outline: Sequence[tuple[Shape, Pose]]  # shapes that reach as far as the pieces
     model: Model
     excess: float
+    fillings: Sequence[tuple[Shape, Pose]]  # boxes around the holes of its meshes
 
 
 def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, model: Model | str = "exact") -> Contact:
@@ -107,7 +109,8 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
     model: model of both, "exact" or one that contains them ("sphere", "aabb", "obb", "kdop14", "convex_hull", …), which
     is coarser; the error bound includes its error.
     If one of them is concave and they overlap, the depth is that of the deepest pair of their convex pieces, and the
-    bound extends to a translation that certainly parts them.
+    bound extends to a translation that certainly parts them. Where a mesh is not closed, the distance is that of its
+    surface, and the bound includes the solids that the surface may belong to (see `fillings`).
     Raises ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, or a model that is not available.
     """
     a, b = _posed(shape_a, pose_a, model, "A"), _posed(shape_b, pose_b, model, "B")
@@ -126,7 +129,8 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
     row = found.best
     distance, bound = float(row[DISTANCE]), float(row[BOUND])
     normal = row[NORMAL : NORMAL + 3].copy()
-    enclosed = distance > 0.0 and (_holds(a, b, offset) or _holds(b, a, -offset))
+    where = {_where(a, b, offset), _where(b, a, -offset)} if distance > 0.0 else set()
+    enclosed = Location.INSIDE in where
     if enclosed:
         # no surfaces meet, but one object is inside the other, at least this deep
         distance, normal = -distance, -normal
@@ -135,6 +139,11 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
     unbounded = distance == -np.inf  # exact: no length is involved that could be wrong
     if distance <= 0.0 and not convex and not unbounded:
         bound += max(_parting_translation(a, b, offset, normal) + distance, 0.0)
+    if distance > 0.0 and (UNKNOWN in where or a.fillings or b.fillings):
+        least = _least_distance(a, b, offset)
+        if UNKNOWN in where or least <= 0.0:
+            least = -_parting_translation(a, b, offset, normal)
+        bound = max(bound, distance - least)
     excess = a.excess + b.excess
     if distance <= 0.0 and excess > 0.0 and not all(len(exact_piece_table(side.shapes)) == 1 for side in (a, b)):
         bound -= distance  # the models may overlap deeply although the concave objects are apart
@@ -155,10 +164,11 @@ def _posed(shape: Compound, pose: Pose, model: Model | str, name: str) -> _Posed
     if not isinstance(pose, Pose):
         raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
     if parse_model(model) in (Model.AUTO, Model.EXACT):
-        return _Posed(shapes, pose, pose.rotation, exact_piece_table(shapes), shapes, Model.EXACT, 0.0)
+        exact = exact_piece_table(shapes)
+        return _Posed(shapes, pose, pose.rotation, exact, shapes, Model.EXACT, 0.0, fillings(shapes))
     modelled = containing_model(shapes, model)
     pieces = piece_table(modelled.pieces)
-    return _Posed(shapes, pose, pose.rotation, pieces, modelled.pieces, modelled.model, modelled.excess)
+    return _Posed(shapes, pose, pose.rotation, pieces, modelled.pieces, modelled.model, modelled.excess, ())
 
 
 def _check_in_plane(side: _Posed) -> None:
@@ -166,21 +176,36 @@ def _check_in_plane(side: _Posed) -> None:
         raise PoseError(f"expected a turn about z for a shape of the plane, got the quaternion {side.pose.quaternion}")
 
 
-def _holds(outer: _Posed, inner: _Posed, offset: Array) -> bool:
-    """Whether a closed mesh of `outer` contains a piece of `inner`, at `offset` (m) from it; no surfaces meet."""
+def _where(inner: _Posed, outer: _Posed, offset: Array) -> int:
+    """Location of `inner` in the meshes of `outer`, at `offset` (m) from it; no surfaces meet."""
+    found: int = Location.OUTSIDE
     if outer.model is not Model.EXACT or len(outer.pieces) == 1:
-        return False
-    points = offset + inner.pieces.inner @ inner.rotation.T
+        return found
+    points = inner.pieces.inner @ inner.rotation.T - offset
     for shape, pose in outer.shapes:
         if not isinstance(shape, Mesh):
             continue
         own = (points - outer.rotation @ pose.position) @ (outer.rotation @ pose.rotation)
         own = own[((own >= shape.vertices.min(axis=0)) & (own <= shape.vertices.max(axis=0))).all(axis=1)]
-        if not len(own) or not is_closed(shape.faces):
-            continue
-        if (locate_in_polyhedron(own, shape.vertices, shape.faces) >= Location.BOUNDARY).any():
-            return True
-    return False
+        if len(own):
+            location = locate_in_surface(own, shape.surface)
+            if ((location == Location.INSIDE) | (location == Location.BOUNDARY)).any():
+                return Location.INSIDE
+            if (location == UNKNOWN).any():
+                found = UNKNOWN
+    return found
+
+
+def _least_distance(a: _Posed, b: _Posed, offset: Array) -> float:
+    """Lower bound (m) of the distances of each object from the fillings of the other; infinite without fillings."""
+    X_A, X_B = (a.rotation, np.zeros(3)), (b.rotation, offset)
+    solid_a, solid_b = (piece_table(side.fillings) if side.fillings else None for side in (a, b))
+    least = np.inf
+    for own, other in ((solid_a, b.pieces), (a.pieces, solid_b), (solid_a, solid_b)):
+        if own is not None and other is not None:
+            best = NearestPieces(own, X_A, other, X_B).best
+            least = min(least, float(best[DISTANCE] - best[BOUND]))
+    return least
 
 
 def _parting_translation(a: _Posed, b: _Posed, offset: Array, normal: Array) -> float:
