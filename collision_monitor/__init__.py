@@ -39,6 +39,7 @@ _HOME = {
     "Capsule": "geometry.shapes",
     "Cylinder": "geometry.shapes",
     "Cone": "geometry.shapes",
+    "Ellipsoid": "geometry.shapes",
     "ConvexHull": "geometry.shapes",
     "Mesh": "geometry.shapes",
     "HalfSpace": "geometry.shapes",
@@ -87,6 +88,7 @@ if TYPE_CHECKING:
     from collision_monitor.geometry.shapes import Cone as Cone
     from collision_monitor.geometry.shapes import ConvexHull as ConvexHull
     from collision_monitor.geometry.shapes import Cylinder as Cylinder
+    from collision_monitor.geometry.shapes import Ellipsoid as Ellipsoid
     from collision_monitor.geometry.shapes import HalfSpace as HalfSpace
     from collision_monitor.geometry.shapes import Mesh as Mesh
     from collision_monitor.geometry.shapes import Polygon as Polygon

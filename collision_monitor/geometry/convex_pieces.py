@@ -36,8 +36,8 @@ def convex_pieces(shape: Shape) -> tuple[tuple[Shape, Pose], ...]:
     result is cached. Raises ShapeError.
     """
     match shape:
-        case Polygon() if not is_convex(shape.points):
-            return tuple((Polygon(shape.points[part]), Pose()) for part in convex_parts(shape.points))
+        case Polygon() if len(shape.points) > 2 and not is_convex(shape.points):
+            return tuple((Polygon(shape.points[part], shape.radius), Pose()) for part in convex_parts(shape.points))
         case Mesh() if is_convex_mesh(shape):
             return ((ConvexHull(shape.vertices[np.unique(shape.surface.faces)]), Pose()),)
         case Mesh():

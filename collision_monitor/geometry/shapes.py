@@ -120,6 +120,22 @@ class Cone(Shape):
         object.__setattr__(self, "length", _positive(self.length, "Cone length"))
 
 
+@dataclass(frozen=True)
+class Ellipsoid(Shape):
+    """Ellipsoid; radii: half axes along x, y, z in m."""
+
+    radii: Any
+
+    def __post_init__(self) -> None:
+        try:
+            radii = tuple(self.radii)
+        except TypeError:
+            raise ShapeError(f"Ellipsoid radii: expected 3 half axes in metres, got {self.radii!r}") from None
+        if len(radii) != 3:
+            raise ShapeError(f"Ellipsoid radii: expected 3 half axes in metres, got {self.radii!r}")
+        object.__setattr__(self, "radii", tuple(_positive(radius, "Ellipsoid radii") for radius in radii))
+
+
 @dataclass(frozen=True, eq=False)
 class ConvexHull(Shape):
     """Convex hull of points (n, 3) in m, n >= 4 and not all in one plane; interior points are allowed."""
@@ -221,10 +237,18 @@ class Circle(Shape):
 
 @dataclass(frozen=True, eq=False)
 class Polygon(Shape):
-    """Polygon in the x-y plane: points (n, 2) in m around the boundary of a simple polygon, convex or concave."""
+    """Polygon in the x-y plane: points (n, 2) in m around the boundary of a simple polygon, convex or concave.
+
+    radius: the polygon is grown by this length (m), which rounds its corners. With a radius, two points make a capsule.
+    """
 
     points: Any
+    radius: float = 0.0
 
     def __post_init__(self) -> None:
-        points = _points(self.points, "Polygon points", 2, 3)
+        radius = self.radius if self.radius == 0.0 else _positive(self.radius, "Polygon radius")
+        points = _points(self.points, "Polygon points", 2, 2 if radius else 3)
+        if len(points) == 2 and (points[0] == points[1]).all():
+            raise ShapeError("Polygon points: expected two different points, got the same twice (use a Circle)")
         object.__setattr__(self, "points", points)
+        object.__setattr__(self, "radius", float(radius))

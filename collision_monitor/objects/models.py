@@ -29,6 +29,7 @@ from collision_monitor.geometry.shapes import (
     Cone,
     ConvexHull,
     Cylinder,
+    Ellipsoid,
     HalfSpace,
     Mesh,
     Shape,
@@ -161,7 +162,7 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
     single = len(pieces) == 1
     match model:
         case Model.SPHERE:
-            if single and isinstance(shape, Sphere | Box | Capsule | Cylinder):
+            if single and isinstance(shape, Sphere | Box | Capsule | Cylinder | Ellipsoid):
                 return Sphere(float(reach([(shape, Pose())], _widest(shape))) * (1 + ROUNDED_UP)), pose
             ball = minimal_sphere(_corners(pieces))
             return Sphere(float(ball.radius) * (1 + ROUNDED_UP)), Pose(ball.center)
@@ -180,7 +181,7 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
             turned = Rotation.from_matrix(axes).as_quat()
             return _box(2 * box.half_extents), Pose(box.center, turned)
         case Model.CONVEX_HULL:
-            if any(isinstance(s, Sphere | Capsule | Cylinder | Cone) for s, _ in pieces):
+            if any(isinstance(s, Sphere | Capsule | Cylinder | Cone | Ellipsoid) for s, _ in pieces):
                 if single:
                     return shape, pose
                 raise UnsupportedError("model convex_hull: the hull of several shapes with round ones is not offered")
@@ -188,11 +189,13 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
     return _kdop(pieces, KDOPS[model])
 
 
-def _widest(shape: Sphere | Box | Capsule | Cylinder) -> Array:
+def _widest(shape: Sphere | Box | Capsule | Cylinder | Ellipsoid) -> Array:
     """Direction in which a shape that is symmetric about its origin extends farthest."""
     match shape:
         case Box():
             d = np.array(shape.size)
+        case Ellipsoid():
+            d = np.eye(3)[int(np.argmax(shape.radii))]
         case Cylinder():
             d = np.array([shape.radius, 0.0, shape.length / 2])
         case _:

@@ -119,7 +119,7 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
         kinds = sorted({type(shape).__name__ for shape, _ in (*a.shapes, *b.shapes)})
         raise UnsupportedError(
             "Circle and Polygon meet each other only; supported are pairs of Circle, Polygon, or of "
-            f"Sphere, Box, Capsule, Cylinder, Cone, ConvexHull, Mesh, HalfSpace; got {', '.join(kinds)}"
+            f"Sphere, Box, Capsule, Cylinder, Cone, Ellipsoid, ConvexHull, Mesh, HalfSpace; got {', '.join(kinds)}"
         )
     if planes == {True}:
         _check_in_plane(a)
