@@ -49,7 +49,7 @@ def surface_triangles(shape: Shape) -> Triangles:
             return _revolve(np.array([0.0, shape.radius, 0.0]), np.array([-h, -h, h]))
         case Ellipsoid():
             angles = np.linspace(-np.pi / 2, np.pi / 2, SIDES // 2 + 1)
-            return _revolve(np.cos(angles), np.sin(angles)) * np.array(shape.radii)
+            return np.asarray(_revolve(np.cos(angles), np.sin(angles)) * shape.radii)
         case Circle():
             return _revolve(np.array([0.0, shape.radius]), np.zeros(2))
         case Mesh():

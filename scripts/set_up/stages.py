@@ -262,7 +262,7 @@ STAGES = (
 )
 
 MODULES = (
-    *("scipy", "numba", "trimesh", "fcl", "mcap", "rich", "matplotlib", "yaml"),
+    *("scipy", "numba", "trimesh", "collada", "fcl", "mcap", "rich", "matplotlib", "yaml"),
     *("pytest", "hypothesis", "rosbags", "mypy", "colcon_core"),
 )
 
