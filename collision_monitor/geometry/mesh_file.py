@@ -68,7 +68,7 @@ def _read(file: Path) -> tuple[Array, NDArray[np.int64], float]:
     if not file.is_file():
         raise ShapeError(f"{file}: expected a mesh file, got {'a folder' if file.is_dir() else 'no file there'}")
     if file.stat().st_size > LARGEST_FILE:
-        raise ShapeError(f"{file}: expected a file of at most {LARGEST_FILE >> 30} GiB, got {file.stat().st_size} bytes")
+        raise ShapeError(f"{file}: expected at most {LARGEST_FILE >> 30} GiB, got {file.stat().st_size} bytes")
     try:
         with file.open("rb") as stream:
             scene = trimesh.load_scene(stream, file_type=kind, process=False, skip_materials=True)
