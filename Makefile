@@ -11,7 +11,7 @@ unexport PYTHONPATH
 endif
 unexport PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup demo test test-core lint fuzz soak bench bench-peers clean
+.PHONY: help setup demo test test-core lint fuzz fuzz-files soak bench bench-peers clean
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -30,14 +30,15 @@ test: ## set up, lint and run every test
 test-core: setup ## run the tests, except those of the node and of the set-up
 	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore=test/ros --ignore=test/setup
 
-fuzz-files: setup ; @$(BIN)/python test/attacks/fuzz_sessions.py $(ARGS) ## read damaged and hostile copies of sessions; ARGS=--files=100000
-
 lint: setup ## run ruff and mypy --strict
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
 
 fuzz: setup ## attack the monitor with hostile messages; ARGS="--messages 1000000 --seed 7", --dds for a node
 	@$(BIN)/python test/attacks/fuzz_messages.py $(ARGS)
+
+fuzz-files: setup ## read damaged and hostile copies of sessions; ARGS="--files 100000"
+	@$(BIN)/python test/attacks/fuzz_sessions.py $(ARGS)
 
 soak: setup ## simulate 24 h of objects that come, change and go, and compare with plain recomputation; ARGS="--hours 1"
 	@$(BIN)/python benchmarks/soak.py $(ARGS)

@@ -37,6 +37,23 @@ class SessionError(CollisionMonitorError):
     """A recording cannot be opened, read or written."""
 
 
+def reason_of(error: Exception) -> str:
+    """Return the text with which one object of a message is refused, so that the others go on.
+
+    Our own errors have a text for users. Every other exception is an error in this program or in a library below it
+    (LinAlgError, OverflowError, ZeroDivisionError, IndexError, …) or a lack of memory or stack (MemoryError,
+    RecursionError). A monitor must not end for any of them, because the topic is latched and the next one would
+    receive the same message. The text names the type. KeyboardInterrupt and SystemExit are no Exception.
+    """
+    if isinstance(error, CollisionMonitorError):
+        return str(error)
+    return f"it cannot be monitored, for an unexpected {type(error).__name__}: {error!s:.200}; please report it"
+
+
+class TooCostlyError(CollisionMonitorError):
+    """A computation exceeds the limit that its caller set (`orientation.exact_limit`)."""
+
+
 class Refusal(Enum):
     """Reason for which the monitor refused an input; the status counts each as `refused_<value>`."""
 

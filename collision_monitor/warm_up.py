@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.geometry.pose import Motion, Pose
-from collision_monitor.geometry.shapes import Box, Shape, Sphere
+from collision_monitor.geometry.shapes import Box, ConvexHull, Shape, Sphere
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.records import STATE
+from collision_monitor.objects.models import containing_model
+from collision_monitor.records import STATE, Model
 
 OBJECTS = 70  # more than the initial capacity of the arrays, so that growing them is compiled too
 
@@ -24,6 +25,8 @@ def warm_up_monitor() -> None:
     monitor.add(OBJECTS, Box((500, 10, 1)), static=True, pose=Pose((0, 0, -0.5)))
     for object_id in range(OBJECTS):
         monitor.add(object_id, Box((1, 1, 1)) if object_id % 2 else Sphere(0.5))
+    # the excess of a model has a kernel too; without this, the first concave mesh would hold up the answers
+    containing_model([(ConvexHull(np.vstack([np.zeros(3), np.eye(3)])), Pose())], Model.AABB)
     poses = np.zeros((OBJECTS, 7))
     poses[:, 6] = 1.0
     poses[:, 0] = 0.9 * np.arange(OBJECTS)

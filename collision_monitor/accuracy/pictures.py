@@ -13,7 +13,7 @@ from collision_monitor.accuracy.extremes import SWEEPS, WorstCase
 from collision_monitor.accuracy.measurement import Measurement, labels_of_models
 
 MOST_IN_LEGEND: Final = 4
-"""Largest number of points that a panel names in its legend. More points have their names beside them."""
+"""Largest number of points that a panel names within its axes. A longer legend stands beside the panel."""
 
 
 def draw_tradeoff(rows: Sequence[Measurement], path: Path) -> None:
@@ -45,9 +45,7 @@ def draw_tradeoff(rows: Sequence[Measurement], path: Path) -> None:
         if len(shown) <= MOST_IN_LEGEND:
             panel.legend(loc="lower left")
         else:
-            for row in shown:
-                at = (row.ttc_error_s.p99, row.step_ms)
-                panel.annotate(row.profile, at, (0, 8), textcoords="offset points", rotation=60, fontsize=7)
+            panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
         panel.grid(alpha=0.3)
     figure.savefig(path, dpi=120)
 

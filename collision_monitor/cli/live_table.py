@@ -125,7 +125,7 @@ def _doubt(impact: Any) -> str:
 
 
 def _time(seconds: float) -> str:
-    return f"{seconds:.4f} s" if math.isfinite(seconds) else "not known"
+    return f"{seconds:.2f} s" if math.isfinite(seconds) else "not known"
 
 
 def _milliseconds(seconds: float) -> str:

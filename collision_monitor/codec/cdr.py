@@ -59,6 +59,11 @@ class Reader:
         """Number of bytes that are not read yet."""
         return len(self._data) - self._at
 
+    @property
+    def at(self) -> int:
+        """Offset of the next byte."""
+        return self._at
+
     def _take(self, size: int, alignment: int, what: str) -> int:
         """Skip the next `size` bytes, behind the alignment, and return their offset."""
         start = self._at + (4 - self._at) % alignment

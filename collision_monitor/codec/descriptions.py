@@ -9,10 +9,10 @@ import numpy as np
 
 from collision_monitor.codec.cdr import Buffer, Floats, Ids, Reader, Writer, write_header
 from collision_monitor.codec.shape_fields import LEAST_SHAPE, make_shape, read_shape, write_shape
-from collision_monitor.errors import CollisionMonitorError, InputError, ShapeError
+from collision_monitor.errors import InputError, ShapeError, reason_of
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Sphere
-from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.objects.description import MOST_SHAPES, ObjectDescription
 
 _ADD, _REMOVE = 0, 1
 _IDENTITY = Pose()
@@ -31,13 +31,17 @@ Change = ObjectDescription | Removal
 
 @dataclass(frozen=True, eq=False)
 class ObjectDescriptionArray:
-    """The changes that are possible, in order; and the id of each refused one, with the reason."""
+    """The changes that are possible, in order; and the id of each refused one, with the reason.
+
+    model_at: offset of the byte in the message that holds the model, for each of the objects.
+    """
 
     stamp_ns: int
     frame_id: str
     snapshot: bool
     objects: tuple[Change, ...]
     refused: tuple[tuple[int, str], ...] = ()
+    model_at: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +59,7 @@ class _Fields:
     mask: int
     allowed: Ids
     padding: float
+    model_at: int
     model: int
     max_linear_acceleration: float
     max_angular_acceleration: float
@@ -75,14 +80,16 @@ def decode_descriptions(data: Buffer) -> ObjectDescriptionArray:
 
     objects: list[Change] = []
     refused: list[tuple[int, str]] = []
+    model_at: list[int] = []
     for each in raw:
         try:
             objects.append(_change(each))
-        except CollisionMonitorError as error:
+            model_at.append(each.model_at)
+        except Exception as error:  # see `reason_of`
             what = f"object {each.object_id}"
-            text = str(error)
+            text = reason_of(error)
             refused.append((each.object_id, text if text.startswith(what) else f"{what}: {text}"))
-    return ObjectDescriptionArray(stamp_ns, frame_id, snapshot, tuple(objects), tuple(refused))
+    return ObjectDescriptionArray(stamp_ns, frame_id, snapshot, tuple(objects), tuple(refused), tuple(model_at))
 
 
 def _read_description(reader: Reader) -> _Fields:
@@ -98,6 +105,7 @@ def _read_description(reader: Reader) -> _Fields:
         mask=reader.scalar("u4", "mask"),
         allowed=reader.sequence("<u4", 4, "allowed"),
         padding=reader.scalar("f8", "padding"),
+        model_at=reader.at,
         model=reader.scalar("u1", "model"),
         max_linear_acceleration=reader.scalar("f8", "max_linear_acceleration"),
         max_angular_acceleration=reader.scalar("f8", "max_angular_acceleration"),
@@ -110,6 +118,8 @@ def _change(it: _Fields) -> Change:
         return Removal(it.object_id)
     if it.operation != _ADD:
         raise InputError(f"operation: expected 0 (ADD) or 1 (REMOVE), got {it.operation}")
+    if len(it.shapes) > MOST_SHAPES:  # before they are made
+        raise ShapeError(f"shapes: expected at most {MOST_SHAPES}, got {len(it.shapes)}; use a Mesh or a hull")
     if len(it.shape_poses) not in (0, len(it.shapes)):
         raise ShapeError(f"shape_poses: expected none or {len(it.shapes)}, as shapes, got {len(it.shape_poses)}")
     poses = [_pose(row) for row in it.shape_poses] or [_IDENTITY] * len(it.shapes)

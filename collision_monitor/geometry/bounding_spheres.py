@@ -7,6 +7,7 @@ All take points (n, 2 or 3) in m. The radius is the distance of the farthest poi
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -21,6 +22,11 @@ GROWTH_THRESHOLD: Final = 1e-12
 """Excess distance of a point, as a part of the radius, above which the minimal sphere grows.
 Smaller: with five or more points on the sphere, round-off selects them in turns. Larger: the sphere is larger than the
 smallest one by this part."""
+
+MOST_GROWTH: Final = 20_000
+"""Spheres that the search for the smallest one tries. Its expected number grows as the cube of the logarithm of the
+number of points (300 for a million). Only points that are chosen to be in the worst order need more; the sphere around
+them is then the grown one."""
 
 
 def sphere_from_centroid(points: ArrayLike) -> BoundingSphere:
@@ -57,7 +63,7 @@ def sphere_grown(points: ArrayLike) -> BoundingSphere:
     q = points[np.linalg.norm(points - p, axis=1).argmax()]
     center, radius = 0.5 * p + 0.5 * q, 0.5 * float(np.linalg.norm(q - p))
     k = 0
-    while k < len(points):
+    while k < len(points):  # terminates: k grows in each turn
         distance = np.linalg.norm(points[k:] - center, axis=1)
         outside = np.flatnonzero(distance > radius)
         if not len(outside):
@@ -78,24 +84,32 @@ def minimal_sphere(points: ArrayLike) -> BoundingSphere:
     size = float(np.abs(outer - base).max()) or 1.0
     # a random order makes the expected time linear; a fixed seed makes the result reproducible
     shuffled = np.random.default_rng(0).permutation((outer - base) / size)
-    center, _ = _smallest(shuffled, np.zeros((0, points.shape[1])))
-    return _around(points, base + size * center)
+    found = _smallest(shuffled, np.zeros((0, points.shape[1])), iter(range(MOST_GROWTH)))
+    return sphere_grown(points) if found is None else _around(points, base + size * found[0])
 
 
-def _smallest(points: Array, touching: Array) -> tuple[Array, float]:
-    """Centre and radius of the smallest sphere around `points` with all points of `touching` on its surface."""
+def _smallest(points: Array, touching: Array, tries: Iterator[int]) -> tuple[Array, float] | None:
+    """Centre and radius of the smallest sphere around `points` with all points of `touching` on its surface.
+
+    None if it takes more than the tries.
+    """
     center, radius = _through(touching) if len(touching) else (points[0], 0.0)
     if len(touching) == points.shape[1] + 1:
         return center, radius
     k = 0
-    while k < len(points):
+    while k < len(points):  # terminates: k grows in each turn
         distance = np.linalg.norm(points[k:] - center, axis=1)
         outside = np.flatnonzero(distance > radius * (1 + GROWTH_THRESHOLD))
         if not len(outside):
             break
         k += int(outside[0])
         # a point outside the smallest sphere of the points before it is on the surface of the next sphere
-        center, radius = _smallest(points[:k], np.vstack([touching, points[k]]))
+        if next(tries, None) is None:
+            return None
+        found = _smallest(points[:k], np.vstack([touching, points[k]]), tries)
+        if found is None:
+            return None
+        center, radius = found
         k += 1
     return center, radius
 

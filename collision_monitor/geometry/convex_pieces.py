@@ -48,6 +48,11 @@ def convex_pieces(shape: Shape) -> tuple[tuple[Shape, Pose], ...]:
     return ((shape, Pose()),)
 
 
+def _own_memory(_: bool, mesh: Mesh) -> int:
+    return array_bytes(mesh)
+
+
+@bounded_cache(REMEMBERED_PIECES, _own_memory)
 def is_convex_mesh(mesh: Mesh) -> bool:
     """Whether a mesh bounds a solid and no vertex is outside the plane of any face, up to round-off."""
     if not (mesh.surface.closed and len(mesh.surface.faces)):

@@ -8,13 +8,16 @@ Shewchuk, Adaptive precision floating-point arithmetic and fast robust geometric
 
 from __future__ import annotations
 
-from math import copysign, ldexp
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from math import ldexp
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from collision_monitor.errors import InputError
+from collision_monitor.errors import InputError, TooCostlyError
 from collision_monitor.geometry.coordinates import Array
 
 CANCELLATION: Final = 2.0**-7
@@ -23,7 +26,28 @@ Its round-off is at most 16 * 2^-53 of that sum (Shewchuk, 1997), so accepted va
 Larger: exact arithmetic, 10 µs each, is used where it changes nothing. Smaller: crossing points lose digits."""
 
 UNDERFLOW: Final = 1e-290
-"""Sums of products below this may have lost terms to underflow."""
+"""Sums of products below this, relative to the factor that multiplies a product again, may have lost terms to
+underflow: each product loses at most 5e-324."""
+
+_limits: ContextVar[list[int] | None] = ContextVar("exact_limit", default=None)
+
+LARGEST: Final = 1.7976931348623157e308
+SMALLEST: Final = 5e-324
+"""The largest and the smallest positive float64: values of determinants that exceed the range on either side."""
+
+
+@contextmanager
+def exact_limit(most: int) -> Iterator[list[int]]:
+    """Allow at most this many determinants in integers within the context, 10 to 20 µs each. Yields the number left.
+
+    Beyond it, the functions of this module raise TooCostlyError. Shapes can be made so that nearly every one is needed.
+    """
+    left = [most]
+    token = _limits.set(left)
+    try:
+        yield left
+    finally:
+        _limits.reset(token)
 
 
 def cross(a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> Array:
@@ -35,8 +59,8 @@ def cross(a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> Array:
         value = left - right
         size = np.abs(left) + np.abs(right)
         certain = (np.abs(value) > CANCELLATION * size) & (size > UNDERFLOW)
-    certain |= ((u == 0.0) | (v[..., ::-1] == 0.0)).all(axis=-1)  # both products are exactly zero, not underflowed
-    return _corrected(value, certain, _cross_exactly, a, b, c, d)
+    zero = ((u == 0.0) | (v[..., ::-1] == 0.0)).all(axis=-1)  # both products are exactly zero, not underflowed
+    return _corrected(np.where(zero, 0.0, value), certain | zero, _cross_exactly, a, b, c, d)
 
 
 def orient2d(a: ArrayLike, b: ArrayLike, p: ArrayLike) -> Array:
@@ -54,10 +78,11 @@ def orient3d(a: ArrayLike, b: ArrayLike, c: ArrayLike, p: ArrayLike) -> Array:
             left, right = u[..., i] * v[..., j], u[..., j] * v[..., i]
             value += (left - right) * w[..., k]
             size += (np.abs(left) + np.abs(right)) * np.abs(w[..., k])
-        certain = (np.abs(value) > CANCELLATION * size) & (size > UNDERFLOW)
+        largest = np.maximum(1.0, np.abs(w).max(axis=-1))
+        certain = (np.abs(value) > CANCELLATION * size) & (size > UNDERFLOW * largest)
     # a coordinate that is equal in all points makes a determinant with a column of zeros
-    certain |= ((u == 0.0) & (v == 0.0) & (w == 0.0)).any(axis=-1)
-    return _corrected(value, certain, _volume_exactly, a, b, c, p)
+    zero = ((u == 0.0) & (v == 0.0) & (w == 0.0)).any(axis=-1)
+    return _corrected(np.where(zero, 0.0, value), certain | zero, _volume_exactly, a, b, c, p)
 
 
 def _together(width: int, *points: ArrayLike) -> list[Array]:
@@ -76,6 +101,11 @@ def _corrected(value: Array, certain: NDArray[np.bool_], exactly: Any, *points: 
     if certain.all():
         return value
     value = np.array(value)
+    limit = _limits.get()
+    if limit is not None:
+        limit[0] -= int(np.count_nonzero(~certain))
+        if limit[0] < 0:
+            raise TooCostlyError("determinants: expected fewer that need exact arithmetic")
     chosen = np.stack([point[~certain] for point in points], axis=1)  # (m, points, width)
     # as integers: every coordinate of a row is digits * 2^exponent
     mantissa, exponent = np.frexp(chosen)
@@ -108,9 +138,10 @@ def _to_float(value: int, exponent: int) -> float:
     """value * 2^exponent; on underflow or overflow, the smallest or largest number with the same sign."""
     if value == 0:
         return 0.0
+    sign = 1.0 if value > 0 else -1.0  # not by copysign, because an integer may be too large for a float
     excess = max(value.bit_length() - 64, 0)
     try:
         result = ldexp(float(value >> excess), excess + exponent)
     except OverflowError:
-        return copysign(1.7976931348623157e308, value)
-    return result or copysign(5e-324, value)
+        return sign * LARGEST
+    return result or sign * SMALLEST

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import frexp, inf
 from typing import Final
 
 import numpy as np
@@ -27,6 +27,13 @@ OUTLINE: Final = 128
 FACE_NORMALS: Final = 256
 """Largest number of hull faces, the largest first, that a box is aligned with.
 Larger: seconds for round hulls of a thousand similar faces. Smaller: the best face may be missed."""
+
+MOST_TURNS: Final = 100
+"""Turns about the best box's own axes. The volume falls at each one and no box was seen to take ten; larger values
+change nothing, smaller ones would end the search early."""
+
+SMALLEST: Final = 1e-90
+"""Sizes (m) below which the points are enlarged first, because volumes and squares of lengths would vanish."""
 
 DISTINCT: Final = 1e-9
 """Directions closer than this count as equal."""
@@ -54,6 +61,12 @@ def obb_minimum_volume(points: ArrayLike) -> Obb:
     best turn about its normal.
     """
     points = point_set(points, "points", 3)
+    size = float(np.abs(points).max())
+    if 0.0 < size < SMALLEST:
+        scale = 2.0 ** (-frexp(size)[1] // 2)  # twice, because the inverse of a denormal number is infinite
+        box = obb_minimum_volume(points * scale * scale)
+        half = np.nextafter(box.half_extents / scale / scale, np.inf)
+        return Obb(box.center / scale / scale, box.rotation, half)
     try:
         hull = convex_hull(points)
     except ShapeError:
@@ -70,11 +83,12 @@ def obb_minimum_volume(points: ArrayLike) -> Obb:
     candidates = [_turned(vertices, edges, normal) for normal in normals]
     candidates += [_measured(vertices, obb_pca(points).rotation), _measured(vertices, np.eye(3))]
     volume, axes = min(candidates, key=lambda candidate: candidate[0])
-    while True:
+    for _ in range(MOST_TURNS):
         turned = min((_turned(vertices, edges, axis) for axis in axes.T), key=lambda candidate: candidate[0])
-        if turned[0] >= volume * (1 - 1e-12):
-            return _along(points, axes)
+        if not turned[0] < volume * (1 - 1e-12):
+            break
         volume, axes = turned
+    return _along(points, axes)
 
 
 def _flat(points: Array) -> Obb:

@@ -16,11 +16,12 @@ PLANAR_VECTORS = {"position": slice(2, 3), "linear": slice(2, 3), "angular": sli
 def flat_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Nearest rotations about z (n, 4) of orientations (n, 4); all 0, which is no orientation, if z points down."""
     x, y, z, w = quaternions.T
-    squared = z * z + w * w
-    upright = squared > x * x + y * y
-    scale = np.where(upright, np.sqrt((squared + x * x + y * y) / np.where(upright, squared, 1.0)), 0.0)
-    flat = np.zeros_like(quaternions)
-    flat[:, 2], flat[:, 3] = z * scale, w * scale
+    with np.errstate(over="ignore", invalid="ignore"):  # such an orientation is refused later
+        squared = z * z + w * w
+        upright = squared > x * x + y * y
+        scale = np.where(upright, np.sqrt((squared + x * x + y * y) / np.where(upright, squared, 1.0)), 0.0)
+        flat = np.zeros_like(quaternions)
+        flat[:, 2], flat[:, 3] = z * scale, w * scale
     return flat
 
 

@@ -17,8 +17,13 @@ from collision_monitor.geometry.lines import segments_intersect
 from collision_monitor.geometry.orientation import orient2d, orient3d
 from collision_monitor.geometry.point_in_polygon import Location
 
-POINTS_AT_ONCE: Final = 256
-"""Points located together in a mesh. Larger: more faces are near some of them. Smaller: more iterations."""
+POINTS_AT_ONCE: Final = (256, 4096)
+"""Least and most points located together in a mesh. Larger: more faces are near some of them. Smaller: more iterations.
+"""
+
+TESTS_AT_ONCE: Final = 1 << 15
+"""Pairs of a point and a face tested together if that allows more than the least number of points. Larger: no faster.
+Smaller: meshes of a few faces take several times as long."""
 
 
 def mesh_edges(faces: ArrayLike) -> Indices:
@@ -89,8 +94,10 @@ def ray_crossings(points: Array, vertices: Array, faces: Indices) -> Crossings:
     on_face = np.zeros(len(points), bool)
     order = np.argsort(points[:, 0])
     met: list[tuple[Indices, Indices, Array]] = []
-    for first in range(0, len(points), POINTS_AT_ONCE):  # points in order of x, so that few faces are near each batch
-        some = order[first : first + POINTS_AT_ONCE]
+    least, most = POINTS_AT_ONCE
+    at_once = min(max(TESTS_AT_ONCE // len(faces), least), most)
+    for first in range(0, len(points), at_once):  # points in order of x, so that few faces are near each batch
+        some = order[first : first + at_once]
         near = np.flatnonzero((low[:, 0] <= points[some[-1], 0]) & (points[some[0], 0] <= high[:, 0]))
         beside = (low[near, :2] <= points[some, None, :2]) & (points[some, None, :2] <= high[near, :2])
         below = points[some, None, 2] <= high[near, 2]

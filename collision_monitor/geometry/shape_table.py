@@ -175,9 +175,16 @@ class ShapeTableBuilder:
         """Number of shapes in the table."""
         return self._slots - len(self._free_slots)
 
-    def append(self, shape: shapes.Shape, pose: Pose | None = None, margin: float = 0.0) -> int:
+    def append(
+        self,
+        shape: shapes.Shape,
+        pose: Pose | None = None,
+        margin: float = 0.0,
+        corners: NDArray[np.int32] | None = None,
+    ) -> int:
         """Add a shape at a pose in its object's frame, enlarged by `margin` (m); return its slot.
 
+        corners: the `hull_vertices` of a ConvexHull, if they are known already.
         Raises UnsupportedError for a kind without kernels, ShapeError for an invalid margin.
         """
         if not (np.isfinite(margin) and margin >= 0.0):
@@ -206,8 +213,9 @@ class ShapeTableBuilder:
                 kind, size, radius = HALF_SPACE, (*shape.normal, shape.offset), inf
             case shapes.ConvexHull() | shapes.Triangle():
                 kind, size, radius = CONVEX_HULL, (), float(np.linalg.norm(shape.points, axis=1).max())
-                flat = isinstance(shape, shapes.Triangle)
-                start, count = self._share(shape.points, _TRIANGLE if flat else hull_vertices(shape.points))
+                if corners is None:
+                    corners = _TRIANGLE if isinstance(shape, shapes.Triangle) else hull_vertices(shape.points)
+                start, count = self._share(shape.points, corners)
             case shapes.Circle():
                 kind, size, radius = CIRCLE, (shape.radius,), shape.radius
             case shapes.Polygon():
@@ -243,7 +251,7 @@ class ShapeTableBuilder:
                 del self._users[start], self._blocks[key]
                 self._free_blocks.setdefault(int(self.table.vertex_count[slot]), []).append(start)
         self.table.kind[slot] = 0
-        self.table.vertex_count[slot] = 0
+        self.table.vertex_start[slot] = self.table.vertex_count[slot] = 0
         self._free_slots.append(slot)
 
     def _new_slot(self) -> int:

@@ -214,15 +214,18 @@ class HalfSpace(Shape):
         except (TypeError, ValueError):
             got = f"{self.normal!r}, {self.offset!r}"
             raise ShapeError(f"HalfSpace: expected a normal (3) and an offset, got {got}") from None
-        length = float(np.linalg.norm(normal)) if normal.shape == (3,) else 0.0
+        with np.errstate(over="ignore"):  # an infinite length is refused below
+            length = float(np.linalg.norm(normal)) if normal.shape == (3,) else 0.0
         if not (length > 0.0 and np.isfinite(length) and np.isfinite(offset)):
             raise ShapeError(
                 f"HalfSpace: expected a non-zero, finite normal and a finite offset, got {self.normal}, {offset}"
             )
-        normal = normal / length
+        normal, offset = normal / length, offset / length
+        if not abs(offset) <= LARGEST_INPUT:
+            raise ShapeError(f"HalfSpace offset: expected at most {LARGEST_INPUT:g} m, got {offset:g} m")
         normal.setflags(write=False)
         object.__setattr__(self, "normal", normal)
-        object.__setattr__(self, "offset", offset / length)
+        object.__setattr__(self, "offset", offset)
 
 
 @dataclass(frozen=True)

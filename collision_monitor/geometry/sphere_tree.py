@@ -78,7 +78,7 @@ def sphere_tree(vertices: ArrayLike, faces: ArrayLike, depth: int = 5) -> Sphere
     owner, face = np.zeros(len(faces), np.int64), np.arange(len(faces))  # faces that may be nearest to each cell
     levels: list[Level] = []
     carried: Level | None = None  # cells that are entirely inside, which are not split
-    while len(center) and len(levels) <= depth:
+    while len(center) and len(levels) <= depth:  # at most DEEPEST + 1 turns
         nearest, distance, apart = _nearest(center, corners, owner, face)
         inside = np.zeros(len(center), bool)
         if closed:

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -13,14 +15,21 @@ from collision_monitor.geometry.coordinates import Array, Indices, point_set
 from collision_monitor.geometry.orientation import orient2d
 from collision_monitor.geometry.polygons import corners, crossing_edges, is_counter_clockwise
 
+MOST_CORNERS: Final = 2000
+"""Corners of a concave polygon. It has that many times as many pairs of edges, which take 0.3 GB, and up to a minute.
+"""
+
 
 def triangulate(points: ArrayLike) -> Indices:
     """Triangles (n - 2, 3) of a simple polygon (n, 2), as counter-clockwise indices of its corners; none is flat.
 
     Ear clipping: cut off a corner if its triangle contains no other corner, and repeat (Meisters, 1975). O(n²) for n
-    corners, O(n³) at worst. A repeated corner is used once. Raises ShapeError if the polygon is not simple.
+    corners, O(n³) at worst. A repeated corner is used once. Raises ShapeError if the polygon is not simple or has
+    more than MOST_CORNERS.
     """
     polygon = point_set(points, "polygon", 2, least=3)
+    if len(polygon) > MOST_CORNERS:
+        raise ShapeError(f"polygon: expected at most {MOST_CORNERS} corners if it is concave, got {len(polygon)}")
     crossing = crossing_edges(polygon)
     if crossing is not None:
         i, j = crossing
@@ -29,7 +38,7 @@ def triangulate(points: ArrayLike) -> Indices:
     if not is_counter_clockwise(polygon):
         ring = ring[::-1]
     ears = []
-    while len(ring) > 3:
+    while len(ring) > 3:  # terminates: each turn removes a corner
         k = _ear(polygon[ring])
         ears.append([ring[k - 1], ring[k], ring[(k + 1) % len(ring)]])
         ring = np.delete(ring, k)

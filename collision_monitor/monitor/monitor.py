@@ -15,6 +15,7 @@ from collision_monitor.monitor.active_pairs import ActivePairs
 from collision_monitor.monitor.answers import Answers, step_status
 from collision_monitor.monitor.budget import PairBudget, StepClock
 from collision_monitor.monitor.candidates import Candidates
+from collision_monitor.monitor.crowding import MOST_PAIRS, crowded
 from collision_monitor.monitor.event_list import EventList
 from collision_monitor.monitor.first_impacts import FirstImpacts
 from collision_monitor.monitor.intake import Intake
@@ -28,7 +29,7 @@ from collision_monitor.monitor.timeline import Order, Progress, Timeline
 from collision_monitor.monitor.tracking import Tracking
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.objects.models import parse_model, shape_class
+from collision_monitor.objects.models import Modelled, parse_model, shape_class
 from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.records import Model, joined
 from collision_monitor.settings.profile import Profile
@@ -110,6 +111,10 @@ class Monitor:
         """The ids of all described objects, ascending."""
         return self._roster.ids
 
+    def __contains__(self, object_id: int) -> bool:
+        """Whether the object is described."""
+        return object_id in self._roster
+
     def name(self, object_id: int) -> str:
         """Name of an object, for display. Raises InputError for an unknown id."""
         return self._roster.name(object_id)
@@ -128,12 +133,13 @@ class Monitor:
         """
         self.describe(ObjectDescription(object_id, shape, **fields))
 
-    def describe(self, description: ObjectDescription) -> None:
+    def describe(self, description: ObjectDescription, prepared: Modelled | None = None) -> None:
         """Add a new object, or replace the description of a known one and keep its state.
 
+        prepared: what represents the object, if it is known already.
         Raises InputError, ShapeError; UnsupportedError for an unsupported shape or model.
         """
-        i = self._roster.describe(description, self.model_of(description))
+        i = self._roster.describe(description, self.model_of(description), prepared)
         self._make_room()
         self._candidates.forget(np.array([i], np.int32))  # the next step inserts its new box
         self._time_critical.describe(self._roster, i, self._profile)
@@ -289,12 +295,32 @@ class Monitor:
         if len(which) == 0:
             return np.zeros(0, IMPACT)
         self._tracking.restart(step, moved, ending, self._uncertain, self._candidates.grid)
-        pairs = self._candidates.find(step, which)
+        pairs = self._leave_out_crowds(step, self._candidates.find(step, which))
         self._uncertain.add_pairs(step, pairs)
         new = self._first_impacts.bound(step, pairs) if bounds_only else self._first_impacts.predict(step, pairs)
         new = self._events.first_of_pairs(new, step.roster.bodies, self._active_pairs.pairs)
         self._tracking.remember_cover(step, which)
         return new
+
+    def _leave_out_crowds(self, step: StepContext, pairs: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return the pairs without those of the bodies beyond MOST_PAIRS, which become unseen until they part."""
+        roster = self._roster
+        out = crowded(roster.bodies, pairs, (self._active_pairs.pairs, self._events.events), roster.top)
+        if not len(out):
+            return pairs
+        is_out = np.zeros(roster.top, np.bool_)
+        is_out[out] = True
+        ids = ", ".join(map(str, roster.bodies.id[out[:NAMED]].tolist())) + (", …" if len(out) > NAMED else "")
+        self.refuse(
+            Refusal.MALFORMED,
+            f"expected at most {MOST_PAIRS:,} pairs of objects that may meet, got {len(pairs):,}: the {len(out):,} "
+            f"objects with the most pairs (ids {ids}) are unseen until they part",
+            len(out),
+        )
+        roster.forget_states(out)
+        self._candidates.forget(out)
+        self._active_pairs.end_of(is_out)
+        return pairs.compress(~is_out[pairs].any(axis=1), axis=0)
 
     def _examine_due(self, step: StepContext, new: Events, budget: PairBudget | None) -> None:
         """Stages 5 and 6: examine the pairs that touch or are due; keep the other new impacts as events."""

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
 from collision_monitor._jit.vectors import LANES
-from collision_monitor.errors import CollisionMonitorError, InputError, UnsupportedError
+from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.shape_table import POLYGON, ShapeTable, ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, array_bytes
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.objects.models import monitored_model
+from collision_monitor.objects.models import Modelled, monitored_model
 from collision_monitor.prediction.bodies import Bodies, Multibody, Parts, enlarge, make_bodies, make_parts
 from collision_monitor.prediction.body_layout import lay_out_body
 from collision_monitor.prediction.impact_record import pair_keys
@@ -105,6 +105,10 @@ class Roster(Stage):
         """The ids of all described objects, ascending."""
         return sorted(self._slots)
 
+    def __contains__(self, object_id: int) -> bool:
+        """Whether the object is described."""
+        return object_id in self._slots
+
     def __len__(self) -> int:
         """Number of described objects."""
         return len(self._slots)
@@ -150,9 +154,10 @@ class Roster(Stage):
 
     # ------------------------------------------------------------------ changing
 
-    def describe(self, d: ObjectDescription, model: Model) -> int:
+    def describe(self, d: ObjectDescription, model: Model, prepared: Modelled | None = None) -> int:
         """Add a new object, or replace the description of a known one and keep its state. Return its slot.
 
+        prepared: the model of the object, if it is known already.
         Raises InputError, also if all objects together would need more than MOST_MEMORY; ShapeError; UnsupportedError
         for an unsupported shape or model.
         """
@@ -168,12 +173,13 @@ class Roster(Stage):
             raise UnsupportedError(f"object {d.object_id}: a HalfSpace has no end and can only be static")
         planar = self._is_planar(d)
         pose = flat_pose(d.pose) if planar and d.pose is not None else d.pose
-        modelled = monitored_model(d.shapes, model)
+        modelled = monitored_model(d.shapes, model) if prepared is None else prepared
+        corners = modelled.corners or (None,) * len(modelled.pieces)
         slots: list[int] = []
         try:
-            for shape, offset in modelled.pieces:
-                slots.append(self._shapes.append(shape, flat_pose(offset) if planar else offset, d.padding))
-        except CollisionMonitorError:
+            for (shape, offset), chosen in zip(modelled.pieces, corners, strict=True):
+                slots.append(self._shapes.append(shape, flat_pose(offset) if planar else offset, d.padding, chosen))
+        except Exception:
             for slot in slots:
                 self._shapes.remove(slot)
             raise
@@ -226,9 +232,14 @@ class Roster(Stage):
         """Mark every object to be predicted anew in the next step."""
         self.renewed.update(self.used().tolist())
 
-    def forget_states(self) -> None:
-        """Forget all states: every object that is not static is unseen until its next state."""
+    def forget_states(self, which: NDArray[np.int32] | None = None) -> None:
+        """Forget the states of the bodies `which`, of all by default: those that move are unseen until the next one."""
         bodies = self.bodies
+        if which is not None:
+            bodies.seen[which] = False
+            bodies.version[which] += 1
+            self.renewed.update(which.tolist())
+            return
         bodies.seen[:] = bodies.static & bodies.used
         bodies.version[:] += 1
         self.renewed = set(self.used().tolist())

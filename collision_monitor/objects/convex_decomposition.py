@@ -31,6 +31,16 @@ COVERED: Final = 1e-6
 """Part of the size by which the parts are enlarged, times four until they cover the surface, because CoACD rounds its
 corners to some 1e-5. Smaller: more tries."""
 
+MOST_GROWTHS: Final = 11
+"""Enlargements by a factor of four: COVERED * 4^11 = 4.2 of the size, after which any one part contains the mesh."""
+
+THINNEST: Final = 1e-9
+"""Least volume of a mesh, as a part of its hull's. Below it the mesh has no inside, and the errors are round-off."""
+
+MOST_PIECES: Final = 50_000
+"""Polygons outside of the parts, and triangles between two bounds of the surface error (20 MB). A mesh with more is
+refused, or gets the upper bound that is known then."""
+
 SETTLED: Final = 0.02
 """Relative accuracy of the surface error; smaller values cost time."""
 
@@ -83,7 +93,10 @@ def convex_decomposition(mesh: Mesh, concavity: float = CONCAVITY) -> Decomposit
     used = mesh.vertices[np.unique(welded)]
     center = 0.5 * used.min(axis=0) + 0.5 * used.max(axis=0)
     size = float(np.ptp(used, axis=0).max())
-    vertices = (mesh.vertices - center) / size
+    vertices = (mesh.vertices - center) / (size or 1.0)
+    solid = abs(Hull(vertices, welded.astype(np.int64)).volume)
+    if not solid > THINNEST * convex_hull((used - center) / (size or 1.0)).volume:  # raises ShapeError if it is flat
+        raise ShapeError("convex decomposition: expected a mesh with an inside, got one without volume")
     hulls = []
     for points, _ in coacd.run_coacd(coacd.Mesh(vertices, welded), threshold=concavity, seed=SEED):
         try:
@@ -92,8 +105,12 @@ def convex_decomposition(mesh: Mesh, concavity: float = CONCAVITY) -> Decomposit
             continue  # a flat part contains nothing that its neighbours do not
     faces = list(vertices[welded])
     grown = COVERED
-    while _uncovered(faces, hulls, grown):
+    for _ in range(MOST_GROWTHS):
+        if not _uncovered(faces, hulls, grown):
+            break
         grown *= 4.0
+    else:
+        raise UnsupportedError("convex decomposition: CoACD found no solid part in this mesh; use convex_hull")
     hulls = [_grown(hull, 2.0 * grown) for hull in hulls]
     outer = [
         polygon
@@ -104,11 +121,10 @@ def convex_decomposition(mesh: Mesh, concavity: float = CONCAVITY) -> Decomposit
     inside = locate_in_polyhedron(middles, vertices, welded) == Location.INSIDE
     if inside.any() and float(_to_surface(middles[inside], vertices[welded])[0].max()) > 4.0 * grown:
         raise UnsupportedError("convex decomposition: CoACD's parts leave a hollow in this mesh; use convex_hull")
-    solid = Hull(vertices, welded.astype(np.int64)).volume
     return Decomposition(
         parts=tuple(ConvexHull(center + size * hull.vertices) for hull in hulls),
         surface_error=size * _farthest(outer, vertices[welded]),
-        volume_error=sum(hull.volume for hull in hulls) / abs(solid) - 1.0,
+        volume_error=sum(hull.volume for hull in hulls) / solid - 1.0,
     )
 
 
@@ -140,6 +156,8 @@ def _uncovered(polygons: list[Array], hulls: list[Hull], slack: float) -> list[A
             else:
                 rest += _without(polygon, normal, offset + slack)
         polygons = rest
+        if len(polygons) > MOST_PIECES:
+            raise UnsupportedError("convex decomposition: CoACD's parts leave too many gaps; use convex_hull")
     return polygons
 
 
@@ -190,7 +208,7 @@ def _farthest(polygons: list[Array], corners: Array) -> float:
     """
     triangles = np.array([[p[0], p[k], p[k + 1]] for p in polygons for k in range(1, len(p) - 1)])
     known, upper = 0.0, COARSE
-    while len(triangles):
+    while len(triangles):  # terminates: each turn halves the triangles, down to COARSE
         middle = triangles.mean(axis=1)
         distance, face = _to_surface(middle, corners)
         around = np.linalg.norm(triangles - middle[:, None], axis=2).max(axis=1)
@@ -198,6 +216,8 @@ def _farthest(polygons: list[Array], corners: Array) -> float:
         reach = np.minimum(distance + around, from_face)
         known = max(known, float(distance.max()))
         upper = known + max(SETTLED * known, COARSE)
+        if np.count_nonzero(reach > upper) > MOST_PIECES:
+            return float(reach.max())
         triangles = triangles[reach > upper]
         a, b, c = np.moveaxis(triangles, 1, 0)
         ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2

@@ -6,13 +6,17 @@ import math
 from dataclasses import dataclass
 from typing import Any, Final
 
-from collision_monitor.errors import InputError
+from collision_monitor.errors import InputError, ShapeError
 from collision_monitor.geometry.compound import shape_pairs
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.records import Model
 from collision_monitor.tolerances import LARGEST_INPUT
 
 ALL_GROUPS = 0xFFFFFFFF
+
+MOST_SHAPES = 1024
+"""Shapes of one object. Two such objects have a million pairs of shapes to test, which take 0.1 to 1 s."""
+
 _UINT32_MAX = 0xFFFFFFFF
 
 MOST_NAME_BYTES: Final = 256
@@ -84,13 +88,16 @@ class ObjectDescription:
         except (ValueError, KeyError):
             choices = ", ".join(f"{m.name} ({m.value})" for m in Model)
             raise InputError(f"{what}, model: expected one of {choices}, got {self.model!r}") from None
+        shapes = shape_pairs(self.shapes, what)
+        if len(shapes) > MOST_SHAPES:
+            raise ShapeError(f"{what}: expected at most {MOST_SHAPES} shapes, got {len(shapes)}; use a Mesh or a hull")
         if self.static and self.pose is None:
             raise InputError(f"{what}: a static object needs the pose where it stands, got None")
         if self.pose is not None and not isinstance(self.pose, Pose):
             raise InputError(f"{what}, pose: expected a Pose, got {type(self.pose).__name__}")
         checked = {
             "object_id": object_id,
-            "shapes": shape_pairs(self.shapes, what),
+            "shapes": shapes,
             "name": _name(self.name, what) or f"object_{object_id}",
             "static": bool(self.static),
             "group": _uint32(self.group, f"{what}, group") or 1,

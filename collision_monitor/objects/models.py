@@ -65,6 +65,7 @@ class Modelled(NamedTuple):
     model: Model
     excess: float
     convex: bool  # whether the object itself, not its model, is convex
+    corners: tuple[NDArray[np.int32] | None, ...] = ()  # of each piece, if known: the `hull_vertices` of a ConvexHull
 
 
 def parse_model(model: Model | str | int) -> Model:

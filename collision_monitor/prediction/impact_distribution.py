@@ -67,7 +67,7 @@ def summarise(times, weights, order, confidence, safe, answer):
     shortest = inf
     for high in range(n):
         inside += weights[order[high]]
-        while inside - weights[order[low]] >= 0.5 * total:
+        while low < high and inside - weights[order[low]] >= 0.5 * total:
             inside -= weights[order[low]]
             low += 1
         length = times[order[high]] - times[order[low]]

@@ -12,7 +12,7 @@ import numpy as np
 
 from collision_monitor.errors import Refusal
 from collision_monitor.report.facts import ReportFacts
-from collision_monitor.session.history.alerts import AlertOutcome
+from collision_monitor.session.history.alerts import AlertOutcome, stated_error
 from collision_monitor.session.history.history import History
 
 NAMED: Final = 3
@@ -62,6 +62,12 @@ def _findings(facts: ReportFacts) -> list[str]:
         lines.append(
             f"{_were(len(leads))} predicted: at least {leads.min():.2f} s ahead, with a median of "
             f"{np.median(leads):.2f} s"
+        )
+    wrong = [each for each in facts.answered if stated_error(facts.answered[each], each, facts.period)[0] != 0.0]
+    if wrong:
+        lines.append(
+            f"the first prediction of {len(wrong)} stated an interval without the contact, because the objects changed "
+            "their motion; later predictions corrected it"
         )
     if facts.surprises:
         lines.append(f"{len(facts.surprises)} had no prediction right before the contact")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collision_monitor.report.assessment import counted
 from collision_monitor.report.facts import ReportFacts
-from collision_monitor.report.figures import CURVES, PAIRS, drawn_collisions, largest_error
+from collision_monitor.report.figures import CURVES, NEAR, PAIRS, drawn_collisions, largest_error
 from collision_monitor.report.from_above import AROUND, EVENTS
 from collision_monitor.session.history.history import History
 
@@ -32,7 +32,8 @@ def _predicted(facts: ReportFacts) -> str:
     held = f"The largest error of an interval was {worst:.2g} s" if worst > 0.0005 else "Here every interval was right"
     return (
         "Error of the stated time of contact for each predicted collision, from the first prediction to the contact. "
-        "The coloured band is the stated interval. Below the grey band it was too early, above it too late. "
+        "The coloured band is the stated interval. Below the grey band it was too early, above it too late; "
+        "beyond five steps the scale is logarithmic. "
         f"A prediction assumes that both objects keep their motion. {held}."
         + (f" Only the {CURVES} collisions with the largest errors; {left} more left out." if left else "")
     )
@@ -40,7 +41,8 @@ def _predicted(facts: ReportFacts) -> str:
 
 def _distances() -> str:
     return (
-        "Distance of the shapes, computed from the recorded states, and the predicted time to collision. "
+        "Distance of the shapes, computed from the recorded states, to scale within "
+        f"{NEAR:g} m and logarithmic beyond, and the predicted time to collision. "
         "A curve has a gap where a state is missing or an object jumped."
     )
 

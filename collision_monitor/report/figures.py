@@ -7,6 +7,7 @@ from typing import Final
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -25,6 +26,8 @@ CURVES: Final = 6
 """Largest number of collisions whose predictions are drawn."""
 DOTS: Final = 2000
 """Largest number of predictions of one pair that are drawn."""
+NEAR: Final = 0.5
+"""m: distances up to this one are drawn to scale, and larger ones on a logarithmic scale beyond."""
 FINEST: Final = 1000
 """Number of parts of the timeline. Predictions within about one part are drawn as one bar."""
 BINS: Final = 40
@@ -125,6 +128,15 @@ def _timeline(history: History, facts: ReportFacts, size: Size) -> Figure | None
     return figure
 
 
+def _compress(axes: Axes, threshold: float, steps: tuple[int, ...]) -> None:
+    """Draw y to scale up to the threshold and logarithmically beyond, with ticks at 0 and at steps of each decade."""
+    axes.set_yscale("symlog", linthresh=threshold)
+    low, high = axes.get_ylim()
+    ticks = [0.0, *(sign * step * 10.0**k for sign in (-1, 1) for k in range(-3, 10) for step in steps)]
+    axes.set_yticks([tick for tick in ticks if not tick or (abs(tick) >= threshold and low <= tick <= high)])
+    axes.yaxis.set_major_formatter("{x:g}")
+
+
 def _legend(figure: Figure, handles: list[Patch | Line2D], columns: int) -> None:
     figure.legend(handles=handles, loc="outside upper left", ncols=columns, columnspacing=1.2)
 
@@ -152,6 +164,8 @@ def _predicted(history: History, facts: ReportFacts, size: Size) -> Figure | Non
     axes.invert_xaxis()
     axes.set_xlabel("s before the contact was first reported")
     axes.set_ylabel("predicted − actual (ms)")
+    # to scale within a few steps and logarithmic beyond, so that one early guess does not flatten all other curves
+    _compress(axes, max(5e3 * facts.period, 1.0), steps=(1,))
     handles.append(Patch(color=POSSIBLE, alpha=0.4, label="within the step in which the contact began"))
     _legend(figure, handles, 1 if size.narrow else 2)
     return figure
@@ -180,6 +194,7 @@ def _distances(history: History, facts: ReportFacts, size: Size) -> Figure | Non
     above.axhspan(1.1 * low, 0.0, color=CONTACT, alpha=0.12, linewidth=0)
     above.axhline(0.0, color=INK, linewidth=0.8)
     above.set_ylabel("distance (m)")
+    _compress(above, NEAR, steps=(1, 2, 5))
     below.set_ylabel("time to\ncollision (s)")
     below.set_ylim(0.0, 1.05 * history.profile.horizon)
     below.set_xlim(0.0, max(history.duration, facts.period) or 1.0)

@@ -38,6 +38,7 @@ def _monitor(stop: StopRequest) -> None:
     from collision_monitor.ros.node import MonitorNode
 
     node = MonitorNode(stop)
+    stop.on_stuck = node.save
     try:
         spin(node, stop, events=node.settings.executor == "events")
     finally:

@@ -16,7 +16,8 @@ from rclpy.node import Node
 
 from collision_monitor import codec, warm_up
 from collision_monitor.errors import CollisionMonitorError
-from collision_monitor.pipeline.pipeline import Outputs, Pipeline
+from collision_monitor.pipeline.pipeline import Outputs, Pipeline, TakenShapes
+from collision_monitor.pipeline.preparation import Preparation
 from collision_monitor.pipeline.topics import NODE, STATUS_PERIOD, Topic
 from collision_monitor.records import Phase
 from collision_monitor.ros.endpoints import publisher, subscription
@@ -60,7 +61,8 @@ class MonitorNode(Node):
         self._warm_up(stop)
         self._name = self.get_fully_qualified_name()
         self._name_conflict = NameConflict(self)
-        self._pipeline = Pipeline(settings.profile, frame_id=settings.frame_id)
+        self._preparation = Preparation()
+        self._pipeline = Pipeline(settings.profile, frame_id=settings.frame_id, preparation=self._preparation)
         self._times = StepTimes(settings.profile.max_time_step)
         self._markers = MarkerView(self._pipeline.catalogue, settings.frame_id)
         self._last_status = self._last_markers = self._last_log = time.monotonic_ns()
@@ -149,13 +151,24 @@ class MonitorNode(Node):
 
     def _on_shapes(self, data: bytes) -> None:
         received = self._now()
-        changes = self._pipeline.on_shapes(data)
+        self._note_shapes(self._pipeline.take_shapes(data), received)
         self._refusals.report(self._shapes_in, time.monotonic_ns())
-        self._record_shapes(data, received)
-        if changes:
-            self._markers.update(changes)
-            _keep_from_collector()
         self._publish_status_if_due(time.monotonic_ns())  # so that the sender learns when its shapes are known
+
+    def _note_shapes(self, taken: TakenShapes, received: int) -> None:
+        """Record descriptions and show them."""
+        self._record_shapes(taken.data, received)
+        if taken.changes:
+            self._markers.update(taken.changes)
+            _keep_from_collector()
+
+    def _take_prepared(self) -> None:
+        """Describe the objects again whose models were made beside the monitoring. Log why others stay coarse."""
+        taken, texts = self._pipeline.take_prepared()
+        for each in taken:
+            self._note_shapes(each, self._now())
+        for text in texts:
+            self.get_logger().warning(text)
 
     def _on_settings(self, profile: Profile) -> None:
         """Change the settings. Like all callbacks, this runs between two steps."""
@@ -177,6 +190,7 @@ class MonitorNode(Node):
     def _on_watchdog(self) -> None:
         self._recording.log_problems()
         self._name_conflict.look()
+        self._take_prepared()
         now = time.monotonic_ns()
         silent = self._is_silent(now)
         if silent != self._was_silent:
@@ -217,8 +231,13 @@ class MonitorNode(Node):
         nanoseconds: int = self.get_clock().now().nanoseconds
         return nanoseconds
 
+    def save(self) -> None:
+        """Finish the session file, from another thread: this one is stuck and the process is about to end."""
+        self._recording.finish()
+
     def close(self) -> None:
         """Publish and record the last status, and finish the session file."""
+        self._preparation.close()
         self._publish_status()
         self._recording.close()
         self.destroy_node()

@@ -66,8 +66,12 @@ class NodeRecording:
                 f"the disk is too slow for the recording: {now['recording_dropped']} messages dropped so far"
             )
 
-    def close(self) -> None:
-        """Finish the session."""
+    def finish(self) -> None:
+        """Finish the session without a word, from any thread."""
         if self._recorder is not None:
             self._recorder.close()
-            self.log_problems()
+
+    def close(self) -> None:
+        """Finish the session."""
+        self.finish()
+        self.log_problems()

@@ -9,11 +9,13 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from collision_monitor.errors import InputError
 
@@ -24,18 +26,50 @@ WAKE_UP = 0.1
 """Longest time (s) until a stop request is seen while no message arrives."""
 
 
+STOP_S: Final = 1.9
+"""Longest time (s) from a signal to the end of the process, whatever it does at that time. Supervisors wait 2 s and
+more before they kill."""
+
+FINISH_S: Final = 0.9
+"""Time (s) from a signal until `StopRequest.on_stuck` is called, if the process still runs: half of STOP_S is for the
+ordinary end, half for finishing a recording without the thread that is stuck."""
+
+
 class StopRequest:
-    """Set by SIGINT or SIGTERM. Further signals during the shutdown change nothing."""
+    """Set by SIGINT or SIGTERM. Further signals during the shutdown change nothing.
+
+    A thread ends the process STOP_S after the first signal if it has not ended by then, for example within native code.
+    on_stuck: called by another thread at FINISH_S, to bring to safety what must not be lost.
+    """
 
     def __init__(self) -> None:
         self.received = False
+        self.on_stuck: Callable[[], None] | None = None
         self._ends = False
 
     def install(self) -> StopRequest:
         """Take over both signals. Call it before the slow imports, so that an early Ctrl-C is clean as well."""
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._on_signal)
+        # Python calls `_on_signal` between two of its own instructions only, but writes to this pipe at once
+        waiting, woken = os.pipe()
+        os.set_blocking(woken, False)
+        signal.set_wakeup_fd(woken, warn_on_full_buffer=False)
+        threading.Thread(target=self._end_in_time, args=(waiting,), name="stop", daemon=True).start()
         return self
+
+    def _end_in_time(self, waiting: int) -> None:
+        numbers = b""
+        while signal.SIGINT not in numbers and signal.SIGTERM not in numbers:  # other signals have other handlers
+            numbers = os.read(waiting, 64)
+        began = time.monotonic()
+        time.sleep(FINISH_S)
+        finishing = threading.Thread(target=self.on_stuck or (lambda: None), name="finish", daemon=True)
+        finishing.start()
+        finishing.join(began + STOP_S - time.monotonic())
+        time.sleep(max(0.0, began + STOP_S - time.monotonic()))
+        os.write(2, b"collision-monitor: ended within its work, which took too long after the signal\n")
+        os._exit(0)
 
     def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
         self.received = True

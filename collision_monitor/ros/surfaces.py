@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.geometry.qhull import qhull
 from collision_monitor.geometry.shapes import (
     Box,
     Capsule,
@@ -23,6 +24,9 @@ from collision_monitor.geometry.shapes import (
 Triangles = NDArray[np.float64]
 """(n, 3, 3): triangle, corner, coordinate in m."""
 
+MOST_POINTS = 5000
+"""Points of a hull that is drawn, which takes up to 50 ms. A larger one, or one too flat for Qhull, appears as its box.
+"""
 SIDES = 16
 """Number of sides of a round shape."""
 HALF_SPACE_EXTENT = 20.0
@@ -85,9 +89,11 @@ def _box(corner: NDArray[np.float64]) -> Triangles:
 
 
 def _hull(points: NDArray[np.float64]) -> Triangles:
-    from scipy.spatial import ConvexHull as Hull
-
-    corners: Triangles = points[Hull(points).simplices]
+    hull = qhull(points) if len(points) <= MOST_POINTS else None
+    if hull is None:
+        low, high = points.min(axis=0), points.max(axis=0)
+        return _box(Box((1.0, 1.0, 1.0)).corners * (high - low) + 0.5 * (low + high))
+    corners: Triangles = points[hull.simplices]
     return corners
 
 

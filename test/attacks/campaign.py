@@ -15,7 +15,6 @@ from random import Random
 from typing import Any, Final
 
 import known_scene
-from dice import Allowed
 from message_fuzzer import Message, hostile_message
 from well_formed import faults_of_contacts, faults_of_predictions
 
@@ -23,13 +22,12 @@ from collision_monitor.codec import decode_contacts, decode_descriptions, decode
 from collision_monitor.errors import MessageError
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.pipeline.pipeline import Outputs, Pipeline
+from collision_monitor.pipeline.preparation import Preparation
 from collision_monitor.pipeline.settings_event import encode_settings
 from collision_monitor.pipeline.topics import Topic
+from collision_monitor.session.replaying.difference import compare_status
 from collision_monitor.settings.profile import Profile
 from collision_monitor.warm_up import warm_up_monitor
-
-OPEN: Final = Allowed(tiny=False, decomposition=False, long_names=False, large=False)
-"""Hostile content without the kinds of the known defects that are still open."""
 
 RUN: Final = 5_000
 """Messages of one run, which begins with a new pipeline. Longer: a failure takes longer to reproduce."""
@@ -40,8 +38,6 @@ STEP: Final = 10_000_000
 
 SLOWEST: Final = 0.1
 """s for one input of up to LARGEST bytes. The time of the processor counts too, as others share the cores."""
-SLOWEST_SHAPES: Final = 0.5
-"""s for a description of concave meshes: how far a coarser model exceeds one is sampled, in 10 to 100 ms each."""
 STUCK: Final = 20.0
 """s of wall time that no input may take, whatever the load: it waits for something that does not come."""
 LARGEST: Final = 1 << 20
@@ -134,10 +130,9 @@ def is_broken_by(topic: Topic, data: bytes) -> list[str]:
 class Campaign:
     """Attacks a pipeline. `run` returns at the first failure."""
 
-    def __init__(self, seed: int, allowed: Allowed = OPEN) -> None:
+    def __init__(self, seed: int) -> None:
         self.seed = seed
-        self.allowed = allowed
-        self.pipeline = Pipeline(PROFILE, timed=False)
+        self.pipeline = Pipeline(PROFILE, timed=False, preparation=Preparation(limit=0.0))
         self.summary = Summary(seed)
         self._shadow: Pipeline | None = None
         self._shadow_left = 0
@@ -179,7 +174,7 @@ class Campaign:
 
     def message(self, index: int) -> Message:
         """Return the message of the run with this index, as it is sent now."""
-        return hostile_message(self.seed, index, self.now, self.allowed)
+        return hostile_message(self.seed, index, self.now)
 
     def attack(self, index: int, message: Message) -> None:
         """Send one message, check its answer, and mostly let the known scene ask."""
@@ -206,12 +201,12 @@ class Campaign:
     def _send(self, index: int, message: Message) -> Outputs | None:
         """Send a message to the pipeline and to its shadow. Check the limits and the form of the answers."""
         wall, cpu = time.perf_counter(), time.process_time()
-        outputs = _process(self.pipeline, message)
+        outputs, taken = _process(self.pipeline, message)
         wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
         self._check_time(index, message, wall, cpu)
         self._check_answers(outputs)
         if self._shadow is not None:
-            self._compare_with_shadow(message, outputs)
+            self._compare_with_shadow(taken, outputs)
         return outputs
 
     def _check_time(self, index: int, message: Message, wall: float, cpu: float) -> None:
@@ -220,8 +215,7 @@ class Campaign:
         if len(slowest) > 64:
             slowest.sort(reverse=True)
             del slowest[5:]
-        limit = SLOWEST_SHAPES if message.topic is Topic.SHAPES else SLOWEST
-        if size <= LARGEST and (min(wall, cpu) > limit or wall > STUCK):
+        if size <= LARGEST and (min(wall, cpu) > SLOWEST or wall > STUCK):
             self.problems.append(f"{size} bytes took {wall:.3f} s, {cpu:.3f} s of the processor")
 
     def _check_answers(self, outputs: Outputs | None) -> None:
@@ -273,29 +267,32 @@ class Campaign:
         self._shadow, self._shadow_left = Pipeline.restored(snapshot, self.pipeline.frame_id), SHADOW
         self.summary.restarts += 1
 
-    def _compare_with_shadow(self, message: Message, outputs: Outputs | None) -> None:
+    def _compare_with_shadow(self, taken: Message, outputs: Outputs | None) -> None:
         assert self._shadow is not None
         if outputs is not None and outputs.limit is not None:  # a session holds it before the states
             self._shadow.on_settings(outputs.limit)
-        other = _process(self._shadow, message)
+        other, _ = _process(self._shadow, taken)
         if _bytes(outputs) != _bytes(other) or self.pipeline.monitor.digest != self._shadow.monitor.digest:
             self.problems.append("the pipeline restored from a snapshot gives other bytes")
-        if self.pipeline.status() != self._shadow.status():
-            self.problems.append("the pipeline restored from a snapshot has another status")
+        difference = compare_status("status", 0, self.pipeline.status(), self._shadow.status())
+        if difference:
+            self.problems.append(f"the pipeline restored from a snapshot has another status: {difference}")
         self._shadow_left -= 1
         if self._shadow_left == 0:
             self._shadow = None
 
 
-def _process(pipeline: Pipeline, message: Message) -> Outputs | None:
+def _process(pipeline: Pipeline, message: Message) -> tuple[Outputs | None, Message]:
+    """Return the answer, and the message as a session holds it."""
     match message.topic:
         case Topic.STATES:
-            return pipeline.on_states(message.data)
+            return pipeline.on_states(message.data), message
         case Topic.SHAPES:
-            pipeline.on_shapes(message.data)
-        case _:
-            pipeline.on_settings(message.data)
-    return None
+            taken = pipeline.take_shapes(message.data).data
+            pipeline.take_prepared()
+            return None, Message(Topic.SHAPES, taken)
+    pipeline.on_settings(message.data)
+    return None, message
 
 
 def _bytes(outputs: Outputs | None) -> tuple[bytes, bytes, int] | None:

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import known_scene
 import rclpy
-from campaign import OPEN, START, STEP, Failure
+from campaign import START, STEP, Failure
 from message_fuzzer import hostile_message
 from rclpy.executors import SingleThreadedExecutor
 from visualization_msgs.msg import MarkerArray
@@ -209,7 +209,7 @@ def _attack(
     settled = memory_of(process.pid)
     for index in range(messages):
         report["last"] = index
-        message = hostile_message(seed, index, attacker.now, OPEN)
+        message = hostile_message(seed, index, attacker.now)
         attacker.publish(message.topic, message.data)
         report["messages"] += 1
         attacker.listen(1.0 / rate)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import struct
-from dataclasses import dataclass
 from random import Random
 from typing import Final
 
@@ -27,26 +26,11 @@ LONGEST_NAME: Final = 256
 """Bytes of a name that the monitor has to accept."""
 
 
-@dataclass(frozen=True)
-class Allowed:
-    """Which kinds of hostile content a fuzzer may make. A kind is switched off while its defect is known and open.
-
-    tiny: denormal coordinates. decomposition: meshes with the model CONVEX_DECOMPOSITION. long_names: names beyond
-    LONGEST_NAME. large: shapes of thousands of vertices.
-    """
-
-    tiny: bool = True
-    decomposition: bool = True
-    long_names: bool = True
-    large: bool = True
-
-
 class Dice:
     """Choices of one message, which (seed, index) determines. wild: share of the numbers that are hostile."""
 
-    def __init__(self, seed: int, index: int, allowed: Allowed) -> None:
+    def __init__(self, seed: int, index: int) -> None:
         self.random = Random(seed * 1_000_000_007 + index)
-        self.allowed = allowed
         self.wild = 0.0 if self.random.random() < 0.55 else self.random.choice((0.02, 0.1, 0.4))
 
     def chance(self, probability: float) -> bool:
@@ -63,13 +47,12 @@ class Dice:
         kind = self.random.random()
         if kind < 0.6:
             return self.random.choice(SPECIAL)
-        if kind < 0.75 and self.allowed.tiny:
+        if kind < 0.75:
             return self.random.choice(TINY)
-        if kind < 0.85 and self.allowed.tiny:
+        if kind < 0.85:
             value: float = struct.unpack("<d", self.random.randbytes(8))[0]  # any float at all
             return value
-        least = -60 if self.allowed.tiny else -15
-        return math.copysign(10.0 ** self.random.uniform(least, 40), self.random.random() - 0.5)
+        return math.copysign(10.0 ** self.random.uniform(-60, 40), self.random.random() - 0.5)
 
     def number(self, low: float, high: float) -> float:
         """Return a number from low to high, or a hostile one."""
@@ -94,7 +77,7 @@ class Dice:
     def text(self) -> str:
         """Return a name."""
         if self.is_hostile:
-            if self.allowed.long_names and self.chance(0.1):
+            if self.chance(0.1):
                 return "n" * self.random.choice((LONGEST_NAME, LONGEST_NAME + 1, 10_000, 300_000))
             return self.random.choice(WORDS)
         return f"attacker {self.random.randrange(100)}"

@@ -27,8 +27,7 @@ from typing import Any, Final
 HERE: Final = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1])]
 
-from campaign import OPEN, RUN, Campaign, Failure, Summary, is_broken_by, resident  # noqa: E402
-from dice import Allowed  # noqa: E402
+from campaign import RUN, Campaign, Failure, Summary, is_broken_by, resident  # noqa: E402
 from rich.console import Console  # noqa: E402
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn  # noqa: E402
 
@@ -41,9 +40,9 @@ WORKER_GROWTH: Final = 64e6
 """Bytes by which a process may grow over many runs."""
 
 
-def run(seed: int, messages: int, allowed: Allowed) -> tuple[Summary, int]:
+def run(seed: int, messages: int) -> tuple[Summary, int]:
     """Run one campaign. Return its summary and the resident memory afterwards (bytes)."""
-    return Campaign(seed, allowed).run(messages), resident()
+    return Campaign(seed).run(messages), resident()
 
 
 def runs(seed: int, messages: int) -> list[tuple[int, int]]:
@@ -54,7 +53,7 @@ def runs(seed: int, messages: int) -> list[tuple[int, int]]:
 
 def summaries(args: argparse.Namespace) -> Iterator[tuple[Summary, int]]:
     """Run all campaigns on several processes."""
-    wanted = [(*each, Allowed() if args.everything else OPEN) for each in runs(args.seed, args.messages)]
+    wanted = runs(args.seed, args.messages)
     jobs = args.jobs
     if jobs == 1 or len(wanted) == 1:
         for each in wanted:
@@ -76,7 +75,7 @@ def reproduce(path: Path) -> list[str]:
         problems = is_broken_by(Topic[failure.topic], base64.b64decode(failure.data))
         if problems:
             return problems
-    summary = Campaign(failure.seed, OPEN).run(failure.index + 1)
+    summary = Campaign(failure.seed).run(failure.index + 1)
     return [each.problem for each in summary.failures]
 
 
@@ -134,7 +133,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--failures", type=int, default=5, help="end after so many")
     parser.add_argument("--folder", type=Path, default=Path("build/fuzz"), help="for the inputs of failures")
     parser.add_argument("--reproduce", type=Path, metavar="FILE", help="send a saved input again")
-    parser.add_argument("--everything", action="store_true", help="also what is known to break the monitor")
     parser.add_argument("--dds", action="store_true", help="attack a node in its own process, over DDS")
     parser.add_argument("--rate", type=float, default=500.0, help="messages per second over DDS")
     parser.add_argument("--json", action="store_true", help="print one JSON object")

@@ -116,7 +116,7 @@ def _points(dice: Dice) -> Vertices:
         points /= np.linalg.norm(points, axis=1, keepdims=True)
     elif kind < 0.95:  # on a lattice: many lie in one face
         points = _generator(dice).integers(0, 3, (dice.random.randrange(4, 60), 3)) * 0.5
-    elif kind < 0.99 or not dice.allowed.large:
+    elif kind < 0.99:
         points = np.zeros((dice.random.randrange(4), 3))
     else:
         points = _generator(dice).normal(size=(LARGE, 3))
@@ -127,7 +127,7 @@ def _boundary(dice: Dice) -> Vertices:
     """Return the corners of a polygon: round, a star, crossing itself, or too few."""
     count = dice.random.randrange(3, 30)
     if dice.is_hostile and dice.chance(0.3):
-        count = dice.random.choice((0, 1, 2, 500, *((LARGE,) if dice.allowed.large else ())))
+        count = dice.random.choice((0, 1, 2, 500, LARGE))
     angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
     radius = np.ones(count)
     if dice.chance(0.5):
@@ -149,7 +149,7 @@ def _mesh(dice: Dice) -> tuple[Vertices, list[int]]:
         vertices, faces = _height_field(dice, dice.random.randrange(2, 7))
     elif kind < 0.9:
         vertices, faces = _notched(dice)
-    elif kind < 0.995 or not dice.allowed.large:  # a soup of triangles
+    elif kind < 0.995:  # a soup of triangles
         vertices = _generator(dice).normal(size=(dice.random.randrange(3, 30), 3))
         faces = _generator(dice).integers(0, len(vertices), (dice.random.randrange(1, 40), 3))
     else:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
-from dice import Allowed, Dice
+from dice import Dice
 from hostile_shapes import any_shape
 
 from collision_monitor.codec import encode_parameter_event
@@ -14,7 +14,7 @@ from collision_monitor.codec.cdr import ENCAPSULATION, Writer
 from collision_monitor.codec.states import COVARIANCE_SIZE
 from collision_monitor.errors import MessageError
 from collision_monitor.pipeline.topics import Topic
-from collision_monitor.records import STATE, Model, ShapeType
+from collision_monitor.records import STATE, Model
 from collision_monitor.settings.profile import Profile
 
 SECOND: Final = 1_000_000_000
@@ -46,9 +46,9 @@ class Message(NamedTuple):
     data: bytes
 
 
-def hostile_message(seed: int, index: int, now_ns: int, allowed: Allowed) -> Message:
+def hostile_message(seed: int, index: int, now_ns: int) -> Message:
     """Return message `index` of a seed, sent at `now_ns`."""
-    dice = Dice(seed, index, allowed)
+    dice = Dice(seed, index)
     topic = dice.random.choices((Topic.STATES, Topic.SHAPES, Topic.SETTINGS), (72, 25, 3))[0]
     data = _MAKERS[topic](dice, now_ns)
     if dice.is_hostile or dice.chance(0.05):
@@ -162,7 +162,7 @@ def _description(writer: Writer, dice: Dice) -> None:
         writer.scalar("u4", dice.word() if dice.chance(0.2) else 0, what)
     writer.sequence(np.array(_allowed_ids(dice, object_id), "<u4"), "<u4", 4)
     writer.scalar("f8", dice.number(0.0, 0.2) if dice.chance(0.3) else 0.0, "padding")
-    writer.scalar("u1", _model(dice, {shape.kind for shape in shapes}), "model")
+    writer.scalar("u1", _model(dice), "model")
     for what in ("max_linear_acceleration", "max_angular_acceleration"):
         writer.scalar("f8", dice.number(0.0, 3.0) if dice.chance(0.3) else 0.0, what)
 
@@ -173,13 +173,10 @@ def _allowed_ids(dice: Dice, object_id: int) -> list[int]:
     return [dice.random.choice((object_id, _object_id(dice))) for _ in range(3 if dice.chance(0.1) else 0)]
 
 
-def _model(dice: Dice, kinds: set[int]) -> int:
+def _model(dice: Dice) -> int:
     if dice.is_hostile and dice.chance(0.2):
         return dice.random.choice((11, 12, 128, 255))
-    model = int(dice.random.choice(list(Model))) if dice.chance(0.4) else 0
-    if model == Model.CONVEX_DECOMPOSITION and ShapeType.MESH in kinds and not dice.allowed.decomposition:
-        return int(Model.CONVEX_HULL)
-    return model
+    return int(dice.random.choice(list(Model))) if dice.chance(0.4) else 0
 
 
 # -- settings

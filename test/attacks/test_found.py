@@ -11,9 +11,11 @@ from collision_monitor.codec import decode_status, encode_descriptions, encode_s
 from collision_monitor.codec.descriptions import decode_descriptions
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
-from collision_monitor.geometry.shapes import Box, Circle, ConvexHull, Mesh, Sphere
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Box, Circle, ConvexHull, Cylinder, HalfSpace, Mesh, Sphere
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.objects.preparation_cost import Budget
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.settings_event import LIMIT, encode_settings
 from collision_monitor.records import STATE, Model
@@ -118,3 +120,25 @@ def test_a_snapshot_that_turns_a_plane_scene_into_one_in_space_is_taken_as_a_who
     pipeline.on_shapes(encode_descriptions(0, "world", solid))
     assert pipeline.monitor.ids == [3, 4], "a message that is no snapshot removes nothing"
     assert decode_status(pipeline.status()).refused_shape == 3
+
+
+def test_a_snapshot_needs_no_description_to_keep_an_object_whose_next_one_is_refused() -> None:
+    """A restored pipeline has no descriptions; it removed the object, which the original pipeline kept."""
+    pipeline = Pipeline()
+    pipeline.on_shapes(encode_descriptions(0, "world", [ObjectDescription(1, Sphere(1.0))]))
+    restored = Pipeline.restored(Snapshot.decode(pipeline.snapshot().encode()), "world")
+    mixed = [(HalfSpace((0.0, 0.0, 1.0)), Pose()), (Sphere(1.0), Pose())]
+    impossible = ObjectDescription(1, mixed, static=True, pose=Pose(), model=Model.OBB)
+    for each in (pipeline, restored):
+        each.on_shapes(encode_descriptions(0, "world", [impossible]))
+        assert decode_status(each.status()).refused_shape == 1
+        assert each.monitor.ids == [1]
+
+
+def test_a_concave_mesh_beside_other_shapes_is_estimated_by_its_faces() -> None:
+    x, y = np.meshgrid(np.arange(6.0), np.arange(6.0))
+    k = np.arange(30)[np.arange(30) % 6 != 5]
+    surface = Mesh(np.column_stack([x.ravel(), y.ravel(), np.sin(x * y).ravel()]), np.column_stack([k, k + 6, k + 1]))
+    beside = [(surface, Pose()), (Cylinder(0.1, 1.0), Pose())]
+    assert Budget().fits([(surface, Pose())], Model.CONVEX_HULL)
+    assert not Budget().fits(beside, Model.CONVEX_HULL)

@@ -45,11 +45,11 @@ def test_the_table_shows_each_pair_once_soonest_first():
     assert "25.0 mm" in touching
     assert "1.50 s" in touching
     assert "rack_7 – person_3" in possible
-    assert "0.2500 s" in possible
+    assert "0.25 s" in possible
     assert "not known" in possible
     assert "unresolved" in possible
     assert "robot_1 – person_3" in certain
-    assert "0.7600 s" in certain
+    assert "0.76 s" in certain
     assert "50 Hz" in text
     assert "latency 4.2 ms" in text
     assert "recording, 17 messages" in text
@@ -62,7 +62,7 @@ def test_what_is_stale_or_not_recorded_is_said():
 
 
 def test_the_line_names_the_soonest_pair():
-    assert "1 touching, 2 predicted, next: rack_7 – person_3 in 0.2500 s (unresolved)" in picture().line()
+    assert "1 touching, 2 predicted, next: rack_7 – person_3 in 0.25 s (unresolved)" in picture().line()
 
 
 def test_nothing_heard_yet():

@@ -196,3 +196,22 @@ def test_what_cannot_be_done_is_said():
     with pytest.raises(InputError, match="slot"):
         builder.remove(slot)
     assert len(builder) == 0
+
+
+def test_removed_slots_point_into_the_table_after_its_gaps_were_closed():
+    """A snapshot holds the free slots too, and is refused if they point behind the last vertex."""
+    builder = ShapeTableBuilder()
+    rng = np.random.default_rng(5)
+
+    def ball(corners: int) -> shapes.ConvexHull:
+        points = rng.normal(size=(corners, 3))
+        return shapes.ConvexHull(points / np.linalg.norm(points, axis=1, keepdims=True))
+
+    slots = [builder.append(ball(40 + k)) for k in range(16)]
+    before = len(builder.used.vertex_index)
+    for slot in slots[1:]:
+        builder.remove(slot)
+    slots.append(builder.append(ball(len(builder.table.vertex_index) - before + 1)))
+    table = builder.used
+    assert len(table.vertex_index) < before, "the gaps were closed"
+    assert (table.vertex_start + table.vertex_count <= len(table.vertex_index)).all()

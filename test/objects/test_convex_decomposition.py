@@ -87,3 +87,35 @@ def test_without_the_library_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "coacd", None)
     with pytest.raises(cm.UnsupportedError, match=r'pip install "collision_monitor\[decomposition\]"'):
         contact(Mesh(U_SHAPE.vertices, U_SHAPE.faces), Pose(), Sphere(1), Pose(), model="convex_decomposition")
+
+
+FLAT = {
+    "flat": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]],
+    "thin": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 1e-17]],
+    "needle": [[0, 0, 0], [1, 0, 0], [0.5, 0, 0], [0.25, 1e-300, 0]],
+    "point": [[1, 2, 3]] * 4,
+}
+CLOSED = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+
+
+@pytest.mark.parametrize("corners", FLAT.values(), ids=FLAT)
+def test_a_mesh_without_an_inside_is_refused(corners):
+    pytest.importorskip("coacd")
+    with pytest.raises(cm.ShapeError, match="expected points that span a solid"):
+        module.convex_decomposition(Mesh(np.array(corners, float), CLOSED))
+
+
+def test_a_bent_sheet_with_two_sides_is_refused():
+    pytest.importorskip("coacd")
+    corners = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 1)], float)
+    sheet = np.array([(0, 1, 2), (1, 3, 2)])
+    with pytest.raises(cm.ShapeError, match="without volume"):
+        module.convex_decomposition(Mesh(corners, np.concatenate([sheet, sheet[:, ::-1]])))
+
+
+def test_without_a_solid_part_the_search_for_a_cover_ends(monkeypatch):
+    coacd = pytest.importorskip("coacd")
+    flat = np.array(FLAT["flat"], float)
+    monkeypatch.setattr(coacd, "run_coacd", lambda *_, **__: [(flat, CLOSED)])
+    with pytest.raises(cm.UnsupportedError, match="no solid part"):
+        module.convex_decomposition(Mesh(U_SHAPE.vertices.copy(), U_SHAPE.faces))

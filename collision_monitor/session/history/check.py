@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -22,11 +23,12 @@ _NOT_XML: Final = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff
 
 @dataclass(frozen=True)
 class Checked:
-    """A session and its outcomes, or the reason why it could not be read."""
+    """A session and its outcomes, or the reason why it could not be read. seconds: time to read and check it."""
 
     session: str
     outcomes: list[ExpectationResult] = field(default_factory=list)
     error: str = ""
+    seconds: float = field(default=0.0, compare=False)
 
     @property
     def holds(self) -> bool:
@@ -39,8 +41,10 @@ def check_session(path: Path, expectations: Any, with_profile: str | None = None
 
     with_profile: check the answers of this program with that profile, or AS_RECORDED, instead of the recorded answers.
     """
+    begin = time.perf_counter()
     history = read_history(Session(path), with_profile)
-    return Checked(str(path), evaluate(parse_expectations(expectations), history, lambda: replay_verdict(path)))
+    outcomes = evaluate(parse_expectations(expectations), history, lambda: replay_verdict(path))
+    return Checked(str(path), outcomes, seconds=time.perf_counter() - begin)
 
 
 def _unread(path: Path, why: str) -> Checked:
@@ -69,7 +73,8 @@ def check_sessions(
 
 def junit_xml(results: Sequence[Checked]) -> str:
     """Return the results as JUnit XML, with a suite for each session and a case for each expectation."""
-    root = ElementTree.Element("testsuites", name="collision-monitor check")
+    total = sum(each.seconds for each in results)
+    root = ElementTree.Element("testsuites", name="collision-monitor check", time=f"{total:.3f}")
     for each in results:
         failures = sum(not outcome.holds for outcome in each.outcomes)
         suite = ElementTree.SubElement(
@@ -79,12 +84,19 @@ def junit_xml(results: Sequence[Checked]) -> str:
             tests=str(max(len(each.outcomes), 1)),
             failures=str(failures),
             errors=str(int(bool(each.error))),
+            time=f"{each.seconds:.3f}",
         )
         if each.error:
             case = ElementTree.SubElement(suite, "testcase", classname=each.session, name="session")
             ElementTree.SubElement(case, "error", message=each.error)
         for outcome in each.outcomes:
-            case = ElementTree.SubElement(suite, "testcase", classname=each.session, name=outcome.expectation)
+            case = ElementTree.SubElement(
+                suite,
+                "testcase",
+                classname=each.session,
+                name=outcome.expectation,
+                time=f"{outcome.seconds:.3f}",
+            )
             if not outcome.holds:
                 ElementTree.SubElement(case, "failure", message=outcome.found)
     for element in root.iter():

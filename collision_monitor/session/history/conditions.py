@@ -93,7 +93,8 @@ def warned_before(names: PairSelector, before: float) -> Condition:
         for each in collisions:
             # NaN passes: a contact at the session's begin could not be predicted
             if each.warned < before:
-                return False, f"warned {each.warned:.3f} s before {each.begin:.3f} s, {_pair(history, each.pair)}"
+                lead = f"predicted only {each.warned:.3f} s before" if each.warned > 0.0 else "not predicted"
+                return False, f"the contact of {_pair(history, each.pair)} at {each.begin:.3f} s was {lead}"
             least = min(least, each.warned)
         if not collisions:
             return not history.problems, _problems(history) or "no contact"

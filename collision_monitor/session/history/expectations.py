@@ -7,8 +7,9 @@ happen counts as not known, and fails.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -29,11 +30,12 @@ from collision_monitor.settings.yaml_file import read_yaml
 
 @dataclass(frozen=True)
 class ExpectationResult:
-    """Result of one expectation: its text, whether it holds, and what was found."""
+    """Result of one expectation: its text, whether it holds, what was found, and the time to find it (s)."""
 
     expectation: str
     holds: bool
     found: str
+    seconds: float = field(default=0.0, compare=False)
 
 
 @dataclass(frozen=True)
@@ -70,11 +72,12 @@ def evaluate(expectations: list[Expectation], history: History, replay: Callable
     """Return the result of each expectation. replay: replays the session and returns its verdict, if that is needed."""
     outcomes = []
     for each in expectations:
+        begin = time.perf_counter()
         try:
             holds, found = each.condition(history, replay)
         except CollisionMonitorError as error:
             holds, found = False, str(error)
-        outcomes.append(ExpectationResult(each.text, holds, found))
+        outcomes.append(ExpectationResult(each.text, holds, found, time.perf_counter() - begin))
     return outcomes
 
 

@@ -113,7 +113,7 @@ def test_the_history_is_what_happened(yard: Path) -> None:
         ("{no_prediction: [cart, person_2], under: 0.5}", True, "no such prediction"),
         ("{no_prediction: any, under: 0.5}", False, "cart and person_1"),
         ("{warned: any, before: 1.9}", True, "1 contacts"),
-        ("{warned: any, before: 2.5}", False, "warned 2.0"),
+        ("{warned: any, before: 2.5}", False, "predicted only 2.0"),
         ("{step_time_p99: 0.01}", True, "0.00"),
         ("{step_time_p99: 0.001}", False, "over 6 steps that a status reported"),
         ("{replay: identical}", True, "identical"),
@@ -178,7 +178,10 @@ def test_many_sessions_on_many_processes(yard: Path, tmp_path: Path) -> None:
     assert list(check_sessions(paths, expected, engine=Engine(jobs=2))) == one
     assert "expected an MCAP file" in one[1].error
     assert [o.holds for o in one[0].outcomes] == [True, False] == [o.holds for o in one[2].outcomes]
-    counts = [(s.get("tests"), s.get("failures"), s.get("errors")) for s in ElementTree.fromstring(junit_xml(one))]
+    suites = ElementTree.fromstring(junit_xml(one))
+    counts = [(s.get("tests"), s.get("failures"), s.get("errors")) for s in suites]
+    assert float(suites.get("time")) > 0.0
+    assert all(float(case.get("time")) >= 0.0 for case in suites.iter("testcase") if case.find("error") is None)
     assert counts == [("2", "1", "0"), ("1", "0", "1"), ("2", "1", "0")]
     with pytest.raises(InputError, match="got none"):
         find_sessions([str(tmp_path / "sessions" / ".."), str(_empty(tmp_path))])
