@@ -18,7 +18,8 @@ PACKAGE = Path(__file__).parents[1] / NAME
 FLOORS: Final = (
     {"_jit", "errors", "tolerances", "records", "_version"},
     {"settings", "geometry"},
-    {"broad_phase", "narrow_phase", "meshes"},
+    {"broad_phase", "narrow_phase"},
+    {"meshes"},
     {"objects", "prediction"},
     {"query", "detection", "monitor", "codec", "world"},
     {"pipeline", "warm_up"},

@@ -16,6 +16,7 @@ from collision_monitor._jit import device
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.geometry import shapes
+from collision_monitor.geometry.forest import REACH, Forest
 from collision_monitor.geometry.polygons import corners, is_convex, is_counter_clockwise
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.qhull import hull_vertices
@@ -33,10 +34,17 @@ HALF_SPACE: Final = int(ShapeType.HALF_SPACE)
 CIRCLE: Final = int(ShapeType.CIRCLE)
 POLYGON: Final = int(ShapeType.POLYGON)
 ELLIPSOID: Final = int(ShapeType.ELLIPSOID)
+MESH: Final = int(ShapeType.MESH)
+
+TREE: Final = 3
+"""Column of `size` with the first block of the shape's tree plus 1, or 0; a half-space has its offset there."""
 
 SUPPORTED_SHAPES: Final = (
     "Sphere, Box, Capsule, Cylinder, Cone, Ellipsoid, ConvexHull, HalfSpace; Circle, Polygon (convex) in the plane"
 )
+
+SHARED: Final = ("vertices", "vertex_index", "blocks")
+"""Fields of a table without a row for each slot."""
 
 _TRIANGLE: Final = np.arange(3, dtype=np.int32)
 """The corners of a triangle, in the form of `hull_vertices`."""
@@ -48,6 +56,7 @@ class ShapeTable(NamedTuple):
     size holds, by kind: sphere r | box half extents x, y, z | capsule r, half core length | cylinder r, half height |
     cone r, half height | half-space normal x, y, z, offset | hull nothing | circle r | polygon number of corners |
     ellipsoid half axes x, y, z. The radius of a polygon is part of its margin.
+    The last number of any other kind is its tree (TREE); a mesh always has one, and nothing else.
     Hull vertices come in blocks padded to a multiple of LANES with the last vertex, so that the support scan has no
     tail.
     """
@@ -62,6 +71,7 @@ class ShapeTable(NamedTuple):
     vertex_index: Any  # (V,) int32: the vertex's index in the user's points
     local_position: Any  # (K, 3) float64: position of the shape in its object's frame (m)
     local_rotation: Any  # (K, 3, 3) float64
+    blocks: Any  # (N, 16, 8) float64: the trees, see meshes.layout
 
 
 def _empty(slots: int, vertices: int) -> ShapeTable:
@@ -76,28 +86,30 @@ def _empty(slots: int, vertices: int) -> ShapeTable:
         vertex_index=np.zeros(vertices, np.int32),
         local_position=np.zeros((slots, 3)),
         local_rotation=np.zeros((slots, 3, 3)),
+        blocks=np.zeros((1, 16, 8)),
     )
 
 
 def _resized(table: ShapeTable, slots: int, vertices: int) -> ShapeTable:
     new = _empty(slots, vertices)
-    for source, target in zip(table, new, strict=True):
+    for source, target in zip(table[:-1], new[:-1], strict=True):
         target[tuple(slice(n) for n in source.shape)] = source
-    return new
+    return new._replace(blocks=table.blocks)
 
 
 def take(table: ShapeTable, slots: NDArray[np.int_]) -> ShapeTable:
-    """Return a table of these slots in this order; a slot may occur several times. The vertices are shared."""
-    rows = {name: getattr(table, name)[slots] for name in table._fields if name not in ("vertices", "vertex_index")}
+    """Return a table of these slots in this order; a slot may occur several times. Vertices and trees are shared."""
+    rows = {name: getattr(table, name)[slots] for name in table._fields if name not in SHARED}
     return table._replace(**rows)
 
 
 def join(tables: Sequence[ShapeTable]) -> ShapeTable:
-    """Concatenate several tables into one, in order."""
-    columns = {name: [getattr(table, name) for table in tables] for name in ShapeTable._fields}
+    """Concatenate several tables of shapes without trees into one, in order."""
+    columns = {name: [getattr(table, name) for table in tables] for name in ShapeTable._fields[:-1]}
     start = np.cumsum([0] + [len(index) for index in columns["vertex_index"][:-1]])
     columns["vertex_start"] = [each + np.int32(at) for each, at in zip(columns["vertex_start"], start, strict=True)]
-    return ShapeTable(**{name: np.concatenate(each, axis=int(name == "vertices")) for name, each in columns.items()})
+    rows = {name: np.concatenate(each, axis=int(name == "vertices")) for name, each in columns.items()}
+    return ShapeTable(**rows, blocks=tables[0].blocks)
 
 
 def triangle_table(corners: Array) -> ShapeTable:
@@ -130,8 +142,9 @@ def convex_ring(points: Array) -> NDArray[np.int32]:
 class ShapeTableBuilder:
     """Builds a ShapeTable. `table` is the current table and must be read again after `append`."""
 
-    def __init__(self, slots: int = 64, vertices: int = 512) -> None:
-        self.table = _empty(max(slots, 1), max(vertices, LANES))
+    def __init__(self, slots: int = 64, vertices: int = 512, forest: Forest | None = None) -> None:
+        self._forest = forest or Forest()
+        self.table = _empty(max(slots, 1), max(vertices, LANES))._replace(blocks=self._forest.blocks)
         self._slots = 0
         self._vertices = 0
         self._free_slots: list[int] = []
@@ -144,6 +157,7 @@ class ShapeTableBuilder:
         """Restore a builder from its `used` table and its `free` slots and blocks."""
         slots, vertices = len(table.kind), len(table.vertex_index)
         builder = cls()
+        table = table._replace(blocks=builder.table.blocks)
         builder.table = _resized(table, max(slots, len(builder.table.kind)), max(vertices, LANES))
         builder._slots, builder._vertices = slots, vertices
         builder._free_slots, builder._free_blocks = free_slots, free_blocks
@@ -162,6 +176,7 @@ class ShapeTableBuilder:
         by_vertex = {
             "vertices": self.table.vertices[:, : self._vertices],
             "vertex_index": self.table.vertex_index[: self._vertices],
+            "blocks": self.table.blocks,
         }
         rows = {name: column[: self._slots] for name, column in self.table._asdict().items() if name not in by_vertex}
         return ShapeTable(**rows, **by_vertex)
@@ -181,11 +196,12 @@ class ShapeTableBuilder:
         pose: Pose | None = None,
         margin: float = 0.0,
         corners: NDArray[np.int32] | None = None,
+        tree: Array | None = None,
     ) -> int:
         """Add a shape at a pose in its object's frame, enlarged by `margin` (m); return its slot.
 
-        corners: the `hull_vertices` of a ConvexHull, if they are known already.
-        Raises UnsupportedError for a kind without kernels, ShapeError for an invalid margin.
+        corners: the `hull_vertices` of a ConvexHull, if they are known already. tree: of a mesh, which is needed
+        (`meshes.shape_trees`). Raises UnsupportedError for a kind without kernels, ShapeError for an invalid margin.
         """
         if not (np.isfinite(margin) and margin >= 0.0):
             raise ShapeError(f"margin: expected a finite number of metres >= 0, got {margin!r}")
@@ -223,6 +239,8 @@ class ShapeTableBuilder:
                 kind, size, radius = POLYGON, (len(ring),), float(np.linalg.norm(shape.points, axis=1).max())
                 start, count = self._share(np.pad(shape.points, ((0, 0), (0, 1))), ring)
                 margin += shape.radius
+            case shapes.Mesh() if tree is not None:
+                kind, size, radius = MESH, (), float(tree[REACH])
             case _:
                 raise UnsupportedError(f"{type(shape).__name__} has no narrow phase; supported are {SUPPORTED_SHAPES}")
         slot = self._new_slot()
@@ -236,7 +254,15 @@ class ShapeTableBuilder:
         table.local_position[slot] = 0.0 if pose is None else pose.position
         table.local_rotation[slot] = np.eye(3) if pose is None else pose.rotation
         table.kind[slot] = kind
+        if tree is not None:
+            self.plant(slot, tree)
         return slot
+
+    def plant(self, slot: int, tree: Array) -> None:
+        """Give the shape in a slot, which is no half-space, a tree of its surface."""
+        first = self._forest.add(tree)
+        self.table = self.table._replace(blocks=self._forest.blocks)
+        self.table.size[slot, TREE] = first + 1
 
     def remove(self, slot: int) -> None:
         """Free a slot for reuse. Raises InputError if it holds no shape."""
@@ -250,6 +276,9 @@ class ShapeTableBuilder:
             else:
                 del self._users[start], self._blocks[key]
                 self._free_blocks.setdefault(int(self.table.vertex_count[slot]), []).append(start)
+        if self.table.size[slot, TREE] and self.table.kind[slot] != HALF_SPACE:
+            self._forest.drop(int(self.table.size[slot, TREE]) - 1)
+        self.table.size[slot] = 0.0
         self.table.kind[slot] = 0
         self.table.vertex_start[slot] = self.table.vertex_count[slot] = 0
         self._free_slots.append(slot)

@@ -33,7 +33,10 @@ class Surface:
         first = first_equal(vertices)
         self.welded = int((first != np.arange(len(first))).sum())
         """Number of vertices that equal an earlier one."""
-        self.faces: Indices = _distinct(first[faces])
+        solid = _without_collapsed(first[faces])
+        self.faces: Indices = _distinct(solid)
+        self.repeats = len(self.faces) < len(solid)
+        """Whether a face repeats another, in any order of its vertices."""
 
     @cached_property
     def _edges(self) -> tuple[Indices, Indices, NDArray[np.bool_]]:
@@ -104,8 +107,8 @@ class Surface:
 
     @property
     def certain(self) -> bool:
-        """Whether each point has a known location: the surface has no hole, and orientation if solids overlap."""
-        return self.sheet or (self.oriented and self.closed)
+        """Whether the winding number of the faces as given tells what is inside: no hole, no repeats, and oriented."""
+        return self.sheet or (self.closed and self.oriented and not self.repeats)
 
     @cached_property
     def volume(self) -> float:
@@ -133,10 +136,14 @@ def first_equal(points: Array) -> Indices:
     return first
 
 
-def _distinct(faces: Indices) -> Indices:
-    """Faces without those that have two equal vertices, and without repetitions in any order of the vertices."""
+def _without_collapsed(faces: Indices) -> Indices:
+    """Faces without those that have two equal vertices."""
     a, b, c = faces.T
-    faces = faces[(a != b) & (b != c) & (c != a)]
+    return faces[(a != b) & (b != c) & (c != a)]
+
+
+def _distinct(faces: Indices) -> Indices:
+    """Faces without repetitions in any order of the vertices; the first is kept."""
     ordered = np.sort(faces, axis=1)
     order = np.lexsort(ordered.T)
     new = np.ones(len(faces), bool)

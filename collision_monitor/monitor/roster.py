@@ -13,7 +13,9 @@ from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.shape_table import POLYGON, ShapeTable, ShapeTableBuilder
-from collision_monitor.geometry.shapes import HalfSpace, array_bytes
+from collision_monitor.geometry.shapes import HalfSpace, Mesh, array_bytes
+from collision_monitor.meshes.shape_trees import shape_tree
+from collision_monitor.meshes.slot_trees import plant_trees
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled, monitored_model
@@ -178,11 +180,14 @@ class Roster(Stage):
         slots: list[int] = []
         try:
             for (shape, offset), chosen in zip(modelled.pieces, corners, strict=True):
-                slots.append(self._shapes.append(shape, flat_pose(offset) if planar else offset, d.padding, chosen))
+                tree = shape_tree(shape) if isinstance(shape, Mesh) else None
+                at = flat_pose(offset) if planar else offset
+                slots.append(self._shapes.append(shape, at, d.padding, corners=chosen, tree=tree))
         except Exception:
             for slot in slots:
                 self._shapes.remove(slot)
             raise
+        plant_trees(self._shapes)
         i = self._slots.get(d.object_id)
         if i is None:
             i = self._slots[d.object_id] = self._new_body()

@@ -12,7 +12,7 @@ from typing import Any
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.shape_table import CONE, CYLINDER, ELLIPSOID
 from collision_monitor.narrow_phase.contact_row import write
-from collision_monitor.narrow_phase.core import core_length, core_pair, core_radius, rounding
+from collision_monitor.narrow_phase.core import CorePair, core_length, core_pair, core_radius, rounding
 from collision_monitor.narrow_phase.epa import epa
 from collision_monitor.narrow_phase.gjk import gjk, point_on_a, simplex_point
 from collision_monitor.narrow_phase.pair_pose import PairPose
@@ -59,12 +59,19 @@ def convex_separation(table: Any, a: int, b: int, pose: PairPose, limit: float, 
 @device
 def convex_contact(table: Any, a: int, b: int, pose: PairPose, limit: float, out: Any, work: Any) -> bool:
     """Write the contact; False, with out undefined, as soon as the distance is certified to exceed `limit` (m)."""
+    size = core_length(table, a) + core_length(table, b)
+    return cores_contact(core_pair(table, a, b), (rounding(table, a), rounding(table, b)), size, pose, limit, out, work)
+
+
+@device
+def cores_contact(
+    cores: CorePair, radii: tuple[float, float], size: float, pose: PairPose, limit: float, out: Any, work: Any
+) -> bool:
+    """`convex_contact` of two cores with the radii (m) that round them; size: sum of their bounding radii (m)."""
     _place(pose, work)
     px, py, pz = pose.p
-    cores = core_pair(table, a, b)
     A, B = cores.A, cores.B
-    ra, rb = rounding(table, a), rounding(table, b)
-    size = core_length(table, a) + core_length(table, b)
+    ra, rb = radii
     count, lower, normal = gjk(cores, work, size, limit + ra + rb)
     if count == 0:
         return False

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.geometry.bounding_spheres import minimal_sphere
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
-from collision_monitor.geometry.convex_pieces import convex_pieces
+from collision_monitor.geometry.convex_pieces import convex_pieces, is_concave_mesh
 from collision_monitor.geometry.inside import locate_in_surface
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
 from collision_monitor.geometry.planar import is_planar
@@ -118,19 +118,20 @@ def containing_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | 
     return Modelled([(piece, pose)], [0], chosen, _excess(shapes, pieces, piece, pose), convex)
 
 
-def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model) -> Modelled:
-    """Compute the model that a monitor uses: AUTO means EXACT, but the convex hull for each concave mesh.
+def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | int) -> Modelled:
+    """Compute the model that a monitor uses, as `containing_model`; but an exact concave mesh stays one piece.
 
-    Raises UnsupportedError for a concave mesh with the model EXACT.
+    A mesh of which the inside is not certain (`Surface.certain`) has no exact model: its convex hull replaces it.
     """
-    concave = [isinstance(shape, Mesh) and len(convex_pieces(shape)) > 1 for shape, _ in shapes]
-    if model is Model.EXACT and any(concave):
-        raise UnsupportedError("a concave Mesh is not tested exactly; supported are auto (its convex hull) and coarser")
-    if model is not Model.AUTO or not any(concave):
-        return containing_model(shapes, model)
+    chosen = parse_model(model)
+    if chosen not in (Model.AUTO, Model.EXACT):
+        return containing_model(shapes, chosen)
+    uncertain = [isinstance(shape, Mesh) and not shape.surface.certain for shape, _ in shapes]
+    if not any(uncertain):
+        return exact_model(shapes)
     parts = [
-        containing_model([pair], Model.CONVEX_HULL if bent else Model.EXACT)
-        for pair, bent in zip(shapes, concave, strict=True)
+        containing_model([pair], Model.CONVEX_HULL) if open_ else exact_model([pair])
+        for pair, open_ in zip(shapes, uncertain, strict=True)
     ]
     return Modelled(
         pieces=[piece for part in parts for piece in part.pieces],
@@ -139,6 +140,18 @@ def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model) -> Model
         excess=max(part.excess for part in parts),
         convex=False,
     )
+
+
+def exact_model(shapes: Sequence[tuple[Shape, Pose]]) -> Modelled:
+    """Convex pieces and concave meshes that are exactly the object."""
+    pieces: PosedShapes = []
+    index = []
+    for k, (shape, pose) in enumerate(shapes):
+        parts = ((shape, Pose()),) if is_concave_mesh(shape) else convex_pieces(shape)
+        pieces += [(part, pose @ offset) for part, offset in parts]
+        index += [k] * len(parts)
+    convex = len(pieces) == 1 and not isinstance(pieces[0][0], Mesh)
+    return Modelled(pieces, index, Model.EXACT, 0.0, convex)
 
 
 def _decomposed(shapes: Sequence[tuple[Shape, Pose]], convex: bool) -> Modelled:

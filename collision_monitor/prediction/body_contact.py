@@ -7,10 +7,10 @@ from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
-from collision_monitor.narrow_phase.dispatch import contact_within
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.bodies import next_pair, place_shape
 from collision_monitor.prediction.body_impact import CLOSING, closing_speed
+from collision_monitor.prediction.mesh_pair import shapes_within, unknown_depth
 from collision_monitor.prediction.motion import (
     age_of,
     position_now,
@@ -112,8 +112,9 @@ def body_contact(multibody, i, j, time, query, scratch, result):
         pose = PairPose(R_a, R_b, (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]))
         tests += 1
         limit = min(wanted, best)
-        if contact_within(table, a, b, pose, limit, out, scratch.work) and out[DISTANCE] < best:
+        if shapes_within(table, a, b, pose, limit, out, scratch) and out[DISTANCE] < best:
             best = out[DISTANCE]
+            out[BOUND] += unknown_depth(table, a, b, pose.p, best)
             for c in range(3):
                 out[POINT_A + c] += oa[c]
                 out[POINT_B + c] += oa[c]

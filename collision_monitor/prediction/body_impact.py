@@ -13,8 +13,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import device, inlined
+from collision_monitor._jit.vectors import LANES
+from collision_monitor.meshes.nearest import MEMORY, PLACE_A, PLACE_B, answer_row
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
-from collision_monitor.narrow_phase.dispatch import pair_contact, separation
+from collision_monitor.narrow_phase.dispatch import separation
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.work_memory import WORK_SIZE
 from collision_monitor.prediction.advance import Placed, advance
@@ -27,6 +29,7 @@ from collision_monitor.prediction.impact_record import (
     UNRESOLVED,
     write_pair,
 )
+from collision_monitor.prediction.mesh_pair import advance_mesh, has_mesh, shapes_within
 from collision_monitor.prediction.motion import half_acceleration, relative_position, relative_velocity, rotation_at
 from collision_monitor.prediction.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
 from collision_monitor.tolerances import EPSILON
@@ -79,6 +82,9 @@ class Scratch(NamedTuple):
     quaternion: Any  # (1, 4)
     out: Any  # (16,): a contact row, and the closing speed
     work: Any  # (WORK_SIZE,)
+    tree: Any  # (MEMORY,), see meshes.nearest
+    answer: Any  # (ANSWER,), see there
+    triangle: Any  # (3, LANES), see meshes.solid
 
 
 CLOSING: Final = CONTACT_SIZE
@@ -87,7 +93,15 @@ CLOSING: Final = CONTACT_SIZE
 
 def make_scratch() -> Scratch:
     """Make the scratch memory of one thread."""
-    return Scratch(np.zeros((4, 3, 3)), np.zeros((1, 4)), np.zeros(CLOSING + 1), np.zeros(WORK_SIZE))
+    return Scratch(
+        rotation=np.zeros((4, 3, 3)),
+        quaternion=np.zeros((1, 4)),
+        out=np.zeros(CLOSING + 1),
+        work=np.zeros(WORK_SIZE),
+        tree=np.zeros(MEMORY),
+        answer=answer_row(),
+        triangle=np.zeros((3, LANES)),
+    )
 
 
 @inlined
@@ -114,6 +128,8 @@ def shape_impact(table, parts, pair, window, tube, query, scratch):
     unknown.
     """
     A, B, a, b = pair
+    if has_mesh(table, a, b):
+        return _mesh_impact(table, parts, pair, window, tube, query, scratch)
     begin, end = window
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
@@ -162,6 +178,43 @@ def shape_impact(table, parts, pair, window, tube, query, scratch):
 
 
 @device
+def _mesh_impact(table, parts, pair, window, tube, query, scratch):
+    """`shape_impact` of a pair with a mesh: each step advances all of its triangles, through their trees."""
+    A, B, a, b = pair
+    begin, end = window
+    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
+    acceleration = (B.ax - A.ax, B.ay - A.ay, B.az - A.az)
+    w_a, w_b = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
+    scratch.answer[PLACE_A] = scratch.answer[PLACE_B] = -1.0
+    t = t_before = begin
+    gap_before = inf
+    status, iteration, guess = UNRESOLVED, 0, 0.0
+    while iteration < query.iterations:
+        iteration += 1
+        rotation_at(A, t, R_i)
+        rotation_at(B, t, R_j)
+        oa = place_shape(table, parts, a, R_i, R_a)
+        ob = place_shape(table, parts, b, R_j, R_b)
+        p, v = relative_position(A, B, t), relative_velocity(A, B, t)
+        at = Placed(a, b, R_a, R_b, oa, ob, p, v, acceleration, w_a, w_b)
+        margin = query.margin + tube.start + tube.growth * (t - begin)
+        d, gap = advance_mesh(table, at, margin, tube.growth, end - t, query.tolerance, scratch)
+        if d == 0.0:
+            if t > t_before and gap_before > gap:
+                wanted = gap + query.tolerance + 2.0 * (tube.start + tube.growth * (t - begin))
+                guess = wanted * (t - t_before) / (gap_before - gap)
+            status = HIT
+            break
+        if d >= end - t:
+            return CLEAR, end, iteration, guess
+        t_before, gap_before = t, gap
+        if t + d <= t:  # the time has no finer resolution
+            break
+        t += d
+    return status, t, iteration, guess
+
+
+@device
 def contact_at(table, parts, pair, t, scratch):
     """Write the contact of a pair of shapes (ShapePair) at time t into scratch.out; return the signed distance (m).
 
@@ -176,7 +229,7 @@ def contact_at(table, parts, pair, t, scratch):
     ob = place_shape(table, parts, b, R_j, R_b)
     p = relative_position(A, B, t)
     pose = PairPose(R_a, R_b, (p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]))
-    pair_contact(table, a, b, pose, out, scratch.work)
+    shapes_within(table, a, b, pose, inf, out, scratch)
     for k in range(3):
         out[POINT_A + k] += oa[k]
         out[POINT_B + k] += oa[k]

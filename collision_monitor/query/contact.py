@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final, NamedTuple
@@ -13,13 +13,18 @@ from numpy.typing import NDArray
 from collision_monitor.errors import PoseError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
 from collision_monitor.geometry.compound import shape_pairs
+from collision_monitor.geometry.convex_pieces import is_concave_mesh
 from collision_monitor.geometry.inside import UNKNOWN, locate_in_surface
 from collision_monitor.geometry.planar import is_planar
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
-from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape
-from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, as_contacts
+from collision_monitor.geometry.shapes import Capsule, HalfSpace, Mesh, Shape, Sphere
+from collision_monitor.meshes.contact import APART, ENCLOSED, OPEN, contact_of_trees, reach_of
+from collision_monitor.meshes.extent import extents
+from collision_monitor.meshes.nearest import MEMORY, answer_row
+from collision_monitor.meshes.shape_trees import shape_tree
+from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, as_contacts
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.objects.models import containing_model, parse_model
 from collision_monitor.query.fillings import fillings
@@ -69,7 +74,7 @@ class Contact:
     point_b: Array
     model_a: Model
     model_b: Model
-    _found: NearestPieces | None = field(repr=False)  # source of the patch; None: the two points alone
+    _find: Callable[[], NearestPieces] | None = field(repr=False)  # source of the patch; None: the two points alone
 
     @property
     def overlaps(self) -> bool:
@@ -82,25 +87,44 @@ class Contact:
 
         Otherwise `point_a` alone. Computed on first access.
         """
-        return self.point_a[None] if self._found is None else _patch(self._found, self.point_a)
+        return self.point_a[None] if self._find is None else _patch(self._find(), self.point_a)
 
     @cached_property
     def points_b(self) -> Array:
         """The same points on B: those on A plus the signed distance along the normal."""
-        return self.point_b[None] if self._found is None else self.points_a + self.signed_distance * self.normal
+        return self.point_b[None] if self._find is None else self.points_a + self.signed_distance * self.normal
 
 
-class _Posed(NamedTuple):
-    """One of the two objects at its pose, with the pieces that represent it."""
+@dataclass(frozen=True, eq=False)
+class _Posed:
+    """One of the two objects at its pose. outline: shapes that reach as far as its pieces."""
 
     shapes: Sequence[tuple[Shape, Pose]]
     pose: Pose
-    rotation: Array  # (3, 3), that of the pose
-    pieces: PieceTable
-    outline: Sequence[tuple[Shape, Pose]]  # shapes that reach as far as the pieces
-    model: Model
-    excess: float
-    fillings: Sequence[tuple[Shape, Pose]]  # boxes around the holes of its meshes
+    outline: Sequence[tuple[Shape, Pose]]
+    model: Model = Model.EXACT
+    excess: float = 0.0
+
+    @property
+    def rotation(self) -> Array:
+        """That of the pose, (3, 3)."""
+        return self.pose.rotation
+
+    @cached_property
+    def pieces(self) -> PieceTable:
+        """Convex pieces that represent it."""
+        return exact_piece_table(self.shapes) if self.model is Model.EXACT else piece_table(self.outline)
+
+    @cached_property
+    def is_uncertain(self) -> bool:
+        """Whether it has a mesh of which the inside is not certain."""
+        meshes = [shape for shape, _ in self.shapes if isinstance(shape, Mesh)] if self.model is Model.EXACT else []
+        return not all(mesh.surface.certain for mesh in meshes)
+
+    @cached_property
+    def is_concave(self) -> bool:
+        """Whether it has several pieces."""
+        return any(is_concave_mesh(shape) for shape, _ in self.outline) or len(self.pieces) > 1
 
 
 def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, model: Model | str = "exact") -> Contact:
@@ -125,25 +149,28 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
         _check_in_plane(a)
         _check_in_plane(b)
     offset = b.pose.position - a.pose.position
-    found = NearestPieces(a.pieces, (a.rotation, np.zeros(3)), b.pieces, (b.rotation, offset))
-    row = found.best
+    deepest = _by_trees(a, b)
+    if deepest is None:
+        deepest = _by_pieces(a, b, offset)
+    row, enclosed = deepest.row, deepest.enclosed
+    least = np.inf
+    if row[DISTANCE] > 0.0 and (a.is_uncertain or b.is_uncertain):
+        where = _where(a, b, offset), _where(b, a, -offset)
+        enclosed = Location.INSIDE in where
+        if enclosed:
+            _turn_inward(row)
+        else:
+            least = -np.inf if UNKNOWN in where else min(_distance_of_fillings(a, b), _distance_of_fillings(b, a))
     distance, bound = float(row[DISTANCE]), float(row[BOUND])
     normal = row[NORMAL : NORMAL + 3].copy()
-    where = {_where(a, b, offset), _where(b, a, -offset)} if distance > 0.0 else set()
-    enclosed = Location.INSIDE in where
-    if enclosed:
-        # no surfaces meet, but one object is inside the other, at least this deep
-        distance, normal = -distance, -normal
-    point = a.pose.position + (row[POINT_A : POINT_A + 3] + found.position[found.pair[0]])
-    convex = len(a.pieces) == len(b.pieces) == 1
+    point = a.pose.position + row[POINT_A : POINT_A + 3]
+    convex = not (a.is_concave or b.is_concave)
     unbounded = distance == -np.inf  # exact: no length is involved that could be wrong
     if distance <= 0.0 and not convex and not unbounded:
         bound += max(_parting_translation(a, b, offset, normal) + distance, 0.0)
-    if distance > 0.0 and (UNKNOWN in where or a.fillings or b.fillings):
-        least = _least_distance(a, b, offset)
-        if UNKNOWN in where or least <= 0.0:
-            least = -_parting_translation(a, b, offset, normal)
-        bound = max(bound, distance - least)
+    if least < distance:
+        # the solids that the surfaces may belong to are at least this far apart, or can be parted
+        bound = max(bound, distance - (least if least > 0.0 else -_parting_translation(a, b, offset, normal)))
     excess = a.excess + b.excess
     if distance <= 0.0 and excess > 0.0 and not all(len(exact_piece_table(side.shapes)) == 1 for side in (a, b)):
         bound -= distance  # the models may overlap deeply although the concave objects are apart
@@ -155,8 +182,67 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
         point_b=point.copy() if unbounded else point + distance * normal,
         model_a=a.model,
         model_b=b.model,
-        _found=None if enclosed or unbounded else found,
+        _find=None if enclosed or unbounded else deepest.pieces,
     )
+
+
+class _Deepest(NamedTuple):
+    """The nearest or deepest contact of two objects, about A's origin in world axes.
+
+    pieces: finds the pieces that touch in one plane. enclosed: no surfaces meet, but one object is inside the other.
+    """
+
+    row: Array
+    pieces: Callable[[], NearestPieces]
+    enclosed: bool
+
+
+def _by_pieces(a: _Posed, b: _Posed, offset: Array) -> _Deepest:
+    found = NearestPieces(a.pieces, (a.rotation, np.zeros(3)), b.pieces, (b.rotation, offset))
+    row = found.best.copy()
+    row[POINT_A : POINT_A + 3] += found.position[found.pair[0]]
+    enclosed = bool(row[DISTANCE] > 0.0 and Location.INSIDE in (_where(a, b, offset), _where(b, a, -offset)))
+    if enclosed:
+        _turn_inward(row)
+    return _Deepest(row, lambda: found, enclosed)
+
+
+def _turn_inward(row: Array) -> None:
+    """Make the contact of two surfaces that of a solid inside the other, which is at least this deep."""
+    row[DISTANCE] *= -1.0
+    row[NORMAL : NORMAL + 3] *= -1.0
+
+
+def _by_trees(a: _Posed, b: _Posed) -> _Deepest | None:
+    """The contact through the trees of two single shapes, one of which is a concave mesh; None for others.
+
+    The pieces also know how deep a triangle is inside a convex solid, so an overlap with one is left to them.
+    """
+    pair = a.outline[0][0], b.outline[0][0]
+    if len(a.outline) > 1 or len(b.outline) > 1 or not any(is_concave_mesh(shape) for shape in pair):
+        return None
+    trees = shape_tree(pair[0]), shape_tree(pair[1])
+    if trees[0] is None or trees[1] is None:
+        return None
+    row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
+    (R_a, p_a), (R_b, p_b) = _place(a), _place(b)
+    p_b = p_b + (b.pose.position - a.pose.position)
+    known = contact_of_trees(trees[0], R_a, p_a, trees[1], R_b, p_b, np.inf, row, answer, work)
+    if known != APART and not all(isinstance(shape, Mesh | Sphere | Capsule) for shape in pair):
+        return None
+    if known == OPEN:
+        row[BOUND] += reach_of(trees[0]) + reach_of(trees[1]) + float(np.linalg.norm(p_b - p_a))
+    row[POINT_A : POINT_A + 3] += p_a
+    offset = b.pose.position - a.pose.position
+    return _Deepest(row, lambda: _by_pieces(a, b, offset).pieces(), known == ENCLOSED)
+
+
+def _place(side: _Posed) -> tuple[Array, Array]:
+    """Rotation (3, 3) and position (3,), about the object's origin, of its only shape, in world axes."""
+    own = side.outline[0][1]
+    if own.quaternion[3] == 1.0 and not own.position.any():
+        return side.rotation, np.zeros(3)
+    return side.rotation @ own.rotation, side.rotation @ own.position
 
 
 def _posed(shape: Compound, pose: Pose, model: Model | str, name: str) -> _Posed:
@@ -164,11 +250,9 @@ def _posed(shape: Compound, pose: Pose, model: Model | str, name: str) -> _Posed
     if not isinstance(pose, Pose):
         raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
     if parse_model(model) in (Model.AUTO, Model.EXACT):
-        exact = exact_piece_table(shapes)
-        return _Posed(shapes, pose, pose.rotation, exact, shapes, Model.EXACT, 0.0, fillings(shapes))
+        return _Posed(shapes, pose, shapes)
     modelled = containing_model(shapes, model)
-    pieces = piece_table(modelled.pieces)
-    return _Posed(shapes, pose, pose.rotation, pieces, modelled.pieces, modelled.model, modelled.excess, ())
+    return _Posed(shapes, pose, modelled.pieces, modelled.model, modelled.excess)
 
 
 def _check_in_plane(side: _Posed) -> None:
@@ -179,7 +263,7 @@ def _check_in_plane(side: _Posed) -> None:
 def _where(inner: _Posed, outer: _Posed, offset: Array) -> int:
     """Location of `inner` in the meshes of `outer`, at `offset` (m) from it; no surfaces meet."""
     found: int = Location.OUTSIDE
-    if outer.model is not Model.EXACT or len(outer.pieces) == 1:
+    if outer.model is not Model.EXACT or not outer.is_concave:
         return found
     points = inner.pieces.inner @ inner.rotation.T - offset
     for shape, pose in outer.shapes:
@@ -196,15 +280,15 @@ def _where(inner: _Posed, outer: _Posed, offset: Array) -> int:
     return found
 
 
-def _least_distance(a: _Posed, b: _Posed, offset: Array) -> float:
-    """Lower bound (m) of the distances of each object from the fillings of the other; infinite without fillings."""
-    X_A, X_B = (a.rotation, np.zeros(3)), (b.rotation, offset)
-    solid_a, solid_b = (piece_table(side.fillings) if side.fillings else None for side in (a, b))
+def _distance_of_fillings(a: _Posed, b: _Posed) -> float:
+    """Lower bound (m) of the distances of A's fillings from B and from its fillings; infinite if A has none."""
     least = np.inf
-    for own, other in ((solid_a, b.pieces), (a.pieces, solid_b), (solid_a, solid_b)):
-        if own is not None and other is not None:
-            best = NearestPieces(own, X_A, other, X_B).best
-            least = min(least, float(best[DISTANCE] - best[BOUND]))
+    for filling in fillings(a.shapes) if a.model is Model.EXACT else ():
+        own = _Posed([filling], a.pose, [filling])
+        for shapes in ([shape] for shape in (*b.outline, *(fillings(b.shapes) if b.model is Model.EXACT else ()))):
+            other = _Posed(shapes, b.pose, shapes)
+            deepest = _by_trees(own, other) or _by_pieces(own, other, b.pose.position - a.pose.position)
+            least = min(least, float(deepest.row[DISTANCE] - deepest.row[BOUND]))
     return least
 
 
@@ -220,5 +304,14 @@ def _parting_translation(a: _Posed, b: _Posed, offset: Array, normal: Array) -> 
     directions = np.array([normal, *axes, *planes])
     if is_planar(a.shapes[0][0]):
         directions = directions[directions[:, 2] == 0.0]
-    ends = reach(a.outline, directions @ a.rotation) - directions @ offset
-    return float((ends + reach(b.outline, -directions @ b.rotation)).min())
+    ends = _reach(a, directions @ a.rotation) - directions @ offset
+    return float((ends + _reach(b, -directions @ b.rotation)).min())
+
+
+def _reach(side: _Posed, directions: Array) -> Array:
+    """How far an object reaches in directions (n, 3) in its own frame (m)."""
+    shape, pose = side.outline[0]
+    tree = shape_tree(shape) if len(side.outline) == 1 and isinstance(shape, Mesh) else None
+    if tree is None:
+        return reach(side.outline, directions)
+    return extents(tree, directions @ pose.rotation) + directions @ pose.position

@@ -18,6 +18,9 @@ from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Mesh, Shape, array_bytes
 from collision_monitor.tolerances import ROUNDED_UP
 
+LEAST_THICKNESS: Final = 1e-6
+"""Least thickness of a box, as part of its length: a box without one has no faces that trees and hulls can use."""
+
 REMEMBERED_FILLINGS: Final = 64 << 20
 """Bytes of meshes with boxes that are remembered. Less: the box around an irregular hole is computed again, 0.1 s."""
 
@@ -42,5 +45,6 @@ def _filling(mesh: Mesh) -> tuple[tuple[Box, Pose], ...]:
 
     box = obb_minimum_volume(mesh.surface.hole)
     size = 2.0 * np.asarray(box.half_extents)
+    size = np.maximum(size, LEAST_THICKNESS * size.max())
     pose = Pose(box.center, Rotation.from_matrix(box.rotation).as_quat())
     return ((Box(size + ROUNDED_UP * size.max()), pose),)

@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import PoseError, UnsupportedError
+from collision_monitor.geometry.bounded_cache import bounded_cache
 from collision_monitor.geometry.compound import shape_pairs
+from collision_monitor.geometry.forest import Forest
 from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shape_table import ShapeTableBuilder
-from collision_monitor.geometry.shapes import HalfSpace, Shape
-from collision_monitor.objects.models import PosedShapes, containing_model
+from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape
+from collision_monitor.meshes.shape_trees import shape_tree
+from collision_monitor.objects.models import PosedShapes, containing_model, exact_model
 from collision_monitor.prediction.bodies import Bodies, Multibody, make_bodies, make_parts
 from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.body_layout import lay_out_body
 from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.prediction.pair_impacts import predict_pairs
 from collision_monitor.query.contact import Compound
+
+REMEMBERED: Final = 256 << 20
+"""Bytes of the trees of pairs that are remembered. Less: each query of two meshes copies them, 1 ms for 5,000 triangles."""
 
 
 class MotionQuery(NamedTuple):
@@ -33,7 +39,7 @@ class MotionQuery(NamedTuple):
 
 
 class MovingShape(NamedTuple):
-    """One of two moving objects: its shapes, and the convex pieces that represent them, with poses in its frame."""
+    """One of two moving objects: its shapes, and the convex pieces or meshes that represent them, with poses in its frame."""
 
     shapes: Sequence[tuple[Shape, Pose]]
     pieces: PosedShapes
@@ -55,8 +61,28 @@ def make_moving_shape(shape: Compound, motion: Motion, name: str) -> MovingShape
         x, y, _ = motion.linear
         level = (*motion.acceleration[:2], 0.0)
         motion = Motion(flat_pose(motion.pose), (x, y, 0.0), (0.0, 0.0, motion.angular[2]), level)
-    modelled = containing_model(shapes, "exact")
+    modelled = exact_model(shapes)
     return MovingShape(shapes, modelled.pieces, modelled.shapes, motion)
+
+
+def in_convex_pieces(moving: MovingShape) -> MovingShape:
+    """The same object with the triangles of a concave mesh as pieces of their own."""
+    modelled = containing_model(moving.shapes, "exact")
+    return moving._replace(pieces=modelled.pieces, shape_of=modelled.shapes)
+
+
+def _bytes(forest: Forest, pieces: tuple[Shape, ...]) -> int:
+    return forest.blocks.nbytes
+
+
+@bounded_cache(REMEMBERED, _bytes)
+def _forest(pieces: tuple[Shape, ...]) -> Forest:
+    """The trees of all pieces that have one."""
+    trees = [tree for tree in map(shape_tree, pieces) if tree is not None]
+    forest = Forest(sum(map(len, {id(tree): tree for tree in trees}.values())))
+    for tree in trees:
+        forest.add(tree)
+    return forest
 
 
 def lay_out_pair(a: MovingShape, b: MovingShape, horizon: float, apart: bool = False) -> Multibody:
@@ -65,8 +91,13 @@ def lay_out_pair(a: MovingShape, b: MovingShape, horizon: float, apart: bool = F
     The pieces of A come first in the table, then those of B.
     """
     count = len(a.pieces) + len(b.pieces)
-    builder = ShapeTableBuilder(slots=count)
-    slots = [[builder.append(piece, pose) for piece, pose in shape.pieces] for shape in (a, b)]
+    pieces = tuple(piece for moving in (a, b) for piece, _ in moving.pieces)
+    forest = _forest(pieces) if any(isinstance(piece, Mesh) for piece in pieces) else None
+    builder = ShapeTableBuilder(slots=count, forest=forest)
+    slots = [
+        [builder.append(piece, pose, tree=shape_tree(piece) if forest else None) for piece, pose in moving.pieces]
+        for moving in (a, b)
+    ]
     multibody = Multibody(builder.table, make_parts(count), make_bodies(count if apart else 2))
     k = 0
     for moving, own in zip((a, b), slots, strict=True):

@@ -15,7 +15,14 @@ from collision_monitor.prediction.impact_record import HIT
 from collision_monitor.query.arguments import finite_number, whole_number
 from collision_monitor.query.contact import Compound, Contact, contact
 from collision_monitor.query.fillings import fillings
-from collision_monitor.query.moving_pair import MotionQuery, MovingShape, first_impacts, lay_out_pair, make_moving_shape
+from collision_monitor.query.moving_pair import (
+    MotionQuery,
+    MovingShape,
+    first_impacts,
+    in_convex_pieces,
+    lay_out_pair,
+    make_moving_shape,
+)
 from collision_monitor.query.touching import follow
 from collision_monitor.tolerances import GJK_TOUCHING
 
@@ -91,7 +98,7 @@ def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain:
     lower = float(events[0]["lower"])
     upper = float(events[0]["upper"]) if events[0]["status"] == HIT else math.inf
     if lower <= 0.0:
-        lower, upper = follow(a, b, query, round_off)
+        lower, upper = follow(in_convex_pieces(a), in_convex_pieces(b), query, round_off)
         if lower == math.inf:
             return _CLEAR
     certain = upper <= query.horizon

@@ -71,8 +71,10 @@ def time_of_impact_batch(
 def _is_special(a: MovingShape, b: MovingShape, state_a: Array, state_b: Array) -> bool:
     """Whether the kernel alone is not enough: plane shapes, meshes that may contain the other, rotating half-spaces."""
     for body, state in ((a, state_a), (b, state_b)):
+        if any(isinstance(piece, Mesh) for piece, _ in body.pieces):
+            return True
         for shape, _ in body.shapes:
-            if is_planar(shape) or (isinstance(shape, Mesh) and len(body.pieces) > 1):
+            if is_planar(shape):
                 return True
             if isinstance(shape, HalfSpace) and state[:, 10:].any():
                 return True

@@ -1,0 +1,1 @@
+"""Trees over triangles and points: build, distance, overlap, touching triangles, first impact."""

@@ -1,0 +1,99 @@
+"""Contact of two trees: the nearest triangles, the deepest of those that touch, or how deep one solid is inside the other."""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor._jit import device, inlined, kernel
+from collision_monitor.meshes.inside import INSIDE, OUTSIDE, UNKNOWN, is_in
+from collision_monitor.meshes.layout import RADIUS, REACH, WIDTH
+from collision_monitor.meshes.nearest import MOST_PAIRS, ON_A, ON_B, PLACE_A, nearest
+from collision_monitor.meshes.placing import inverse, relative
+from collision_monitor.meshes.touching import deepest, touching
+from collision_monitor.narrow_phase.contact_row import write
+from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.narrow_phase.vector import along, dot, minus, opposite, rotate, sum_of_sizes
+from collision_monitor.tolerances import SAT_ROUND_OFF
+
+FARTHER, APART, TOUCHING, ENCLOSED, OPEN = range(5)
+"""What is known of a pair: farther than the limit; apart; surfaces touch; one is in the other and surfaces are apart;
+surfaces are apart, and round-off or the number of parts leaves open whether one is in the other."""
+
+FACE_TO_FACE: Final = (0.0, 0.0, 1.0)
+"""Normal where no direction is better than another."""
+
+
+@inlined
+def reach_in(blocks: Any, root: int) -> float:
+    """Distance (m) of the farthest point of a tree from its origin."""
+    return blocks[root, REACH, 1]
+
+
+def reach_of(tree: NDArray[np.float64]) -> float:
+    """Distance (m) of the farthest point of a tree from its origin."""
+    return float(tree[0, REACH, 1])
+
+
+@device
+def tree_contact(
+    blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, pose: PairPose, limit: float, out: Any, answer: Any, work: Any
+) -> int:
+    """Write the contact of two trees into a contact row if they are at most `limit` (m) apart; return what is known.
+
+    pose: as for every pair test. answer: of `nearest`, with a hint or not. If surfaces touch, the depth is that of the
+    deepest pair of triangles. The bound holds round-off only: what parts concave solids may be longer.
+    """
+    X = relative(pose.R_A, pose.R_B, pose.p)
+    round_off = SAT_ROUND_OFF * (reach_in(blocks_a, root_a) + reach_in(blocks_b, root_b) + sum_of_sizes(pose.p))
+    distance = nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work)
+    if distance == 0.0:
+        count, _ = touching(blocks_a, root_a, blocks_b, root_b, X, MOST_PAIRS, work)
+        if count > 0:
+            depth, n, on_a, which = deepest(blocks_a, blocks_b, X, work, count)
+        else:  # round-off says so of the distance alone
+            depth, n, on_a = 0.0, FACE_TO_FACE, (answer[ON_A], answer[ON_A + 1], answer[ON_A + 2])
+        write(out, -depth, rotate(pose.R_A, n), rotate(pose.R_A, on_a), round_off)
+        return TOUCHING
+    known = APART
+    inside = is_in(blocks_a, root_a, blocks_b, root_b, X, work)
+    if inside != INSIDE:
+        inside = max(inside, is_in(blocks_b, root_b, blocks_a, root_a, inverse(X), work))
+    if inside == INSIDE:
+        known = ENCLOSED
+    elif inside == UNKNOWN:
+        known = OPEN
+    if distance == inf:
+        if known == APART:
+            return FARTHER
+        distance = nearest(blocks_a, root_a, blocks_b, root_b, X, inf, answer, work)
+    on_a, on_b = (answer[ON_A], answer[ON_A + 1], answer[ON_A + 2]), (answer[ON_B], answer[ON_B + 1], answer[ON_B + 2])
+    w = minus(on_b, on_a)
+    length = sqrt(dot(w, w))
+    n = (w[0] / length, w[1] / length, w[2] / length) if length > 0.0 else FACE_TO_FACE
+    place = int(answer[PLACE_A])
+    on_a = along(on_a, blocks_a[place // WIDTH, RADIUS, place % WIDTH], n)
+    if known == ENCLOSED:
+        distance, n = -distance, opposite(n)
+    write(out, distance, rotate(pose.R_A, n), rotate(pose.R_A, on_a), round_off)
+    return known
+
+
+@kernel
+def contact_of_trees(tree_a, R_a, p_a, tree_b, R_b, p_b, limit, out, answer, work):
+    """`tree_contact` of two trees at poses given by rotations (3, 3) and positions (3,) (m); the points are about A."""
+    p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
+    return tree_contact(tree_a, 0, tree_b, 0, PairPose(R_a, R_b, p), limit, out, answer, work)
+
+
+@kernel
+def trees_overlap(tree_a, R_a, p_a, tree_b, R_b, p_b, work):
+    """Whether two trees at poses as in `contact_of_trees` have a point in common: on the surfaces, or inside a solid."""
+    p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
+    X = relative(R_a, R_b, p)
+    if touching(tree_a, 0, tree_b, 0, X, 1, work)[0] > 0:
+        return True
+    return is_in(tree_a, 0, tree_b, 0, X, work) != OUTSIDE or is_in(tree_b, 0, tree_a, 0, inverse(X), work) != OUTSIDE

@@ -1,0 +1,117 @@
+"""Whether a point is inside a closed, oriented surface: by its winding number, from a ray through the tree."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from collision_monitor._jit import device, inlined
+from collision_monitor.meshes.boxes import box_bounds, half_of
+from collision_monitor.meshes.layout import CENTER, CHILD, CLOSED, FIRST_PART, MOST_PARTS, PARTS, WIDTH
+from collision_monitor.meshes.nearest import BOUNDS, triangle_at
+from collision_monitor.meshes.placing import Placing, place_point, turned_back
+from collision_monitor.meshes.touching import repeats
+from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus
+from collision_monitor.tolerances import EPSILON
+
+OUTSIDE, UNKNOWN, INSIDE = 0, 1, 2
+
+UNDECIDED: Final = 1 << 62
+"""Not a winding number."""
+
+DIRECTIONS: Final = ((0.5377, 0.2871, 0.7928), (-0.3138, 0.9102, 0.2702), (0.8791, -0.4418, 0.1789), (0.1, -0.61, -0.7861))
+"""Rays that are tried one after another: a ray that passes too near an edge decides nothing. None is parallel to what
+people build."""
+
+
+@device
+def locate(blocks: Any, root: int, x: Vector, work: Any) -> int:
+    """OUTSIDE or INSIDE for a point (m) in the frame of a closed surface; UNKNOWN if round-off leaves it open."""
+    e = half_of(blocks, root, 0)
+    c = blocks[root, CENTER, 0], blocks[root, CENTER + 1, 0], blocks[root, CENTER + 2, 0]
+    y = turned_back(blocks, root, 0, minus(x, c))
+    if abs(y[0]) > e[0] or abs(y[1]) > e[1] or abs(y[2]) > e[2]:
+        return OUTSIDE
+    for d in DIRECTIONS:
+        winding = _winding(blocks, root, x, d, work)
+        if winding != UNDECIDED:
+            return INSIDE if winding != 0 else OUTSIDE
+    return UNKNOWN
+
+
+@device
+def is_in(blocks: Any, root: int, other: Any, other_root: int, X: Placing, work: Any) -> int:
+    """INSIDE if a part of the other tree, placed by X, is in the solid that a tree bounds and no surfaces meet.
+
+    UNKNOWN if round-off, or the number of parts, leaves it open.
+    """
+    if blocks[root, CLOSED, 1] == 0.0:
+        return OUTSIDE
+    parts = int(other[other_root, PARTS, 1])
+    first = other_root + int(other[other_root, FIRST_PART, 1])
+    known = OUTSIDE
+    for k in range(min(parts, MOST_PARTS)):
+        block, member = first + k // WIDTH, k % WIDTH
+        x = place_point(X, (other[block, 0, member], other[block, 1, member], other[block, 2, member]))
+        known = max(known, locate(blocks, root, x, work))
+        if known == INSIDE:
+            return INSIDE
+    if parts > MOST_PARTS:
+        box_bounds(blocks, root, 0, other, other_root, X, (0.0, 0.0, 0.0), work, BOUNDS)
+        if work[BOUNDS] <= 0.0:
+            return UNKNOWN
+    return known
+
+
+@inlined
+def _ray_meets(blocks: Any, block: int, k: int, x: Vector, d: Vector) -> bool:
+    """Whether the ray from x along d may meet a box: no axis of it, and no cross product with d, separates them."""
+    e = half_of(blocks, block, k)
+    c = blocks[block, CENTER, k], blocks[block, CENTER + 1, k], blocks[block, CENTER + 2, k]
+    p, q = turned_back(blocks, block, k, minus(x, c)), turned_back(blocks, block, k, d)
+    for i in range(3):
+        if (p[i] > e[i] and q[i] >= 0.0) or (p[i] < -e[i] and q[i] <= 0.0):
+            return False
+    m = cross(q, p)
+    return (
+        abs(m[0]) <= e[1] * abs(q[2]) + e[2] * abs(q[1])
+        and abs(m[1]) <= e[0] * abs(q[2]) + e[2] * abs(q[0])
+        and abs(m[2]) <= e[0] * abs(q[1]) + e[1] * abs(q[0])
+    )
+
+
+@device
+def _winding(blocks: Any, root: int, x: Vector, d: Vector, work: Any) -> int:
+    """Crossings of the ray from x along d out of the surface less those into it; UNDECIDED if round-off leaves it open.
+
+    It counts the solids that contain the point, so that their common part is inside too, and a cavity outside.
+    """
+    work[0] = WIDTH * root
+    waiting, count = 1, 0
+    while waiting > 0:
+        waiting -= 1
+        place = int(work[waiting])
+        child = blocks[place // WIDTH, CHILD, place % WIDTH]
+        if child > 0.0:
+            block = root + int(child)
+            for k in range(WIDTH):
+                if blocks[block, CHILD, k] != 0.0 and _ray_meets(blocks, block, k, x, d):
+                    work[waiting] = WIDTH * block + k
+                    waiting += 1
+            continue
+        block = root - int(child)
+        for k in range(WIDTH):
+            if repeats(blocks, block, k):
+                continue
+            T = triangle_at(blocks, block, k)
+            a, b, c = minus(T.a, x), minus(T.b, x), minus(T.c, x)
+            u, v, w = dot(cross(a, b), d), dot(cross(b, c), d), dot(cross(c, a), d)
+            scale = max(dot(a, a), max(dot(b, b), dot(c, c)))
+            slack = 64.0 * EPSILON * scale
+            if (u < -slack or v < -slack or w < -slack) and (u > slack or v > slack or w > slack):
+                continue
+            volume = dot(cross(a, b), c)  # its sign, against that of the turns, says on which side of x the triangle is
+            if abs(u) <= slack or abs(v) <= slack or abs(w) <= slack or abs(volume) <= slack * scale**0.5:
+                return UNDECIDED
+            if (volume > 0.0) == (u > 0.0):
+                count += 1 if u > 0.0 else -1
+    return count

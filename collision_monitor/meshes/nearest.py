@@ -1,0 +1,222 @@
+"""Nearest triangles of two trees, and whether two trees have a point in common.
+
+Pairs of boxes wait on a stack, the nearest on top; a pair is dropped if its bound exceeds the best distance so far.
+(Larsen, Gottschalk, Lin, Manocha, 1999; Ericson, Real-Time Collision Detection, 6.3)
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor._jit import device, inlined, kernel
+from collision_monitor.meshes.boxes import box_bounds, triangle_bounds
+from collision_monitor.meshes.layout import CHILD, CORNERS, FACE, HALF, RADIUS, WIDTH
+from collision_monitor.meshes.placing import inverse, place_triangle, relative, turn_back
+from collision_monitor.meshes.triangle_pair import Triangle, closest_points
+from collision_monitor.narrow_phase.vector import dot, minus, opposite
+from collision_monitor.tolerances import EPSILON
+
+DEEPEST: Final = 24
+"""Largest number of levels of two trees together: each level has eight times as many triangles."""
+
+WAITING: Final = 3 * WIDTH * DEEPEST
+"""Numbers for the pairs of boxes that wait: bound, box of A, box of B, each box as WIDTH * block + member."""
+BOUNDS: Final = WAITING
+_TRIANGLES: Final = BOUNDS + WIDTH
+NEAR_A: Final = _TRIANGLES + 9 * WIDTH
+NEAR_B: Final = NEAR_A + WIDTH
+PAIRS: Final = NEAR_B + WIDTH
+MOST_PAIRS: Final = 4096
+"""Most pairs of triangles that touch which are remembered: more than two meshes of a million triangles usually have
+along the curve where they cross. The depth of the others is not known then."""
+MEMORY: Final = PAIRS + 2 * MOST_PAIRS
+"""Numbers of scratch memory of a query."""
+
+# columns of an answer
+SQUARED: Final = 0
+ON_A: Final = 1
+ON_B: Final = 4
+PLACE_A: Final = 7
+PLACE_B: Final = 8
+ANSWER: Final = 9
+"""Numbers of an answer: distance of the surfaces (m), closest points on both in A's frame (m), and the places of the two
+triangles, WIDTH * block + member, which serve as a hint for a later query."""
+
+
+def answer_row() -> NDArray[np.float64]:
+    """Make an answer without a hint."""
+    row = np.zeros(ANSWER)
+    row[PLACE_A] = row[PLACE_B] = -1.0
+    return row
+
+
+@inlined
+def triangle_at(blocks, block, k):
+    """Triangle k of a block."""
+    return Triangle(
+        (blocks[block, CORNERS, k], blocks[block, CORNERS + 1, k], blocks[block, CORNERS + 2, k]),
+        (blocks[block, CORNERS + 3, k], blocks[block, CORNERS + 4, k], blocks[block, CORNERS + 5, k]),
+        (blocks[block, CORNERS + 6, k], blocks[block, CORNERS + 7, k], blocks[block, CORNERS + 8, k]),
+    )
+
+
+@inlined
+def size_of(blocks, block, member):
+    """Sum of the half extents of a box (m)."""
+    return blocks[block, HALF, member] + blocks[block, HALF + 1, member] + blocks[block, HALF + 2, member]
+
+
+@device
+def _write_triangles(blocks, block, X, work):
+    """Write the corners of the triangles of a block, placed by X, into the scratch memory."""
+    for i in range(3):
+        for k in range(WIDTH):
+            x = blocks[block, CORNERS + 3 * i, k]
+            y = blocks[block, CORNERS + 3 * i + 1, k]
+            z = blocks[block, CORNERS + 3 * i + 2, k]
+            work[_TRIANGLES + WIDTH * (3 * i) + k] = X.r00 * x + X.r01 * y + X.r02 * z + X.x
+            work[_TRIANGLES + WIDTH * (3 * i + 1) + k] = X.r10 * x + X.r11 * y + X.r12 * z + X.y
+            work[_TRIANGLES + WIDTH * (3 * i + 2) + k] = X.r20 * x + X.r21 * y + X.r22 * z + X.z
+
+
+@inlined
+def _written_triangle(work, k):
+    return Triangle(
+        (work[_TRIANGLES + k], work[_TRIANGLES + WIDTH + k], work[_TRIANGLES + 2 * WIDTH + k]),
+        (work[_TRIANGLES + 3 * WIDTH + k], work[_TRIANGLES + 4 * WIDTH + k], work[_TRIANGLES + 5 * WIDTH + k]),
+        (work[_TRIANGLES + 6 * WIDTH + k], work[_TRIANGLES + 7 * WIDTH + k], work[_TRIANGLES + 8 * WIDTH + k]),
+    )
+
+
+@device
+def push_nearest_last(blocks, block, work, waiting, limit, fixed, fixed_is_a):
+    """Push the pairs of a box and the members of a block with bounds below the limit; return the stack's new length."""
+    first = waiting
+    for k in range(WIDTH):
+        bound = work[BOUNDS + k]
+        if blocks[block, CHILD, k] == 0.0 or not bound < limit:
+            continue
+        place = float(WIDTH * block + k)
+        at = waiting
+        while at > first and work[3 * (at - 1)] < bound:
+            for c in range(3):
+                work[3 * at + c] = work[3 * (at - 1) + c]
+            at -= 1
+        work[3 * at] = bound
+        work[3 * at + 1] = fixed if fixed_is_a else place
+        work[3 * at + 2] = place if fixed_is_a else fixed
+        waiting += 1
+    return waiting
+
+
+@inlined
+def opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
+    """Whether to open the box of B rather than that of A: the one that is not a leaf, or the larger."""
+    if child_b < 0.0:
+        return False
+    return child_a < 0.0 or size_of(blocks_b, b, j) >= size_of(blocks_a, a, i)
+
+
+@inlined
+def _direction(answer, distance):
+    """Unit vector between the closest points of an answer; 0 if there is none."""
+    if not 0.0 < distance < inf:
+        return 0.0, 0.0, 0.0
+    n = minus((answer[ON_B], answer[ON_B + 1], answer[ON_B + 2]), (answer[ON_A], answer[ON_A + 1], answer[ON_A + 2]))
+    length = sqrt(dot(n, n)) * (1.0 + 4.0 * EPSILON)
+    return n[0] / length, n[1] / length, n[2] / length
+
+
+@device
+def _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, n, best, answer, work):
+    """Improve the answer by the triangles of two leaves; return the best distance. a, i and b, j: their boxes."""
+    limit = best * best
+    triangle_bounds(blocks_a, a, i, blocks_b, leaf_b, X, work, NEAR_B)
+    triangle_bounds(blocks_b, b, j, blocks_a, leaf_a, inverse(X), work, NEAR_A)
+    _write_triangles(blocks_b, leaf_b, X, work)
+    for m in range(WIDTH):
+        if not work[NEAR_B + m] < limit or (m > 0 and blocks_b[leaf_b, FACE, m] == blocks_b[leaf_b, FACE, m - 1]):
+            continue
+        T = _written_triangle(work, m)
+        for k in range(WIDTH):
+            if not work[NEAR_A + k] < limit or (k > 0 and blocks_a[leaf_a, FACE, k] == blocks_a[leaf_a, FACE, k - 1]):
+                continue
+            S = triangle_at(blocks_a, leaf_a, k)
+            radius = blocks_a[leaf_a, RADIUS, k] + blocks_b[leaf_b, RADIUS, m]
+            # the direction between the nearest pair so far separates most others
+            far = max(dot(S.a, n), max(dot(S.b, n), dot(S.c, n)))
+            near = min(dot(T.a, n), min(dot(T.b, n), dot(T.c, n)))
+            if near - far >= best + radius:
+                continue
+            found = closest_points(S, T)
+            distance = max(sqrt(found.squared) - radius, 0.0)
+            if distance < best:
+                best = distance
+                limit = best * best
+                answer[0] = distance
+                for c in range(3):
+                    answer[ON_A + c], answer[ON_B + c] = found.on_a[c], found.on_b[c]
+                answer[PLACE_A], answer[PLACE_B] = WIDTH * leaf_a + k, WIDTH * leaf_b + m
+                n = _direction(answer, best)
+                if best == 0.0:
+                    return best
+    return best
+
+
+@device
+def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
+    """Write the nearest triangles of two trees into the answer if they are nearer than `limit` (m); return the distance.
+
+    blocks_a, root_a: the array of a tree and its block 0 there. X (Placing): pose of B in A's frame. answer: may hold
+    the places of two triangles as a hint, else -1. work (MEMORY,). The distance is at least 0; inf: none below the limit.
+    """
+    best = limit
+    found = inf
+    if answer[PLACE_A] >= 0.0:
+        a, b = int(answer[PLACE_A]), int(answer[PLACE_B])
+        S = triangle_at(blocks_a, a // WIDTH, a % WIDTH)
+        closest = closest_points(S, place_triangle(X, triangle_at(blocks_b, b // WIDTH, b % WIDTH)))
+        radius = blocks_a[a // WIDTH, RADIUS, a % WIDTH] + blocks_b[b // WIDTH, RADIUS, b % WIDTH]
+        distance = max(sqrt(closest.squared) - radius, 0.0)
+        if distance < best:
+            best = found = distance
+            answer[0] = distance
+            for c in range(3):
+                answer[ON_A + c], answer[ON_B + c] = closest.on_a[c], closest.on_b[c]
+    Y = inverse(X)
+    work[0], work[1], work[2] = 0.0, WIDTH * root_a, WIDTH * root_b
+    waiting = 1
+    n = _direction(answer, found)
+    while waiting > 0 and best > 0.0:  # terminates: each pair of boxes is opened once
+        waiting -= 1
+        if not work[3 * waiting] < best * best:
+            continue
+        place_a, place_b = int(work[3 * waiting + 1]), int(work[3 * waiting + 2])
+        a, i, b, j = place_a // WIDTH, place_a % WIDTH, place_b // WIDTH, place_b % WIDTH
+        child_a, child_b = blocks_a[a, CHILD, i], blocks_b[b, CHILD, j]
+        if child_a < 0.0 and child_b < 0.0:
+            leaf_a, leaf_b = root_a - int(child_a), root_b - int(child_b)
+            distance = _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, n, best, answer, work)
+            if distance < best:
+                best = found = distance
+                n = _direction(answer, found)
+        elif opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
+            block = root_b + int(child_b)
+            box_bounds(blocks_a, a, i, blocks_b, block, X, n, work, BOUNDS)
+            waiting = push_nearest_last(blocks_b, block, work, waiting, best * best, float(place_a), True)
+        else:
+            block = root_a + int(child_a)
+            box_bounds(blocks_b, b, j, blocks_a, block, Y, opposite(turn_back(X, n)), work, BOUNDS)
+            waiting = push_nearest_last(blocks_a, block, work, waiting, best * best, float(place_b), False)
+    return found
+
+
+@kernel
+def tree_distance(tree_a, R_a, p_a, tree_b, R_b, p_b, limit, answer, work):
+    """`nearest` of two trees at poses given by rotations (3, 3) and positions (3,) (m)."""
+    p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
+    return nearest(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), limit, answer, work)

@@ -1,0 +1,43 @@
+"""Trees of the convex shapes of a table, for their pairs with meshes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.geometry.shape_table import BOX, CAPSULE, CONVEX_HULL, MESH, SPHERE, TREE, ShapeTableBuilder
+from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Sphere, Triangle
+from collision_monitor.meshes.shape_trees import made_tree
+
+Array = NDArray[np.float64]
+
+
+def slot_tree(table: Any, slot: int) -> Array | None:
+    """Tree of the convex shape in a slot, without its margin; None for a kind that triangles cannot represent."""
+    size = table.size[slot]
+    match int(table.kind[slot]):
+        case kind if kind == SPHERE:
+            return made_tree(Sphere(size[0]))
+        case kind if kind == CAPSULE:
+            return made_tree(Capsule(size[0], 2.0 * size[1]))
+        case kind if kind == BOX:
+            return made_tree(Box(2.0 * size[:3]))
+        case kind if kind == CONVEX_HULL:
+            start, count = int(table.vertex_start[slot]), int(table.vertex_count[slot])
+            points = np.unique(table.vertices[:, start : start + count].T, axis=0)
+            return made_tree(ConvexHull(points) if len(points) > 3 else Triangle(np.resize(points, (3, 3))))
+    return None
+
+
+def plant_trees(builder: ShapeTableBuilder) -> None:
+    """Give every convex shape of a table with a mesh the tree that its pairs with meshes need."""
+    table = builder.table
+    if not (table.kind == MESH).any():
+        return
+    without = np.isin(table.kind, (SPHERE, CAPSULE, BOX, CONVEX_HULL)) & (table.size[:, TREE] == 0.0)
+    for slot in np.flatnonzero(without).tolist():
+        tree = slot_tree(table, slot)
+        if tree is not None:
+            builder.plant(slot, tree)

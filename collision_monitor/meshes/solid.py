@@ -1,0 +1,210 @@
+"""A tree against a cylinder, a cone or a half-space, which triangles cannot represent: contact, and a time without one.
+
+Boxes and triangles are dropped by their bounding spheres; the triangles that remain are tested by GJK and EPA, or by
+their deepest corner for a half-space. Other convex shapes have trees of their own.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Any, NamedTuple
+
+from collision_monitor._jit import device, inlined
+from collision_monitor._jit.vectors import LANES
+from collision_monitor.geometry.shape_table import CONVEX_HULL, ELLIPSOID, HALF_SPACE
+from collision_monitor.meshes.approach import Approach, time_until
+from collision_monitor.meshes.boxes import half_of
+from collision_monitor.meshes.layout import CENTER, CHILD, RADIUS, WIDTH
+from collision_monitor.meshes.nearest import NEAR_A, triangle_at
+from collision_monitor.meshes.placing import Placing, inverse, place_point, relative, turn_back
+from collision_monitor.meshes.touching import repeats
+from collision_monitor.meshes.triangle_pair import Triangle
+from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, write
+from collision_monitor.narrow_phase.convex_convex import cores_contact
+from collision_monitor.narrow_phase.core import Core, CorePair, core_length, core_of
+from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.narrow_phase.support_value import core_support
+from collision_monitor.narrow_phase.vector import Vector, along, cross, dot, minus, opposite, rotate, rotate_back
+from collision_monitor.tolerances import SAT_ROUND_OFF
+
+
+class SolidMemory(NamedTuple):
+    """Scratch memory of one thread."""
+
+    triangle: Any  # (3, LANES): its corners, the last one repeated
+    gjk: Any  # (WORK_SIZE,)
+    tree: Any  # (MEMORY,), see `nearest`
+
+
+@inlined
+def _outside(table: Any, b: int, x: Vector) -> tuple[float, Vector]:
+    """Lower bound on the signed distance (m) of a point from a solid without margin, and its direction, in its frame."""
+    if table.kind[b] == HALF_SPACE:
+        n = table.size[b, 0], table.size[b, 1], table.size[b, 2]
+        return dot(n, x) - table.size[b, 3], n
+    if table.kind[b] == ELLIPSOID:
+        length = sqrt(dot(x, x))
+        out = (x[0] / length, x[1] / length, x[2] / length) if length > 0.0 else (1.0, 0.0, 0.0)
+        return length - max(table.size[b, 0], max(table.size[b, 1], table.size[b, 2])), out
+    r, h = table.size[b, 0], table.size[b, 1]
+    rim = sqrt(x[0] * x[0] + x[1] * x[1])
+    side, end = rim - r, abs(x[2]) - h  # of the cylinder around it
+    up = 1.0 if x[2] > 0.0 else -1.0
+    out = (x[0] / rim, x[1] / rim, 0.0) if rim > 0.0 else (1.0, 0.0, 0.0)
+    if side > 0.0 and end > 0.0:
+        length = sqrt(side * side + end * end)
+        return length, (out[0] * side / length, out[1] * side / length, up * end / length)
+    if side > end:
+        return side, out
+    return end, (0.0, 0.0, up)
+
+
+@inlined
+def _middle(T: Triangle) -> tuple[Vector, float]:
+    """Centre of a sphere about a triangle, and its radius (m)."""
+    third = 1.0 / 3.0
+    c = (
+        third * (T.a[0] + T.b[0] + T.c[0]),
+        third * (T.a[1] + T.b[1] + T.c[1]),
+        third * (T.a[2] + T.b[2] + T.c[2]),
+    )
+    a, b, d = minus(T.a, c), minus(T.b, c), minus(T.c, c)
+    return c, sqrt(max(dot(a, a), max(dot(b, b), dot(d, d)))) * (1.0 + 1e-14)
+
+
+@device
+def _triangle_contact(
+    table: Any, b: int, pose: PairPose, T: Triangle, radius: float, limit: float, out: Any, memory: SolidMemory
+) -> bool:
+    """Write the contact of a triangle of A, enlarged by the radius, with the solid b; False if farther than the limit."""
+    if table.kind[b] == HALF_SPACE:
+        n = rotate(pose.R_B, (table.size[b, 0], table.size[b, 1], table.size[b, 2]))
+        d = rotate_back(pose.R_A, n)
+        x = T.a if dot(T.a, d) <= min(dot(T.b, d), dot(T.c, d)) else (T.b if dot(T.b, d) <= dot(T.c, d) else T.c)
+        witness = along(rotate(pose.R_A, x), -radius, n)
+        scale = abs(witness[0]) + abs(witness[1]) + abs(witness[2]) + abs(pose.p[0]) + abs(pose.p[1]) + abs(pose.p[2])
+        distance = dot(n, minus(witness, pose.p)) - table.size[b, 3] - table.margin[b]
+        write(out, distance, opposite(n), witness, SAT_ROUND_OFF * (scale + abs(table.size[b, 3])))
+        return distance <= limit
+    for k in range(LANES):
+        x = T.a if k == 0 else (T.b if k == 1 else T.c)
+        memory.triangle[0, k], memory.triangle[1, k], memory.triangle[2, k] = x
+    flat = Core(CONVEX_HULL, (0.0, 0.0, 0.0), 0, LANES)
+    size = core_length(table, b) + sqrt(max(dot(T.a, T.a), max(dot(T.b, T.b), dot(T.c, T.c))))
+    radii = radius, table.margin[b]
+    found = cores_contact(CorePair(flat, core_of(table, b), memory.triangle), radii, size, pose, limit, out, memory.gjk)
+    return found and out[DISTANCE] <= limit
+
+
+@device
+def solid_contact(
+    blocks: Any, root: int, margin: float, table: Any, b: int, pose: PairPose, limit: float, out: Any, memory: SolidMemory
+) -> bool:
+    """Write the contact of a tree A, enlarged by a margin (m), and a solid b; False if it is farther than the limit."""
+    Y = inverse(relative(pose.R_A, pose.R_B, pose.p))
+    work, row = memory.tree, memory.tree[NEAR_A : NEAR_A + CONTACT_SIZE]
+    best, found = limit, False
+    work[0], work[1] = -inf, WIDTH * root
+    waiting = 1
+    while waiting > 0:  # terminates: each box is opened once
+        waiting -= 1
+        if work[2 * waiting] > best:
+            continue
+        place = int(work[2 * waiting + 1])
+        child = blocks[place // WIDTH, CHILD, place % WIDTH]
+        block = root + int(abs(child))
+        for k in range(WIDTH):
+            if child > 0.0:
+                if blocks[block, CHILD, k] == 0.0:
+                    continue
+                e = half_of(blocks, block, k)
+                c = blocks[block, CENTER, k], blocks[block, CENTER + 1, k], blocks[block, CENTER + 2, k]
+                bound, _ = _outside(table, b, place_point(Y, c))
+                bound -= sqrt(dot(e, e)) + margin + table.margin[b]
+                if bound <= best:
+                    work[2 * waiting], work[2 * waiting + 1] = bound, WIDTH * block + k
+                    waiting += 1
+                continue
+            if repeats(blocks, block, k):
+                continue
+            T = triangle_at(blocks, block, k)
+            radius = blocks[block, RADIUS, k] + margin
+            c, size = _middle(T)
+            bound, _ = _outside(table, b, place_point(Y, c))
+            if bound - size - radius - table.margin[b] > best:
+                continue
+            if _triangle_contact(table, b, pose, T, radius, best, row, memory) and (not found or row[DISTANCE] < best):
+                best, found = row[DISTANCE], True
+                for i in range(CONTACT_SIZE):
+                    out[i] = row[i]
+    return found
+
+
+@device
+def _solid_time(
+    table: Any, b: int, X: Placing, n: Vector, gap: float, x: Vector, size: float, move: Approach
+) -> float:
+    """Time until which a ball of points (centre x, radius size, in A's frame) keeps its gap along n from the solid b."""
+    k, m = cross(n, move.w_a), cross(n, move.w_b)
+    speed = dot(x, k) + size * sqrt(dot(k, k)) - dot(n, move.v) + move.growth
+    own = 0.0
+    if table.kind[b] != HALF_SPACE and move.bend_b > 0.0:
+        d = turn_back(X, m)
+        speed += core_support(table, b, -d[0], -d[1], -d[2])
+        own = core_length(table, b)
+    curvature = move.bend + move.bend_a * (sqrt(dot(x, x)) + size) + move.bend_b * own
+    return time_until(gap, speed, curvature)
+
+
+@device
+def advance_to_solid(
+    blocks: Any, root: int, table: Any, b: int, pose: PairPose, move: Approach, until: float, tolerance: float,
+    memory: SolidMemory,
+) -> tuple[float, float]:
+    """As `advance_trees`, for a tree A and a solid b; move: in A's axes, its `start` includes both margins."""
+    X = relative(pose.R_A, pose.R_B, pose.p)
+    Y = inverse(X)
+    work, row = memory.tree, memory.tree[NEAR_A : NEAR_A + CONTACT_SIZE]
+    aim = 0.5 * tolerance
+    start = move.start - table.margin[b]  # the contact row includes that margin
+    best, least = until, -1.0
+    work[0], work[1] = 0.0, WIDTH * root
+    waiting = 1
+    while waiting > 0:  # terminates: each box is opened once
+        waiting -= 1
+        if not work[2 * waiting] < best:
+            continue
+        place = int(work[2 * waiting + 1])
+        child = blocks[place // WIDTH, CHILD, place % WIDTH]
+        block = root + int(abs(child))
+        for k in range(WIDTH):
+            if child > 0.0:
+                if blocks[block, CHILD, k] == 0.0:
+                    continue
+                e = half_of(blocks, block, k)
+                c, size = (blocks[block, CENTER, k], blocks[block, CENTER + 1, k], blocks[block, CENTER + 2, k]), sqrt(dot(e, e))
+                radius = 0.0
+            else:
+                if repeats(blocks, block, k):
+                    continue
+                c, size = _middle(triangle_at(blocks, block, k))
+                radius = blocks[block, RADIUS, k]
+            bound, n = _outside(table, b, place_point(Y, c))
+            n = opposite(minus(place_point(X, n), (X.x, X.y, X.z)))
+            time = _solid_time(table, b, X, n, bound - size - radius - move.start, c, size, move)
+            if not time < best:
+                continue
+            if child > 0.0:
+                work[2 * waiting], work[2 * waiting + 1] = time, WIDTH * block + k
+                waiting += 1
+                continue
+            if not _triangle_contact(table, b, pose, triangle_at(blocks, block, k), radius, inf, row, memory):
+                continue
+            gap = row[DISTANCE] - row[BOUND] - start
+            if gap <= tolerance:
+                return 0.0, gap
+            n = rotate_back(pose.R_A, (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2]))
+            time = _solid_time(table, b, X, n, gap - aim, c, size, move)
+            if time < best:
+                best, least = time, gap
+    return best, least

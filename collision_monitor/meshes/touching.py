@@ -1,0 +1,170 @@
+"""Triangles of two trees that have a point in common: all of them up to a limit, or just whether there is one."""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Any, Final
+
+from collision_monitor._jit import device, inlined, kernel
+from collision_monitor.meshes.boxes import box_bounds, triangle_bounds
+from collision_monitor.meshes.layout import CHILD, FACE, RADIUS, WIDTH
+from collision_monitor.meshes.nearest import BOUNDS, NEAR_A, NEAR_B, PAIRS, opens_b, triangle_at
+from collision_monitor.meshes.placing import inverse, place_triangle, relative
+from collision_monitor.meshes.triangle_pair import Triangle, closest_points, crossing_point
+from collision_monitor.narrow_phase.vector import Vector, along, cross, dot, minus
+from collision_monitor.tolerances import PARALLEL_SIN2
+
+NOWHERE: Final = (0.0, 0.0, 0.0)
+
+MOST_LEAVES: Final = 100_000
+"""Most pairs of leaves to examine, about 50 ms. Hostile meshes, such as a million triangles in a point, need more; the
+answer then says that it is not complete."""
+
+
+@device
+def _push_meeting(blocks: Any, block: int, work: Any, waiting: int, fixed: float, fixed_is_a: bool) -> int:
+    """Push the pairs of a box and the members of a block that may overlap; return the stack's new length."""
+    for k in range(WIDTH):
+        if blocks[block, CHILD, k] != 0.0 and work[BOUNDS + k] <= 0.0:
+            place = float(WIDTH * block + k)
+            work[2 * waiting] = fixed if fixed_is_a else place
+            work[2 * waiting + 1] = place if fixed_is_a else fixed
+            waiting += 1
+    return waiting
+
+
+@inlined
+def repeats(blocks: Any, block: int, k: int) -> bool:
+    """Whether a member of a block of triangles repeats the one before."""
+    return k > 0 and blocks[block, FACE, k] == blocks[block, FACE, k - 1]
+
+
+@device
+def touching(
+    blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, X: Any, most: int, work: Any
+) -> tuple[int, bool]:
+    """Find pairs of triangles that meet, `most` at most; return their number, and whether these are all.
+
+    Pair k is at work[PAIRS + 2 k]: the places of both triangles. Other arguments as in `nearest`.
+    """
+    Y = inverse(X)
+    work[0], work[1] = WIDTH * root_a, WIDTH * root_b
+    waiting, found, leaves = 1, 0, 0
+    while waiting > 0:  # terminates: each pair of boxes is opened once
+        waiting -= 1
+        place_a, place_b = int(work[2 * waiting]), int(work[2 * waiting + 1])
+        a, i, b, j = place_a // WIDTH, place_a % WIDTH, place_b // WIDTH, place_b % WIDTH
+        child_a, child_b = blocks_a[a, CHILD, i], blocks_b[b, CHILD, j]
+        if child_a < 0.0 and child_b < 0.0:
+            leaf_a, leaf_b = root_a - int(child_a), root_b - int(child_b)
+            leaves += 1
+            if leaves > MOST_LEAVES:
+                return found, False
+            triangle_bounds(blocks_a, a, i, blocks_b, leaf_b, X, work, NEAR_B)
+            triangle_bounds(blocks_b, b, j, blocks_a, leaf_a, Y, work, NEAR_A)
+            for m in range(WIDTH):
+                if work[NEAR_B + m] > 0.0 or repeats(blocks_b, leaf_b, m):
+                    continue
+                T = place_triangle(X, triangle_at(blocks_b, leaf_b, m))
+                for k in range(WIDTH):
+                    if work[NEAR_A + k] > 0.0 or repeats(blocks_a, leaf_a, k):
+                        continue
+                    radius = blocks_a[leaf_a, RADIUS, k] + blocks_b[leaf_b, RADIUS, m]
+                    if meet(triangle_at(blocks_a, leaf_a, k), T, radius):
+                        if found == most:
+                            return found, False
+                        work[PAIRS + 2 * found], work[PAIRS + 2 * found + 1] = WIDTH * leaf_a + k, WIDTH * leaf_b + m
+                        found += 1
+        elif opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
+            block = root_b + int(child_b)
+            box_bounds(blocks_a, a, i, blocks_b, block, X, NOWHERE, work, BOUNDS)
+            waiting = _push_meeting(blocks_b, block, work, waiting, float(place_a), True)
+        else:
+            block = root_a + int(child_a)
+            box_bounds(blocks_b, b, j, blocks_a, block, Y, NOWHERE, work, BOUNDS)
+            waiting = _push_meeting(blocks_a, block, work, waiting, float(place_b), False)
+    return found, True
+
+
+@inlined
+def meet(S: Triangle, T: Triangle, radius: float) -> bool:
+    """Whether two triangles, enlarged by this radius together, have a point in common."""
+    if radius > 0.0:
+        return closest_points(S, T).squared <= radius * radius
+    found, _ = crossing_point(S, T)
+    return found
+
+
+@inlined
+def _overlap_along(S: Triangle, T: Triangle, axis: Vector) -> tuple[float, float]:
+    """How far T has to move along the axis, or against it, to leave S; in units of the axis."""
+    a, b, c = dot(S.a, axis), dot(S.b, axis), dot(S.c, axis)
+    x, y, z = dot(T.a, axis), dot(T.b, axis), dot(T.c, axis)
+    forth = max(a, max(b, c)) - min(x, min(y, z))
+    back = max(x, max(y, z)) - min(a, min(b, c))
+    return forth, back
+
+
+@device
+def triangle_depth(S: Triangle, T: Triangle) -> tuple[float, Vector]:
+    """Length (m) and direction of the shortest translation of T that parts two triangles that meet.
+
+    It is along the normal of one of them or at a right angle to an edge of each, as all faces of their difference are.
+    """
+    d = minus(S.b, S.a), minus(S.c, S.b), minus(S.a, S.c)
+    e = minus(T.b, T.a), minus(T.c, T.b), minus(T.a, T.c)
+    best, direction = inf, (0.0, 0.0, 1.0)
+    for k in range(11):
+        if k == 9:
+            u, v = d[0], d[1]
+        elif k == 10:
+            u, v = e[0], e[1]
+        else:
+            u = d[0] if k < 3 else (d[1] if k < 6 else d[2])
+            v = e[0] if k % 3 == 0 else (e[1] if k % 3 == 1 else e[2])
+        n = cross(u, v)
+        nn = dot(n, n)
+        if not nn > PARALLEL_SIN2 * dot(u, u) * dot(v, v):
+            continue
+        length = sqrt(nn)
+        n = n[0] / length, n[1] / length, n[2] / length
+        forth, back = _overlap_along(S, T, n)
+        if forth < best:
+            best, direction = forth, n
+        if back < best:
+            best, direction = back, (-n[0], -n[1], -n[2])
+    return max(best, 0.0), direction
+
+
+@device
+def deepest(blocks_a: Any, blocks_b: Any, X: Any, work: Any, count: int) -> tuple[float, Vector, Vector, int]:
+    """Depth (m) of the deepest of the first pairs of `touching`, its direction and a point on A, and its index."""
+    best, direction, point, which = -1.0, (0.0, 0.0, 1.0), NOWHERE, 0
+    for k in range(count):
+        a, b = int(work[PAIRS + 2 * k]), int(work[PAIRS + 2 * k + 1])
+        S = triangle_at(blocks_a, a // WIDTH, a % WIDTH)
+        T = place_triangle(X, triangle_at(blocks_b, b // WIDTH, b % WIDTH))
+        radius = blocks_a[a // WIDTH, RADIUS, a % WIDTH] + blocks_b[b // WIDTH, RADIUS, b % WIDTH]
+        crosses, _ = crossing_point(S, T)
+        if crosses or radius == 0.0:
+            depth, n = triangle_depth(S, T)
+            parted = Triangle(along(T.a, depth, n), along(T.b, depth, n), along(T.c, depth, n))
+            x = closest_points(S, parted).on_a
+            depth += radius
+        else:
+            found = closest_points(S, T)
+            length = sqrt(found.squared)
+            w = minus(found.on_b, found.on_a)
+            n = (w[0] / length, w[1] / length, w[2] / length) if length > 0.0 else (0.0, 0.0, 1.0)
+            x, depth = found.on_a, radius - length
+        if depth > best:
+            best, direction, which = depth, n, k
+            point = along(x, blocks_a[a // WIDTH, RADIUS, a % WIDTH], n)
+    return best, direction, point, which
+
+
+@kernel
+def trees_touch(tree_a, R_a, p_a, tree_b, R_b, p_b, most, work):
+    """`touching` of two trees at poses given by rotations (3, 3) and positions (3,) (m)."""
+    p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
+    return touching(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), most, work)

@@ -1,0 +1,159 @@
+"""Two triangles: their distance with its closest points, and whether they meet. Flat triangles and points are allowed.
+
+The closest points lie on two edges, or on a corner and a face; otherwise an edge passes through a face. The search
+ends as soon as the vector between the closest points of two edges separates the triangles.
+(Larsen, Gottschalk, Lin, Manocha, Fast proximity queries with swept sphere volumes, 1999; Ericson, 5.1.9)
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any, NamedTuple
+
+from collision_monitor._jit import device, inlined
+from collision_monitor.narrow_phase.vector import along, cross, dot, minus
+from collision_monitor.tolerances import SEGMENT_PARALLEL_SIN2
+
+
+class Triangle(NamedTuple):
+    """Corners (m)."""
+
+    a: Any
+    b: Any
+    c: Any
+
+
+class Closest(NamedTuple):
+    """Squared distance (m^2), and the closest points on both (m)."""
+
+    squared: Any
+    on_a: Any
+    on_b: Any
+
+
+@inlined
+def _within(x):
+    return min(max(x, 0.0), 1.0)
+
+
+@inlined
+def _segments(p, d, q, e):
+    """Closest points of the segments p + s d and q + t e, s and t in [0, 1]; d and e may be 0."""
+    r = minus(q, p)
+    dd, ee, de = dot(d, d), dot(e, e), dot(d, e)
+    n = cross(d, e)
+    nn = dot(n, n)
+    s = 0.0
+    if nn > SEGMENT_PARALLEL_SIN2 * dd * ee:
+        s = _within(dot(cross(r, e), n) / nn)
+    t = (s * de - dot(r, e)) / ee if ee > 0.0 else 0.0
+    if t < 0.0 or t > 1.0 or not ee > 0.0:
+        t = _within(t)
+        s = _within((t * de + dot(r, d)) / dd) if dd > 0.0 else 0.0
+    x, y = along(p, s, d), along(q, t, e)
+    w = minus(y, x)
+    return dot(w, w), x, y, w
+
+
+@inlined
+def _is_over(x, S, n, nn):
+    """Whether the projection of x onto the plane of the triangle S lies in it; n: normal of any length, nn = n . n."""
+    return (
+        dot(cross(minus(S.b, S.a), minus(x, S.a)), n) >= 0.0
+        and dot(cross(minus(S.c, S.b), minus(x, S.b)), n) >= 0.0
+        and dot(cross(minus(S.a, S.c), minus(x, S.c)), n) >= 0.0
+    ) and nn > 0.0
+
+
+@inlined
+def _pierces(x, y, S, n):
+    """Whether the segment from x to y passes through the triangle S with normal n; the ends lie on both sides."""
+    d = minus(y, x)
+    a, b, c = minus(S.a, x), minus(S.b, x), minus(S.c, x)
+    u, v, w = dot(cross(a, b), d), dot(cross(b, c), d), dot(cross(c, a), d)
+    return (u >= 0.0 and v >= 0.0 and w >= 0.0) or (u <= 0.0 and v <= 0.0 and w <= 0.0)
+
+
+@inlined
+def _normal(S):
+    return cross(minus(S.b, S.a), minus(S.c, S.a))
+
+
+@inlined
+def _heights(S, T, n):
+    """Heights of the corners of S above the plane of T, times the length of its normal n."""
+    return dot(minus(S.a, T.a), n), dot(minus(S.b, T.a), n), dot(minus(S.c, T.a), n)
+
+
+@inlined
+def _crossing(S, T, h, n):
+    """Whether an edge of S passes through T, and a point of it there; h: heights of S's corners, n: normal of T."""
+    if h[0] * h[1] <= 0.0 and h[0] != h[1] and _pierces(S.a, S.b, T, n):
+        return True, along(S.a, h[0] / (h[0] - h[1]), minus(S.b, S.a))
+    if h[1] * h[2] <= 0.0 and h[1] != h[2] and _pierces(S.b, S.c, T, n):
+        return True, along(S.b, h[1] / (h[1] - h[2]), minus(S.c, S.b))
+    if h[2] * h[0] <= 0.0 and h[2] != h[0] and _pierces(S.c, S.a, T, n):
+        return True, along(S.c, h[2] / (h[2] - h[0]), minus(S.a, S.c))
+    return False, S.a
+
+
+@inlined
+def _all_on_one_side(h):
+    return (h[0] > 0.0 and h[1] > 0.0 and h[2] > 0.0) or (h[0] < 0.0 and h[1] < 0.0 and h[2] < 0.0)
+
+
+@device
+def crossing_point(S, T):
+    """Whether an edge of either triangle passes through the other, and a point of both (m)."""
+    n, m = _normal(S), _normal(T)
+    h = _heights(S, T, m)
+    if _all_on_one_side(h):
+        return False, S.a
+    g = _heights(T, S, n)
+    if _all_on_one_side(g):
+        return False, S.a
+    found, x = _crossing(S, T, h, m)
+    if found:
+        return True, x
+    return _crossing(T, S, g, n)
+
+
+@inlined
+def _corner(S, k):
+    return S.a if k == 0 else (S.b if k == 1 else S.c)
+
+
+@device
+def closest_points(S, T):
+    """Closest points of two triangles (Closest)."""
+    best, on_s, on_t = inf, S.a, T.a
+    for i in range(3):
+        p = _corner(S, i)
+        d = minus(_corner(S, (i + 1) % 3), p)
+        third = _corner(S, (i + 2) % 3)
+        for j in range(3):
+            q = _corner(T, j)
+            e = minus(_corner(T, (j + 1) % 3), q)
+            squared, x, y, w = _segments(p, d, q, e)
+            if squared < best:
+                best, on_s, on_t = squared, x, y
+                other = _corner(T, (j + 2) % 3)
+                if squared > 0.0 and dot(minus(third, x), w) <= 0.0 and dot(minus(other, y), w) >= 0.0:
+                    return Closest(best, on_s, on_t)
+    n, m = _normal(S), _normal(T)
+    nn, mm = dot(n, n), dot(m, m)
+    g, h = _heights(T, S, n), _heights(S, T, m)
+    for k in range(3):
+        x, y = _corner(S, k), _corner(T, k)
+        up, over = g[k], h[k]
+        if nn > 0.0 and up * up < best * nn and _is_over(y, S, n, nn):
+            best, on_s, on_t = up * up / nn, along(y, -up / nn, n), y
+        if mm > 0.0 and over * over < best * mm and _is_over(x, T, m, mm):
+            best, on_s, on_t = over * over / mm, x, along(x, -over / mm, m)
+    if not (_all_on_one_side(g) or _all_on_one_side(h)):
+        found, x = _crossing(S, T, h, m)
+        if not found:
+            found, x = _crossing(T, S, g, n)
+        if found:
+            return Closest(0.0, x, x)
+    return Closest(best, on_s, on_t)

@@ -1,0 +1,147 @@
+"""Pairs of shapes with a mesh: their contact at one time, and their first impact, through the trees of their surfaces."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.shape_table import HALF_SPACE, MESH, TREE
+from collision_monitor.meshes.advance import advance_trees
+from collision_monitor.meshes.approach import Approach
+from collision_monitor.meshes.contact import FARTHER, OPEN, tree_contact
+from collision_monitor.meshes.nearest import PLACE_A, PLACE_B
+from collision_monitor.meshes.placing import relative
+from collision_monitor.meshes.solid import SolidMemory, advance_to_solid, solid_contact
+from collision_monitor.narrow_phase.contact_row import (
+    BOUND,
+    DISTANCE,
+    FEATURE_TYPE_A,
+    FEATURE_TYPE_B,
+    NORMAL,
+    POINT_A,
+    POINT_B,
+)
+from collision_monitor.narrow_phase.dispatch import contact_within
+from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
+from collision_monitor.narrow_phase.vector import dot, opposite, rotate_back
+
+
+@inlined
+def has_mesh(table, a, b):
+    """Whether one of two shapes is a mesh."""
+    return table.kind[a] == MESH or table.kind[b] == MESH
+
+
+@inlined
+def _has_tree(table, s):
+    return table.size[s, TREE] > 0.0 and table.kind[s] != HALF_SPACE
+
+
+@inlined
+def _root(table, s):
+    """First block of a shape's tree."""
+    return int(table.size[s, TREE]) - 1
+
+
+@inlined
+def unknown_depth(table, a, b, p, distance):
+    """How much longer than -distance (m) the shortest translation may be that parts two shapes with a mesh; p: b from a.
+
+    One that parts their bounding spheres parts them certainly. A half-space meets the convex hull, with a known depth.
+    """
+    if distance > 0.0 or not has_mesh(table, a, b) or table.kind[a] == HALF_SPACE or table.kind[b] == HALF_SPACE:
+        return 0.0
+    return max(table.radius[a] + table.radius[b] - sqrt(dot(p, p)) + distance, 0.0)
+
+
+@device
+def mesh_within(table, a, b, pose, limit, out, scratch):
+    """Whether the distance of two shapes with trees, or of one and a solid, is at most `limit` (m); writes the contact.
+
+    The pair is brought into the canonical order of the pair tests. If they overlap, the depth is that of the deepest
+    pair of triangles, and its bound is `unknown_depth` wider.
+    """
+    kind_a, kind_b, p = table.kind[a], table.kind[b], pose.p
+    is_swapped = not _has_tree(table, a)
+    if not is_swapped and _has_tree(table, b):
+        is_swapped = kind_a > kind_b or (kind_a == kind_b and a > b)
+    if is_swapped:
+        a, b = b, a
+        pose = swapped(pose)
+    margins = table.margin[a] + table.margin[b]
+    if _has_tree(table, b):
+        scratch.answer[PLACE_A] = scratch.answer[PLACE_B] = -1.0
+        known = tree_contact(
+            table.blocks, _root(table, a), table.blocks, _root(table, b), pose, limit + margins, out, scratch.answer, scratch.tree
+        )
+        if known == FARTHER:
+            return False
+        out[DISTANCE] -= margins
+        for c in range(3):
+            out[POINT_A + c] += table.margin[a] * out[NORMAL + c]
+            out[POINT_B + c] = out[POINT_A + c] + out[DISTANCE] * out[NORMAL + c]
+        if known == OPEN:  # one may be inside the other, at any depth
+            out[BOUND] += table.radius[a] + table.radius[b] + sqrt(dot(p, p))
+        if known != OPEN and not out[DISTANCE] <= limit:
+            return False
+    else:
+        memory = SolidMemory(scratch.triangle, scratch.work, scratch.tree)
+        if not solid_contact(table.blocks, _root(table, a), table.margin[a], table, b, pose, limit, out, memory):
+            return False
+    if is_swapped:
+        for c in range(3):
+            out[NORMAL + c] = -out[NORMAL + c]
+            witness = out[POINT_A + c]
+            out[POINT_A + c] = out[POINT_B + c] + p[c]
+            out[POINT_B + c] = witness + p[c]
+        for c in range(2):
+            out[FEATURE_TYPE_A + c], out[FEATURE_TYPE_B + c] = out[FEATURE_TYPE_B + c], out[FEATURE_TYPE_A + c]
+    return True
+
+
+@inlined
+def shapes_within(table, a, b, pose, limit, out, scratch):
+    """`contact_within` of any two shapes, meshes included."""
+    if has_mesh(table, a, b):
+        return mesh_within(table, a, b, pose, limit, out, scratch)
+    return contact_within(table, a, b, pose, limit, out, scratch.work)
+
+
+@device
+def advance_mesh(table, at, margin, growth, until, tolerance, scratch):
+    """Return a time in (0, until] (s) up to which two shapes with a mesh stay apart, and the gap that limits it (m).
+
+    at (Placed): the two shapes now, and their motion. margin (m): gap that counts as contact now; growth: of it (m/s).
+    The time is 0 if the gap is within the tolerance (m). scratch.answer: a hint, as `advance_trees` leaves it.
+    """
+    a, b, R_a, R_b, o_a, o_b = at.a, at.b, at.R_a, at.R_b, at.o_a, at.o_b
+    w_a, w_b, v, acceleration = at.w_a, at.w_b, at.v, at.acceleration
+    p = at.p[0] + o_b[0] - o_a[0], at.p[1] + o_b[1] - o_a[1], at.p[2] + o_b[2] - o_a[2]
+    if not _has_tree(table, a):
+        a, b, R_a, R_b, o_a, o_b = b, a, R_b, R_a, o_b, o_a
+        w_a, w_b, v, acceleration, p = w_b, w_a, opposite(v), opposite(acceleration), opposite(p)
+    # velocity of the shapes' origins, which turn about those of their bodies
+    v = (
+        v[0] + (w_b[1] * o_b[2] - w_b[2] * o_b[1]) - (w_a[1] * o_a[2] - w_a[2] * o_a[1]),
+        v[1] + (w_b[2] * o_b[0] - w_b[0] * o_b[2]) - (w_a[2] * o_a[0] - w_a[0] * o_a[2]),
+        v[2] + (w_b[0] * o_b[1] - w_b[1] * o_b[0]) - (w_a[0] * o_a[1] - w_a[1] * o_a[0]),
+    )
+    bend_a, bend_b = dot(w_a, w_a), dot(w_b, w_b)
+    bend = sqrt(dot(acceleration, acceleration)) + bend_a * sqrt(dot(o_a, o_a)) + bend_b * sqrt(dot(o_b, o_b))
+    move = Approach(
+        rotate_back(R_a, v),
+        rotate_back(R_a, w_a),
+        rotate_back(R_a, w_b),
+        bend_a,
+        bend_b,
+        bend,
+        margin + table.margin[a] + table.margin[b],
+        growth,
+    )
+    if _has_tree(table, b):
+        X = relative(R_a, R_b, p)
+        return advance_trees(
+            table.blocks, _root(table, a), table.blocks, _root(table, b), X, move, until, tolerance, scratch.answer, scratch.tree
+        )
+    memory = SolidMemory(scratch.triangle, scratch.work, scratch.tree)
+    return advance_to_solid(table.blocks, _root(table, a), table, b, PairPose(R_a, R_b, p), move, until, tolerance, memory)
