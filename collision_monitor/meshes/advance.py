@@ -34,15 +34,15 @@ NEAR: Final = 0.001
 
 SHARE_FAR: Final = 0.5
 SHARE_NEAR: Final = 0.8
-"""Shares of the best step that are enough far apart and near each other. Smaller: more steps. Larger: the first steps of
-two tori of 32,768 triangles take 10 ms each instead of 10 µs."""
+"""Shares of the best step that are enough far apart and near each other. Smaller: more steps. Larger: the first steps
+of two tori of 32,768 triangles take 10 ms each instead of 10 µs."""
 
 
 @device
 def pair_time(
     S: Triangle, T: Triangle, radius: float, aim: float, at: Vector, move: Approach
 ) -> tuple[float, float, Vector]:
-    """Time until which two triangles stay `aim` (m) apart, at most their gap; the gap, and its direction from S to T."""
+    """Time until which two triangles stay `aim` (m) apart; their gap (m), and its direction from S to T."""
     found = closest_points(S, T)
     w = minus(found.on_b, found.on_a)
     length = sqrt(found.squared)
@@ -86,8 +86,8 @@ def advance_trees(
 ) -> tuple[float, float]:
     """Return a time in (0, until] up to which two trees stay apart, and the gap of the pair that limits it (m).
 
-    The time is 0 if a pair of triangles is within the tolerance (m) beyond the wanted gap; else the advance aims at half
-    the tolerance. answer: as in `nearest`; its places are a hint, and then those of the pair that limits the time.
+    The time is 0 if a pair of triangles is within the tolerance (m) beyond the wanted gap; else the advance aims at
+    half the tolerance. answer: as in `nearest`; its places are a hint, and then those of the pair that limits the time.
     """
     aim = 0.5 * tolerance
     at = X.x, X.y, X.z

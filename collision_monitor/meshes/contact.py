@@ -1,4 +1,4 @@
-"""Contact of two trees: the nearest triangles, the deepest of those that touch, or how deep one solid is inside the other."""
+"""Contact of two trees: the nearest triangles, the deepest that touch, or how deep one solid is inside the other."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ def reach_of(tree: NDArray[np.float64]) -> float:
 
 @device
 def tree_contact(
-    blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, pose: PairPose, limit: float, out: Any, answer: Any, work: Any
+    blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, pose: PairPose, limit: float,
+    out: Any, answer: Any, work: Any,
 ) -> int:
     """Write the contact of two trees into a contact row if they are at most `limit` (m) apart; return what is known.
 
@@ -53,7 +54,7 @@ def tree_contact(
     if distance == 0.0:
         count, _ = touching(blocks_a, root_a, blocks_b, root_b, X, MOST_PAIRS, work)
         if count > 0:
-            depth, n, on_a, which = deepest(blocks_a, blocks_b, X, work, count)
+            depth, n, on_a = deepest(blocks_a, blocks_b, X, work, count)
         else:  # round-off says so of the distance alone
             depth, n, on_a = 0.0, FACE_TO_FACE, (answer[ON_A], answer[ON_A + 1], answer[ON_A + 2])
         write(out, -depth, rotate(pose.R_A, n), rotate(pose.R_A, on_a), round_off)
@@ -91,7 +92,7 @@ def contact_of_trees(tree_a, R_a, p_a, tree_b, R_b, p_b, limit, out, answer, wor
 
 @kernel
 def trees_overlap(tree_a, R_a, p_a, tree_b, R_b, p_b, work):
-    """Whether two trees at poses as in `contact_of_trees` have a point in common: on the surfaces, or inside a solid."""
+    """Whether two trees, placed as in `contact_of_trees`, have a point in common, on a surface or in a solid."""
     p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
     X = relative(R_a, R_b, p)
     if touching(tree_a, 0, tree_b, 0, X, 1, work)[0] > 0:

@@ -18,7 +18,9 @@ OUTSIDE, UNKNOWN, INSIDE = 0, 1, 2
 UNDECIDED: Final = 1 << 62
 """Not a winding number."""
 
-DIRECTIONS: Final = ((0.5377, 0.2871, 0.7928), (-0.3138, 0.9102, 0.2702), (0.8791, -0.4418, 0.1789), (0.1, -0.61, -0.7861))
+DIRECTIONS: Final = (
+    (0.5377, 0.2871, 0.7928), (-0.3138, 0.9102, 0.2702), (0.8791, -0.4418, 0.1789), (0.1, -0.61, -0.7861)
+)  # fmt: skip
 """Rays that are tried one after another: a ray that passes too near an edge decides nothing. None is parallel to what
 people build."""
 

@@ -43,8 +43,8 @@ ON_B: Final = 4
 PLACE_A: Final = 7
 PLACE_B: Final = 8
 ANSWER: Final = 9
-"""Numbers of an answer: distance of the surfaces (m), closest points on both in A's frame (m), and the places of the two
-triangles, WIDTH * block + member, which serve as a hint for a later query."""
+"""Numbers of an answer: distance of the surfaces (m), closest points on both in A's frame (m), and the places of the
+two triangles, WIDTH * block + member, which serve as a hint for a later query."""
 
 
 def answer_row() -> NDArray[np.float64]:
@@ -169,10 +169,10 @@ def _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, n, best, answe
 
 @device
 def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
-    """Write the nearest triangles of two trees into the answer if they are nearer than `limit` (m); return the distance.
+    """Write the nearest triangles of two trees to the answer if they are nearer than `limit` (m); return the distance.
 
     blocks_a, root_a: the array of a tree and its block 0 there. X (Placing): pose of B in A's frame. answer: may hold
-    the places of two triangles as a hint, else -1. work (MEMORY,). The distance is at least 0; inf: none below the limit.
+    the places of two triangles as a hint, else -1. work (MEMORY,). The distance is at least 0; inf: none below it.
     """
     best = limit
     found = inf

@@ -86,12 +86,9 @@ def place_triangle(X: Placing, T: Triangle) -> Triangle:
 @inlined
 def turned_back(blocks: Any, block: int, member: int, v: Vector) -> Vector:
     """A vector of a tree's frame in the frame of one of its boxes."""
+    x, y, z = v
     return (
-        blocks[block, AXES, member] * v[0] + blocks[block, AXES + 3, member] * v[1] + blocks[block, AXES + 6, member] * v[2],
-        blocks[block, AXES + 1, member] * v[0]
-        + blocks[block, AXES + 4, member] * v[1]
-        + blocks[block, AXES + 7, member] * v[2],
-        blocks[block, AXES + 2, member] * v[0]
-        + blocks[block, AXES + 5, member] * v[1]
-        + blocks[block, AXES + 8, member] * v[2],
+        blocks[block, AXES, member] * x + blocks[block, AXES + 3, member] * y + blocks[block, AXES + 6, member] * z,
+        blocks[block, AXES + 1, member] * x + blocks[block, AXES + 4, member] * y + blocks[block, AXES + 7, member] * z,
+        blocks[block, AXES + 2, member] * x + blocks[block, AXES + 5, member] * y + blocks[block, AXES + 8, member] * z,
     )

@@ -31,6 +31,7 @@ def shape_tree(shape: Shape) -> Array | None:
 
 
 def made_tree(shape: Shape) -> Array | None:
+    """As `shape_tree`, but made anew."""
     match shape:
         case Mesh():
             surface = shape.surface

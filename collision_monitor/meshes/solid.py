@@ -38,7 +38,7 @@ class SolidMemory(NamedTuple):
 
 @inlined
 def _outside(table: Any, b: int, x: Vector) -> tuple[float, Vector]:
-    """Lower bound on the signed distance (m) of a point from a solid without margin, and its direction, in its frame."""
+    """Lower bound on the signed distance (m) of a point in its frame from a solid without margin; its direction."""
     if table.kind[b] == HALF_SPACE:
         n = table.size[b, 0], table.size[b, 1], table.size[b, 2]
         return dot(n, x) - table.size[b, 3], n
@@ -76,7 +76,7 @@ def _middle(T: Triangle) -> tuple[Vector, float]:
 def _triangle_contact(
     table: Any, b: int, pose: PairPose, T: Triangle, radius: float, limit: float, out: Any, memory: SolidMemory
 ) -> bool:
-    """Write the contact of a triangle of A, enlarged by the radius, with the solid b; False if farther than the limit."""
+    """Write the contact of a triangle of A, enlarged by a radius, and the solid b; False if beyond the limit."""
     if table.kind[b] == HALF_SPACE:
         n = rotate(pose.R_B, (table.size[b, 0], table.size[b, 1], table.size[b, 2]))
         d = rotate_back(pose.R_A, n)
@@ -98,7 +98,8 @@ def _triangle_contact(
 
 @device
 def solid_contact(
-    blocks: Any, root: int, margin: float, table: Any, b: int, pose: PairPose, limit: float, out: Any, memory: SolidMemory
+    blocks: Any, root: int, margin: float, table: Any, b: int, pose: PairPose, limit: float,
+    out: Any, memory: SolidMemory,
 ) -> bool:
     """Write the contact of a tree A, enlarged by a margin (m), and a solid b; False if it is farther than the limit."""
     Y = inverse(relative(pose.R_A, pose.R_B, pose.p))
@@ -144,7 +145,7 @@ def solid_contact(
 def _solid_time(
     table: Any, b: int, X: Placing, n: Vector, gap: float, x: Vector, size: float, move: Approach
 ) -> float:
-    """Time until which a ball of points (centre x, radius size, in A's frame) keeps its gap along n from the solid b."""
+    """Time until which the points of A in a ball (centre x, radius size) keep their gap along n from the solid b."""
     k, m = cross(n, move.w_a), cross(n, move.w_b)
     speed = dot(x, k) + size * sqrt(dot(k, k)) - dot(n, move.v) + move.growth
     own = 0.0
@@ -182,8 +183,8 @@ def advance_to_solid(
                 if blocks[block, CHILD, k] == 0.0:
                     continue
                 e = half_of(blocks, block, k)
-                c, size = (blocks[block, CENTER, k], blocks[block, CENTER + 1, k], blocks[block, CENTER + 2, k]), sqrt(dot(e, e))
-                radius = 0.0
+                c = blocks[block, CENTER, k], blocks[block, CENTER + 1, k], blocks[block, CENTER + 2, k]
+                size, radius = sqrt(dot(e, e)), 0.0
             else:
                 if repeats(blocks, block, k):
                     continue

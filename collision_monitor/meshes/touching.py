@@ -137,9 +137,9 @@ def triangle_depth(S: Triangle, T: Triangle) -> tuple[float, Vector]:
 
 
 @device
-def deepest(blocks_a: Any, blocks_b: Any, X: Any, work: Any, count: int) -> tuple[float, Vector, Vector, int]:
-    """Depth (m) of the deepest of the first pairs of `touching`, its direction and a point on A, and its index."""
-    best, direction, point, which = -1.0, (0.0, 0.0, 1.0), NOWHERE, 0
+def deepest(blocks_a: Any, blocks_b: Any, X: Any, work: Any, count: int) -> tuple[float, Vector, Vector]:
+    """Depth (m) of the deepest of the first pairs of `touching`, its direction, and a point on A."""
+    best, direction, point = -1.0, (0.0, 0.0, 1.0), NOWHERE
     for k in range(count):
         a, b = int(work[PAIRS + 2 * k]), int(work[PAIRS + 2 * k + 1])
         S = triangle_at(blocks_a, a // WIDTH, a % WIDTH)
@@ -158,9 +158,9 @@ def deepest(blocks_a: Any, blocks_b: Any, X: Any, work: Any, count: int) -> tupl
             n = (w[0] / length, w[1] / length, w[2] / length) if length > 0.0 else (0.0, 0.0, 1.0)
             x, depth = found.on_a, radius - length
         if depth > best:
-            best, direction, which = depth, n, k
+            best, direction = depth, n
             point = along(x, blocks_a[a // WIDTH, RADIUS, a % WIDTH], n)
-    return best, direction, point, which
+    return best, direction, point
 
 
 @kernel

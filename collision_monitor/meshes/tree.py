@@ -51,7 +51,7 @@ def tree_of(
     """Build the tree (n, ROWS, WIDTH) over triangles (m, 3, 3) in m, m >= 1, in any order and place.
 
     radius: by which the triangles are enlarged (m), one number or (m,). A cloud of points is triangles with equal
-    corners. closed: the triangles bound a solid. parts (k, 3): a point of each connected part; the first corner if None.
+    corners. closed: the triangles bound a solid. parts (k, 3): a point of each connected part; None: there is one part.
     """
     corners = np.ascontiguousarray(corners, dtype=np.float64)
     radii = np.broadcast_to(np.asarray(radius, dtype=np.float64), len(corners)).copy()
@@ -191,7 +191,6 @@ def _fit(corners, radius, order, begin, end, axes, half, center, blocks, block, 
     best, least = 0, np.inf
     for choice in range(2):
         R = axes[choice]
-        widest = 0.0
         for c in range(3):
             low, high = np.inf, -np.inf
             for k in range(begin, end):
@@ -203,9 +202,10 @@ def _fit(corners, radius, order, begin, end, axes, half, center, blocks, block, 
                     )
                     low, high = min(low, at - radius[order[k]]), max(high, at + radius[order[k]])
             center[choice, c], half[choice, c] = low + 0.5 * (high - low), 0.5 * (high - low)
-        widest = half[choice, 0] * half[choice, 1] + half[choice, 1] * half[choice, 2] + half[choice, 2] * half[choice, 0]
-        if widest < least:
-            best, least = choice, widest
+        x, y, z = half[choice, 0], half[choice, 1], half[choice, 2]
+        surface = x * y + y * z + z * x
+        if surface < least:
+            best, least = choice, surface
     R = axes[best]
     scale = abs(ox) + abs(oy) + abs(oz) + half[best, 0] + half[best, 1] + half[best, 2]
     for r in range(3):
@@ -232,14 +232,14 @@ def _principal_axes(xx, xy, xz, yy, yz, zz, R):
             second = yy if q == 1 else zz
             theta = 0.5 * (second - first) / off
             t = copysign(1.0, theta) / (abs(theta) + sqrt(theta * theta + 1.0))
-            c = 1.0 / sqrt(t * t + 1.0)
-            s = t * c
+            cosine = 1.0 / sqrt(t * t + 1.0)
+            sine = t * cosine
             if pair == 0:
-                xx, yy, xy, xz, yz = xx - t * xy, yy + t * xy, 0.0, c * xz - s * yz, s * xz + c * yz
+                xx, yy, xy, xz, yz = xx - t * xy, yy + t * xy, 0.0, cosine * xz - sine * yz, sine * xz + cosine * yz
             elif pair == 1:
-                xx, zz, xz, xy, yz = xx - t * xz, zz + t * xz, 0.0, c * xy - s * yz, s * xy + c * yz
+                xx, zz, xz, xy, yz = xx - t * xz, zz + t * xz, 0.0, cosine * xy - sine * yz, sine * xy + cosine * yz
             else:
-                yy, zz, yz, xy, xz = yy - t * yz, zz + t * yz, 0.0, c * xy - s * xz, s * xy + c * xz
+                yy, zz, yz, xy, xz = yy - t * yz, zz + t * yz, 0.0, cosine * xy - sine * xz, sine * xy + cosine * xz
             for r in range(3):
                 a, b = R[r, p], R[r, q]
-                R[r, p], R[r, q] = c * a - s * b, s * a + c * b
+                R[r, p], R[r, q] = cosine * a - sine * b, sine * a + cosine * b

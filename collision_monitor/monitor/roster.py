@@ -12,10 +12,11 @@ from collision_monitor._jit import kernel
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.planar import flat_pose, is_planar
-from collision_monitor.geometry.shape_table import POLYGON, ShapeTable, ShapeTableBuilder
+from collision_monitor.geometry.shape_table import POLYGON, SHARED, TREE, ShapeTable, ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, array_bytes
 from collision_monitor.meshes.shape_trees import shape_tree
 from collision_monitor.meshes.slot_trees import plant_trees
+from collision_monitor.monitor.mesh_snapshot import mesh_arrays, plant_meshes
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled, monitored_model
@@ -295,12 +296,16 @@ class Roster(Stage):
         """See Stage."""
         top, shapes = self.top, self._shapes.used
         free_shapes, free_blocks = self._shapes.free
+        size = shapes.size.copy()
+        size[shapes.kind != ShapeType.HALF_SPACE, TREE] = 0.0  # `restore` builds the trees again
         snapshot.arrays.update(
             {
                 **{f"bodies.{name}": column[:top].copy() for name, column in self.bodies._asdict().items()},
                 **{f"parts.{name}": column[: len(shapes.kind)].copy() for name, column in self.parts._asdict().items()},
-                **{f"shapes.{name}": column.copy() for name, column in shapes._asdict().items()},
+                **{f"shapes.{name}": getattr(shapes, name).copy() for name in shapes._fields if name != "blocks"},
                 "shapes.vertices": shapes.vertices.T.copy(),
+                "shapes.size": size,
+                **mesh_arrays(shapes),
             }
         )
         facts |= {
@@ -348,9 +353,10 @@ class Roster(Stage):
         rows = {
             name: snapshot.array(f"shapes.{name}", column, len(kind))
             for name, column in like._asdict().items()
-            if name not in ("vertices", "vertex_index")
+            if name not in SHARED
         }
-        table = ShapeTable(**rows, vertices=vertices, vertex_index=index)
+        table = ShapeTable(**rows, vertices=vertices, vertex_index=index, blocks=like.blocks)
+        table.size[table.kind != ShapeType.HALF_SPACE, TREE] = 0.0
         check_range("shapes.kind", table.kind, 0, max(ShapeType) + 1)
         check_range("shapes.vertex_start", table.vertex_start, 0, len(index) + 1)
         check_range("shapes.vertex_count", table.vertex_count, 0, len(index) + 1)
@@ -363,6 +369,7 @@ class Roster(Stage):
             raise InputError(f"snapshot, shapes.size: expected as many corners as there are, got {corners.tolist()}")
         free_blocks = {count: list(starts) for count, starts in facts["free_blocks"]}
         self._shapes = ShapeTableBuilder.restored(table, list(facts["free_shapes"]), free_blocks)
+        plant_meshes(self._shapes, snapshot)
 
 
 def _check_chains(bodies: Bodies, parts: Parts, kind: NDArray[Any]) -> None:

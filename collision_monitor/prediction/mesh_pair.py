@@ -1,4 +1,4 @@
-"""Pairs of shapes with a mesh: their contact at one time, and their first impact, through the trees of their surfaces."""
+"""Pairs of shapes with a mesh: their contact at one time, and a time without one, by the trees of their surfaces."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def _root(table, s):
 
 @inlined
 def unknown_depth(table, a, b, p, distance):
-    """How much longer than -distance (m) the shortest translation may be that parts two shapes with a mesh; p: b from a.
+    """How much longer than -distance (m) the shortest translation may be that parts two shapes with a mesh, p apart.
 
     One that parts their bounding spheres parts them certainly. A half-space meets the convex hull, with a known depth.
     """
@@ -70,10 +70,10 @@ def mesh_within(table, a, b, pose, limit, out, scratch):
         pose = swapped(pose)
     margins = table.margin[a] + table.margin[b]
     if _has_tree(table, b):
-        scratch.answer[PLACE_A] = scratch.answer[PLACE_B] = -1.0
-        known = tree_contact(
-            table.blocks, _root(table, a), table.blocks, _root(table, b), pose, limit + margins, out, scratch.answer, scratch.tree
-        )
+        answer, work = scratch.answer, scratch.tree
+        answer[PLACE_A] = answer[PLACE_B] = -1.0
+        first, second = _root(table, a), _root(table, b)
+        known = tree_contact(table.blocks, first, table.blocks, second, pose, limit + margins, out, answer, work)
         if known == FARTHER:
             return False
         out[DISTANCE] -= margins
@@ -139,9 +139,8 @@ def advance_mesh(table, at, margin, growth, until, tolerance, scratch):
         growth,
     )
     if _has_tree(table, b):
-        X = relative(R_a, R_b, p)
-        return advance_trees(
-            table.blocks, _root(table, a), table.blocks, _root(table, b), X, move, until, tolerance, scratch.answer, scratch.tree
-        )
-    memory = SolidMemory(scratch.triangle, scratch.work, scratch.tree)
-    return advance_to_solid(table.blocks, _root(table, a), table, b, PairPose(R_a, R_b, p), move, until, tolerance, memory)
+        X, answer, work = relative(R_a, R_b, p), scratch.answer, scratch.tree
+        first, second = _root(table, a), _root(table, b)
+        return advance_trees(table.blocks, first, table.blocks, second, X, move, until, tolerance, answer, work)
+    pose, memory = PairPose(R_a, R_b, p), SolidMemory(scratch.triangle, scratch.work, scratch.tree)
+    return advance_to_solid(table.blocks, _root(table, a), table, b, pose, move, until, tolerance, memory)

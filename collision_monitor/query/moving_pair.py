@@ -26,7 +26,8 @@ from collision_monitor.prediction.pair_impacts import predict_pairs
 from collision_monitor.query.contact import Compound
 
 REMEMBERED: Final = 256 << 20
-"""Bytes of the trees of pairs that are remembered. Less: each query of two meshes copies them, 1 ms for 5,000 triangles."""
+"""Bytes of the trees of pairs that are remembered. Less: each query of two meshes copies them, 1 ms for
+5,000 triangles."""
 
 
 class MotionQuery(NamedTuple):
@@ -39,7 +40,7 @@ class MotionQuery(NamedTuple):
 
 
 class MovingShape(NamedTuple):
-    """One of two moving objects: its shapes, and the convex pieces or meshes that represent them, with poses in its frame."""
+    """One of two moving objects: its shapes, and the convex pieces or meshes that represent them, in its frame."""
 
     shapes: Sequence[tuple[Shape, Pose]]
     pieces: PosedShapes

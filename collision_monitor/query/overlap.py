@@ -32,11 +32,10 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
     shape that the test does not take.
     """
     if test == "contact":
-        if isinstance(shape_a, Shape) and isinstance(shape_b, Shape) and isinstance(pose_a, Pose) and isinstance(pose_b, Pose):
-            trees = _trees(shape_a, shape_b)
-            if trees is not None:
-                X, Y = (pose_a.rotation, pose_a.position), (pose_b.rotation, pose_b.position)
-                return bool(trees_overlap(trees[0], *X, trees[1], *Y, np.empty(MEMORY)))
+        trees = _trees(shape_a, shape_b)
+        if trees is not None and isinstance(pose_a, Pose) and isinstance(pose_b, Pose):
+            X, Y = (pose_a.rotation, pose_a.position), (pose_b.rotation, pose_b.position)
+            return bool(trees_overlap(trees[0], *X, trees[1], *Y, np.empty(MEMORY)))
         return contact(shape_a, pose_a, shape_b, pose_b).overlaps
     if test not in TESTS:
         raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")
@@ -48,11 +47,11 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
     return any(polyhedra_intersect(*a, *b).collides for a in solids[0] for b in solids[1])
 
 
-def _trees(a: Shape, b: Shape) -> tuple[Array, Array] | None:
+def _trees(a: Compound, b: Compound) -> tuple[Array, Array] | None:
     """Trees of two shapes if one of them is a concave mesh, with a certain inside, and the other has a tree."""
-    if not all(shape.surface.certain for shape in (a, b) if isinstance(shape, Mesh)):
+    if not (isinstance(a, Shape) and isinstance(b, Shape)) or not (is_concave_mesh(a) or is_concave_mesh(b)):
         return None
-    if not (is_concave_mesh(a) or is_concave_mesh(b)):
+    if not all(shape.surface.certain for shape in (a, b) if isinstance(shape, Mesh)):
         return None
     trees = shape_tree(a), shape_tree(b)
     return None if trees[0] is None or trees[1] is None else (trees[0], trees[1])

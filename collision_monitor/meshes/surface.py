@@ -1,0 +1,45 @@
+"""The triangles of a tree in the user's order, from which the same tree can be built again."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.meshes.layout import CHILD, CLOSED, CORNERS, FACE, FIRST_PART, MOST_PARTS, PARTS, WIDTH
+from collision_monitor.meshes.tree import tree_of
+
+Array = NDArray[np.float64]
+
+
+class Surface(NamedTuple):
+    """What `tree_of` takes: corners (m, 3, 3), whether they bound a solid, and a point of each connected part (k, 3)."""
+
+    corners: Array
+    closed: bool
+    parts: Array
+
+    @property
+    def tree(self) -> Array:
+        """The tree over the triangles."""
+        return tree_of(self.corners, closed=self.closed, parts=self.parts)
+
+
+def surface_of(blocks: Array, root: int) -> Surface:
+    """The surface of the tree of a mesh that begins at a block."""
+    boxes = np.array([root])
+    leaves = []
+    while len(boxes):
+        child = blocks[boxes, CHILD].ravel().astype(np.int64)
+        leaves.append(root - child[child < 0])
+        boxes = root + child[child > 0]
+    members = np.concatenate(leaves)
+    face = blocks[members, FACE].ravel().astype(np.int64)
+    corners = np.empty((face.max() + 1, 3, 3))
+    corners[face] = blocks[members, CORNERS : CORNERS + 9].transpose(0, 2, 1).reshape(-1, 3, 3)
+    first, count = root + int(blocks[root, FIRST_PART, 1]), int(blocks[root, PARTS, 1])
+    stored = min(count, MOST_PARTS)
+    points = blocks[first : first + -(-stored // WIDTH), :3].transpose(0, 2, 1).reshape(-1, 3)[:stored]
+    parts = np.resize(points, (count, 3))  # only the number of the others counts
+    return Surface(corners, bool(blocks[root, CLOSED, 1]), parts)

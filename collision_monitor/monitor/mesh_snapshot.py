@@ -1,0 +1,65 @@
+"""The meshes of a snapshot: their triangles, from which `restore` builds the trees again, equal to the bit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.errors import InputError
+from collision_monitor.geometry.shape_table import MESH, TREE, ShapeTable, ShapeTableBuilder
+from collision_monitor.meshes.slot_trees import plant_trees
+from collision_monitor.meshes.surface import Surface, surface_of
+from collision_monitor.monitor.snapshot import Snapshot, check_range
+from collision_monitor.tolerances import LARGEST_INPUT
+
+
+def mesh_arrays(table: ShapeTable) -> dict[str, NDArray[Any]]:
+    """Arrays that describe the meshes of a table; none if it has none. Equal meshes are saved once.
+
+    meshes.of: the mesh of each slot with one. By mesh: numbers of triangles and of parts, and whether it is closed.
+    meshes.corners (m, 3, 3) and meshes.points (k, 3): those of all meshes, one after another.
+    """
+    slots = np.flatnonzero(table.kind == MESH)
+    if not len(slots):
+        return {}
+    roots, of = np.unique(table.size[slots, TREE].astype(np.int64) - 1, return_inverse=True)
+    found = [surface_of(table.blocks, int(root)) for root in roots]
+    return {
+        "meshes.of": of.astype(np.int32),
+        "meshes.triangles": np.array([len(each.corners) for each in found], np.int32),
+        "meshes.parts": np.array([len(each.parts) for each in found], np.int32),
+        "meshes.closed": np.array([each.closed for each in found], np.bool_),
+        "meshes.corners": np.concatenate([each.corners for each in found]),
+        "meshes.points": np.concatenate([each.parts for each in found]),
+    }
+
+
+def plant_meshes(builder: ShapeTableBuilder, snapshot: Snapshot) -> None:
+    """Give the meshes of a restored table their trees, and the other shapes those that their pairs need.
+
+    Raises InputError if the arrays do not describe them.
+    """
+    slots = np.flatnonzero(builder.table.kind == MESH)
+    if not len(slots):
+        return
+    of = snapshot.array("meshes.of", np.zeros(0, np.int32), len(slots))
+    triangles = snapshot.array("meshes.triangles", np.zeros(0, np.int32))
+    parts = snapshot.array("meshes.parts", np.zeros(0, np.int32), len(triangles))
+    closed = snapshot.array("meshes.closed", np.zeros(0, np.bool_), len(triangles))
+    check_range("meshes.of", of, 0, len(triangles))
+    for name, counts in (("meshes.triangles", triangles), ("meshes.parts", parts)):
+        check_range(name, counts, 1, 1 << 31)
+    corners = snapshot.array("meshes.corners", np.zeros((0, 3, 3)), int(triangles.sum()))
+    points = snapshot.array("meshes.points", np.zeros((0, 3)), int(parts.sum()))
+    if not ((np.abs(corners) <= LARGEST_INPUT).all() and (np.abs(points) <= LARGEST_INPUT).all()):
+        raise InputError(f"snapshot, meshes: expected finite coordinates up to {LARGEST_INPUT:g}, got others")
+    ends, last = np.cumsum(triangles), np.cumsum(parts)
+    trees = [
+        Surface(corners[ends[k] - triangles[k] : ends[k]], bool(closed[k]), points[last[k] - parts[k] : last[k]]).tree
+        for k in range(len(triangles))
+    ]
+    for slot, mesh in zip(slots.tolist(), of.tolist(), strict=True):
+        builder.plant(slot, trees[mesh])
+    plant_trees(builder)
