@@ -1,4 +1,4 @@
-"""Features of two polytopes in contact: "vertex 3 of A on face 7 of B"."""
+"""Features of two shapes in contact: "vertex 3 of A on face 7 of B"."""
 
 from __future__ import annotations
 
@@ -11,7 +11,18 @@ from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.contact_features import Feature, FeatureContact, FeatureType, feature_at
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape
+from collision_monitor.geometry.round_features import feature_of_cone, feature_of_cylinder, feature_of_outline
+from collision_monitor.geometry.shapes import (
+    Box,
+    Capsule,
+    Cone,
+    ConvexHull,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Polygon,
+    Shape,
+)
 from collision_monitor.query.contact import Contact
 
 Array = NDArray[np.float64]
@@ -23,11 +34,13 @@ _TRIANGLES: Final = _QUADS[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
 
 
 def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Shape, pose_b: Pose) -> FeatureContact:
-    """Features of A and of B at the witness points of their contact, for Box, ConvexHull and Mesh.
+    """Features of A and of B at the witness points of their contact, for shapes with vertices, edges or faces.
 
     A mesh keeps its own numbers of vertices and faces. A hull has the vertex numbers of its points and the face numbers
     of `convex_hull`. A box numbers its corners by their sides (bit 0: +x, 1: +y, 2: +z) and its faces in the order
-    +x -x +y -y +z -z. Raises UnsupportedError for other shapes.
+    +x -x +y -y +z -z. A cylinder has faces and rims 0 (+z) and 1 (-z), a cone vertex 0, rim 0 and face 0, and both a
+    curved surface. A polygon has the corners of its points, a capsule corner 0 (-z) and 1 (+z) and the edge between
+    them. A half-space is face 0. Raises UnsupportedError for Sphere, Ellipsoid and Circle, which are one surface.
     """
     return FeatureContact(
         _feature(shape_a, pose_a, contact.point_a, contact.normal),
@@ -50,5 +63,20 @@ def _feature(shape: Shape, pose: Pose, point: Array, normal: Array) -> Feature:
             if found.type is FeatureType.FACE:
                 return Feature(FeatureType.FACE, tuple(_QUADS[found.face // 2].tolist()), found.face // 2)
             return found
+        case Cylinder():
+            return feature_of_cylinder(at, towards, shape.radius, shape.length)
+        case Cone():
+            return feature_of_cone(at, towards, shape.radius, shape.length)
+        case Capsule():
+            ends = np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]]) * shape.length
+            return feature_of_outline(at - shape.radius * towards, towards, ends)
+        case Polygon():
+            core = at[:2] - shape.radius * towards[:2]
+            return feature_of_outline(core, towards[:2], shape.points)
+        case HalfSpace():
+            return Feature(FeatureType.FACE, (), 0)
     kind = type(shape).__name__
-    raise UnsupportedError(f"{kind} has no vertices, edges and faces; supported are Box, ConvexHull, Mesh")
+    raise UnsupportedError(
+        f"{kind} has no vertices, edges and faces; supported are Box, ConvexHull, Mesh, Cylinder, Cone, Capsule, "
+        "Polygon, HalfSpace"
+    )
