@@ -11,19 +11,26 @@ from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.contact_features import Feature, FeatureContact, FeatureType, feature_at
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.round_features import feature_of_cone, feature_of_cylinder, feature_of_outline
+from collision_monitor.geometry.round_features import (
+    ROUND_TIE,
+    feature_of_cone,
+    feature_of_cylinder,
+    feature_of_outline,
+)
 from collision_monitor.geometry.shapes import (
     Box,
     Capsule,
     Cone,
     ConvexHull,
     Cylinder,
+    Ellipsoid,
     HalfSpace,
     Mesh,
     Polygon,
     Shape,
 )
 from collision_monitor.query.contact import Contact
+from collision_monitor.tolerances import FEATURE_TIE
 
 Array = NDArray[np.float64]
 
@@ -42,24 +49,26 @@ def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Sh
     curved surface. A polygon has the corners of its points, a capsule corner 0 (-z) and 1 (+z) and the edge between
     them. A half-space is face 0. Raises UnsupportedError for Sphere, Ellipsoid and Circle, which are one surface.
     """
+    curved = any(isinstance(shape, Cylinder | Cone | Ellipsoid) for shape in (shape_a, shape_b))
+    tie = ROUND_TIE if curved else FEATURE_TIE
     return FeatureContact(
-        _feature(shape_a, pose_a, contact.point_a, contact.normal),
-        _feature(shape_b, pose_b, contact.point_b, -contact.normal),
+        _feature(shape_a, pose_a, contact.point_a, contact.normal, tie),
+        _feature(shape_b, pose_b, contact.point_b, -contact.normal, tie),
     )
 
 
-def _feature(shape: Shape, pose: Pose, point: Array, normal: Array) -> Feature:
+def _feature(shape: Shape, pose: Pose, point: Array, normal: Array, tie: float) -> Feature:
     at, towards = (point - pose.position) @ pose.rotation, normal @ pose.rotation
     match shape:
         case Mesh():
-            return feature_at(at, towards, shape.vertices, shape.faces)
+            return feature_at(at, towards, shape.vertices, shape.faces, tie)
         case ConvexHull():
             hull = convex_hull(shape.points)
-            found = feature_at(at, towards, hull.vertices, hull.faces)
+            found = feature_at(at, towards, hull.vertices, hull.faces, tie)
             same = (shape.points == hull.vertices[list(found.vertices), None]).all(axis=-1)
             return found._replace(vertices=tuple(same.argmax(axis=1).tolist()))
         case Box():
-            found = feature_at(at, towards, _SIDES * shape.size, _TRIANGLES)
+            found = feature_at(at, towards, _SIDES * shape.size, _TRIANGLES, tie)
             if found.type is FeatureType.FACE:
                 return Feature(FeatureType.FACE, tuple(_QUADS[found.face // 2].tolist()), found.face // 2)
             return found
