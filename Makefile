@@ -47,6 +47,7 @@ QUICK := $(findstring --quick,$(ARGS))
 
 bench: setup ## time full detection and every installed peer, the event list, the node; ARGS=--quick takes 3 minutes
 	@$(BIN)/python benchmarks/run.py $(ARGS)
+	@$(BIN)/python benchmarks/mesh_pairs.py $(QUICK)
 	@$(BIN)/python benchmarks/event_list.py $(if $(QUICK),--seconds 1)
 	@$(BIN)/python benchmarks/through_node.py $(if $(QUICK),--duration 10)
 	@$(BIN)/python benchmarks/memory.py $(QUICK)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.geometry.pose import Motion, Pose
-from collision_monitor.geometry.shapes import Box, ConvexHull, Shape, Sphere
+from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.models import containing_model
 from collision_monitor.records import STATE, Model
@@ -63,6 +63,7 @@ def warm_up_functions() -> None:
     from collision_monitor.detection.detector import WORTH_THREADS, Detector, default_threads
     from collision_monitor.query.contact import contact
     from collision_monitor.query.feature_impact import vertex_face_impact
+    from collision_monitor.query.overlap import overlap
     from collision_monitor.query.time_of_impact import time_of_impact
     from collision_monitor.query.time_of_impact_batch import time_of_impact_batch
 
@@ -78,6 +79,10 @@ def warm_up_functions() -> None:
     for shape in (box, ball):
         time_of_impact_batch(shape, poses, twists, shape, poses + np.eye(1, 7), twists)
     vertex_face_impact(np.arange(24.0).reshape(8, 3))
+    corner = Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [(0, 1, 2), (0, 1, 3)])
+    for at in (Pose(), Pose((3, 0, 0))):
+        overlap(corner, Pose(), corner, at)
+        contact(corner, Pose(), corner, at)
 
 
 PARTS = {"monitor": warm_up_monitor, "functions": warm_up_functions}

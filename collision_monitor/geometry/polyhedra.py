@@ -35,8 +35,10 @@ def mesh_edges(faces: ArrayLike) -> Indices:
 def is_closed(faces: ArrayLike) -> bool:
     """Whether faces (m, 3) enclose a volume without a gap: each edge belongs to an even number of faces."""
     faces = np.asarray(faces, dtype=np.int64)
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    return bool((np.unique(edges, axis=0, return_counts=True)[1] % 2 == 0).all())
+    ends = faces, np.roll(faces, -1, axis=1)
+    keys = np.sort((np.minimum(*ends) * (int(faces.max(initial=0)) + 1) + np.maximum(*ends)).ravel())
+    first = np.flatnonzero(np.diff(keys, prepend=-1))  # of each edge among its equals
+    return bool((np.diff(first, append=len(keys)) % 2 == 0).all())
 
 
 def closed_mesh(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> tuple[Array, Indices]:

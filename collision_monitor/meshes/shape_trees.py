@@ -1,20 +1,21 @@
-"""The tree of a shape, made once and kept as long as the shape lives."""
+"""The tree of a shape, made once and kept with the shape."""
 
 from __future__ import annotations
 
 from typing import Final
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.geometry.bounding_volumes import convex_hull
+from collision_monitor.geometry.convex_pieces import is_concave_mesh
 from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Mesh, Shape, Sphere, Triangle
 from collision_monitor.meshes.tree import tree_of
 
 Array = NDArray[np.float64]
 
-_TREES: Final[WeakKeyDictionary[Shape, Array]] = WeakKeyDictionary()
+_KEPT: Final = "_tree"
+"""Where a shape keeps its tree, in a tuple, since `array_bytes` counts the arrays of the user."""
 
 
 def shape_tree(shape: Shape) -> Array | None:
@@ -22,12 +23,24 @@ def shape_tree(shape: Shape) -> Array | None:
 
     A sphere is a point with a radius, a capsule an edge with a radius; a box and a hull are closed surfaces.
     """
-    tree = _TREES.get(shape)
-    if tree is None:
-        tree = made_tree(shape)
-        if tree is not None:
-            _TREES[shape] = tree
+    kept = shape.__dict__.get(_KEPT)
+    if kept is None:
+        is_certain = not isinstance(shape, Mesh) or shape.surface.certain
+        kept = shape.__dict__[_KEPT] = (made_tree(shape), is_concave_mesh(shape), is_certain)
+    tree: Array | None = kept[0]
     return tree
+
+
+def trees_of_pair(a: Shape, b: Shape) -> tuple[Array, Array] | None:
+    """Trees of two shapes; None unless one of them is a concave mesh and the other has a tree.
+
+    Also None if it is not certain what is inside of a mesh.
+    """
+    tree_a, tree_b = shape_tree(a), shape_tree(b)
+    (_, concave_a, certain_a), (_, concave_b, certain_b) = a.__dict__[_KEPT], b.__dict__[_KEPT]
+    if tree_a is None or tree_b is None or not (concave_a or concave_b) or not (certain_a and certain_b):
+        return None
+    return tree_a, tree_b
 
 
 def made_tree(shape: Shape) -> Array | None:

@@ -147,9 +147,14 @@ def exact_model(shapes: Sequence[tuple[Shape, Pose]]) -> Modelled:
     pieces: PosedShapes = []
     index = []
     for k, (shape, pose) in enumerate(shapes):
-        parts = ((shape, Pose()),) if is_concave_mesh(shape) else convex_pieces(shape)
-        pieces += [(part, pose @ offset) for part, offset in parts]
-        index += [k] * len(parts)
+        if is_concave_mesh(shape):
+            pieces.append((shape, pose))
+            index.append(k)
+            continue
+        placed = pose.position.any() or pose.quaternion[3] != 1.0
+        for part, offset in convex_pieces(shape):
+            pieces.append((part, pose @ offset if placed else offset))
+            index.append(k)
     convex = len(pieces) == 1 and not isinstance(pieces[0][0], Mesh)
     return Modelled(pieces, index, Model.EXACT, 0.0, convex)
 

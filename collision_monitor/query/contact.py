@@ -23,7 +23,7 @@ from collision_monitor.geometry.shapes import Capsule, HalfSpace, Mesh, Shape, S
 from collision_monitor.meshes.contact import APART, ENCLOSED, OPEN, contact_of_trees, reach_of
 from collision_monitor.meshes.extent import extents
 from collision_monitor.meshes.nearest import MEMORY, answer_row
-from collision_monitor.meshes.shape_trees import shape_tree
+from collision_monitor.meshes.shape_trees import shape_tree, trees_of_pair
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, as_contacts
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.objects.models import containing_model, parse_model
@@ -36,7 +36,9 @@ from collision_monitor.tolerances import FEATURE_TIE, UNIT_QUATERNION
 Array = NDArray[np.float64]
 Compound = Shape | Sequence[tuple[Shape, Pose]]
 
-_DIRECTIONS: Final = [sign * np.array(d) / np.linalg.norm(d) for d in KDOP_DIRECTIONS[26] for sign in (1.0, -1.0)]
+_DIRECTIONS: Final = np.array(
+    [sign * np.array(d) / np.linalg.norm(d) for d in KDOP_DIRECTIONS[26] for sign in (1.0, -1.0)]
+)
 
 def _patch(found: NearestPieces, witness: Array) -> Array:
     """Corners (k, 3) on A of the patch of all pieces that touch in one plane; a floor of triangles is one face."""
@@ -137,6 +139,9 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
     surface, and the bound includes the solids that the surface may belong to (see `fillings`).
     Raises ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, or a model that is not available.
     """
+    quick = _meshes_apart(shape_a, pose_a, shape_b, pose_b) if model in ("exact", Model.EXACT) else None
+    if quick is not None:
+        return quick
     a, b = _posed(shape_a, pose_a, model, "A"), _posed(shape_b, pose_b, model, "B")
     planes = {is_planar(shape) for shape, _ in (*a.shapes, *b.shapes)}
     if len(planes) > 1:
@@ -184,6 +189,32 @@ def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, mo
         model_b=b.model,
         _find=None if enclosed or unbounded else deepest.pieces,
     )
+
+
+def _meshes_apart(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -> Contact | None:
+    """The contact of two single shapes, one of which is a concave mesh, if they are apart; else None."""
+    if not (type(shape_a) is Mesh or type(shape_b) is Mesh):
+        return None
+    if not (isinstance(shape_a, Shape) and isinstance(shape_b, Shape)):
+        return None
+    if not (isinstance(pose_a, Pose) and isinstance(pose_b, Pose)):
+        return None
+    trees = trees_of_pair(shape_a, shape_b)
+    if trees is None:
+        return None
+    row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
+    X, Y = (pose_a.rotation, pose_a.position), (pose_b.rotation, pose_b.position)
+    if contact_of_trees(trees[0], *X, trees[1], *Y, np.inf, row, answer, work) != APART:
+        return None
+
+    def pieces() -> NearestPieces:
+        a, b = _posed(shape_a, pose_a, Model.EXACT, "A"), _posed(shape_b, pose_b, Model.EXACT, "B")
+        return _by_pieces(a, b, b.pose.position - a.pose.position).pieces()
+
+    distance, normal = float(row[DISTANCE]), row[NORMAL : NORMAL + 3]
+    point = pose_a.position + row[POINT_A : POINT_A + 3]
+    far = point + distance * normal
+    return Contact(distance, float(row[BOUND]), normal, point, far, Model.EXACT, Model.EXACT, pieces)
 
 
 class _Deepest(NamedTuple):
@@ -294,14 +325,14 @@ def _distance_of_fillings(a: _Posed, b: _Posed) -> float:
 
 def _parting_translation(a: _Posed, b: _Posed, offset: Array, normal: Array) -> float:
     """Length (m) of the shortest translation that certainly parts the two, along the normal or an axis of either."""
-    axes = [side.rotation @ direction for side in (a, b) for direction in _DIRECTIONS]
     planes = [
         sign * side.rotation @ pose.rotation @ shape.normal
         for side, sign in ((a, 1.0), (b, -1.0))
         for shape, pose in side.outline
         if isinstance(shape, HalfSpace)
     ]
-    directions = np.array([normal, *axes, *planes])
+    axes = [_DIRECTIONS @ side.rotation.T for side in (a, b)]
+    directions = np.concatenate([normal[None], *axes, np.reshape(planes, (-1, 3))])
     if is_planar(a.shapes[0][0]):
         directions = directions[directions[:, 2] == 0.0]
     ends = _reach(a, directions @ a.rotation) - directions @ offset

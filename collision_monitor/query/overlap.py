@@ -10,14 +10,12 @@ from collision_monitor.errors import InputError, PoseError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import Hull, convex_hull
 from collision_monitor.geometry.cascade import polyhedra_intersect
 from collision_monitor.geometry.compound import shape_pairs
-from collision_monitor.geometry.convex_pieces import is_concave_mesh
-from collision_monitor.geometry.coordinates import Array
 from collision_monitor.geometry.polyhedron_sat import sat_3d
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape
 from collision_monitor.meshes.contact import trees_overlap
 from collision_monitor.meshes.nearest import MEMORY
-from collision_monitor.meshes.shape_trees import shape_tree
+from collision_monitor.meshes.shape_trees import trees_of_pair
 from collision_monitor.query.contact import Compound, contact
 
 TESTS: Final = ("contact", "cascade", "sat")
@@ -32,10 +30,13 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
     shape that the test does not take.
     """
     if test == "contact":
-        trees = _trees(shape_a, shape_b)
-        if trees is not None and isinstance(pose_a, Pose) and isinstance(pose_b, Pose):
-            X, Y = (pose_a.rotation, pose_a.position), (pose_b.rotation, pose_b.position)
-            return bool(trees_overlap(trees[0], *X, trees[1], *Y, np.empty(MEMORY)))
+        if type(shape_a) is Mesh or type(shape_b) is Mesh:
+            posed = isinstance(pose_a, Pose) and isinstance(pose_b, Pose)
+            if posed and isinstance(shape_a, Shape) and isinstance(shape_b, Shape):
+                trees = trees_of_pair(shape_a, shape_b)
+                if trees is not None:
+                    X, Y = (pose_a.rotation, pose_a.position), (pose_b.rotation, pose_b.position)
+                    return bool(trees_overlap(trees[0], *X, trees[1], *Y, np.empty(MEMORY)))
         return contact(shape_a, pose_a, shape_b, pose_b).overlaps
     if test not in TESTS:
         raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")
@@ -45,16 +46,6 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
     if test == "sat":
         return any(sat_3d(a, b).overlaps for a in solids[0] for b in solids[1])
     return any(polyhedra_intersect(*a, *b).collides for a in solids[0] for b in solids[1])
-
-
-def _trees(a: Compound, b: Compound) -> tuple[Array, Array] | None:
-    """Trees of two shapes if one of them is a concave mesh, with a certain inside, and the other has a tree."""
-    if not (isinstance(a, Shape) and isinstance(b, Shape)) or not (is_concave_mesh(a) or is_concave_mesh(b)):
-        return None
-    if not all(shape.surface.certain for shape in (a, b) if isinstance(shape, Mesh)):
-        return None
-    trees = shape_tree(a), shape_tree(b)
-    return None if trees[0] is None or trees[1] is None else (trees[0], trees[1])
 
 
 def _solids(shape: Compound, pose: Pose, test: str, name: str) -> list[Hull]:

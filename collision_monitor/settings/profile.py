@@ -120,9 +120,7 @@ class Profile:
     )
     model_primitive: str = choice(_MODELS, "Model of boxes, capsules, cylinders and cones without one of their own.")
     model_hull: str = choice(_MODELS, "Model of convex hulls without one of their own.")
-    model_mesh: str = choice(
-        _MODELS, "Model of meshes without one of their own; auto: exact."
-    )
+    model_mesh: str = choice(_MODELS, "Model of meshes without one of their own; auto: exact.")
     model_compound: str = choice(_MODELS, "Model of objects of several shapes without one of their own.")
     region_min: tuple[float, float, float] = vector(
         (-EVERYWHERE, -EVERYWHERE, -EVERYWHERE),

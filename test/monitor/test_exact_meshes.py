@@ -60,7 +60,7 @@ def test_its_contacts_are_those_of_contact(other):
             low = -row["signed_distance"] - row["error_bound"]
             high = -row["signed_distance"] + row["error_bound"]
             assert low <= -truth.signed_distance + truth.error_bound and -truth.signed_distance <= high + 1e-9
-        assert (row["status"] == ContactStatus.TOUCHING)
+        assert row["status"] == ContactStatus.TOUCHING
     assert static or overlapping
 
 
@@ -90,7 +90,8 @@ def test_its_impacts_are_certified_and_those_of_time_of_impact(other):
         hits += 1
         (row,) = found
         assert row["status"] == PredictionStatus.HIT and truth.status == "hit"
-        assert row["lower"] == pytest.approx(truth.lower, abs=1e-3)
+        assert row["lower"] <= truth.lower + 1e-9 and truth.lower <= row["upper"]
+        assert row["upper"] - row["lower"] < 0.05
         for t in np.linspace(0.0, truth.lower, 6)[:-1]:
             assert not cm.overlap(RING, motions[0].at(t), other, motions[1].at(t))
         assert cm.contact(RING, motions[0].at(truth.upper), other, motions[1].at(truth.upper)).signed_distance <= 1e-12
@@ -98,7 +99,7 @@ def test_its_impacts_are_certified_and_those_of_time_of_impact(other):
 
 
 def scene(profile: Profile) -> Monitor:
-    monitor = Monitor(profile, timed=False)
+    monitor = Monitor(profile)
     for k, shape in enumerate(OTHERS):
         monitor.add(k, shape)
     monitor.add(20, [(RING, cm.Pose((0.3, 0, 0))), (cm.Sphere(0.2), cm.Pose((0, 1, 0)))], padding=0.02)
@@ -112,8 +113,7 @@ def test_a_restored_monitor_goes_on_with_the_same_bytes(profile):
     for step in range(3):
         monitor.step((1 + step) * 50_000_000, ids, states(len(ids), step, 1.5), states(len(ids), 50 + step)[:, :6])
     data = monitor.snapshot().encode()
-    other = Monitor(profile, timed=False)
-    other.restore(Snapshot.decode(data))
+    other = Monitor.restored(profile, Snapshot.decode(data))
     assert other.snapshot().encode() == data
     for step in range(3, 6):
         poses, twists = states(len(ids), step, 1.5), states(len(ids), 50 + step)[:, :6]
@@ -138,4 +138,4 @@ def test_a_snapshot_with_damaged_meshes_is_refused():
         arrays = {key: array.copy() for key, array in snapshot.arrays.items()}
         arrays[name].reshape(-1)[0] = value
         with pytest.raises(cm.InputError, match="snapshot"):
-            Monitor().restore(Snapshot(arrays, snapshot.facts))
+            Monitor.restored(Profile(), Snapshot(arrays, snapshot.facts))
