@@ -95,7 +95,8 @@ def ray_crossings(points: Array, vertices: Array, faces: Indices) -> Crossings:
     low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     on_face = np.zeros(len(points), bool)
     order = np.argsort(points[:, 0])
-    met: list[tuple[Indices, Indices, Array]] = []
+    nothing = np.zeros(0, np.int64)
+    met: list[tuple[Indices, Indices, Array]] = [(nothing, nothing, np.zeros(0))]
     least, most = POINTS_AT_ONCE
     at_once = min(max(TESTS_AT_ONCE // len(faces), least), most)
     for first in range(0, len(points), at_once):  # points in order of x, so that few faces are near each batch
