@@ -28,7 +28,7 @@ NEAR: Final = 0.3
 COMPARED_STEPS: Final = 12
 """Number of steps, evenly spread, that are compared. A pair of triangle meshes takes most of a second."""
 
-MODELS: Final = (Model.SPHERE, Model.OBB, Model.KDOP26, Model.CONVEX_HULL)
+MODELS: Final = (Model.SPHERE, Model.OBB, Model.KDOP26, Model.CONVEX_HULL, Model.AUTO)
 
 Pair = tuple[int, int]
 
@@ -40,7 +40,9 @@ def model_tradeoff(
     models: Sequence[Model | str] = MODELS,
     progress: Callable[[int], None] = lambda done: None,
 ) -> list[Measurement]:
-    """Return a row for `exact`, which is `contact` of the exact shapes, then a row for each model. Raises InputError.
+    """Return a row for `exact`, which is `contact` of the exact shapes, then a row for each model in the monitor.
+
+    Raises InputError.
 
     Pairs up to NEAR apart are compared. An alarm is a pair that is reported to touch. A miss is a pair that touches and
     is not reported. progress: called with the number of steps just done; the total is

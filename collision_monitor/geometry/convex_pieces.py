@@ -48,7 +48,6 @@ def convex_pieces(shape: Shape) -> tuple[tuple[Shape, Pose], ...]:
     return ((shape, Pose()),)
 
 
-@bounded_cache(REMEMBERED_PIECES, lambda _, shape: array_bytes(shape))
 def is_concave_mesh(shape: Shape) -> bool:
     """Whether a shape is a mesh that is not the surface of a convex solid."""
     return isinstance(shape, Mesh) and not is_convex_mesh(shape)

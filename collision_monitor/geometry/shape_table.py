@@ -201,7 +201,8 @@ class ShapeTableBuilder:
         """Add a shape at a pose in its object's frame, enlarged by `margin` (m); return its slot.
 
         corners: the `hull_vertices` of a ConvexHull, if they are known already. tree: of a mesh, which is needed
-        (`meshes.shape_trees`). Raises UnsupportedError for a kind without kernels, ShapeError for an invalid margin.
+        (`meshes.shape_trees`).
+        Raises UnsupportedError for a kind without kernels, ShapeError for an invalid margin.
         """
         if not (np.isfinite(margin) and margin >= 0.0):
             raise ShapeError(f"margin: expected a finite number of metres >= 0, got {margin!r}")

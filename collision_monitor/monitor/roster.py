@@ -42,10 +42,16 @@ COPIES: Final = 4
 the table has up to twice the room that it needs."""
 
 
+TREE_BYTES: Final = 300
+"""Memory of a triangle in the tree of its mesh: 150 to 220 bytes, and the array of all trees may have half as much room
+again."""
+
+
 def memory(d: ObjectDescription) -> int:
     """Return the memory that a described object needs (bytes), rounded up."""
     shapes = sum(SHAPE_BYTES + COPIES * array_bytes(shape) for shape, _ in d.shapes)
-    return OBJECT_BYTES + shapes + ALLOWED_BYTES * len(d.allowed)
+    trees = TREE_BYTES * sum(len(shape.faces) for shape, _ in d.shapes if isinstance(shape, Mesh))
+    return OBJECT_BYTES + shapes + trees + ALLOWED_BYTES * len(d.allowed)
 
 
 class Roster(Stage):
@@ -182,8 +188,8 @@ class Roster(Stage):
         try:
             for (shape, offset), chosen in zip(modelled.pieces, corners, strict=True):
                 tree = shape_tree(shape) if isinstance(shape, Mesh) else None
-                at = flat_pose(offset) if planar else offset
-                slots.append(self._shapes.append(shape, at, d.padding, corners=chosen, tree=tree))
+                placed = flat_pose(offset) if planar else offset
+                slots.append(self._shapes.append(shape, placed, d.padding, chosen, tree))
         except Exception:
             for slot in slots:
                 self._shapes.remove(slot)

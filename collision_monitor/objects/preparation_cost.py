@@ -36,6 +36,7 @@ _SIMPLE: Final = 0.05  # a shape with dimensions
 _HULL: Final = (0.3, 3e-3, 5e-6)  # a hull: in all, for each point, for each two points
 _HEIGHT: Final = 2e-5  # a vertex above the plane of a face, in the test for convexity
 _CONCAVE: Final = (30.0, 0.12)  # the excess around a concave object: in all, for each face
+_TREE: Final = (0.1, 3e-3)  # the tree of an exact concave mesh: in all, for each face
 _EXACT: Final = 0.02  # a determinant in integers
 _PIECE: Final = 10.0  # the excess around several pieces: for each piece
 _TRIANGLE: Final = 3.0  # the excess around a concave mesh beside other shapes: for each face
@@ -105,6 +106,8 @@ class Budget:
                 own = _of_hull(n) + (fixed if n > 8 else 0.1 * fixed) + each * n
                 if is_convex_mesh(shape):
                     return own
+                if model in (Model.AUTO, Model.EXACT):
+                    return _TREE[0] + _TREE[1] * m
                 if model is Model.CONVEX_DECOMPOSITION:
                     return inf
                 return own + _CONCAVE[0] + (_TRIANGLE if mixed else _CONCAVE[1]) * m

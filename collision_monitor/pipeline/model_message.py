@@ -39,7 +39,7 @@ def encode_model(model: Modelled | str) -> bytes:
         "corners": np.array([corners is not None for corners in model.corners], np.bool_),
     }
     for k, (piece, _) in enumerate(model.pieces):
-        arrays |= {f"{k}.{name}": np.asarray(getattr(piece, name)) for name in (each.name for each in fields(piece))}
+        arrays |= {f"{k}.{field.name}": np.asarray(getattr(piece, field.name)) for field in fields(piece)}
     arrays |= {f"{k}/corners": corners for k, corners in enumerate(model.corners) if corners is not None}
     np.savez(buffer, allow_pickle=False, **arrays)
     return buffer.getvalue()
