@@ -4,9 +4,9 @@
     python benchmarks/mesh_pairs.py --quick      a few poses of each
 
 Each query is asked of us and of FCL in turn, and of Coal (installed by `make bench-peers`) in a second process with the
-same poses. The figures are means in µs over all poses, each the best of three; ratios are to the faster of the two:
-below 1 we are faster. All answers are compared. Ours are
-`cm.contact`, `cm.overlap` and `cm.time_of_impact`, with all that Python adds.
+same poses. The figures are means in µs over all poses, each the best of three. The ratios are to the faster of the two:
+below 1 we are faster. All answers are compared. Ours are `cm.contact`, `cm.overlap` and `cm.time_of_impact`, with all
+that Python adds.
 """
 
 from __future__ import annotations

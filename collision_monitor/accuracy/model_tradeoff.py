@@ -42,10 +42,8 @@ def model_tradeoff(
 ) -> list[Measurement]:
     """Return a row for `exact`, which is `contact` of the exact shapes, then a row for each model in the monitor.
 
-    Raises InputError.
-
-    Pairs up to NEAR apart are compared. An alarm is a pair that is reported to touch. A miss is a pair that touches and
-    is not reported. progress: called with the number of steps just done; the total is
+    Raises InputError. Pairs up to NEAR apart are compared. An alarm is a pair that is reported to touch. A miss is a
+    pair that touches and is not reported. progress: called with the number of steps just done; the total is
     len(steps) * len(models) + min(COMPARED_STEPS, len(steps)).
     """
     if not steps:

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 class Surface(NamedTuple):
-    """What `tree_of` takes: corners (m, 3, 3), whether they bound a solid, and a point of each connected part (k, 3)."""
+    """What `tree_of` takes: corners (m, 3, 3), whether they bound a solid, a point of each connected part (k, 3)."""
 
     corners: Array
     closed: bool

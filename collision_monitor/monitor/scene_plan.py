@@ -7,13 +7,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.hashed_grid import GRID_LEVELS, LEVEL_OFFSET, HashedGrid
+from collision_monitor.geometry.shape_table import MESH
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.narrow_phase.dispatch import KIND_NAMES, TEST_METHODS, pair_test
+
+_NAMES: Final = {**KIND_NAMES, MESH: "mesh"}
+_METHODS: Final = {**TEST_METHODS, "meshes": "trees of triangles"}
 
 
 @dataclass(frozen=True)
@@ -27,7 +32,7 @@ class ScenePlan:
     turning: int
     """Moving objects whose rotation matters: all but single spheres and circles at their frame's origin."""
     tests: dict[tuple[str, str], str]
-    """The narrow-phase test, a file of `narrow_phase/`, for each two kinds that can meet."""
+    """The test for each two kinds that can meet: a file of `narrow_phase/`, or the folder `meshes`."""
     cells: dict[float, int]
     """Objects in the grid by cell width (m). The grid holds swept boxes, so the width depends on size and speed."""
     groups: int
@@ -47,7 +52,7 @@ class ScenePlan:
         lines = [f"objects   {self.moving} moving, {self.static} static"]
         lines.append("shapes    " + (", ".join(f"{count} {name}" for name, count in self.shapes.items()) or "none"))
         for (a, b), test in self.tests.items():
-            lines.append(f"test      {a} – {b}: {test} ({TEST_METHODS[test]})")
+            lines.append(f"test      {a} – {b}: {test} ({_METHODS[test]})")
         for width, count in self.cells.items():
             lines.append(f"grid      cells of {width:g} m: {count}")
         unneeded = self.unneeded
@@ -97,11 +102,13 @@ def scene_plan(roster: Roster, grid: HashedGrid, *, uncertain: bool, outside: in
     ]
     filters = of_groups[0][0]
     return ScenePlan(
-        shapes={KIND_NAMES[kind]: count for kind, count in counts.items()},
+        shapes={_NAMES[kind]: count for kind, count in counts.items()},
         moving=len(moving_bodies),
         static=int(np.count_nonzero(static)),
         turning=int(np.count_nonzero(bodies.spin_radius[moving_bodies] > 0.0)),
-        tests={(KIND_NAMES[a], KIND_NAMES[b]): pair_test(a, b) for a, b in sorted(set(pairs))},
+        tests={
+            (_NAMES[a], _NAMES[b]): "meshes" if MESH in (a, b) else pair_test(a, b) for a, b in sorted(set(pairs))
+        },
         cells={2.0 ** (k - LEVEL_OFFSET): int(grid.level_count[k]) for k in range(GRID_LEVELS) if grid.level_count[k]},
         groups=len(filters),
         never_meet=_ignoring(*of_groups[0]) - _ignoring(*of_groups[1]),
