@@ -101,7 +101,7 @@ CLOSED = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 @pytest.mark.parametrize("corners", FLAT.values(), ids=FLAT)
 def test_a_mesh_without_an_inside_is_refused(corners):
     pytest.importorskip("coacd")
-    with pytest.raises(cm.ShapeError, match="expected points that span a solid|expected a closed mesh"):
+    with pytest.raises(cm.ShapeError, match=r"expected points that span a solid|expected a closed mesh"):
         module.convex_decomposition(Mesh(np.array(corners, float), CLOSED))
 
 
