@@ -11,7 +11,7 @@ unexport PYTHONPATH
 endif
 unexport PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup demo test test-core lint fuzz fuzz-files soak bench bench-peers clean
+.PHONY: help setup interfaces demo test test-core lint fuzz fuzz-files soak bench bench-peers clean
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -23,7 +23,10 @@ setup: ## set up what is missing: environment, ROS 2, messages, package, compile
 demo: setup ## play a scene and show the monitor's answers, live in this terminal
 	@$(BIN)/collision-monitor demo
 
-test: ## set up, lint and run every test
+interfaces: setup ## build the message packages that the wheels lack: tf2, vision, autoware, moveit
+	@$(BIN)/python scripts/set_up/interfaces.py
+
+test: interfaces ## set up, lint and run every test
 	@$(MAKE) --no-print-directory -j2 lint test-core
 	@$(BIN)/python -m pytest -n 3 --dist worksteal test/ros test/setup
 

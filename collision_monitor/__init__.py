@@ -9,9 +9,12 @@
     query.contact                  contact, Contact                       two shapes: distance, normal, points, bound
     query.features                 contact_features                       features: "vertex 3 of A on face 7 of B"
     query.overlap                  overlap                                yes or no, with a choice of tests
+    query.containment              contains                              which points are in a shape
+    query.rays                     cast_ray, RayHits                     where rays and segments meet a shape
     query.time_of_impact           time_of_impact, Impact                 time of impact of two shapes, as an interval
     query.time_of_impact_batch     time_of_impact_batch, Impacts          the same for many motions of two shapes
     query.feature_impact           vertex_face_impact, edge_edge_impact   the same for features in linear motion
+    response                       response.collide, reflect, …           what bodies do when they meet, for simulations
     records                        Model                                  the geometric models of an object
     errors                         CollisionMonitorError and subclasses   errors of the inputs
 
@@ -51,6 +54,9 @@ _HOME = {
     "Contact": "query.contact",
     "contact_features": "query.features",
     "overlap": "query.overlap",
+    "contains": "query.containment",
+    "cast_ray": "query.rays",
+    "RayHits": "query.rays",
     "convex_decomposition": "objects.convex_decomposition",
     "Decomposition": "objects.convex_decomposition",
     "time_of_impact": "query.time_of_impact",
@@ -70,9 +76,11 @@ _HOME = {
     "SessionError": "errors",
     "Refusal": "errors",
 }
-__all__ = ["__version__", *_HOME]
+_MODULES = ("response",)
+__all__ = ["__version__", *_MODULES, *_HOME]
 
 if TYPE_CHECKING:
+    from collision_monitor import response as response
     from collision_monitor.errors import CollisionMonitorError as CollisionMonitorError
     from collision_monitor.errors import InputError as InputError
     from collision_monitor.errors import MessageError as MessageError
@@ -104,11 +112,14 @@ if TYPE_CHECKING:
     from collision_monitor.objects.description import ObjectDescription as ObjectDescription
     from collision_monitor.query.contact import Contact as Contact
     from collision_monitor.query.contact import contact as contact
+    from collision_monitor.query.containment import contains as contains
     from collision_monitor.query.feature_impact import FeatureImpact as FeatureImpact
     from collision_monitor.query.feature_impact import edge_edge_impact as edge_edge_impact
     from collision_monitor.query.feature_impact import vertex_face_impact as vertex_face_impact
     from collision_monitor.query.features import contact_features as contact_features
     from collision_monitor.query.overlap import overlap as overlap
+    from collision_monitor.query.rays import RayHits as RayHits
+    from collision_monitor.query.rays import cast_ray as cast_ray
     from collision_monitor.query.time_of_impact import Impact as Impact
     from collision_monitor.query.time_of_impact import time_of_impact as time_of_impact
     from collision_monitor.query.time_of_impact_batch import Impacts as Impacts
@@ -119,6 +130,8 @@ if TYPE_CHECKING:
 
 def __getattr__(name: str) -> Any:
     """Import the name at its first use, so that `collision-monitor --help` does not wait for the kernels."""
+    if name in _MODULES:
+        return import_module(f"{__name__}.{name}")
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -48,8 +48,13 @@ FLOORS: tuple[tuple[tuple[str, str], ...], ...] = (
     (
         ("prediction", "motion, time of impact, uncertainty of a pair"),
         ("objects", "description of an object, its models"),
+        ("robots", "URDF, SRDF, forward kinematics"),
     ),
-    (("broad_phase", "grids, trees, sweep and prune"), ("narrow_phase", "one file per pair test, dispatch")),
+    (
+        ("broad_phase", "grids, trees, sweep and prune"),
+        ("narrow_phase", "one file per pair test, dispatch"),
+        ("response", "what simulated bodies do when they meet"),
+    ),
     (("geometry", "shapes, poses, bounds, feature tests"), ("settings", "settings and profiles")),
 )
 

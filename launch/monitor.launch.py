@@ -21,6 +21,9 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "record", default_value="", description="path of the session to record: a .mcap file or a folder"
             ),
+            DeclareLaunchArgument(
+                "sources", default_value="", description="sources file: topics of other programs to monitor"
+            ),
             Node(
                 package="collision_monitor",
                 executable="monitor",
@@ -28,7 +31,7 @@ def generate_launch_description() -> LaunchDescription:
                 output="screen",
                 parameters=[
                     LaunchConfiguration("params"),
-                    {"record": ParameterValue(LaunchConfiguration("record"), value_type=str)},
+                    {name: ParameterValue(LaunchConfiguration(name), value_type=str) for name in ("record", "sources")},
                 ],
             ),
         ]

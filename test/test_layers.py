@@ -18,9 +18,9 @@ PACKAGE = Path(__file__).parents[1] / NAME
 FLOORS: Final = (
     {"_jit", "errors", "tolerances", "records", "_version"},
     {"settings", "geometry"},
-    {"broad_phase", "narrow_phase"},
+    {"broad_phase", "narrow_phase", "response"},
     {"meshes"},
-    {"objects", "prediction"},
+    {"objects", "prediction", "robots"},
     {"query", "detection", "monitor", "codec", "world"},
     {"pipeline", "warm_up"},
     {"sources", "session"},

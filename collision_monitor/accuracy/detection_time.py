@@ -18,13 +18,18 @@ CHECKED_FRAME: Final = 4
 """Frame whose number of pairs is reported. The answers of other systems are compared at this frame."""
 
 
-def time_detection(scene: MovingBodies, threads: int, frames: int | None = None) -> dict[str, Any]:
-    """Return median, 99th percentile and minimum (ms) of the time per frame, with the settings of the measurement."""
+def time_detection(
+    scene: MovingBodies, threads: int, frames: int | None = None, broad_phase: str = "grid"
+) -> dict[str, Any]:
+    """Return median, 99th percentile and minimum (ms) of the time per frame, with the settings of the measurement.
+
+    Raises InputError for an unknown broad phase.
+    """
     from collision_monitor.detection.detector import (
         Detector,  # imported here because it loads the compiler, which would slow --help down
     )
 
-    detector = Detector(scene.shapes, threads=threads)
+    detector = Detector(scene.shapes, threads=threads, broad_phase=broad_phase)
     detector.detect(scene.positions[0], scene.quaternions[0])  # compiles the kernels if they are not cached
     count = min(frames or len(scene.positions), len(scene.positions))
     warm_up = min(WARM_UP_FRAMES, count - 1)

@@ -16,6 +16,7 @@ from collision_monitor.broad_phase.boxes import Array, Indices, box_arrays, in_o
 from collision_monitor.broad_phase.brute_force import overlapping_pairs
 from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.broad_phase.hashed_grid import make_hashed_grid, put_boxes, query_boxes
+from collision_monitor.broad_phase.kd_tree import kd_tree_overlaps
 from collision_monitor.broad_phase.octree import octree_overlaps
 from collision_monitor.broad_phase.sweep_and_prune import sweep_and_prune
 
@@ -57,6 +58,7 @@ PARTITIONS: Final[dict[str, Partition]] = {
     "sweep and prune": sweep_and_prune,
     "AABB tree": tree_overlaps,
     "octree": octree_overlaps,
+    "k-d tree": kd_tree_overlaps,
     "grid": grid_overlaps,
     "hashed grid": hashed_grid_overlaps,
 }

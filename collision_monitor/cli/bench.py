@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
+from typing import Any
 
 from collision_monitor.accuracy.detection_time import WARM_UP_FRAMES
 from collision_monitor.cli.exit_codes import ExitCode
@@ -22,6 +23,7 @@ EPILOG = """\
 examples:
   collision-monitor bench --scene boxes --n 10000
   collision-monitor bench --scene hulls --n 1000 --threads 1 --json
+  collision-monitor bench --n 2000 --broad-phase all        why the grid is the default
   collision-monitor bench --scene-file scene.npz --json
 
 exit codes:
@@ -52,6 +54,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--threads", type=whole(1), metavar="T", help="number of threads (default: 2, or 1 on a single core)"
     )
+    parser.add_argument(
+        "--broad-phase",
+        metavar="NAME",
+        help="another broad phase than the grid, on one thread, or `all` to compare them (see docs/geometry.md)",
+    )
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
     parser.set_defaults(command=bench_command)
 
@@ -60,19 +67,34 @@ def bench_command(args: argparse.Namespace) -> int:
     """Run the benchmark, print the result and return the exit code. Raises InputError."""
     from collision_monitor.accuracy.detection_time import time_detection
     from collision_monitor.detection.detector import default_threads
+    from collision_monitor.detection.partitioned import BROAD_PHASES, MOST_FOR_BRUTE_FORCE
     from collision_monitor.world.moving_bodies import FRAMES, load_moving_bodies, make_moving_bodies
 
     if args.scene_file is None:
         scene = make_moving_bodies(args.scene, args.n, args.seed, args.frames or FRAMES)
     else:
         scene = load_moving_bodies(args.scene_file)
-    result = time_detection(scene, default_threads() if args.threads is None else args.threads, args.frames)
-    if args.json:
-        print(json.dumps(result))
-    else:
-        print(
-            f"{result['scene']}, {result['n']} objects, {result['threads']} thread{'s'[: result['threads'] > 1]}: "
-            f"{result['median_ms']:.3f} ms per frame (p99 {result['p99_ms']:.3f} ms over {result['frames']} frames), "
-            f"{result['pairs']} colliding pairs"
-        )
+    threads = default_threads() if args.threads is None else args.threads
+    if args.broad_phase is None:
+        _print(time_detection(scene, threads, args.frames), args.json)
+        return ExitCode.DONE
+    names = BROAD_PHASES if args.broad_phase == "all" else (args.broad_phase,)
+    for name in names:
+        if args.broad_phase == "all" and name == "brute-force" and len(scene.shapes) > MOST_FOR_BRUTE_FORCE:
+            continue
+        result = time_detection(scene, threads if name == "grid" else 1, args.frames, name)
+        _print({**result, "broad_phase": name}, args.json)
     return ExitCode.DONE
+
+
+def _print(result: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(result), flush=True)
+        return
+    chosen = f", {result['broad_phase']}" if "broad_phase" in result else ""
+    print(
+        f"{result['scene']}, {result['n']} objects, {result['threads']} thread{'s'[: result['threads'] > 1]}{chosen}: "
+        f"{result['median_ms']:.3f} ms per frame (p99 {result['p99_ms']:.3f} ms over {result['frames']} frames), "
+        f"{result['pairs']} colliding pairs",
+        flush=True,
+    )

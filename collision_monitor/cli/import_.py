@@ -17,10 +17,9 @@ if TYPE_CHECKING:
     from collision_monitor.sources import Imported
 
 DESCRIPTION = """\
-Make a session from a ROS bag, and let the monitor answer it. The bag may hold nav_msgs/Odometry,
-geometry_msgs/PoseStamped or PoseWithCovarianceStamped, tf2_msgs/TFMessage, and
-visualization_msgs/Marker or MarkerArray. A mapping file gives the topic and the shape of each
-object:
+Make a session from a ROS bag, and let the monitor answer it. The bag may hold odometry, poses, tf,
+footprints, tracks, detections, markers and scans. A mapping file, which is the sources file of the
+live node, gives the topic and the shape of each object:
 
   frame: map                       # frame of the session; other poses are transformed by the bag's tf
   stamps: header                   # or `received`: the time at which the bag received the message
@@ -31,8 +30,9 @@ object:
     walls:    {topic: /markers, marker: {ns: walls}, static: true}   # every marker of the namespace
     floor:    {static: true, shape: {half_space: [0, 0, 1, 0]}}
 
-Without --map, the bag must hold the inputs of a monitor, recorded by `ros2 bag record`. The command
-prints the number of states of each object, and what was skipped or refused, with the reason.
+docs/sources.md explains every type and key. Without --map, the bag must hold the inputs of a
+monitor, recorded by `ros2 bag record`. The command prints the number of states of each object, and
+what was skipped or refused, with the reason.
 """
 EPILOG = """\
 examples:

@@ -19,6 +19,7 @@ messages. Ctrl-C stops the node and completes the recording.
 EPILOG = """\
 examples:
   collision-monitor run --params config/monitor.yaml
+  collision-monitor run --sources sources.yaml            odometry, tf, tracks, scans: see `collision-monitor sources`
   collision-monitor run --record shift_1 --split-size 500M            a rosbag2 folder of files
   collision-monitor run --record near_misses --on-event --before 20   one file per collision
   collision-monitor run --record run.mcap --ros-args -p horizon:=1.0 -r __ns:=/hall_2
@@ -43,6 +44,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument(
         "--params", type=Path, metavar="FILE", help="parameter file (YAML), for example config/monitor.yaml"
+    )
+    parser.add_argument(
+        "--sources", type=Path, metavar="FILE", help="sources file (YAML): topics of other programs to monitor"
     )
     parser.add_argument(
         "--record", type=Path, metavar="PATH", help="record the session to a new .mcap file or a new folder"
@@ -87,6 +91,7 @@ def run_command(args: argparse.Namespace) -> int:
     found = [] if args.params is None else ["--params-file", str(args.params)]
     found += parameters(
         profile=args.profile,
+        sources=args.sources,
         record=args.record,
         record_mode="on_event" if args.on_event else None,
         record_before=args.before,

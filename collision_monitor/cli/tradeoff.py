@@ -7,7 +7,7 @@ import csv
 import json
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from collision_monitor.cli.quantities import not_negative, positive, whole
 from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
+    from collision_monitor.accuracy.inputs import Workload
     from collision_monitor.accuracy.measurement import Measurement
 
 DESCRIPTION = """\
@@ -33,6 +34,7 @@ examples:
   collision-monitor tradeoff run.mcap --profile fast --profile exact --json
   collision-monitor tradeoff --scene fleet --noise 0                      with exact states
   collision-monitor tradeoff --path ../shared/data/citr                   with recorded tracks too
+  collision-monitor tradeoff --scene clutter --impact-methods             bisection, swept SAT, …
   collision-monitor tradeoff --scene arm --model obb --model convex_hull  models against the meshes
 
 An alarm is a pair that is reported at a step, as a contact or as a prediction. An alarm is false if
@@ -82,6 +84,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--model", action="append", metavar="NAME",
         help="measure models of the shapes against the exact shapes, in place of profiles; may be repeated",
     )  # fmt: skip
+    parser.add_argument(
+        "--impact-methods", action="store_true",
+        help="measure the ways to find a time of impact on the pairs of the scenes, in place of profiles",
+    )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="also write the rows to this file")
     parser.add_argument("--png", type=Path, metavar="FILE", help="draw time against error, one panel per scene")
@@ -98,6 +104,8 @@ def tradeoff_command(args: argparse.Namespace) -> int:
         raise InputError("tradeoff: expected a session or scenes, got both")
     if args.model and args.profile:
         raise InputError("tradeoff: expected profiles or models, got both: --profile and --model")
+    if args.impact_methods and (args.model or args.profile or args.csv or args.png):
+        raise InputError("tradeoff, --impact-methods: goes without --model, --profile, --csv and --png")
     if args.session is not None and args.noise:
         raise InputError(
             f"tradeoff, --noise: a session is measured as it was recorded, leave it out (got {args.noise:g})"
@@ -108,6 +116,8 @@ def tradeoff_command(args: argparse.Namespace) -> int:
     inputs = [recorded(args.session)] if args.session else simulated(
         args.scene, objects=args.objects, seed=args.seed, path=args.path, noise=args.noise, duration=args.seconds
     )  # fmt: skip
+    if args.impact_methods:
+        return _compare_impact_methods(args, inputs)
     rows = tradeoff(inputs, profiles, args.model, progress_bar)
     if args.json:
         print(json.dumps({"rows": [row.to_dict() for row in rows]}))
@@ -122,6 +132,28 @@ def tradeoff_command(args: argparse.Namespace) -> int:
             draw_tradeoff(rows, args.png)
     except OSError as error:
         raise InputError(f"expected a file that can be written, got {error.filename}: {error.strerror}") from None
+    return ExitCode.DONE
+
+
+def _compare_impact_methods(args: argparse.Namespace, inputs: Iterable[Workload]) -> int:
+    """Print a row for each scene and way to find a time of impact."""
+    from collision_monitor.accuracy.impact_tradeoff import METHODS, impact_tradeoff
+
+    rows = []
+    for work in inputs:
+        with progress_bar(work.name, len(METHODS)) as progress:
+            rows += impact_tradeoff(work, progress)
+    if args.json:
+        print(json.dumps({"rows": [row.to_dict() for row in rows]}))
+        return ExitCode.DONE
+    heads = ("pairs", 6), ("µs/call", 8), ("hits", 5), ("no hit", 6), ("late s", 8), ("early s", 8)
+    print(f"{'scene':12} {'method':25} " + " ".join(f"{head:>{width}}" for head, width in heads))
+    for row in rows:
+        times = f"{_number(row.call_us):>8}" if row.pairs else f"{'–':>8}"
+        print(
+            f"{row.scene:12} {row.method:25} {row.pairs:6} {times} {row.hits:5} {row.missed:6} "
+            f"{_number(row.late_s):>8} {_number(row.early_s):>8}"
+        )
     return ExitCode.DONE
 
 

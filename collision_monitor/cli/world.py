@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from collision_monitor.cli.quantities import positive, whole
+from collision_monitor.cli.quantities import not_negative, positive, whole
 from collision_monitor.cli.ros_arguments import parameters
 from collision_monitor.errors import InputError
 from collision_monitor.pipeline.topics import NODE
 from collision_monitor.ros.executables import world
+from collision_monitor.world.response_choice import METHODS
 
 DESCRIPTION = """\
 Publish a simulated scene on this ROS domain: the shapes of the objects once, then their states at
@@ -19,6 +20,7 @@ EPILOG = """\
 examples:
   collision-monitor world --list
   collision-monitor world fleet --objects 200 --noise 0.005
+  collision-monitor world billiards --response damped --restitution 0.8
   collision-monitor world trajectory --path tracks --duration 60
 
 exit codes:
@@ -55,6 +57,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="standard deviation of the states, which declare it (m, rad, m/s, rad/s)",
     )
     parser.add_argument(
+        "--restitution", type=not_negative, metavar="E", help="bounce of bodies that respond, 0 (none) to 1 (elastic)"
+    )
+    parser.add_argument(
+        "--gravity", type=not_negative, metavar="G", help="gravity along -z in these scenes (m/s², default: 9.81)"
+    )
+    parser.add_argument(
+        "--response", choices=METHODS, help="what bodies do when they meet in these scenes (default: impulse)"
+    )
+    parser.add_argument(
         "--monitor", default=NODE, metavar="NAME", help="name of the monitor node (default: object_monitor)"
     )
     parser.add_argument("--ros-args", nargs=argparse.REMAINDER, default=[], metavar="…", help="arguments for ROS")
@@ -81,6 +92,9 @@ def play(args: argparse.Namespace) -> int:
         seed=args.seed,
         path=args.path,
         noise=args.noise,
+        restitution=args.restitution,
+        gravity=args.gravity,
+        response=args.response,
         monitor=args.monitor,
     )
     return world(["collision-monitor", "--ros-args", *found, *args.ros_args])

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.broad_phase.dense_grid import classify_bodies, make_grid
 from collision_monitor.detection import kernels
+from collision_monitor.detection.partitioned import check_broad_phase, detect_with
 from collision_monitor.errors import InputError, PoseError, UnsupportedError
 from collision_monitor.geometry.planar import is_planar
 from collision_monitor.geometry.shape_table import BOX, SPHERE, ShapeTableBuilder
@@ -85,11 +86,18 @@ class Detector:
 
     shapes: one for each object. static: (N,) flags; pairs of two static objects are ignored.
     threads: largest number of threads for a frame; the result is the same to the bit for any number.
+    broad_phase: "grid", or a slower one for comparison (`partitioned.BROAD_PHASES`), which runs on one thread.
     Raises ShapeError, UnsupportedError (a shape without narrow phase) or InputError.
     """
 
     def __init__(
-        self, shapes: Sequence[Shape], *, static: ArrayLike | None = None, margin: float = 0.0, threads: int = 1
+        self,
+        shapes: Sequence[Shape],
+        *,
+        static: ArrayLike | None = None,
+        margin: float = 0.0,
+        threads: int = 1,
+        broad_phase: str = "grid",
     ) -> None:
         n = len(shapes)
         if not (np.isfinite(margin) and margin >= 0.0):
@@ -124,6 +132,8 @@ class Detector:
         self._hits = kernels.make_hits(self._threads, max(n, 16))
         self._memory = (*self._table, *self._grid, *self._frame, *self._hits)
         self._room = max(n // 2, 16)
+        self._broad_phase = check_broad_phase(broad_phase, n)
+        self._radius, self._movable = radius, ~resting
 
     def __len__(self) -> int:
         return self._n
@@ -140,6 +150,14 @@ class Detector:
             raise InputError(
                 f"expected positions of shape ({n}, 3) and quaternions of shape ({n}, 4), "
                 f"got {positions.shape} and {quaternions.shape}"
+            )
+        if self._broad_phase != "grid":
+            if not _is_valid(positions, quaternions).all():
+                raise PoseError(_what_is_wrong(positions, quaternions))
+            return DetectedContacts(
+                *detect_with(
+                    self._broad_phase, self._table, self._radius, self._movable, self._margin, positions, quaternions
+                )
             )
         if self._threads > 1:
             numba.set_num_threads(self._threads)
@@ -159,6 +177,12 @@ class Detector:
             self._room = needed + needed // 4
             self._hits = kernels.make_hits(self._threads, self._room)
             self._memory = (*self._table, *self._grid, *self._frame, *self._hits)
+
+
+def _is_valid(positions: Array, quaternions: Array) -> NDArray[np.bool_]:
+    """Mask (N,) of the rows that are valid poses."""
+    near = (np.abs(positions) <= LARGEST_INPUT).all(axis=1)
+    return np.asarray(near & (np.abs(np.linalg.norm(quaternions, axis=1) - 1.0) <= UNIT_QUATERNION))
 
 
 def _what_is_wrong(positions: Array, quaternions: Array) -> str:

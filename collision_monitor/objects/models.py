@@ -10,12 +10,13 @@ from itertools import product
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.geometry.bounding_spheres import minimal_sphere
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
 from collision_monitor.geometry.convex_pieces import convex_pieces, is_concave_mesh
+from collision_monitor.geometry.coordinates import coordinates
 from collision_monitor.geometry.inside import locate_in_surface
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
 from collision_monitor.geometry.planar import is_planar
@@ -47,6 +48,9 @@ PosedShapes = list[tuple[Shape, Pose]]
 EXCESS_CELLS: Final = 24
 """Cells along each axis for the search for the excess around a concave object; its accuracy is their half diagonal.
 Larger: the time grows as the cube. Smaller: the stated excess is up to 2/EXCESS_CELLS of the size too large."""
+
+MOST_DIRECTIONS: Final = 200
+"""Most directions of a user's k-DOP; its polytope has up to four corners for each."""
 
 KDOPS: Final = {Model.KDOP6: 6, Model.KDOP14: 14, Model.KDOP18: 18, Model.KDOP26: 26}
 
@@ -205,7 +209,7 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
                     return shape, pose
                 raise UnsupportedError("model convex_hull: the hull of several shapes with round ones is not offered")
             return ConvexHull(_corners(pieces)), Pose()
-    return _kdop(pieces, KDOPS[model])
+    return _kdop(pieces, np.array(KDOP_DIRECTIONS[KDOPS[model]], float), model.name.lower())
 
 
 def _widest(shape: Sphere | Box | Capsule | Cylinder | Ellipsoid) -> Array:
@@ -240,19 +244,46 @@ def _corners(pieces: PosedShapes) -> Array:
     return np.concatenate(corners)
 
 
-def _kdop(pieces: PosedShapes, k: int) -> tuple[Shape, Pose]:
-    """k-DOP around the pieces, as a polytope."""
+def containing_kdop(shapes: Sequence[tuple[Shape, Pose]], directions: ArrayLike) -> Modelled:
+    """Compute the k-DOP of an object of these shapes with the user's directions (k/2, 3) of any length but zero.
+
+    It is reported as CONVEX_HULL, as the messages have no name for it. (Slide "Bounding Slabs": user-specified
+    collection of bounding plane-pairs) Raises InputError for directions that leave the k-DOP without an end,
+    UnsupportedError for a plane shape and a HalfSpace.
+    """
+    normals = coordinates(directions, "k-DOP directions", 3).reshape(-1, 3)
+    if len(normals) > MOST_DIRECTIONS:
+        raise InputError(f"k-DOP directions: expected at most {MOST_DIRECTIONS}, got {len(normals)}")
+    if not np.abs(normals).max(axis=1).all():
+        raise InputError("k-DOP directions: expected vectors with a direction, got a zero vector")
+    normals = normals / np.abs(normals).max(axis=1, keepdims=True)
+    if np.linalg.matrix_rank(normals, tol=1e-6) < 3:
+        raise InputError("k-DOP directions: expected three or more that are not in one plane, got a slab without end")
+    for shape, _ in shapes:
+        if is_planar(shape) or isinstance(shape, HalfSpace):
+            raise UnsupportedError(f"{type(shape).__name__}: a k-DOP is not offered; supported are auto, exact")
+    pieces = [(piece, pose @ offset) for shape, pose in shapes for piece, offset in convex_pieces(shape)]
+    solid, pose = _kdop(pieces, normals, "of these directions")
+    excess = _excess(shapes, pieces, solid, pose)
+    return Modelled([(solid, pose)], [0], Model.CONVEX_HULL, excess, len(pieces) == 1)
+
+
+def _kdop(pieces: PosedShapes, directions: Array, name: str) -> tuple[Shape, Pose]:
+    """k-DOP with directions (k/2, 3) around the pieces, as a polytope."""
     from scipy.spatial import HalfspaceIntersection
 
-    normals = np.array(KDOP_DIRECTIONS[k], float)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     normals = np.concatenate([normals, -normals])
     far = reach(pieces, normals)
-    centre = (far[:3] - far[k // 2 : k // 2 + 3]) / 2  # middle of the slabs along x, y and z
+    k = len(directions)
+    if (np.abs(directions[:3]) == np.eye(3)).all():
+        centre = (far[:3] - far[k : k + 3]) / 2  # middle of the slabs along x, y and z
+    else:
+        centre = _corners(pieces).mean(axis=0)
     distance = far - normals @ centre
     size = float(distance.max())
     if not size > 0.0:
-        raise ShapeError(f"model kdop{k}: expected an object with an extent, got points in one place")
+        raise ShapeError(f"model {name}: expected an object with an extent, got points in one place")
     # Qhull needs some space around the centre, which a flat object does not leave, and its result is rounded
     distance = np.maximum(distance, 1e-9 * size) + 1e-9 * size
     points = HalfspaceIntersection(np.column_stack([normals, -distance / size]), np.zeros(3)).intersections * size

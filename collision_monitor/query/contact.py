@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import PoseError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
@@ -26,7 +26,7 @@ from collision_monitor.meshes.nearest import MEMORY, answer_row
 from collision_monitor.meshes.shape_trees import shape_tree, trees_of_pair
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, as_contacts
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
-from collision_monitor.objects.models import containing_model, parse_model
+from collision_monitor.objects.models import containing_kdop, containing_model, parse_model
 from collision_monitor.query.fillings import fillings
 from collision_monitor.query.nearest_pieces import NearestPieces
 from collision_monitor.query.piece_table import PieceTable, exact_piece_table, piece_table
@@ -129,17 +129,21 @@ class _Posed:
         return any(is_concave_mesh(shape) for shape, _ in self.outline) or len(self.pieces) > 1
 
 
-def contact(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, model: Model | str = "exact") -> Contact:
+def contact(
+    shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, model: Model | str | ArrayLike = "exact"
+) -> Contact:
     """Contact of two shapes, or compounds given as lists of (shape, pose), at two poses.
 
     model: model of both, "exact" or one that contains them ("sphere", "aabb", "obb", "kdop14", "convex_hull", …), which
-    is coarser; the error bound includes its error.
+    is coarser; the error bound includes its error. Directions (k/2, 3) in the frame of each object are a k-DOP of your
+    own, reported as CONVEX_HULL.
     If one of them is concave and they overlap, the depth is that of the deepest pair of their convex pieces, and the
     bound extends to a translation that certainly parts them. Where a mesh is not closed, the distance is that of its
     surface, and the bound includes the solids that the surface may belong to (see `fillings`).
     Raises ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, or a model that is not available.
     """
-    quick = _meshes_apart(shape_a, pose_a, shape_b, pose_b) if model in ("exact", Model.EXACT) else None
+    exact = isinstance(model, str | int) and model in ("exact", Model.EXACT)
+    quick = _meshes_apart(shape_a, pose_a, shape_b, pose_b) if exact else None
     if quick is not None:
         return quick
     a, b = _posed(shape_a, pose_a, model, "A"), _posed(shape_b, pose_b, model, "B")
@@ -276,13 +280,16 @@ def _place(side: _Posed) -> tuple[Array, Array]:
     return side.rotation @ own.rotation, side.rotation @ own.position
 
 
-def _posed(shape: Compound, pose: Pose, model: Model | str, name: str) -> _Posed:
+def _posed(shape: Compound, pose: Pose, model: Model | str | ArrayLike, name: str) -> _Posed:
     shapes = shape_pairs(shape, f"shape {name}")
     if not isinstance(pose, Pose):
         raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
-    if parse_model(model) in (Model.AUTO, Model.EXACT):
-        return _Posed(shapes, pose, shapes)
-    modelled = containing_model(shapes, model)
+    if isinstance(model, str | int):
+        if parse_model(model) in (Model.AUTO, Model.EXACT):
+            return _Posed(shapes, pose, shapes)
+        modelled = containing_model(shapes, model)
+    else:
+        modelled = containing_kdop(shapes, model)
     return _Posed(shapes, pose, modelled.pieces, modelled.model, modelled.excess)
 
 

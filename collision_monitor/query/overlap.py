@@ -10,24 +10,29 @@ from collision_monitor.errors import InputError, PoseError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import Hull, convex_hull
 from collision_monitor.geometry.cascade import polyhedra_intersect
 from collision_monitor.geometry.compound import shape_pairs
+from collision_monitor.geometry.coordinates import Array
+from collision_monitor.geometry.planar import flat_pose
+from collision_monitor.geometry.polygon_overlap import Evidence, polygons_intersect, sat_2d
 from collision_monitor.geometry.polyhedron_sat import sat_3d
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape
+from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Polygon, Shape
+from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.meshes.contact import trees_overlap
 from collision_monitor.meshes.nearest import MEMORY
 from collision_monitor.meshes.shape_trees import trees_of_pair
 from collision_monitor.query.contact import Compound, contact
 
-TESTS: Final = ("contact", "cascade", "sat")
+TESTS: Final = ("contact", "cascade", "sat", "edges")
 
 
 def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, test: str = "contact") -> bool:
     """Whether two shapes, or compounds given as lists of (shape, pose), overlap or touch.
 
     test: "contact" for any shapes, by the sign of their distance; "cascade" for polyhedra, by the lecture's ordered
-    tests (bounding volumes, vertices, edges against faces), exact for the placed corners; "sat" for convex polyhedra,
-    by the separating axis test. Raises as `contact` does, InputError for an unknown test, and UnsupportedError for a
-    shape that the test does not take.
+    tests (bounding volumes, vertices, edges against faces), exact for the placed corners; "sat" for convex polyhedra
+    and for polygons, by the separating axis test, with concave polygons split; "edges" for polygons, by contained
+    vertices and crossing edges, exact for the placed corners. Raises as `contact` does, InputError for an unknown
+    test, and UnsupportedError for a shape that the test does not take.
     """
     if test == "contact":
         if type(shape_a) is Mesh or type(shape_b) is Mesh:
@@ -40,18 +45,47 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
         return contact(shape_a, pose_a, shape_b, pose_b).overlaps
     if test not in TESTS:
         raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")
+    if test == "edges" or (test == "sat" and any(_is_polygon(shape) for shape in (shape_a, shape_b))):
+        plane = [_polygons(shape, pose, test, name) for shape, pose, name in _named(shape_a, pose_a, shape_b, pose_b)]
+        if test == "edges":
+            return any(polygons_intersect(a, b) is not Evidence.SEPARATE for a in plane[0] for b in plane[1])
+        first, second = ([polygon[part] for polygon in side for part in convex_parts(polygon)] for side in plane)
+        return any(sat_2d(a, b).overlaps for a in first for b in second)
     solids = [
-        _solids(shape, pose, test, name) for shape, pose, name in ((shape_a, pose_a, "A"), (shape_b, pose_b, "B"))
+        _solids(shape, pose, test, name) for shape, pose, name in _named(shape_a, pose_a, shape_b, pose_b)
     ]
     if test == "sat":
         return any(sat_3d(a, b).overlaps for a in solids[0] for b in solids[1])
     return any(polyhedra_intersect(*a, *b).collides for a in solids[0] for b in solids[1])
 
 
+def _named(
+    shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose
+) -> tuple[tuple[Compound, Pose, str], tuple[Compound, Pose, str]]:
+    for pose, name in ((pose_a, "A"), (pose_b, "B")):
+        if not isinstance(pose, Pose):
+            raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
+    return (shape_a, pose_a, "A"), (shape_b, pose_b, "B")
+
+
+def _is_polygon(shape: Compound) -> bool:
+    return any(isinstance(each, Polygon) for each, _ in shape_pairs(shape, "shape"))
+
+
+def _polygons(shape: Compound, pose: Pose, test: str, name: str) -> list[Array]:
+    """Corners (n, 2) of the polygons in the world frame."""
+    found = []
+    for each, offset in shape_pairs(shape, f"shape {name}"):
+        if not isinstance(each, Polygon):
+            kinds = "Polygon" if test == "edges" else "Polygon with Polygon, and Box, ConvexHull with each other"
+            raise UnsupportedError(f"test {test}: {type(each).__name__} is not offered; supported are {kinds}")
+        at = flat_pose(pose @ offset)
+        found.append(each.points @ at.rotation[:2, :2].T + at.position[:2])
+    return found
+
+
 def _solids(shape: Compound, pose: Pose, test: str, name: str) -> list[Hull]:
     """Corners and faces of the shapes in the world frame."""
-    if not isinstance(pose, Pose):
-        raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
     found = []
     for each, offset in shape_pairs(shape, f"shape {name}"):
         solid = _polyhedron(each, test)

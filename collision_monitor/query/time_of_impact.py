@@ -24,6 +24,7 @@ from collision_monitor.query.moving_pair import (
     make_moving_shape,
 )
 from collision_monitor.query.touching import follow
+from collision_monitor.records import Method
 from collision_monitor.tolerances import GJK_TOUCHING
 
 ITERATIONS: Final = 1000
@@ -37,13 +38,14 @@ class Impact:
     "hit": it lies within [lower, upper]. "clear": there is none within the horizon; lower and upper are infinite.
     "unresolved": there is none before lower, but the shapes come so near that round-off or the budget leaves open
     whether they meet, or the inside of a mesh is uncertain; upper is infinite. Treat it as a hit.
-    contact: the contact at upper, or at lower if upper is infinite; None if clear.
+    contact: the contact at upper, or at lower if upper is infinite; None if clear. method: what found the interval.
     """
 
     status: Literal["hit", "clear", "unresolved"]
     lower: float
     upper: float
     contact: Contact | None
+    method: Method = Method.CONSERVATIVE_ADVANCEMENT
 
 
 _CLEAR: Final = Impact("clear", math.inf, math.inf, None)
@@ -58,6 +60,8 @@ def time_of_impact(
     tolerance: float = 1e-6,
     separation: float = 0.0,
     iterations: int = ITERATIONS,
+    method: str = "conservative_advancement",
+    step: float = 1 / 60,
 ) -> Impact:
     """First time in [0, horizon] (s) at which two shapes or compounds are within `separation` (m) of each other.
 
@@ -65,9 +69,18 @@ def time_of_impact(
     not before, by conservative advancement along separating directions (Mirtich, 1996; van den Bergen, 2003, 4.5) or,
     for spheres, in closed form. `iterations`: limit of distance queries for a pair of convex pieces.
     An overlap at the start is a hit at 0. Shapes that only touch and then part, slide, roll or rest have no impact.
+    method: another way for two convex shapes without acceleration. "closed_form": spheres, or a sphere and a HalfSpace;
+    "swept_sat": boxes that do not turn; both are exact. "bisection": steps of `step` (s) until the shapes overlap, then
+    backs up and bisects; "end_of_step": the end of that step. Both may miss a contact within a step, so lower is that
+    of the bounding spheres, and the answer without an overlap is unresolved. "swept_bounds": the bounding spheres only.
     Raises InputError, ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, two HalfSpaces.
     """
     query = check_query(horizon, tolerance, separation, iterations)
+    if method != "conservative_advancement":
+        from collision_monitor.query.impact_by_method import impact_by_method  # which loads the other kernels
+
+        duration = finite_number("step", step, positive=True)
+        return impact_by_method(shape_a, motion_a, shape_b, motion_b, query, method, duration)
     a, b = make_moving_shape(shape_a, motion_a, "A"), make_moving_shape(shape_b, motion_b, "B")
     check_bounded(a, b)
     found = _first_impact(a, b, query)
@@ -104,7 +117,8 @@ def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain:
     certain = upper <= query.horizon
     at = upper if certain else lower
     meeting = contact(a.shapes, a.motion.at(at), b.shapes, b.motion.at(at))
-    return Impact("hit" if certain else "unresolved", lower, upper if certain else math.inf, meeting)
+    used = Method(int(events[0]["method"]))
+    return Impact("hit" if certain else "unresolved", lower, upper if certain else math.inf, meeting, used)
 
 
 def check_query(horizon: float, tolerance: float, separation: float, iterations: int) -> MotionQuery:

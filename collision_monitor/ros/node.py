@@ -8,7 +8,7 @@ from __future__ import annotations
 import gc
 import threading
 import time
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -31,6 +31,10 @@ from collision_monitor.ros.refusal_log import RefusalLog
 from collision_monitor.ros.status_line import status_line
 from collision_monitor.ros.step_times import StepTimes
 from collision_monitor.settings.profile import Profile
+
+if TYPE_CHECKING:
+    from collision_monitor.ros.live_sources import LiveSources
+    from collision_monitor.sources import Input
 
 WATCHDOG_PERIOD: Final = 0.5
 """s: without steps the status is still published at least this often, so that silence never means "clear"."""
@@ -84,9 +88,12 @@ class MonitorNode(Node):
         states = subscription(self, Topic.STATES, self._on_states)
         self._shapes_in, self._states_in = shapes.topic_name, states.topic_name
         self._refusals = RefusalLog(self._pipeline.monitor, self.get_logger().warning)
+        self._sources = self._live_sources()
         self.create_timer(WATCHDOG_PERIOD, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME))
         _keep_from_collector()
         self._publish_status()
+        if self._sources is not None:
+            self._sources.begin()
         self.get_logger().info(
             f"listening on {states.topic_name} and {shapes.topic_name}, "
             f"profile {settings.profile.name}, frame {settings.frame_id}, {self._recording}"
@@ -102,6 +109,22 @@ class MonitorNode(Node):
                 warm_up.warm_up_monitor()
         finally:
             patience.cancel()
+
+    # -- sources of other programs
+
+    def _live_sources(self) -> LiveSources | None:
+        """Return the sources of the file, if one is given; their inputs take the way of the node's own topics."""
+        if self.settings.sources is None:
+            return None
+        from collision_monitor.ros.live_sources import LiveSources
+
+        def take(given: Input) -> None:
+            (self._on_states if given.topic is Topic.STATES else self._on_shapes)(given.data)
+
+        def warn(name: str, text: str, count: int) -> None:
+            self._refusals.note("sources", name, text, count, time.monotonic_ns())
+
+        return LiveSources(self, self.settings.sources, take, warn)
 
     # -- states: one step
 

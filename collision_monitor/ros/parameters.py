@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -19,6 +20,7 @@ from collision_monitor.pipeline.settings_event import PROFILE
 from collision_monitor.session import ONE_FILE, Splitting
 from collision_monitor.settings.profile import Profile
 from collision_monitor.settings.setting import Setting
+from collision_monitor.sources.mapping import Mapping, load_mapping
 
 T = TypeVar("T", str, int, float, str | int | float)
 
@@ -70,6 +72,7 @@ class ParameterReader:
         return self._given.get(name)
 
 
+DEFAULT_FRAME = "world"
 EXECUTORS = ("single", "events")
 RECORD_MODES = ("always", "on_event")
 _RECORD = ("record", "record_mode", "record_before", "record_after", "record_split_size", "record_split_duration")
@@ -84,12 +87,13 @@ class MonitorParameters:
     record: str
     executor: str
     splitting: Splitting = ONE_FILE
+    sources: Mapping | None = None
 
 
 def read_monitor_parameters(node: Node) -> MonitorParameters:
     """Read, check and declare the parameters. Raises InputError; ProfileError for a setting out of range."""
     settings = Profile.fields()
-    reader = ParameterReader(node, [PROFILE, *(s.name for s in settings), "frame_id", *_RECORD, "executor"])
+    reader = ParameterReader(node, [PROFILE, *(s.name for s in settings), "frame_id", "sources", *_RECORD, "executor"])
     name = reader.value(PROFILE, "balanced")
     profile = Profile.named(name)
     given = {s.name: plain(reader.given(s.name), s) for s in settings if reader.given(s.name) is not None}
@@ -99,7 +103,9 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
     for setting in settings:
         reader.declare(setting.name, getattr(profile, setting.name), _descriptor(setting))
 
-    frame_id = reader.read("frame_id", "world", "Frame of all poses; messages in another frame are refused.")
+    text = "Frame of all poses; messages in another frame are refused. A sources file sets it."
+    frame_id = reader.read("frame_id", DEFAULT_FRAME, text)
+    sources = _read_sources(reader, frame_id)
     record = reader.read("record", "", "Path of the session to write, a .mcap file or a folder; empty: no recording.")
     splitting = _read_splitting(reader)
     executor = reader.read("executor", "single", f"rclpy executor: {' or '.join(EXECUTORS)}.")
@@ -107,7 +113,18 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
         raise ProfileError("parameter frame_id: expected the name of a frame, got an empty text")
     if executor not in EXECUTORS:
         raise ProfileError(f"parameter executor: expected {' or '.join(EXECUTORS)}, got {executor!r}")
-    return MonitorParameters(profile, frame_id, record, executor, splitting)
+    return MonitorParameters(profile, sources.frame if sources else frame_id, record, executor, splitting, sources)
+
+
+def _read_sources(reader: ParameterReader, frame_id: str) -> Mapping | None:
+    """Read the sources file. Raises InputError."""
+    path = reader.read("sources", "", "Sources file (YAML): topics of other programs to monitor; empty: none.")
+    if not path:
+        return None
+    mapping = load_mapping(Path(path))
+    if frame_id not in (DEFAULT_FRAME, mapping.frame):
+        raise InputError(f"parameter frame_id: expected that of {path}, {mapping.frame!r}, got {frame_id!r}")
+    return mapping
 
 
 def _read_splitting(reader: ParameterReader) -> Splitting:

@@ -40,13 +40,13 @@ class RefusalLog:
         monitor = self._monitor
         if monitor.restarts != self._restarts:
             self._restarts = monitor.restarts
-            self._note(topic, "restart", monitor.refusal_texts[Refusal.TIME], 1, now)
+            self.note(topic, "restart", monitor.refusal_texts[Refusal.TIME], 1, now)
         if monitor.refused == self._refused:
             return
         for reason, count in monitor.refused.items():
             new = count - self._refused[reason]
             if new:
-                self._note(topic, reason.value, monitor.refusal_texts[reason], new, now)
+                self.note(topic, reason.value, monitor.refusal_texts[reason], new, now)
         self._refused = dict(monitor.refused)
 
     def report_stale(self, topic: str, now: int) -> None:
@@ -58,14 +58,15 @@ class RefusalLog:
         more = f" and {len(ids) - NAMED} more" if len(ids) > NAMED else ""
         problem = self._problems.setdefault((topic, "stale"), _Problem())
         problem.count = 0  # one line is about all of them, however often they were found stale
-        self._note(topic, "stale", f"no usable new state of object {named}{more}: stale", 1, now)
+        self.note(topic, "stale", f"no usable new state of object {named}{more}: stale", 1, now)
 
     def catch_up(self, now: int) -> None:
         """Log what has waited for its line. Call it regularly."""
         for (topic, _), problem in self._problems.items():
             self._log_if_due(topic, problem, now)
 
-    def _note(self, topic: str, kind: str, text: str, count: int, now: int) -> None:
+    def note(self, topic: str, kind: str, text: str, count: int, now: int) -> None:
+        """Log that a kind of problem happened on a topic, now or when its next line is due."""
         problem = self._problems.setdefault((topic, kind), _Problem())
         problem.text = text
         problem.count += count

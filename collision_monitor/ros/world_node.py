@@ -20,8 +20,12 @@ from collision_monitor.ros.endpoints import publisher, subscription
 from collision_monitor.ros.parameters import ParameterReader
 from collision_monitor.ros.process import WAKE_UP, StopRequest
 from collision_monitor.world import make_scene, scene_names
+from collision_monitor.world.response_choice import METHODS
 
-PARAMETERS = ("scene", "objects", "rate", "duration", "seed", "path", "noise", "monitor", "frame_id")
+PARAMETERS = (
+    "scene", "objects", "rate", "duration", "seed", "path", "noise", "restitution", "gravity", "response", "monitor",
+    "frame_id",
+)  # fmt: skip
 
 LISTENER_PATIENCE = 4.0
 """s to wait for a monitor: on a busy machine DDS can lose its first announcement, and repeats it 3 s later."""
@@ -60,8 +64,21 @@ class WorldNode(Node):
         noise = reader.read(
             "noise", 0.0, "Standard deviation of noise on the states [m, rad, m/s, rad/s]; the states declare it."
         )
+        restitution = reader.read(
+            "restitution", -1.0, "Bounce of bodies that respond, 0 (none) to 1 (elastic); -1: the scene's own."
+        )
+        gravity = reader.read("gravity", -1.0, "Gravity along -z in these scenes [m/s^2]; -1: the scene's own.")
+        response = reader.read("response", "", f"Method of these scenes: one of {', '.join(METHODS)}.")
         self._scene = make_scene(
-            name, objects=objects or None, seed=seed, rate=rate or None, path=path or None, noise=noise
+            name,
+            objects=objects or None,
+            seed=seed,
+            rate=rate or None,
+            path=path or None,
+            noise=noise,
+            restitution=None if restitution == -1.0 else restitution,
+            gravity=None if gravity == -1.0 else gravity,
+            response=response or None,
         )
         self._duration = reader.read(
             "duration", 0.0, "Time after which it stops [s]; 0: at the scene's own end, or never."

@@ -1,7 +1,6 @@
 """A rosbag2 recording of any program: an MCAP or SQLite file, or the folder that `ros2 bag record` makes.
 
-The library rosbags reads it: it supports every storage, compression and version of the format, and decodes messages by
-the definitions in the bag.
+The library rosbags reads it: it supports every storage, compression and version of the format.
 """
 
 from __future__ import annotations
@@ -10,19 +9,11 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import Any
 
-from collision_monitor.errors import MessageError, SessionError
+from collision_monitor.errors import SessionError
 from collision_monitor.sources.bag_limits import check_bag, unpack_message
-
-
-class BagMessage(NamedTuple):
-    """A message as the bag holds it. Time in ns."""
-
-    topic: str
-    type: str
-    log_time: int
-    data: bytes
+from collision_monitor.sources.source import RawMessage
 
 
 class Bag:
@@ -53,13 +44,12 @@ class Bag:
             if other != connection.msgtype:
                 self.close()
                 raise SessionError(f"{path}: topic {connection.topic} has messages of {other} and {connection.msgtype}")
-        self._types: Any = None
         self._packed = self._reader.compression_mode == "message"
         if self._packed:  # rosbags would unpack them without a limit
             storage = self._reader.storage
             storage.metadata = storage.metadata._replace(compression_mode=None)
 
-    def messages(self, topics: Iterable[str]) -> Iterator[BagMessage]:
+    def messages(self, topics: Iterable[str]) -> Iterator[RawMessage]:
         """Yield the messages of these topics by the time of receipt. Raises SessionError if the bag is damaged."""
         wanted = set(topics)
         connections = [c for c in self._reader.connections if c.topic in wanted]
@@ -68,7 +58,7 @@ class Bag:
         try:
             for connection, log_time, data in self._reader.messages(connections):
                 plain = unpack_message(data, connection.topic) if self._packed else data
-                yield BagMessage(connection.topic, connection.msgtype, log_time, plain)
+                yield RawMessage(connection.topic, connection.msgtype, bytes(plain), log_time)
         except GeneratorExit:
             raise
         except SessionError:
@@ -76,22 +66,13 @@ class Bag:
         except Exception as error:
             raise self._broken(error) from None
 
-    def decode(self, message: BagMessage) -> Any:
-        """Return the message with its fields as attributes. Raises MessageError."""
-        if self._types is None:
-            self._types = self._typestore()
-        try:
-            return self._types.deserialize_cdr(message.data, message.type)
-        except Exception as error:
-            reason = str(error) or type(error).__name__
-            raise MessageError(f"{message.topic}: expected a {message.type}, cannot be decoded: {reason}") from None
-
-    def _typestore(self) -> Any:
-        """Return the types of ROS 2 Jazzy, replaced by the bag's own definitions of the types that it holds."""
+    @property
+    def definitions(self) -> dict[str, Any]:
+        """The definitions that the bag holds, for `Decoder`."""
         from rosbags.interfaces import MessageDefinitionFormat
-        from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+        from rosbags.typesys import get_types_from_idl, get_types_from_msg
 
-        found: dict[Any, Any] = {}
+        found: dict[str, Any] = {}
         for connection in self._reader.connections:
             definition = connection.msgdef
             with suppress(Exception):  # a bag may hold unreadable types; those needed here are standard ones
@@ -99,9 +80,7 @@ class Bag:
                     found |= get_types_from_msg(definition.data, connection.msgtype)
                 elif definition.format == MessageDefinitionFormat.IDL:
                     found |= get_types_from_idl(definition.data)
-        store = get_typestore(Stores.EMPTY)
-        store.register({**get_typestore(Stores.ROS2_JAZZY).fielddefs, **found})
-        return store
+        return found
 
     def close(self) -> None:
         """Close the files of the bag."""

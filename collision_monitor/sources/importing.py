@@ -16,11 +16,12 @@ from collision_monitor.pipeline.topics import NODE, RECORDED, STATUS_PERIOD, Top
 from collision_monitor.session.recording.recorder import Recorder, Recording
 from collision_monitor.settings.profile import Profile
 from collision_monitor.sources.bag import Bag
-from collision_monitor.sources.convert import Converter, Input, SourceType, put_transform
+from collision_monitor.sources.decoding import Decoder
+from collision_monitor.sources.feed import STATIC, Feed, Input
+from collision_monitor.sources.kinds import BY_TYPE
 from collision_monitor.sources.mapping import Mapping
-from collision_monitor.sources.transforms import TransformTree
+from collision_monitor.sources.tf_objects import TRANSFORMS
 
-_STATIC: Final = "tf_static"
 _INPUTS: Final = (Topic.STATES, Topic.SHAPES)
 
 
@@ -68,12 +69,12 @@ def import_bag(
         if mapping is None:
             frame_id, inputs = _recorded_inputs(bag, node)
         else:
-            converter = _converter(bag, mapping)
-            frame_id, inputs = mapping.frame, _mapped_inputs(bag, mapping, converter, result)
+            feed = _feed_of(bag, mapping)
+            frame_id, inputs = mapping.frame, _mapped_inputs(bag, feed)
         pipeline = Pipeline(profile, frame_id=frame_id, timed=False)
         _write(inputs, target, pipeline, result, overwrite, progress)
     if mapping is not None:
-        result.states, result.skipped = dict(converter.states), result.skipped | dict(converter.skipped)
+        result.states, result.skipped = dict(feed.scene.states), dict(feed.scene.refused)
     return result
 
 
@@ -157,34 +158,45 @@ def _remove(target: Path) -> None:
 # -- bags with other topics
 
 
-def _converter(bag: Bag, mapping: Mapping) -> Converter:
-    """Return a converter with the static transforms of the whole bag, which hold from its start."""
-    tree = TransformTree()
-    for raw in bag.messages(topic for topic in _transform_topics(bag) if topic.endswith(_STATIC)):
-        with suppress(MessageError):  # if the topic is mapped, the conversion counts it
-            for each in bag.decode(raw).transforms:
-                put_transform(tree, each, static=True)
-    return Converter(mapping, bag.topics, tree)
+def _feed_of(bag: Bag, mapping: Mapping) -> Feed:
+    """Return a feed that knows the types of the bag's topics. Raises SessionError, InputError."""
+    feed = Feed(mapping, Decoder(bag.definitions))
+    for topic, types in feed.wanted.items():
+        if topic not in bag.topics:
+            usable = [f"{name} ({each})" for name, each in sorted(bag.topics.items()) if each in BY_TYPE]
+            entries = [entry.name for entry in mapping.topics.get(topic, ())] or [*mapping.sections]
+            raise SessionError(
+                f"{entries[0]}: expected topic {topic} in the bag, got none; "
+                f"what can be mapped there is {', '.join(usable) or 'nothing'}"
+            )
+        if topic in mapping.topics:
+            for problem in feed.bind(topic, bag.topics[topic]).values():
+                raise SessionError(mapping.located(problem))
+        elif bag.topics[topic] not in types:
+            raise SessionError(f"expected {topic} to carry {' or '.join(types)}, got {bag.topics[topic]}")
+    return feed
 
 
-def _mapped_inputs(bag: Bag, mapping: Mapping, converter: Converter, result: Imported) -> Iterator[Input]:
+def _mapped_inputs(bag: Bag, feed: Feed) -> Iterator[Input]:
+    """Yield the inputs of the monitor. The static transforms of the whole bag hold from its start."""
+    topics = [topic for topic, kind in bag.topics.items() if kind == TRANSFORMS]
+    static = [topic for topic in topics if topic.endswith(STATIC) and topic not in feed.mapping.topics]
+    others = {*feed.wanted, *topics} - set(static)
     begun = False
-    for raw in bag.messages({*mapping.topics, *_transform_topics(bag)}):
-        if raw.topic.endswith(_STATIC) and raw.type == SourceType.TRANSFORMS and raw.topic not in mapping.topics:
-            continue
+    for raw in chain(bag.messages(static), bag.messages(others)):
         if not begun:
             begun = True
-            yield converter.begin(raw.log_time)
-        try:
-            message = bag.decode(raw)
-        except MessageError as error:
-            result.skipped[str(error)] = result.skipped.get(str(error), 0) + 1
-            continue
-        yield from converter.take(raw.topic, raw.type, message, raw.log_time)
+            yield from feed.begin(raw.received)
+        if raw.topic not in static and static:
+            static = []
+            _require_placed(feed)
+        yield from feed.take(raw)
+    _require_placed(feed)
 
 
-def _transform_topics(bag: Bag) -> list[str]:
-    return [topic for topic, kind in bag.topics.items() if kind == SourceType.TRANSFORMS]
+def _require_placed(feed: Feed) -> None:
+    if feed.misplaced:
+        raise SessionError(feed.misplaced[0])
 
 
 # -- bags with a monitor's topics
@@ -220,8 +232,8 @@ def _recorded_inputs(bag: Bag, node: str | None) -> tuple[str, Iterator[Input]]:
 
 def _inputs(bag: Bag, chosen: dict[str, Topic]) -> Iterator[Input]:
     for raw in bag.messages(chosen):
-        stamp = raw.log_time
+        stamp = raw.received
         if chosen[raw.topic] is Topic.STATES:
             with suppress(MessageError):
                 stamp = decode_states(raw.data).stamp_ns
-        yield Input(chosen[raw.topic], bytes(raw.data), raw.log_time, stamp)
+        yield Input(chosen[raw.topic], bytes(raw.data), raw.received, stamp)

@@ -1,229 +1,130 @@
-"""The mapping file: for each object, the topic of a bag that holds its pose, and its shape.
+"""The sources file: which topics hold which objects. `collision-monitor run --sources` and `import --map` read it.
 
-frame: map                               # frame of the session; the bag's tf transforms poses from other frames
-stamps: header                           # or `received`: the time at which the bag received the message
+frame: map                               # frame of the monitor; tf transforms poses from other frames
+stamps: header                           # or `received`: the time at which the message arrived
+rate: 20                                 # Hz of the steps; or `step: /cart/odom`: a step at each of its messages;
+                                         # neither: a step at each message
+max_age: 1.0                             # s up to which transforms, and states at a step, may be old
 objects:
   cart:     {topic: /cart/odom, shape: {box: [1.2, 0.8, 0.5], at: [0, 0, 0.25]}}
   person_1: {topic: /tf, frame: person_1, shape: {capsule: [0.3, 1.1]}}
-  crate:    {topic: /markers, marker: {ns: crates, id: 7}}      # the marker's own shape
+  traffic:  {topic: /tracked_objects, forget_after: 1.0}           # every track, with the shape in the message
+  crate:    {topic: /markers, marker: {ns: crates, id: 7}}         # the marker's own shape
   walls:    {topic: /markers, marker: {ns: walls}, static: true}   # all markers of the namespace: walls_0, walls_1 …
   floor:    {static: true, shape: {half_space: [0, 0, 1, 0]}}
 """
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
+import yaml
 
-from collision_monitor.codec.shape_fields import make_shape
 from collision_monitor.errors import CollisionMonitorError, InputError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Shape
-from collision_monitor.records import ShapeType
 from collision_monitor.settings.yaml_file import read_yaml
+from collision_monitor.sources.object_entry import ObjectEntry, read_entries
+from collision_monitor.sources.yaml_table import number, table, text
 
 HEADER, RECEIVED = "header", "received"
 
-_TOP: Final = ("frame", "stamps", "objects")
-_OBJECT: Final = (
-    *("topic", "frame", "marker", "shape", "shapes", "static", "pose", "id", "padding", "group", "mask", "allowed"),
-)
-_BY_VERTICES: Final = ("convex_hull", "polygon")
-_SHAPES: Final = tuple(kind.name.lower() for kind in ShapeType if kind is not ShapeType.MESH)
+SECTIONS: Final = ("robots",)
+"""Sections with sources of their own; `kinds.SECTIONS` reads them."""
 
-
-@dataclass(frozen=True)
-class Source:
-    """An object, and the source of its pose in the bag.
-
-    marker: namespace and id of its marker; id None: all markers of the namespace. shapes: empty if the marker holds
-    them. pose: of a static object, in `frame` (empty: the session's).
-    """
-
-    name: str
-    object_id: int
-    topic: str = ""
-    frame: str = ""
-    marker: tuple[str, int | None] | None = None
-    shapes: tuple[tuple[Shape, Pose], ...] = ()
-    static: bool = False
-    pose: Pose | None = None
-    padding: float = 0.0
-    group: int = 1
-    mask: int = 0
-    allowed: tuple[str, ...] = ()
+_TOP: Final = ("frame", "stamps", "rate", "step", "max_age", "objects", *SECTIONS)
 
 
 @dataclass(frozen=True)
 class Mapping:
-    """The content of a mapping file. stamps: HEADER or RECEIVED."""
+    """The content of a sources file.
+
+    stamps: HEADER or RECEIVED. rate: Hz of the steps, 0: not at a rate. step_topic: the topic whose messages make the
+    steps, or empty. max_age: s. sections: the content of each further section, unread. lines: the line of each key, by
+    the text with which errors begin, such as `cart, shape`. path: of the file, or empty.
+    """
 
     frame: str
-    sources: tuple[Source, ...]
+    sources: tuple[ObjectEntry, ...] = ()
     stamps: str = HEADER
+    rate: float = 0.0
+    step_topic: str = ""
+    max_age: float = 1.0
+    sections: dict[str, Any] = field(default_factory=dict)
+    lines: dict[str, int] = field(default_factory=dict)
+    path: str = ""
 
     @property
-    def topics(self) -> dict[str, list[Source]]:
-        """The sources of each topic."""
-        found: dict[str, list[Source]] = {}
+    def topics(self) -> dict[str, list[ObjectEntry]]:
+        """The entries of each topic."""
+        found: dict[str, list[ObjectEntry]] = {}
         for source in self.sources:
             if source.topic:
                 found.setdefault(source.topic, []).append(source)
         return found
 
+    def located(self, message: str) -> str:
+        """Return an error text with the file and the line of the key with which it begins."""
+        return _located(message, self.path, self.lines)
+
 
 def load_mapping(path: Path) -> Mapping:
-    """Read a mapping file. Raises InputError, with the object and the key, if it cannot be used."""
+    """Read a sources file. Raises InputError, with the line, the object and the key, if it cannot be used."""
     content = read_yaml(path)
+    lines = _lines(path)
     try:
-        return make_mapping(content)
+        return make_mapping(content, str(path), lines)
     except CollisionMonitorError as error:
-        raise InputError(f"{path}: {error}") from None
+        raise InputError(_located(str(error), str(path), lines)) from None
 
 
-def make_mapping(content: Any) -> Mapping:
+def make_mapping(content: Any, path: str = "", lines: dict[str, int] | None = None) -> Mapping:
     """Return the mapping of a file's content. Raises InputError."""
-    top = _table(content, "the file", _TOP)
+    top = table(content, "the file", _TOP)
     frame = top.get("frame")
     if not isinstance(frame, str) or not frame:
         raise InputError(f"frame: expected the name of the frame of the session, such as map, got {frame!r}")
     stamps = top.get("stamps", HEADER)
     if stamps not in (HEADER, RECEIVED):
         raise InputError(f"stamps: expected {HEADER} or {RECEIVED}, got {stamps!r}")
-    objects = top.get("objects")
-    if not isinstance(objects, dict) or not objects:
+    sections = {name: top[name] for name in SECTIONS if name in top}
+    objects = top.get("objects", {} if sections else None)
+    if not isinstance(objects, dict) or not (objects or sections):
         raise InputError(f"objects: expected a table of names, got {objects!r}")
-    tables = {str(name): _table(value, str(name), _OBJECT) for name, value in objects.items()}
-    ids = _ids(tables)
-    sources = tuple(_source(name, table, ids[name]) for name, table in tables.items())
-    single = [source.name for source in sources if source.marker is None or source.marker[1] is not None]
-    for source in sources:
-        for other in source.allowed:
-            _known(other, single, f"{source.name}, allowed")
-    return Mapping(frame.removeprefix("/"), sources, stamps)
-
-
-def _ids(tables: dict[str, dict[str, Any]]) -> dict[str, int]:
-    """Return the given ids, and the lowest free ones from 1 for the other objects."""
-    given: dict[str, int] = {}
-    for name, table in tables.items():
-        if "id" in table:
-            value = table["id"]
-            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 1 << 32:
-                raise InputError(f"{name}, id: expected a whole number from 0 to 4294967295, got {value!r}")
-            if value in given.values():
-                raise InputError(f"{name}, id: expected one that no other object has, got {value}")
-            given[name] = value
-    free = (i for i in range(1, len(tables) + len(given) + 1) if i not in given.values())
-    return {name: given[name] if name in given else next(free) for name in tables}
-
-
-def _source(name: str, table: dict[str, Any], object_id: int) -> Source:
-    topic, frame, static = table.get("topic", ""), table.get("frame", ""), table.get("static", False)
-    for key, value, kind in (("topic", topic, str), ("frame", frame, str), ("static", static, bool)):
-        if not isinstance(value, kind):
-            raise InputError(f"{name}, {key}: expected {'a text' if kind is str else 'true or false'}, got {value!r}")
-    marker = _marker(name, table["marker"]) if "marker" in table else None
-    pose = _pose(table["pose"], f"{name}, pose") if "pose" in table else None
-    if marker is not None and not topic:
-        raise InputError(f"{name}, topic: expected the topic of the markers, got none")
-    if static and marker is None:
-        if topic:
-            raise InputError(f"{name}: a static object stands at its `pose` in its `frame`; expected no topic")
-    elif not topic:
-        raise InputError(f"{name}, topic: expected the topic that tells where it is, or `static: true`, got none")
-    elif pose is not None:
-        raise InputError(f"{name}, pose: expected one of static objects only; `at` places a shape in its object")
-    if "shape" in table and "shapes" in table:
-        raise InputError(f"{name}: expected `shape` or `shapes`, got both")
-    given = table.get("shapes", [table["shape"]] if "shape" in table else [])
-    if not isinstance(given, list) or not (given or marker):
-        raise InputError(f"{name}, shape: expected one of {', '.join(_SHAPES)}, got none; only markers bring their own")
-    allowed = table.get("allowed", [])
-    if not isinstance(allowed, list):
-        raise InputError(f"{name}, allowed: expected a list of names, got {allowed!r}")
-    return Source(
-        name=name,
-        object_id=object_id,
-        topic=topic,
+    if "rate" in top and "step" in top:
+        raise InputError("rate: expected `rate` or `step`, got both")
+    return Mapping(
         frame=frame.removeprefix("/"),
-        marker=marker,
-        shapes=tuple(_shape(each, name) for each in given),
-        static=static,
-        pose=pose,
-        padding=table.get("padding", 0.0),
-        group=table.get("group", 1),
-        mask=table.get("mask", 0),
-        allowed=tuple(map(str, allowed)),
+        sources=read_entries(objects),
+        stamps=stamps,
+        rate=number(top["rate"], "rate", "Hz", least=0.01, most=10_000.0) if "rate" in top else 0.0,
+        step_topic=text(top.get("step", ""), "step"),
+        max_age=number(top.get("max_age", 1.0), "max_age", "s", least=0.001),
+        sections=sections,
+        lines=lines or {},
+        path=path,
     )
 
 
-def _marker(name: str, value: Any) -> tuple[str, int | None]:
-    table = _table(value, f"{name}, marker", ("ns", "id"))
-    namespace, number = table.get("ns", ""), table.get("id")
-    if not isinstance(namespace, str) or isinstance(number, bool) or not (number is None or isinstance(number, int)):
-        raise InputError(f"{name}, marker: expected ns: a text, and id: a whole number, got {value!r}")
-    return namespace, number
+def _lines(path: Path) -> dict[str, int]:
+    """Return the line of each key of the file: `frame`, and below a section `cart` and `cart, shape`."""
+    with path.open(encoding="utf-8-sig") as file:
+        root = yaml.compose(file, yaml.SafeLoader)
+    found: dict[str, int] = {}
+    for key, value in _pairs(root):
+        found[key.value] = key.start_mark.line + 1
+        for name, entry in _pairs(value):
+            found[name.value] = name.start_mark.line + 1
+            for inner, _ in _pairs(entry):
+                found[f"{name.value}, {inner.value}"] = inner.start_mark.line + 1
+    return found
 
 
-def _shape(value: Any, name: str) -> tuple[Shape, Pose]:
-    table = _table(value, f"{name}, shape", (*_SHAPES, "at"))
-    kinds = [key for key in table if key != "at"]
-    if len(kinds) != 1:
-        raise InputError(f"{name}, shape: expected one of {', '.join(_SHAPES)}, got {', '.join(kinds) or 'none'}")
-    (kind,) = kinds
-    what = f"{name}, {kind}"
-    by_vertices = kind in _BY_VERTICES
-    numbers = _numbers(table[kind], what)
-    if by_vertices:
-        columns = 2 if kind == "polygon" else 3
-        if numbers.ndim != 2 or numbers.shape[1] != columns:
-            raise InputError(f"{what}: expected points of {columns} numbers, got {table[kind]!r}")
-        numbers = np.column_stack([numbers, np.zeros((len(numbers), 3 - columns))])
-    elif numbers.ndim > 1:
-        raise InputError(f"{what}: expected a number or a list of numbers, got {table[kind]!r}")
-    none = np.zeros(0)
-    dimensions, vertices = (none, numbers) if by_vertices else (np.atleast_1d(numbers), none)
-    try:
-        shape = make_shape(ShapeType[kind.upper()], dimensions, vertices, np.zeros(0, np.uint32))
-    except CollisionMonitorError as error:
-        raise InputError(f"{name}, shape: {error}") from None
-    return shape, _pose(table["at"], f"{name}, at") if "at" in table else Pose()
+def _pairs(node: Any) -> list[tuple[Any, Any]]:
+    return node.value if isinstance(node, yaml.MappingNode) else []
 
 
-def _pose(value: Any, what: str) -> Pose:
-    """Return the pose of three numbers, a position, or of seven, with a quaternion."""
-    numbers = _numbers(value, what)
-    if numbers.shape not in ((3,), (7,)):
-        raise InputError(f"{what}: expected [x, y, z] or [x, y, z, qx, qy, qz, qw], got {value!r}")
-    try:
-        return Pose(numbers[:3], numbers[3:]) if len(numbers) == 7 else Pose(numbers)
-    except CollisionMonitorError as error:
-        raise InputError(f"{what}: {error}") from None
-
-
-def _numbers(value: Any, what: str) -> Any:
-    try:
-        return np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{what}: expected numbers, got {value!r}") from None
-
-
-def _table(value: Any, what: str, keys: Collection[str]) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise InputError(f"{what}: expected a table with {', '.join(keys)}, got {value!r}")
-    for key in value:
-        _known(str(key), keys, what)
-    return {str(key): each for key, each in value.items()}
-
-
-def _known(key: str, keys: Collection[str], what: str) -> None:
-    if key not in keys:
-        near = difflib.get_close_matches(key, keys, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(keys)}"
-        raise InputError(f"{what}: {key!r} is unknown: {hint}")
+def _located(message: str, path: str, lines: dict[str, int]) -> str:
+    begins = [key for key in lines if message.startswith((f"{key}:", f"{key},"))]
+    where = f"{path}, line {lines[max(begins, key=len)]}" if begins else path
+    return f"{where}: {message}" if where else message

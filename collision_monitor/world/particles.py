@@ -9,7 +9,8 @@ from collision_monitor._jit import allocating_kernel
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.world.collision_response import bounce_between_walls, collide
+from collision_monitor.response.two_bodies import collide
+from collision_monitor.world.collision_response import bounce_between_walls
 from collision_monitor.world.scene import Array, Scene, States, object_count, positive_rate, state_array
 
 Integers = NDArray[np.int64]

@@ -17,6 +17,7 @@ NEWEST_WHEELS = (3, 13)
 ROS_PACKAGES = (
     "ament_cmake",
     "builtin_interfaces",
+    "diagnostic_msgs",
     "geometry_msgs",
     "rclpy",
     "rosidl_default_generators",

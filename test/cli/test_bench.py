@@ -10,6 +10,7 @@ import pytest
 
 from collision_monitor._version import VERSION
 from collision_monitor.cli.main import main
+from collision_monitor.detection.partitioned import BROAD_PHASES
 from collision_monitor.errors import InputError
 from collision_monitor.world.moving_bodies import BENCHMARK_SCENES, load_moving_bodies, make_moving_bodies
 
@@ -79,3 +80,14 @@ def test_bad_arguments_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_scenes_are_refused_by_name() -> None:
     with pytest.raises(InputError, match="expected one of boxes"):
         make_moving_bodies("box", 10)
+
+
+def test_broad_phases_are_compared_and_find_the_same_pairs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "--n", "200", "--frames", "3", "--broad-phase", "all", "--json"]) == 0
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [row["broad_phase"] for row in rows] == list(BROAD_PHASES)
+    assert len({row["pairs"] for row in rows}) == 1
+    assert main(["bench", "--n", "50", "--frames", "3", "--broad-phase", "k-d-tree"]) == 0
+    assert ", k-d-tree: " in capsys.readouterr().out
+    assert main(["bench", "--n", "50", "--broad-phase", "magic"]) == 1
+    assert "expected one of grid" in capsys.readouterr().err

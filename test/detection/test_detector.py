@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from collision_monitor.detection.detector import DetectedContacts, Detector
+from collision_monitor.detection.partitioned import BROAD_PHASES
 from collision_monitor.errors import InputError, PoseError, UnsupportedError
 from collision_monitor.geometry.pose import rotation_matrix
 from collision_monitor.geometry.shape_table import ShapeTableBuilder
@@ -182,3 +185,27 @@ def test_bad_settings_are_refused() -> None:
         Detector([Sphere(1.0)], static=[True, False])
     with pytest.raises(UnsupportedError, match="Mesh has no narrow phase"):
         Detector([Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])])
+
+
+@pytest.mark.parametrize("broad_phase", BROAD_PHASES[1:])
+@pytest.mark.parametrize("scene", [mixed, with_the_ground])
+def test_every_broad_phase_gives_the_same_contacts(scene: Any, broad_phase: str) -> None:
+    rng = np.random.default_rng(5)
+    shapes, static = scene(rng), rng.random(N) < 0.3
+    at = poses(rng, scene)
+    expected = Detector(shapes, static=static, margin=0.05).detect(*at)
+    found = Detector(shapes, static=static, margin=0.05, broad_phase=broad_phase).detect(*at)
+    assert found.pairs.tolist() == expected.pairs.tolist()
+    bound = found.error_bound + expected.error_bound + 1e-9
+    assert (np.abs(found.signed_distance - expected.signed_distance) <= bound).all()
+    assert found.point_b - found.point_a == pytest.approx(found.signed_distance[:, None] * found.normal, abs=1e-9)
+
+
+def test_a_broad_phase_refuses_what_it_cannot_do() -> None:
+    with pytest.raises(InputError, match=r"expected one of grid, brute-force, .*k-d-tree.* got 'magic'"):
+        Detector([Sphere(1)], broad_phase="magic")
+    with pytest.raises(InputError, match="at most 5000 objects"):
+        Detector([Sphere(1)] * 5001, broad_phase="brute-force")
+    detector = Detector([Sphere(1)] * 2, broad_phase="octree")
+    with pytest.raises(PoseError, match=r"quaternions\[1\]"):
+        detector.detect(np.zeros((2, 3)), [(0, 0, 0, 1), (0, 0, 0, 2)])

@@ -140,3 +140,33 @@ def test_concave_polygons_and_walls_of_the_plane():
     monitor.remove(1)
     monitor.remove(2)
     monitor.add(1, cm.Sphere(1))  # an empty monitor accepts a scene of either kind
+
+
+def test_a_kdop_of_own_directions_contains_the_object_and_states_its_excess() -> None:
+    rng = np.random.default_rng(1)
+    away = cm.Pose((9, 1, 2))
+    for shape in (cm.ConvexHull(rng.normal(size=(20, 3))), cm.Cylinder(0.4, 2), cm.Cone(0.5, 1)):
+        exact = cm.contact(shape, cm.Pose(), cm.Sphere(0.1), away)
+        for directions in (np.eye(3), rng.normal(size=(4, 3)), rng.normal(size=(30, 3))):
+            coarse = cm.contact(shape, cm.Pose(), cm.Sphere(0.1), away, model=directions)
+            assert coarse.signed_distance <= exact.signed_distance + 1e-7
+            assert coarse.signed_distance + coarse.error_bound >= exact.signed_distance - 1e-7
+    box = cm.Box((1, 2, 3))
+    tight = cm.contact(box, cm.Pose(), cm.Sphere(0.1), away, model=[(1, 0, 0), (0, 5, 0), (0, 0, 1)])
+    aabb = cm.contact(box, cm.Pose(), cm.Sphere(0.1), away, model="aabb")
+    assert tight.signed_distance == pytest.approx(aabb.signed_distance, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("directions", "text"),
+    [
+        ([(1, 0, 0), (0, 1, 0), (1, 1, 0)], "not in one plane"),
+        ([(1, 0, 0), (0, 1, 0), (0, 0, 0)], "zero vector"),
+        (np.ones((500, 3)), "at most 200"),
+        ([(1, 0)], "shape"),
+        ([(1, 0, float("nan"))], "finite"),
+    ],
+)
+def test_impossible_directions_are_refused(directions: object, text: str) -> None:
+    with pytest.raises(cm.InputError, match=text):
+        cm.contact(cm.Box((1, 1, 1)), cm.Pose(), cm.Sphere(1), cm.Pose((3, 0, 0)), model=directions)

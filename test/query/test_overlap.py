@@ -44,7 +44,7 @@ def test_one_in_the_other_and_a_ball_in_the_hole() -> None:
         (Sphere(1), "cascade", cm.UnsupportedError, "Sphere is no such polyhedron; supported are Box, ConvexHull, clo"),
         (RING, "sat", cm.UnsupportedError, "Mesh is no such polyhedron; supported are Box, ConvexHull"),
         (Mesh(RING.vertices, RING.faces[1:]), "cascade", cm.UnsupportedError, "closed Mesh"),
-        (ROCK, "guess", cm.InputError, "expected one of contact, cascade, sat, got 'guess'"),
+        (ROCK, "guess", cm.InputError, "expected one of contact, cascade, sat, edges, got 'guess'"),
         (7, "sat", cm.ShapeError, "expected a shape or a list"),
     ],
 )
@@ -53,3 +53,27 @@ def test_what_is_refused(shape: cm.Shape, test: str, error: type[Exception], wor
         overlap(shape, Pose(), ROCK, Pose(), test=test)
     with pytest.raises(cm.PoseError, match="pose B: expected a Pose"):
         overlap(ROCK, Pose(), ROCK, None, test="sat")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_polygons_overlap_alike_by_distance_sat_and_edges(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shapes = []
+    for _ in range(2):
+        angle, far = 2 * np.pi * (np.arange(9) + rng.uniform(0, 0.9, 9)) / 9, rng.uniform(0.3, 1.0, (9, 1))
+        shapes.append(cm.Polygon(far * np.stack([np.cos(angle), np.sin(angle)], axis=1)))
+    turn = rng.uniform(-3, 3, 2)
+    poses = [cm.Pose((x, 0, 0), (0, 0, np.sin(t / 2), np.cos(t / 2))) for x, t in zip((0.0, 1.1), turn, strict=True)]
+    answers = {
+        test: cm.overlap(shapes[0], poses[0], shapes[1], poses[1], test) for test in ("contact", "sat", "edges")
+    }
+    assert len(set(answers.values())) == 1, answers
+
+
+def test_edges_are_for_polygons() -> None:
+    square = cm.Polygon([(0, 0), (1, 0), (1, 1), (0, 1)])
+    assert cm.overlap(square, cm.Pose(), square, cm.Pose((1, 1, 0)), "edges")
+    with pytest.raises(cm.UnsupportedError, match="test edges: Box"):
+        cm.overlap(square, cm.Pose(), cm.Box((1, 1, 1)), cm.Pose(), "edges")
+    with pytest.raises(cm.UnsupportedError, match="test sat: Circle"):
+        cm.overlap(square, cm.Pose(), cm.Circle(1), cm.Pose(), "sat")

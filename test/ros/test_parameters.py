@@ -40,7 +40,8 @@ def test_the_file_with_every_line_in_force_gives_the_defaults(read, tmp_path):
     text = re.sub(r"^( *)# (\w+: )", r"\1\2", CONFIG.read_text(), flags=re.MULTILINE)
     values = next(iter(yaml.safe_load(text).values()))["ros__parameters"]
     recording = {"record", *(f"record_{n}" for n in ("mode", "before", "after", "split_size", "split_duration"))}
-    assert set(values) == {"profile", "frame_id", "executor", *recording, *(s.name for s in Profile.fields())}
+    others = {"profile", "frame_id", "sources", "executor"}
+    assert set(values) == {*others, *recording, *(s.name for s in Profile.fields())}
     (tmp_path / "all.yaml").write_text(text)
     assert read("--params-file", str(tmp_path / "all.yaml"))[0].profile == Profile()
 

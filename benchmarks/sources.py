@@ -1,0 +1,184 @@
+"""Measure the sources: the cost of each message, and the latency from a stamp to the prediction over DDS.
+
+    .venv/bin/python benchmarks/sources.py                 # CPU of each message, in this process
+    .venv/bin/python benchmarks/sources.py --live 20       # a node, and a robot with tracks around it, for 20 s
+
+The first part feeds 200 tracked objects in the frame of a moving robot, odometry, transforms and a cloud of 20,000
+points to a `Feed`, and prints median and p99 of the CPU time of each. The second plays a robot that drives among
+tracked people (10 Hz), with odometry at 50 Hz, to a node with a sources file. It prints the latency from the stamp of
+each odometry message to the receipt of its predictions, and the CPU time of the node.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "test" / "helpers"))
+
+from foreign_bag import STORE, odometry, transforms
+from foreign_messages import CYLINDER, decoder, point_cloud, track, tracked_objects
+
+from collision_monitor.sources import Feed, RawMessage, load_mapping
+from collision_monitor.sources.clouds import cloud_points, thinned
+
+TRACKS = 200
+FILE = """\
+frame: map
+{step}
+objects:
+  robot:  {{topic: /odom, shape: {{box: [1.0, 0.7, 0.5]}}}}
+  people: {{topic: /tracks}}
+"""
+COVARIANCE = np.diag([0.01] * 6)
+
+
+def people(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (count, 2) in m around the robot, and velocities."""
+    return rng.uniform(-30, 30, (count, 2)), rng.uniform(-1.2, 1.2, (count, 2))
+
+
+def seen(p: np.ndarray, v: np.ndarray, t: float, stamp: int, frame: str = "map") -> tuple[str, Any]:
+    """TrackedObjects of people that walk straight on."""
+    each = [
+        track(k + 1, (*(p[k] + v[k] * t), 0.9), linear=(*v[k], 0), kind=CYLINDER, size=(0.6, 0.6, 1.8), label=7,
+              pose_covariance=COVARIANCE, twist_covariance=COVARIANCE)
+        for k in range(len(p))
+    ]  # fmt: skip
+    return tracked_objects(frame, stamp, *each)
+
+
+def raw(topic: str, message: tuple[str, Any], received: int = 0) -> RawMessage:
+    """The bytes of a message."""
+    kind, content = message
+    return RawMessage(topic, kind, bytes(STORE.serialize_cdr(content, kind)), received)
+
+
+def costs(file: Path) -> dict[str, tuple[float, float]]:
+    """Median and p99 of the CPU time (ms) of each kind of message."""
+    file.write_text(FILE.format(step="rate: 20"))
+    feed = Feed(load_mapping(file), decoder())
+    p, v = people(np.random.default_rng(1), TRACKS)
+    start, found = 10**18, {"tf": [], "odometry": [], f"{TRACKS} tracks": []}  # type: ignore[var-annotated]
+    feed.bind("/odom", "nav_msgs/msg/Odometry")
+    feed.bind("/tracks", "autoware_perception_msgs/msg/TrackedObjects")
+    feed.begin(0)
+    for k in range(600):
+        t, stamp = k * 0.05, start + k * 50_000_000
+        each = {
+            "tf": raw("/tf", transforms(stamp, ("map", "base", (t, 0, 0), (0, 0, 0, 1)))),
+            "odometry": raw("/odom", odometry("base", stamp, (0, 0, 0), (0, 0, 0, 1), (1, 0, 0), (0, 0, 0))),
+            f"{TRACKS} tracks": raw("/tracks", seen(p, v, t, stamp, "base")),
+        }
+        for name, message in each.items():
+            found[name].append(cpu(lambda message=message: feed.take(message)))
+    rng = np.random.default_rng(2)
+    kind, cloud = point_cloud("lidar", start, rng.uniform(-20, 20, (20_000, 3)))
+    data = bytes(STORE.serialize_cdr(cloud, kind))
+    found["cloud of 20,000 points"] = [cpu(lambda: cloud_points(decoder()(kind, data))) for _ in range(200)]
+    points = cloud_points(cloud)
+    found["its thinning, voxel 0.5 m"] = [cpu(lambda: thinned(points, 0.5, 0.05)) for _ in range(200)]
+    return {name: (float(np.median(times)), float(np.percentile(times, 99))) for name, times in found.items()}
+
+
+def cpu(work: Callable[[], object]) -> float:
+    """CPU time of a call in ms."""
+    began = time.thread_time()
+    work()
+    return (time.thread_time() - began) * 1e3
+
+
+def live(file: Path, seconds: float, tracks: int) -> dict[str, float]:
+    """Play to a node; return latencies in ms and the share of one core that the node uses."""
+    import rclpy
+    from autoware_perception_msgs.msg import TrackedObjects
+    from nav_msgs.msg import Odometry
+
+    from collision_monitor.codec import decode_predictions
+    from collision_monitor.pipeline.topics import Topic
+    from collision_monitor.ros.endpoints import subscription
+
+    file.write_text(FILE.format(step="step: /odom"))
+    node_process = subprocess.Popen(
+        [sys.executable, "-m", "collision_monitor", "run", "--sources", file, "--record", file.with_suffix(".mcap")]
+    )
+    rclpy.init()
+    node = rclpy.create_node("robot")
+    out = node.create_publisher(Odometry, "/odom", 10), node.create_publisher(TrackedObjects, "/tracks", 10)
+    latencies: list[float] = []
+    hits = 0
+
+    def receive(data: bytes) -> None:
+        nonlocal hits
+        message = decode_predictions(data)
+        latencies.append(time.time() - message.stamp_ns * 1e-9)
+        hits += len(message.predictions)
+
+    subscription(node, Topic.PREDICTIONS, receive, Topic.PREDICTIONS.of())
+    while not all(each.get_subscription_count() for each in out):
+        rclpy.spin_once(node, timeout_sec=0.1)
+    time.sleep(1.0)
+    p, v = people(np.random.default_rng(1), tracks)
+    prepared = [seen(p, v, k * 0.05, 0)[1] for k in range(20)]  # making them costs more than the node
+    began, used = time.monotonic(), cpu_of(node_process.pid)
+    tick = 0
+    while time.monotonic() - began < seconds:
+        t, stamp = tick * 0.02, time.time_ns()
+        if tick % 5 == 0:
+            kind = "autoware_perception_msgs/msg/TrackedObjects"
+            message = prepared[tick // 5 % 20]
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
+            out[1].publish(bytes(STORE.serialize_cdr(message, kind)))
+        kind, content = odometry("map", time.time_ns(), (t % 20, 0, 0), (0, 0, 0, 1), (1, 0, 0), (0, 0, 0))
+        out[0].publish(bytes(STORE.serialize_cdr(content, kind)))
+        tick += 1
+        while (left := began + tick * 0.02 - time.monotonic()) > 0.0:
+            rclpy.spin_once(node, timeout_sec=left)
+    elapsed, used = time.monotonic() - began, cpu_of(node_process.pid) - used
+    node_process.terminate()
+    node_process.wait()
+    node.destroy_node()
+    rclpy.shutdown()
+    given = np.array(latencies[50:]) * 1e3
+    return {
+        "odometry messages": tick,
+        "steps": len(latencies),
+        "predictions": hits,
+        "latency median ms": float(np.median(given)),
+        "latency p99 ms": float(np.percentile(given, 99)),
+        "node share of a core": used / elapsed,
+    }
+
+
+def cpu_of(pid: int) -> float:
+    """CPU time of a process so far (s)."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / 100.0
+
+
+def main() -> None:
+    """Measure, and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--live", type=float, metavar="S", help="play to a node for S seconds")
+    parser.add_argument("--tracks", type=int, default=12, help="tracked people in the live part (12)")
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "sources.yaml"
+        if args.live:
+            print(json.dumps(live(file, args.live, args.tracks), indent=2))
+            return
+        for name, (median, most) in costs(file).items():
+            print(f"{name:28} median {median:7.3f} ms   p99 {most:7.3f} ms")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,111 @@
+"""`collision-monitor sources`: what is on the graph, a sources file to start from, and a check of one."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.quantities import positive
+
+if TYPE_CHECKING:
+    from collision_monitor.ros.survey import TopicFacts
+
+DESCRIPTION = """\
+List the topics on the ROS graph that the monitor understands, with their types, rates and frames, and
+print a sources file to start from. `collision-monitor run --sources FILE` monitors what such a file
+names, and `collision-monitor import --map FILE` imports a bag with it.
+
+With --check FILE, run the sources of a file for a while without a monitor, and report for each line
+what arrived, how many states it gave, and what was refused.
+"""
+EPILOG = """\
+examples:
+  collision-monitor sources > sources.yaml        the file on stdout, the list on stderr
+  collision-monitor sources --check sources.yaml
+  collision-monitor run --sources sources.yaml
+
+docs/sources.md explains every type and key.
+
+exit codes:
+  0  done; with --check: every line got messages and nothing was refused
+  1  the file cannot be used
+  3  with --check: a line has a problem
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Register the command and its options."""
+    parser = subparsers.add_parser(
+        "sources",
+        help="list what is on the ROS graph and print a sources file to start from",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--check", type=Path, metavar="FILE", help="sources file (YAML) to check against the graph")
+    parser.add_argument("--seconds", type=positive, default=3.0, metavar="S", help="time to listen (s, default: 3)")
+    parser.set_defaults(command=sources_command)
+
+
+def sources_command(args: argparse.Namespace) -> int:
+    """Run the command and return the exit code. Raises InputError."""
+    from collision_monitor.ros.process import ros_context, stay_on_this_machine
+
+    if args.check is not None:
+        return _check(args.check, args.seconds)
+    stay_on_this_machine()
+    with ros_context(["collision-monitor"]):
+        from collision_monitor.ros.survey import survey
+
+        found = survey(args.seconds)
+    _print_list(found)
+    print(_template(found), end="")
+    return ExitCode.DONE
+
+
+def _check(path: Path, seconds: float) -> int:
+    from collision_monitor.ros.process import ros_context, stay_on_this_machine
+    from collision_monitor.sources.mapping import load_mapping
+
+    mapping = load_mapping(path)
+    stay_on_this_machine()
+    with ros_context(["collision-monitor"]):
+        from collision_monitor.ros.survey import check
+
+        lines = check(mapping, seconds)
+    good = True
+    for line in lines:
+        is_implied = line.name == line.topic
+        good = good and (is_implied or line.text == "ok")
+        where = mapping.lines.get(line.name)
+        head = f"line {where}" if where else "tf"
+        print(f"{head:>8}  {line.name}: {line.topic} {line.type or '(no publisher)'}")
+        text = line.text.removeprefix(f"{line.name}: ")
+        print(f"          {line.messages} messages, {line.states} states, {line.refused} refused: {text}")
+    return ExitCode.DONE if good else ExitCode.NOT_AS_EXPECTED
+
+
+def _print_list(found: list[TopicFacts]) -> None:
+    from rich.console import Console
+    from rich.table import Column, Table
+
+    table = Table("topic", Column("type", no_wrap=True), "rate", "frames", box=None)
+    for each in found:
+        frames = sorted(each.frames) or [f"{parent} → {child}" for child, parent in sorted(each.parents.items())[:6]]
+        rate = f"{each.rate:.1f} Hz" if each.rate else "–"
+        missing = "" if each.installed else " (package not installed: make interfaces)"
+        table.add_row(each.topic, each.type.replace("/msg/", "/") + missing, rate, ", ".join(frames))
+    console = Console(stderr=True)
+    console.print(table if found else "no topic of a type that the monitor understands has a publisher")
+
+
+def _template(found: list[TopicFacts]) -> str:
+    from collision_monitor.sources.template import Seen, sources_file
+
+    parents: dict[str, str] = {}
+    for each in found:
+        parents |= each.parents
+    seen = [Seen(it.topic, it.type, tuple(sorted(it.frames)), tuple(sorted(it.markers))) for it in found]
+    return sources_file(seen, parents)

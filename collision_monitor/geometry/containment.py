@@ -1,0 +1,78 @@
+"""Which points a solid shape contains, in the shape's frame; the boundary belongs to the shape."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from collision_monitor.errors import UnsupportedError
+from collision_monitor.geometry.bounding_volumes import convex_hull
+from collision_monitor.geometry.coordinates import Array, Booleans
+from collision_monitor.geometry.point_in_polygon import Location, locate, locate_in_convex
+from collision_monitor.geometry.polygons import is_convex
+from collision_monitor.geometry.polyhedra import is_closed, locate_in_convex_polyhedron, locate_in_polyhedron
+from collision_monitor.geometry.shapes import (
+    Box,
+    Capsule,
+    Circle,
+    Cone,
+    ConvexHull,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Polygon,
+    Shape,
+    Sphere,
+)
+
+TESTS: Final = ("closed form", "ray", "sides")
+
+
+def inside(shape: Shape, p: Array, test: str) -> Booleans:
+    """Mask (n,) of points p (n, 3) in m in the shape. test: one of TESTS. Raises UnsupportedError."""
+    if test == "closed form":
+        return _closed_form(shape, p)
+    ray = test == "ray"
+    match shape:
+        case Polygon() if ray:
+            return np.asarray(locate(p[:, :2], shape.points)) != Location.OUTSIDE
+        case Polygon() if is_convex(shape.points):
+            return np.asarray(locate_in_convex(p[:, :2], shape.points)) != Location.OUTSIDE
+        case Box() | ConvexHull():
+            hull = convex_hull(shape.corners if isinstance(shape, Box) else shape.points)
+            find = locate_in_polyhedron if ray else locate_in_convex_polyhedron
+            return np.asarray(find(p, hull.vertices, hull.faces)) != Location.OUTSIDE
+        case Mesh() if ray and is_closed(shape.faces):
+            return np.asarray(locate_in_polyhedron(p, shape.vertices, shape.faces)) != Location.OUTSIDE
+    kinds = "Polygon, Box, ConvexHull, closed Mesh" if ray else "convex Polygon, Box, ConvexHull"
+    raise UnsupportedError(f"test {test}: {type(shape).__name__} is not offered; supported are {kinds}")
+
+
+def _closed_form(shape: Shape, p: Array) -> Booleans:
+    """The usual test of each shape."""
+    rim, height = np.hypot(p[:, 0], p[:, 1]), np.abs(p[:, 2])
+    match shape:
+        case Sphere():
+            found = np.linalg.norm(p, axis=1) <= shape.radius
+        case Box():
+            found = (np.abs(p) <= np.array(shape.size) / 2).all(axis=1)
+        case Cylinder():
+            found = (rim <= shape.radius) & (height <= shape.length / 2)
+        case Capsule():
+            found = np.hypot(rim, np.maximum(height - shape.length / 2, 0.0)) <= shape.radius
+        case Cone():
+            found = (height <= shape.length / 2) & (rim * shape.length <= shape.radius * (shape.length / 2 - p[:, 2]))
+        case HalfSpace():
+            found = p @ shape.normal <= shape.offset
+        case Circle():
+            found = rim <= shape.radius
+        case ConvexHull():
+            return inside(shape, p, "sides")
+        case Mesh() if not is_closed(shape.faces):
+            raise UnsupportedError("Mesh: expected a closed surface, as an open one has no inside")
+        case Mesh() | Polygon():
+            return inside(shape, p, "ray")
+        case _:
+            raise UnsupportedError(f"{type(shape).__name__}: containment is not offered for it")
+    return np.asarray(found)

@@ -1,0 +1,227 @@
+"""Where rays first meet a solid shape, in the shape's frame: clipped intervals of planes, quadratics, triangles.
+
+A ray is p + t d, with a unit vector d and t in m. A ray that starts inside meets the solid at t = 0, without a normal.
+(Slides "Line intersection", "Ray test", "Edge intersection face test"; Kay and Kajiya, 1986, for the clipping; Möller
+and Trumbore, 1997, for the triangles)
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from collision_monitor.errors import InputError, UnsupportedError
+from collision_monitor.geometry.bounding_volumes import convex_hull
+from collision_monitor.geometry.coordinates import Array, Booleans
+from collision_monitor.geometry.point_in_polygon import Location, locate
+from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
+from collision_monitor.geometry.shapes import (
+    Box,
+    Capsule,
+    Circle,
+    Cone,
+    ConvexHull,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Polygon,
+    Shape,
+    Sphere,
+)
+
+AT_ONCE: Final = 1 << 20
+"""Pairs of a ray and a triangle that are tested in one batch, which limits the temporary arrays to 200 MB."""
+
+
+class Interval(NamedTuple):
+    """Part of each ray in a convex solid: t from enter (n,) to leave (n,); empty if enter > leave."""
+
+    enter: Array
+    leave: Array
+    normal: Array  # (n, 3) outward unit normal where it enters
+
+
+def first_hits(shape: Shape, p: Array, d: Array) -> tuple[Array, Array]:
+    """Least t >= 0 (n,), infinite for none, and outward unit normals (n, 3) there, zero inside and for none.
+
+    p (n, 3) m, unit d (n, 3), in the shape's frame. Raises UnsupportedError, InputError.
+    """
+    if isinstance(shape, Mesh):
+        return _mesh_hits(shape, p, d)
+    if isinstance(shape, Polygon):
+        return _polygon_hits(shape, p, d)
+    parts = _solids(shape, p, d)
+    best, normals = np.full(len(p), np.inf), np.zeros_like(p)
+    for part in parts:
+        meets = (part.enter <= part.leave) & (part.leave >= 0.0)
+        t = np.where(meets, np.maximum(part.enter, 0.0), np.inf)
+        nearer = t < best
+        best[nearer] = t[nearer]
+        normals[nearer] = np.where((part.enter >= 0.0)[:, None], part.normal, 0.0)[nearer]
+    return best, normals
+
+
+def _solids(shape: Shape, p: Array, d: Array) -> list[Interval]:
+    """Intervals of convex solids whose union is the shape."""
+    match shape:
+        case Sphere():
+            return [_ball(p, d, shape.radius)]
+        case Box():
+            half = np.array(shape.size) / 2
+            return [_planes(np.concatenate([np.eye(3), -np.eye(3)]), np.tile(half, 2), p, d)]
+        case ConvexHull():
+            hull = convex_hull(shape.points)
+            a, b, c = (hull.vertices[corner] for corner in hull.faces.T)
+            normal = np.cross(b - a, c - a)
+            length = np.linalg.norm(normal, axis=1)
+            normal = normal[length > 0.0] / length[length > 0.0, None]
+            return [_planes(normal, np.einsum("ni,ni->n", normal, a[length > 0.0]), p, d)]
+        case HalfSpace():
+            return [_planes(shape.normal[None], np.array([shape.offset]), p, d)]
+        case Cylinder():
+            return [_common(_tube(p, d, shape.radius), _caps(p, d, shape.length / 2))]
+        case Capsule():
+            end = np.array([0.0, 0.0, shape.length / 2])
+            tube = _common(_tube(p, d, shape.radius), _caps(p, d, shape.length / 2))
+            return [tube, _ball(p - end, d, shape.radius), _ball(p + end, d, shape.radius)]
+        case Cone():
+            return [_cone(shape, p, d)]
+        case Circle():
+            _check_in_plane(d)
+            flat = p * [1.0, 1.0, 0.0]
+            return [_ball(flat, d, shape.radius)]
+    raise UnsupportedError(f"{type(shape).__name__}: rays are not offered for it")
+
+
+def _check_in_plane(d: Array) -> None:
+    if d[:, 2].any():
+        raise InputError("direction: expected one in the x-y plane for a Circle or a Polygon, got one out of it")
+
+
+def _ball(p: Array, d: Array, radius: float) -> Interval:
+    middle = -_dot(p, d)
+    across = p + middle[:, None] * d  # the ray's point nearest to the centre: its square does not cancel
+    rest = radius * radius - _dot(across, across)
+    half = np.sqrt(np.maximum(rest, 0.0))
+    enter = np.where(rest >= 0.0, middle - half, np.inf)
+    return Interval(enter, np.where(rest >= 0.0, middle + half, -np.inf), (across - half[:, None] * d) / radius)
+
+
+def _planes(normal: Array, offset: Array, p: Array, d: Array) -> Interval:
+    """Intersection of half-spaces {x : n.x <= offset}."""
+    height, speed = p @ normal.T - offset, d @ normal.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = -height / speed
+    enter = np.where(speed < 0.0, t, np.where((speed == 0.0) & (height > 0.0), np.inf, -np.inf))
+    leave = np.where(speed > 0.0, t, np.inf)
+    which = enter.argmax(axis=1)
+    return Interval(enter.max(axis=1), leave.min(axis=1), normal[which])
+
+
+def _tube(p: Array, d: Array, radius: float) -> Interval:
+    """An infinite cylinder about z."""
+    u, w = d * [1.0, 1.0, 0.0], p * [1.0, 1.0, 0.0]
+    square = _dot(u, u)
+    along = square == 0.0
+    scale = np.where(along, 1.0, square)
+    middle = -_dot(w, u) / scale
+    across = w + middle[:, None] * u
+    rest = radius * radius - _dot(across, across)
+    half = np.where(along, np.inf, np.sqrt(np.maximum(rest, 0.0) / scale))
+    enter, leave = np.where(rest >= 0.0, middle - half, np.inf), np.where(rest >= 0.0, middle + half, -np.inf)
+    finite = np.where(np.isfinite(half), half, 0.0)
+    return Interval(enter, leave, (across - finite[:, None] * u) / radius)
+
+
+def _caps(p: Array, d: Array, half: float) -> Interval:
+    """The slab |z| <= half."""
+    axis = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
+    return _planes(axis, np.full(2, half), p, d)
+
+
+def _common(a: Interval, b: Interval) -> Interval:
+    later = (a.enter >= b.enter)[:, None]
+    return Interval(np.maximum(a.enter, b.enter), np.minimum(a.leave, b.leave), np.where(later, a.normal, b.normal))
+
+
+def _cone(shape: Cone, p: Array, d: Array) -> Interval:
+    """Between base and apex, the points with f = x² + y² - (s (apex - z))² <= 0, where f is a quadratic of t."""
+    slope, apex = shape.radius / shape.length, shape.length / 2
+    slab = _caps(p, d, apex)
+    down, fall = slope * (apex - p[:, 2]), -slope * d[:, 2]
+    a = d[:, 0] ** 2 + d[:, 1] ** 2 - fall**2
+    b = d[:, 0] * p[:, 0] + d[:, 1] * p[:, 1] - fall * down
+    c = p[:, 0] ** 2 + p[:, 1] ** 2 - down**2
+    root = np.sqrt(np.maximum(b * b - a * c, 0.0))
+    q = -(b + np.copysign(root, b))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        roots = np.stack([q / a, c / q], axis=1)
+    low, high = slab.enter[:, None], slab.leave[:, None]
+    roots = np.where(np.isfinite(roots), roots, low)
+    ends = np.sort(np.clip(np.concatenate([roots, low, high], axis=1), low, np.maximum(low, high)), axis=1)
+    with np.errstate(invalid="ignore"):
+        middle = 0.5 * ends[:, :-1] + 0.5 * ends[:, 1:]
+        inside = (a[:, None] * middle**2 + 2 * b[:, None] * middle + c[:, None] <= 0.0) & (ends[:, :-1] < ends[:, 1:])
+    some = inside.any(axis=1) & (slab.enter <= slab.leave)
+    rows = np.arange(len(p))
+    enter = np.where(some, ends[rows, inside.argmax(axis=1)], np.inf)
+    leave = np.where(some, ends[rows, 3 - inside[:, ::-1].argmax(axis=1)], -np.inf)
+    at = p + np.where(some & np.isfinite(enter), enter, 0.0)[:, None] * d
+    side = at * [1.0, 1.0, 0.0]
+    side[:, 2] = slope * np.hypot(at[:, 0], at[:, 1])
+    length = np.linalg.norm(side, axis=1, keepdims=True)
+    on_base = (enter <= slab.enter)[:, None]
+    return Interval(enter, leave, np.where(on_base, slab.normal, side / np.where(length > 0.0, length, 1.0)))
+
+
+def _polygon_hits(shape: Polygon, p: Array, d: Array) -> tuple[Array, Array]:
+    _check_in_plane(d)
+    start = np.asarray(shape.points)
+    edge = np.roll(start, -1, axis=0) - start
+    inside = np.asarray(locate(p[:, :2], start)) != Location.OUTSIDE
+    offset = start - p[:, None, :2]
+    turn = d[:, None, 0] * edge[:, 1] - d[:, None, 1] * edge[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (offset[..., 0] * edge[:, 1] - offset[..., 1] * edge[:, 0]) / turn
+        s = (offset[..., 0] * d[:, None, 1] - offset[..., 1] * d[:, None, 0]) / turn
+    met = (turn != 0.0) & (t >= 0.0) & (s >= 0.0) & (s <= 1.0)
+    t = np.where(met, t, np.inf)
+    which = t.argmin(axis=1)
+    normal = np.stack([edge[which, 1], -edge[which, 0], np.zeros(len(p))], axis=1)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal *= -np.sign(_dot(normal, d))[:, None]
+    best = np.where(inside, 0.0, t.min(axis=1))
+    return best, np.where((np.isfinite(best) & ~inside)[:, None], normal, 0.0)
+
+
+def _mesh_hits(shape: Mesh, p: Array, d: Array) -> tuple[Array, Array]:
+    """Nearest face on the way; a closed mesh is solid, an open one a surface."""
+    a, b, c = (shape.vertices[corner] for corner in shape.faces.T)
+    u, v = b - a, c - a
+    best, which = np.full(len(p), np.inf), np.zeros(len(p), np.int64)
+    inside: Booleans = np.zeros(len(p), bool)
+    if is_closed(shape.faces):
+        inside = np.asarray(locate_in_polyhedron(p, shape.vertices, shape.faces)) != Location.OUTSIDE
+    step = max(AT_ONCE // len(a), 1)
+    for first in range(0, len(p), step):
+        rows = slice(first, first + step)
+        h = np.cross(d[rows, None], v)
+        determinant = _dot(u, h)
+        offset = p[rows, None] - a
+        q = np.cross(offset, u)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            beta, gamma = _dot(offset, h) / determinant, _dot(d[rows, None], q) / determinant
+            t = _dot(v, q) / determinant
+        met = (determinant != 0.0) & (beta >= 0.0) & (gamma >= 0.0) & (beta + gamma <= 1.0) & (t >= 0.0)
+        t = np.where(met, t, np.inf)
+        which[rows], best[rows] = t.argmin(axis=1), t.min(axis=1)
+    normal = np.cross(u[which], v[which])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    normal *= -np.sign(_dot(normal, d))[:, None]
+    best = np.where(inside, 0.0, best)
+    return best, np.where((np.isfinite(best) & ~inside)[:, None], normal, 0.0)
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray((a * b).sum(axis=-1))

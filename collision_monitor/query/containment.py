@@ -1,0 +1,37 @@
+"""`contains`: which points are in a shape of any kind."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from collision_monitor.errors import InputError, PoseError
+from collision_monitor.geometry.compound import shape_pairs
+from collision_monitor.geometry.containment import TESTS, inside
+from collision_monitor.geometry.coordinates import Booleans, coordinates
+from collision_monitor.geometry.planar import flat_pose, is_planar
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.query.contact import Compound
+
+
+def contains(shape: Compound, pose: Pose, points: ArrayLike, test: str = "closed form") -> Booleans:
+    """Whether points (..., 3) in m, in the world frame, are in a shape or a compound at a pose, or on its boundary.
+
+    test: "closed form" for every shape with an inside; "ray" for polygons and polyhedra, by the parity of a ray;
+    "sides" for convex ones, by the sides of their edges or faces. The last two are exact for the points in the shape's
+    frame. Points of two coordinates are in the x-y plane. (Slides "Point in polygon - ray test", "Point in convex
+    polygon", "A vertex is inside a convex polyhedron if …") Raises ShapeError, PoseError, InputError; UnsupportedError
+    for a shape that the test does not take.
+    """
+    if not isinstance(pose, Pose):
+        raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}")
+    if test not in TESTS:
+        raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")
+    given = coordinates(points, "points")
+    p = np.zeros((given[..., 0].size, 3))
+    p[:, : given.shape[-1]] = given.reshape(-1, given.shape[-1])
+    found = np.zeros(len(p), bool)
+    for each, offset in shape_pairs(shape, "shape"):
+        at = flat_pose(pose @ offset) if is_planar(each) else pose @ offset
+        found |= inside(each, (p - at.position) @ at.rotation, test)
+    return found.reshape(given.shape[:-1])

@@ -1,0 +1,149 @@
+"""The joints of a robot as arrays, each link after its parent: what the forward kinematics reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.robots.urdf import Joint, JointType, Urdf
+
+FIXED: Final = 0
+TURNING: Final = 1
+SLIDING: Final = 2
+
+_KINDS: Final = {
+    JointType.FIXED: FIXED,
+    JointType.REVOLUTE: TURNING,
+    JointType.CONTINUOUS: TURNING,
+    JointType.PRISMATIC: SLIDING,
+}
+
+
+class LinkTable(NamedTuple):
+    """Rows of L links, each link after its parent; row 0 is the base link.
+
+    parent (L,): row of the parent, -1 for the base. kind (L,): of the joint to the parent. position (L, 3) in m and
+    quaternion (L, 4): X_PC, the link in its parent at position 0. axis (L, 3): in the link's frame. variable (L,): the
+    column of the joint in the positions, -1 if it is fixed. The joint is at multiplier (L,) * position + offset (L,).
+    """
+
+    parent: NDArray[np.int32]
+    kind: NDArray[np.int32]
+    position: NDArray[np.float64]
+    quaternion: NDArray[np.float64]
+    axis: NDArray[np.float64]
+    variable: NDArray[np.int32]
+    multiplier: NDArray[np.float64]
+    offset: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class KinematicTree:
+    """links: names, by row of the table. joints: names of the variables, by column.
+
+    wraps (J,): whether the position of a joint may jump by a turn, as that of a continuous one. needs (L, J): whether
+    the pose of a link in the base link depends on a joint.
+    """
+
+    links: tuple[str, ...]
+    joints: tuple[str, ...]
+    table: LinkTable
+    wraps: NDArray[np.bool_]
+    needs: NDArray[np.bool_]
+
+
+def kinematic_tree(urdf: Urdf) -> KinematicTree:
+    """Return the tree of a URDF. Raises InputError if its joints do not form a tree of supported joints.
+
+    A planar or floating joint between the root link and the only other link attached to it is left out, because
+    odometry or tf states the pose of a base that moves freely. The tree then begins at that link.
+    """
+    by_child: dict[str, Joint] = {}
+    children: dict[str, list[Joint]] = {name: [] for name in urdf.links}
+    for joint in urdf.joints.values():
+        for end in (joint.parent, joint.child):
+            if end not in urdf.links:
+                raise joint.element.error(f"expected links that the file has, got {end!r:.80}")
+        if joint.child in by_child:
+            raise joint.element.error(f"expected a child without a parent, but {joint.child!r} has two joints to one")
+        by_child[joint.child] = joint
+        children[joint.parent].append(joint)
+    roots = [name for name in urdf.links if name not in by_child]
+    if len(roots) != 1:
+        loop = next(iter(urdf.joints.values())) if urdf.joints else next(iter(urdf.links.values()))
+        found = ", ".join(roots[:5]) or "none, because the joints form a loop"
+        raise loop.element.error(f"expected one link without a parent in the file, got {found}")
+    order = _downward(_base(urdf, roots[0], children), children)
+    if len(order) + (order[0] != roots[0]) != len(urdf.links):
+        lost = next(name for name in urdf.links if name not in {*order, roots[0]})
+        raise urdf.links[lost].element.error("expected joints that connect it to the base, got a loop")
+    return _tree(order, by_child, urdf)
+
+
+def _base(urdf: Urdf, root: str, children: dict[str, list[Joint]]) -> str:
+    for joint in urdf.joints.values():
+        if joint.type in (JointType.PLANAR, JointType.FLOATING):
+            if joint.parent != root or len(children[root]) > 1 or urdf.links[root].collisions:
+                raise joint.element.error(
+                    f"expected a {joint.type} joint only between a root link without shapes and its one child"
+                )
+            return joint.child
+    return root
+
+
+def _downward(base: str, children: dict[str, list[Joint]]) -> list[str]:
+    """Return the links from the base on, in depth-first order."""
+    order, stack = [], [base]
+    while stack:
+        order.append(stack.pop())
+        stack += [joint.child for joint in reversed(children[order[-1]])]
+    return order
+
+
+def _tree(order: list[str], by_child: dict[str, Joint], urdf: Urdf) -> KinematicTree:
+    row = {name: i for i, name in enumerate(order)}
+    moving = [by_child[name] for name in order[1:] if _KINDS[by_child[name].type] != FIXED]
+    free = [joint for joint in moving if joint.mimic is None]
+    column = {joint.name: j for j, joint in enumerate(free)}
+    count = len(order)
+    table = LinkTable(
+        np.full(count, -1, np.int32),
+        np.zeros(count, np.int32),
+        np.zeros((count, 3)),
+        np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
+        np.zeros((count, 3)),
+        np.full(count, -1, np.int32),
+        np.ones(count),
+        np.zeros(count),
+    )
+    needs = np.zeros((count, len(column)), np.bool_)
+    for i, name in enumerate(order[1:], start=1):
+        joint = by_child[name]
+        table.parent[i], table.kind[i] = row[joint.parent], _KINDS[joint.type]
+        table.position[i], table.quaternion[i] = joint.origin.position, joint.origin.quaternion
+        table.axis[i] = joint.axis
+        needs[i] = needs[table.parent[i]]
+        if table.kind[i] != FIXED:
+            source, table.multiplier[i], table.offset[i] = _leader(joint, urdf)
+            table.variable[i] = column[source]
+            needs[i, column[source]] = True
+    wraps = np.array([joint.type is JointType.CONTINUOUS for joint in free], np.bool_)
+    return KinematicTree(tuple(order), tuple(column), table, wraps, needs)
+
+
+def _leader(joint: Joint, urdf: Urdf) -> tuple[str, float, float]:
+    """Return the joint that this one follows in the end, and multiplier and offset of its position."""
+    multiplier, offset, seen = 1.0, 0.0, {joint.name}
+    at = joint
+    while at.mimic is not None:
+        offset += multiplier * at.mimic.offset
+        multiplier *= at.mimic.multiplier
+        leader = urdf.joints.get(at.mimic.joint)
+        if leader is None or leader.type not in _KINDS or leader.type is JointType.FIXED or leader.name in seen:
+            raise at.element.error(f"mimic: expected a moving joint, and no loop, got {at.mimic.joint!r:.80}")
+        seen.add(leader.name)
+        at = leader
+    return at.name, multiplier, offset

@@ -1,0 +1,116 @@
+"""A robot: its links as objects with shapes, their motions from the joints, and the pairs that are allowed to touch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.errors import InputError
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Shape
+from collision_monitor.robots.kinematic_tree import KinematicTree, kinematic_tree
+from collision_monitor.robots.link_motions import link_motions
+from collision_monitor.robots.link_shapes import link_shapes
+from collision_monitor.robots.mesh_location import FileLocator
+from collision_monitor.robots.srdf import Pair, disabled_pairs
+from collision_monitor.robots.touching_links import touching_links
+from collision_monitor.robots.urdf import parse_urdf
+from collision_monitor.robots.xml_tree import LARGEST_TEXT
+
+Floats = NDArray[np.float64]
+
+_SHOWN: Final = 5
+
+
+@dataclass(frozen=True)
+class Description:
+    """The text of a URDF or SRDF. name: of its file or topic, for errors. folder: for relative paths in it."""
+
+    text: str | bytes
+    name: str
+    folder: Path = Path()
+
+    @classmethod
+    def read(cls, path: Path) -> Description:
+        """Read a file. Raises InputError."""
+        try:
+            with path.open("rb") as file:
+                return cls(file.read(LARGEST_TEXT + 1), str(path), path.parent)
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            raise InputError(f"{path}: expected a file that can be read, got: {reason}") from None
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """Links with shapes, in the order of `rows`.
+
+    rows (S,): rows of these links in the tree. shapes: of each link, with their poses in its frame. touching, disabled:
+    pairs of links whose contact is expected, by construction and by the SRDF. known_joints: names of all joints, with
+    the fixed and mimic ones. problems: a text for each part of the files that is left out.
+    """
+
+    tree: KinematicTree
+    rows: NDArray[np.intp]
+    shapes: tuple[tuple[tuple[Shape, Pose], ...], ...]
+    touching: frozenset[Pair]
+    disabled: frozenset[Pair]
+    known_joints: frozenset[str]
+    problems: tuple[str, ...]
+
+    @property
+    def links(self) -> list[str]:
+        """Names of the links with shapes, (S)."""
+        return [self.tree.links[row] for row in self.rows]
+
+    def motions(self, joints: Floats, base: Floats) -> tuple[Floats, Floats]:
+        """Return poses (L, 7) and twists (L, 6) of all links of the tree, in the frame of the base's pose.
+
+        joints (J, 2): position and velocity of each joint of `tree.joints`. base (13,): position, quaternion, linear
+        and angular velocity of the base link.
+        """
+        poses, twists = link_motions(self.tree.table, joints[None], base[None])
+        return poses[0], twists[0]
+
+
+def make_robot(urdf: Description, srdf: Description | None = None, packages: Mapping[str, Path] | None = None) -> Robot:
+    """Return the robot of a URDF, and of an SRDF if there is one. packages: folders of ROS packages by name.
+
+    A geometry that cannot be used is left out, and `problems` names it. Raises InputError if nothing is left, and for
+    files that are no URDF or SRDF.
+    """
+    model = parse_urdf(urdf.text, urdf.name)
+    tree = kinematic_tree(model)
+    files = FileLocator(urdf.folder, packages)
+    problems: list[str] = []
+    shapes: dict[str, tuple[tuple[Shape, Pose], ...]] = {}
+    for name in tree.links:
+        found, texts = link_shapes(model.links[name], files)
+        problems += texts
+        if found:
+            shapes[name] = tuple(found)
+    if not shapes:
+        reason = f": {problems[0]}" if problems else ", only <visual> or nothing"
+        raise InputError(f"{urdf.name}: expected a link with a <collision> that can be used, got none{reason}")
+    disabled: set[Pair] = set()
+    if srdf is not None:
+        disabled = disabled_pairs(srdf.text, srdf.name, tree.links)
+        unknown = sorted({name for pair in disabled for name in pair} - set(model.links))
+        if unknown:
+            more = "" if len(unknown) <= _SHOWN else f" and {len(unknown) - _SHOWN} more"
+            problems.append(f"{srdf.name}: expected links of {urdf.name}, got {', '.join(unknown[:_SHOWN])}{more}")
+    rows = np.array([row for row, name in enumerate(tree.links) if name in shapes])
+    return Robot(
+        tree,
+        rows,
+        tuple(shapes.values()),
+        frozenset(touching_links(tree, shapes)),
+        frozenset(pair for pair in disabled if pair[0] in shapes and pair[1] in shapes),
+        frozenset(model.joints),
+        tuple(problems),
+    )

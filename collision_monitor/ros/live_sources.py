@@ -1,0 +1,194 @@
+"""The sources of a running node: topics of other programs, converted to the node's own inputs as they arrive.
+
+A topic is subscribed when its publisher is there, with the publisher's quality of service and type. A line of the file
+that cannot be used is logged with the reason and reported in `~/sources`; the others work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, Final, NamedTuple
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from collision_monitor.errors import CollisionMonitorError, InputError
+from collision_monitor.session.mcap.definitions import definition
+from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage
+from collision_monitor.sources.tf_objects import TRANSFORMS
+
+SEARCH_PERIOD: Final = 0.2
+"""s between two looks at the graph for topics of the file."""
+
+REPORT_PERIOD: Final = 1.0
+"""s between two messages on `~/sources`."""
+
+_TF: Final = ("/tf", "/tf_static")
+_DEPTH: Final = {"/tf": 100, "/tf_static": 100}
+"""Depth of the queue; 10 for the other topics."""
+
+
+class LineReport(NamedTuple):
+    """What a line of the file does. level: of DiagnosticStatus, with a text. The counts are those since the start."""
+
+    name: str
+    topic: str
+    type: str
+    messages: int
+    states: int
+    refused: int
+    last_refusal: str
+    level: bytes
+    text: str
+
+
+class LiveSources:
+    """Subscribes to the topics of a sources file. take: called with each input for the monitor.
+
+    warn: called with the name of a line, a text and how often it happened.
+    """
+
+    def __init__(
+        self, node: Node, mapping: Mapping, take: Callable[[Input], None], warn: Callable[[str, str, int], None]
+    ) -> None:
+        self._node, self._take, self._warn = node, take, warn
+        self._mapping = mapping
+        self._decoder = Decoder({})
+        self._feed = Feed(mapping, self._decoder)
+        # Transforms first: if several messages wait, the executor takes them in the order of the subscriptions.
+        wanted = dict.fromkeys(_TF, (TRANSFORMS,)) | self._feed.wanted
+        self._wanted = {node.resolve_topic_name(topic): (topic, types) for topic, types in wanted.items()}
+        self._found: dict[str, str] = {}  # topic of the file -> type
+        self._problems: dict[str, str] = {}  # the same, or the name of a line -> why it cannot be used
+        self._messages: dict[str, int] = {}
+        self._out = node.create_publisher(DiagnosticArray, "~/sources", QoSProfile(depth=1))
+        node.create_timer(SEARCH_PERIOD, self._search)
+        node.create_timer(REPORT_PERIOD, self._report)
+
+    def begin(self) -> None:
+        """Describe what is known from the start, and look for the topics."""
+        for each in self._feed.begin(self._now()):
+            self._take(each)
+        self._search()
+
+    # -- topics
+
+    def _search(self) -> None:
+        """Subscribe to the topics that have a publisher by now."""
+        for resolved in [name for name, (topic, _) in self._wanted.items() if topic not in self._found]:
+            infos = self._node.get_publishers_info_by_topic(resolved)
+            if infos:
+                topic, types = self._wanted[resolved]
+                kinds = {info.topic_type for info in infos}
+                try:
+                    self._bind(topic, resolved, self._chosen(topic, kinds, types), infos)
+                except CollisionMonitorError as error:
+                    self._set_problem(topic, str(error))
+
+    def _chosen(self, topic: str, kinds: set[str], types: tuple[str, ...]) -> str:
+        usable = sorted(kinds & set(types))
+        if not usable:
+            expected = types[0] if len(types) == 1 else f"one of {', '.join(types)}"
+            raise InputError(
+                f"{self._line(topic)}: expected {topic} to carry {expected}, got {', '.join(sorted(kinds))}"
+            )
+        return usable[0]
+
+    def _bind(self, topic: str, resolved: str, kind: str, infos: list[Any]) -> None:
+        package, _, name = kind.split("/")
+        try:
+            message_class = getattr(import_module(f"{package}.msg"), name)
+            self._decoder.define(kind, definition(kind))
+        except (ImportError, AttributeError, CollisionMonitorError):
+            raise InputError(
+                f"{self._line(topic)}: {topic} carries {kind}, and package {package} is not installed; "
+                f"`make interfaces` builds it, or install ros-<distro>-{package.replace('_', '-')}"
+            ) from None
+        self._found[topic] = kind
+        self._problems.pop(topic, None)
+        for name, text in self._feed.bind(topic, kind).items():
+            self._set_problem(name, text)
+        self._node.create_subscription(
+            message_class,
+            resolved,
+            lambda data: self._on_message(topic, kind, data),
+            quality_of_all(topic, infos),
+            raw=True,
+        )
+        self._node.get_logger().info(f"source {topic}: {kind}")
+
+    def _line(self, topic: str) -> str:
+        """Return the name of the first line of the file about a topic."""
+        entries = self._mapping.topics.get(topic, ())
+        return entries[0].name if entries else self._feed.owners.get(topic, topic)
+
+    def _set_problem(self, key: str, text: str) -> None:
+        if self._problems.get(key) != text:
+            self._problems[key] = text
+            self._node.get_logger().error(self._mapping.located(text))
+
+    # -- messages
+
+    def _on_message(self, topic: str, kind: str, data: bytes) -> None:
+        self._messages[topic] = self._messages.get(topic, 0) + 1
+        for each in self._feed.take(RawMessage(topic, kind, data, self._now())):
+            self._take(each)
+        for name, (count, text) in self._feed.scene.take_news().items():
+            self._warn(name, self._mapping.located(f"{name}: {text}"), count)
+
+    def _now(self) -> int:
+        return int(self._node.get_clock().now().nanoseconds)
+
+    # -- report
+
+    def lines(self) -> list[LineReport]:
+        """Return what each line of the file does, in the order of the file; then the topics that it implies."""
+        named, owners = self._mapping.topics, self._feed.owners
+        found = [self._line_report(each.name, each.topic) for each in self._mapping.sources if each.topic]
+        others = [topic for topic, _ in self._wanted.values() if topic not in named]
+        return found + [self._line_report(owners.get(topic, topic), topic) for topic in others]
+
+    def _line_report(self, name: str, topic: str) -> LineReport:
+        scene, messages = self._feed.scene, self._messages.get(topic, 0)
+        refused, refusal = scene.refused_by_name.get(name, 0), scene.last_refusal.get(name, "")
+        parts = f"{name}_", f"{name}/"  # of a group, of a robot
+        states = sum(count for other, count in scene.states.items() if other == name or other.startswith(parts))
+        problem = self._problems.get(name) or self._problems.get(topic)
+        if problem:
+            level, text = DiagnosticStatus.ERROR, problem
+        elif topic not in self._found:
+            level, text = DiagnosticStatus.WARN, f"{topic} has no publisher"
+        elif not messages and topic not in _TF:
+            level, text = DiagnosticStatus.WARN, f"no message on {topic} yet"
+        else:
+            level, text = (DiagnosticStatus.WARN, refusal) if refused else (DiagnosticStatus.OK, "ok")
+        kind = self._found.get(topic, "")
+        return LineReport(name, topic, kind, messages, states, refused, refusal, level, text)
+
+    def _report(self) -> None:
+        """Publish the state of each line of the file."""
+        array = DiagnosticArray()
+        array.header.stamp = self._node.get_clock().now().to_msg()
+        for line in self.lines():
+            values = {key: value for key, value in line._asdict().items() if key not in ("name", "level", "text")}
+            pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+            topic = f" {line.topic}" if line.name in self._feed.owners.values() else ""  # a robot has several
+            name = f"{self._node.get_name()}: {line.name}{topic}"
+            array.status.append(
+                DiagnosticStatus(level=line.level, name=name, message=line.text, hardware_id="none", values=pairs)
+            )
+        self._out.publish(array)
+
+
+def quality_of_all(topic: str, infos: list[Any]) -> QoSProfile:
+    """Return the strictest quality of service that all publishers of a topic offer."""
+    offered = [info.qos_profile for info in infos]
+    reliable = all(each.reliability is ReliabilityPolicy.RELIABLE for each in offered)
+    latched = reliable and all(each.durability is DurabilityPolicy.TRANSIENT_LOCAL for each in offered)
+    return QoSProfile(
+        depth=_DEPTH.get(topic, 10),
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )

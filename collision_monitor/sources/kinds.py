@@ -1,0 +1,42 @@
+"""The kinds of sources: which class takes which message type, and which section of the sources file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from collision_monitor.sources.autoware import PREDICTED, TRACKED, AutowareSource
+from collision_monitor.sources.clouds import CLOUD, SCAN, CloudSource
+from collision_monitor.sources.detections import DETECTIONS, DetectionSource
+from collision_monitor.sources.footprints import FOOTPRINT, FootprintSource
+from collision_monitor.sources.mapping import Mapping
+from collision_monitor.sources.markers import MARKER, MARKERS, MarkerSource
+from collision_monitor.sources.object_entry import ObjectEntry
+from collision_monitor.sources.planning_scene import COLLISION_OBJECT, PLANNING_SCENE, planning_world
+from collision_monitor.sources.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE, PoseSource
+from collision_monitor.sources.robot_section import make_robots
+from collision_monitor.sources.source import Source
+from collision_monitor.sources.tf_objects import TRANSFORMS, FrameSource
+
+BY_TYPE: Final[dict[str, Callable[[ObjectEntry, str, Mapping], Source]]] = {
+    ODOMETRY: PoseSource,
+    POSE: PoseSource,
+    POSE_WITH_COVARIANCE: PoseSource,
+    TRANSFORMS: FrameSource,
+    MARKER: MarkerSource,
+    MARKERS: MarkerSource,
+    PLANNING_SCENE: planning_world,
+    COLLISION_OBJECT: planning_world,
+    TRACKED: AutowareSource,
+    PREDICTED: AutowareSource,
+    DETECTIONS: DetectionSource,
+    FOOTPRINT: FootprintSource,
+    SCAN: CloudSource,
+    CLOUD: CloudSource,
+}
+"""Makes the source of an entry of `objects:` from the entry, the type of its topic, and the whole file. Raises
+InputError for an entry that does not fit the type."""
+
+SECTIONS: Final[dict[str, Callable[[Any, Mapping], list[Source]]]] = {"robots": make_robots}
+"""Makes the sources of a section of the file, such as `robots`, from the content of that section, checked here, and the
+rest of the file. Raises InputError. The name is also in `mapping.SECTIONS`."""

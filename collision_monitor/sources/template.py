@@ -1,0 +1,81 @@
+"""A sources file to start from, made of the topics that are there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final, NamedTuple
+
+from collision_monitor.sources.autoware import PREDICTED, TRACKED
+from collision_monitor.sources.clouds import CLOUD, SCAN
+from collision_monitor.sources.detections import DETECTIONS
+from collision_monitor.sources.footprints import FOOTPRINT
+from collision_monitor.sources.markers import MARKER, MARKERS
+from collision_monitor.sources.planning_scene import COLLISION_OBJECT, PLANNING_SCENE
+from collision_monitor.sources.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE
+from collision_monitor.sources.robot_template import robot_lines
+
+_ENTRIES: Final = {
+    ODOMETRY: "shape: {box: [1.0, 0.7, 0.5]}",
+    POSE: "shape: {box: [1.0, 0.7, 0.5]}",
+    POSE_WITH_COVARIANCE: "shape: {box: [1.0, 0.7, 0.5]}",
+    TRACKED: "forget_after: 1.0",
+    PREDICTED: "forget_after: 1.0",
+    DETECTIONS: "forget_after: 1.0, position_stddev: 0.1",
+    FOOTPRINT: "height: 1.0",
+    SCAN: "radius: 0.05, voxel: 0.1",
+    CLOUD: "radius: 0.05, voxel: 0.1",
+}
+"""The keys of an entry besides its topic. Sizes are to be replaced by the real ones."""
+
+_SIZED: Final = (ODOMETRY, POSE, POSE_WITH_COVARIANCE)
+
+
+class Seen(NamedTuple):
+    """A topic on the graph. namespaces: of its markers."""
+
+    topic: str
+    type: str
+    frames: tuple[str, ...] = ()
+    namespaces: tuple[str, ...] = ()
+
+
+def sources_file(topics: Iterable[Seen], parents: dict[str, str]) -> str:
+    """Return the text of a sources file. parents: the parent of each tf frame."""
+    given = list(topics)
+    frames = [frame for each in given for frame in each.frames if frame]
+    roots = sorted({*parents.values()} - parents.keys())
+    frame = next(
+        (name for name in ("map", "world", "odom") if name in [*roots, *frames]), (roots or frames or ["map"])[0]
+    )
+    lines = [f"frame: {frame}", "rate: 20                # Hz of the steps", "objects:"]
+    used: set[str] = set()
+    for each in given:
+        if each.type in (MARKER, MARKERS):
+            for namespace in each.namespaces:
+                name = _name(namespace or each.topic, used)
+                lines.append(f"  {name}: {{topic: {each.topic}, marker: {{ns: {namespace!r}}}}}")
+        elif each.type in _ENTRIES:
+            note = "   # its real shape, in m" if each.type in _SIZED else ""
+            lines.append(f"  {_name(each.topic, used)}: {{topic: {each.topic}, {_ENTRIES[each.type]}}}{note}")
+    for child in sorted(parents.keys() - {*parents.values()}):
+        lines.append(
+            f"  # {_name(child, used)}: {{topic: /tf, frame: {child}, shape: {{sphere: 0.3}}}}   # a frame of tf"
+        )
+    robots = robot_lines((each.topic, each.type) for each in given)
+    if not robots:  # the world of a planning scene alone
+        scenes = [each.topic for each in given if each.type in (PLANNING_SCENE, COLLISION_OBJECT)]
+        lines += [f"  {_name(topic, used)}: {{topic: {topic}}}" for topic in scenes]
+    if len(lines) == 3:
+        lines[-1:] = [] if robots else ["objects: {}               # no topic of a known type is there"]
+    lines += robots
+    return "\n".join(lines) + "\n"
+
+
+def _name(topic: str, used: set[str]) -> str:
+    """Return a name for an entry that no other one has."""
+    base = name = "_".join(part for part in topic.split("/") if part) or "object"
+    number = 2
+    while name in used:
+        name, number = f"{base}_{number}", number + 1
+    used.add(name)
+    return name

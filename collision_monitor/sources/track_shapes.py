@@ -1,0 +1,42 @@
+"""Shapes of tracks that change a little with every message, described so that each message need not describe anew."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Measured = tuple[int, NDArray[np.float64]]
+"""A kind, and full extents (3,) or corners (n, 3) in m."""
+
+
+def rounded_up(measured: Measured, tolerance: float) -> Measured:
+    """Return the shape to describe: extents rounded up to a multiple of the tolerance; corners as they are."""
+    kind, numbers = measured
+    if numbers.ndim == 2 or tolerance == 0.0 or not (np.isfinite(numbers).all() and (numbers > 0.0).all()):
+        return measured
+    return kind, np.ceil(numbers / tolerance - 1e-6) * tolerance
+
+
+def held_by(described: Measured, measured: Measured, tolerance: float) -> bool:
+    """Whether a described shape still holds the measured one, and exceeds it by at most twice the tolerance."""
+    kind, numbers = measured
+    if kind != described[0] or numbers.shape != described[1].shape:
+        return False
+    if numbers.ndim == 2:
+        return bool((np.abs(numbers - described[1]) <= tolerance).all())
+    spare = described[1] - numbers
+    return bool((spare >= -1e-6 * tolerance).all() and (spare <= 2.0 * tolerance).all())
+
+
+def still_held(
+    described: Sequence[Measured | None], kinds: NDArray[np.uint8], sizes: NDArray[np.float64], tolerance: float
+) -> NDArray[np.bool_]:
+    """Return `held_by` for kinds (N,) and extents (N, 3) at once; False where there is no description, or corners."""
+    none = np.full(3, np.nan)
+    comparable = [it[1] if it is not None and it[1].ndim == 1 and it[0] == k else none for it, k in
+                  zip(described, kinds.tolist(), strict=True)]  # fmt: skip
+    spare = np.array(comparable).reshape(-1, 3) - sizes
+    with np.errstate(invalid="ignore"):
+        return np.asarray(((spare >= -1e-6 * tolerance) & (spare <= 2.0 * tolerance)).all(1))

@@ -1,0 +1,63 @@
+"""A feed with decoded inputs, for tests of sources without a bag."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from foreign_bag import STORE
+from foreign_messages import decoder
+
+from collision_monitor.codec import Change, ObjectStateArray, decode_descriptions, decode_states
+from collision_monitor.pipeline.topics import Topic
+from collision_monitor.sources import Feed, Input, RawMessage
+from collision_monitor.sources.mapping import make_mapping
+
+
+class Fed:
+    """Feeds messages (topic, received, (type, message)). steps: the state arrays; changes: the descriptions."""
+
+    def __init__(self, objects: dict[str, Any], **top: Any) -> None:
+        self.feed = Feed(make_mapping({"frame": "map", "objects": objects, **top}), decoder())
+        self.steps: list[ObjectStateArray] = []
+        self.changes: list[Change] = []
+        self._bound: set[str] = set()
+        self._keep(self.feed.begin(0))
+
+    def give(self, topic: str, received: int, message: tuple[str, Any]) -> None:
+        kind, content = message
+        if topic not in self._bound and topic in self.feed.mapping.topics:
+            self._bound.add(topic)
+            self.feed.bind(topic, kind)
+        data = content if isinstance(content, bytes) else bytes(STORE.serialize_cdr(content, kind))
+        self._keep(self.feed.take(RawMessage(topic, kind, data, received)))
+
+    def give_all(self, messages: Iterable[tuple[str, int, tuple[str, Any]]]) -> None:
+        for message in messages:
+            self.give(*message)
+
+    def _keep(self, inputs: list[Input]) -> None:
+        for each in inputs:
+            if each.topic is Topic.STATES:
+                self.steps.append(decode_states(each.data))
+            else:
+                message = decode_descriptions(each.data)
+                assert not message.refused
+                self.changes += message.objects
+
+    @property
+    def rows(self) -> Any:
+        return np.concatenate([step.states for step in self.steps])
+
+    @property
+    def covariances(self) -> Any:
+        return np.concatenate([step.covariance.reshape(-1, 12) for step in self.steps])
+
+    @property
+    def refused(self) -> dict[str, int]:
+        return dict(self.feed.scene.refused)
+
+    @property
+    def names(self) -> list[str]:
+        return [getattr(change, "name", f"-{change.object_id}") for change in self.changes]

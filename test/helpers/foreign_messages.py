@@ -1,0 +1,121 @@
+"""Messages of the packages in `interfaces/`, and scans, made with rosbags by the definitions there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from foreign_bag import STORE, T, header, pose, vector
+from rosbags.typesys import get_types_from_msg
+
+from collision_monitor.sources import Decoder
+
+INTERFACES = Path(__file__).parents[2] / "interfaces"
+DEFINITIONS: dict[str, Any] = {}
+for _path in sorted(INTERFACES.glob("*/msg/*.msg")):
+    DEFINITIONS |= get_types_from_msg(_path.read_text(), f"{_path.parts[-3]}/msg/{_path.stem}")
+STORE.register({name: fields for name, fields in DEFINITIONS.items() if name not in STORE.fielddefs})
+
+AUTOWARE = "autoware_perception_msgs/msg/"
+BOX, CYLINDER, POLYGON = 0, 1, 2
+
+
+@cache
+def decoder() -> Decoder:
+    return Decoder(DEFINITIONS)
+
+
+def uuid(number: int) -> Any:
+    return T["unique_identifier_msgs/msg/UUID"](np.frombuffer(number.to_bytes(16, "big"), np.uint8))
+
+
+def polygon(points: Iterable[Iterable[float]]) -> Any:
+    return T["geometry_msgs/msg/Polygon"]([T["geometry_msgs/msg/Point32"](*map(float, p)) for p in points])
+
+
+def track(
+    number: int,
+    p: Any,
+    q: Any = (0, 0, 0, 1),
+    linear: Any = (0, 0, 0),
+    angular: Any = (0, 0, 0),
+    *,
+    kind: int = BOX,
+    size: Any = (4, 2, 1.5),
+    footprint: Any = (),
+    label: int = 1,
+    existence: float = 0.9,
+    pose_covariance: Any = None,
+    twist_covariance: Any = None,
+    orientation: int = 2,
+    stationary: bool = False,
+    acceleration: Any = (0, 0, 0),
+    predicted: bool = False,
+) -> Any:
+    none = np.zeros(36)
+    given = [none if c is None else np.asarray(c, np.float64).ravel() for c in (pose_covariance, twist_covariance)]
+    twist = T["geometry_msgs/msg/Twist"](vector(linear), vector(angular))
+    accel = T["geometry_msgs/msg/Accel"](vector(acceleration), vector((0, 0, 0)))
+    parts = (
+        T["geometry_msgs/msg/PoseWithCovariance"](pose(p, q), given[0]),
+        T["geometry_msgs/msg/TwistWithCovariance"](twist, given[1]),
+        T["geometry_msgs/msg/AccelWithCovariance"](accel, none),
+    )
+    shape = T[AUTOWARE + "Shape"](kind, polygon(footprint), vector(size))
+    classes = [T[AUTOWARE + "ObjectClassification"](label, 0.8)]
+    if predicted:
+        kinematics = T[AUTOWARE + "PredictedObjectKinematics"](*parts, [])
+        return T[AUTOWARE + "PredictedObject"](uuid(number), existence, classes, kinematics, shape)
+    kinematics = T[AUTOWARE + "TrackedObjectKinematics"](*parts, orientation, stationary)
+    return T[AUTOWARE + "TrackedObject"](uuid(number), existence, classes, kinematics, shape)
+
+
+def tracked_objects(frame: str, stamp: int, *objects: Any) -> tuple[str, Any]:
+    name = AUTOWARE + "TrackedObjects"
+    return name, T[name](header(frame, stamp), list(objects))
+
+
+def predicted_objects(frame: str, stamp: int, *objects: Any) -> tuple[str, Any]:
+    name = AUTOWARE + "PredictedObjects"
+    return name, T[name](header(frame, stamp), list(objects))
+
+
+def detection(p: Any, size: Any = (1, 1, 1), *, name: str = "", label: str = "person", variance: float = 0.0) -> Any:
+    hypothesis = T["vision_msgs/msg/ObjectHypothesis"](label, 0.9)
+    covariance = np.diag([variance] * 6).ravel()
+    where = T["geometry_msgs/msg/PoseWithCovariance"](pose(p), covariance)
+    box = T["vision_msgs/msg/BoundingBox3D"](pose(p), vector(size))
+    result = T["vision_msgs/msg/ObjectHypothesisWithPose"](hypothesis, where)
+    return T["vision_msgs/msg/Detection3D"](header("", 0), [result], box, name)
+
+
+def detections(frame: str, stamp: int, *each: Any) -> tuple[str, Any]:
+    name = "vision_msgs/msg/Detection3DArray"
+    return name, T[name](header(frame, stamp), list(each))
+
+
+def footprint(frame: str, stamp: int, points: Any) -> tuple[str, Any]:
+    name = "geometry_msgs/msg/PolygonStamped"
+    return name, T[name](header(frame, stamp), polygon((*p, 0.0) for p in points))
+
+
+def laser_scan(frame: str, stamp: int, ranges: Any, *, start: float = -1.0, step: float = 0.5) -> tuple[str, Any]:
+    name = "sensor_msgs/msg/LaserScan"
+    beams = np.asarray(ranges, np.float32)
+    return name, T[name](header(frame, stamp), start, 0.0, step, 0.0, 0.1, 0.1, 10.0, beams, np.zeros(0, np.float32))
+
+
+def point_cloud(frame: str, stamp: int, points: Any, *, gap: int = 4) -> tuple[str, Any]:
+    """A cloud of float32 x, y, z with `gap` bytes behind each point."""
+    name, field = "sensor_msgs/msg/PointCloud2", T["sensor_msgs/msg/PointField"]
+    rows = np.zeros(len(points), np.dtype({"names": list("xyz"), "formats": ["<f4"] * 3, "offsets": [0, 4, 8], "itemsize": 12 + gap}))  # fmt: skip  # noqa: E501
+    for axis, values in zip("xyz", np.asarray(points, np.float64).reshape(-1, 3).T, strict=True):
+        rows[axis] = values
+    fields = [field(axis, 4 * k, 7, 1) for k, axis in enumerate("xyz")]
+    data = rows.view(np.uint8).reshape(-1)
+    return name, T[name](
+        header(frame, stamp), 1, len(points), fields, False, 12 + gap, (12 + gap) * len(points), data, False
+    )

@@ -1,0 +1,55 @@
+"""Mass properties against meshes of the shapes in trimesh, and against the parallel axis theorem."""
+
+import numpy as np
+import pytest
+import trimesh
+
+import collision_monitor as cm
+from collision_monitor.response import mass_properties
+
+SHAPES = {
+    "sphere": (cm.Sphere(0.3), lambda: trimesh.creation.icosphere(5, 0.3)),
+    "box": (cm.Box((1, 2, 3)), lambda: trimesh.creation.box((1, 2, 3))),
+    "cylinder": (cm.Cylinder(0.3, 1.2), lambda: trimesh.creation.cylinder(0.3, 1.2, sections=400)),
+    "capsule": (cm.Capsule(0.3, 1.2), lambda: trimesh.creation.capsule(1.2, 0.3, count=[400, 400])),
+    "cone": (cm.Cone(0.3, 1.2), lambda: trimesh.creation.cone(0.3, 1.2, sections=400)),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_closed_forms_agree_with_fine_meshes(name):
+    shape, make = SHAPES[name]
+    mesh = make()
+    mesh.density = 700.0
+    if name == "cone":
+        mesh.apply_translation((0, 0, -0.6))
+    found = mass_properties(shape, 700.0)
+    assert found.mass == pytest.approx(mesh.mass, rel=2e-3)
+    assert found.centre == pytest.approx(mesh.center_mass, abs=2e-3)
+    assert found.inertia == pytest.approx(mesh.moment_inertia, rel=4e-3, abs=1e-3 * np.trace(found.inertia))
+
+
+def test_polyhedra_agree_with_trimesh_far_from_the_origin():
+    rng = np.random.default_rng(1)
+    for offset in (0.0, 1e4):
+        points = rng.normal(size=(40, 3)) + offset
+        hull = trimesh.convex.convex_hull(points)
+        for shape in (cm.ConvexHull(points), cm.Mesh(hull.vertices, hull.faces)):
+            found = mass_properties(shape, 2.0)
+            near = trimesh.Trimesh(hull.vertices - offset, hull.faces)
+            near.density = 2.0
+            assert found.mass == pytest.approx(near.mass, rel=1e-9)
+            assert found.centre == pytest.approx(near.center_mass + offset, rel=1e-9)
+            assert found.inertia == pytest.approx(near.moment_inertia, rel=1e-7, abs=1e-7 * np.trace(found.inertia))
+
+
+@pytest.mark.parametrize("density", [0.0, -1.0, np.nan, np.inf])
+def test_impossible_densities_are_refused(density):
+    with pytest.raises(cm.InputError, match="density"):
+        mass_properties(cm.Sphere(1), density)
+
+
+@pytest.mark.parametrize("shape", [cm.HalfSpace((0, 0, 1)), cm.Circle(1), cm.Box((1, 1, 0))])
+def test_shapes_without_a_volume_are_refused_with_the_list(shape):
+    with pytest.raises(cm.UnsupportedError, match="supported are Sphere"):
+        mass_properties(shape)
