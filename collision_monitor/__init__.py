@@ -3,6 +3,7 @@
     monitor.monitor                Monitor, StepResult, StepStatus        states in, contacts and predictions out
     settings.profile               Profile                                the settings that trade speed for accuracy
     geometry.shapes, .pose         Sphere, Box, …, Pose, Motion           shapes of objects, and their poses
+    geometry.mesh_file             load_mesh                              a mesh from a file
     objects.description            ObjectDescription                      an object with its shapes, group and bounds
     objects.convex_decomposition   convex_decomposition, Decomposition    a concave mesh as convex parts, with an error
     query.contact                  contact, Contact                       two shapes: distance, normal, points, bound
@@ -43,11 +44,13 @@ _HOME = {
     "Capsule": "geometry.shapes",
     "Cylinder": "geometry.shapes",
     "Cone": "geometry.shapes",
+    "Ellipsoid": "geometry.shapes",
     "ConvexHull": "geometry.shapes",
     "Mesh": "geometry.shapes",
     "HalfSpace": "geometry.shapes",
     "Circle": "geometry.shapes",
     "Polygon": "geometry.shapes",
+    "load_mesh": "geometry.mesh_file",
     "contact": "query.contact",
     "Contact": "query.contact",
     "contact_features": "query.features",
@@ -96,6 +99,7 @@ if TYPE_CHECKING:
     from collision_monitor.errors import SessionError as SessionError
     from collision_monitor.errors import ShapeError as ShapeError
     from collision_monitor.errors import UnsupportedError as UnsupportedError
+    from collision_monitor.geometry.mesh_file import load_mesh as load_mesh
     from collision_monitor.geometry.pose import Motion as Motion
     from collision_monitor.geometry.pose import Pose as Pose
     from collision_monitor.geometry.shapes import Box as Box
@@ -104,6 +108,7 @@ if TYPE_CHECKING:
     from collision_monitor.geometry.shapes import Cone as Cone
     from collision_monitor.geometry.shapes import ConvexHull as ConvexHull
     from collision_monitor.geometry.shapes import Cylinder as Cylinder
+    from collision_monitor.geometry.shapes import Ellipsoid as Ellipsoid
     from collision_monitor.geometry.shapes import HalfSpace as HalfSpace
     from collision_monitor.geometry.shapes import Mesh as Mesh
     from collision_monitor.geometry.shapes import Polygon as Polygon

@@ -159,6 +159,7 @@ class ShapeType(IntEnum):
     HALF_SPACE = 8
     CIRCLE = 9
     POLYGON = 10
+    ELLIPSOID = 11
 
 
 Rows = NDArray[np.void]

@@ -16,6 +16,7 @@ from collision_monitor.geometry.shapes import (
     Cone,
     ConvexHull,
     Cylinder,
+    Ellipsoid,
     HalfSpace,
     Mesh,
     Polygon,
@@ -45,6 +46,7 @@ _DIMENSIONS: dict[int, tuple[type[Shape], str]] = {
     ShapeType.CAPSULE: (Capsule, "radius, length"),
     ShapeType.CYLINDER: (Cylinder, "radius, length"),
     ShapeType.CONE: (Cone, "radius, length"),
+    ShapeType.ELLIPSOID: (Ellipsoid, "rx, ry, rz"),
     ShapeType.HALF_SPACE: (HalfSpace, "nx, ny, nz, offset"),
     ShapeType.CIRCLE: (Circle, "radius"),
 }
@@ -57,21 +59,23 @@ def make_shape(kind: int, dimensions: Floats, vertices: Floats, triangles: Ids) 
         expected = names.count(",") + 1
         if len(dimensions) != expected:
             raise ShapeError(f"{make.__name__}: expected {expected} dimensions ({names}), got {len(dimensions)}")
-        if make is Box:
-            return Box(dimensions)
+        if make in (Box, Ellipsoid):
+            return make(dimensions.tolist())
         if make is HalfSpace:
             return HalfSpace(dimensions[:3], dimensions[3])
         return make(*dimensions.tolist())
     if kind == ShapeType.CONVEX_HULL:
         return ConvexHull(vertices)
     if kind == ShapeType.POLYGON:
-        return Polygon(vertices[:, :2])
+        if len(dimensions) > 1:
+            raise ShapeError(f"Polygon: expected no dimensions, or 1 (radius), got {len(dimensions)}")
+        return Polygon(vertices[:, :2], *dimensions.tolist())
     if kind == ShapeType.MESH:
         if len(triangles) % 3:
             raise ShapeError(f"Mesh triangles: expected three indices for each face, got {len(triangles)} indices")
         return Mesh(vertices, triangles.astype(np.int64).reshape(-1, 3))
     raise ShapeError(
-        f"shape type: expected {min(ShapeType)} to {max(ShapeType)} (Shape.SPHERE to Shape.POLYGON), got {kind}"
+        f"shape type: expected {min(ShapeType)} to {max(ShapeType)} (Shape.SPHERE to Shape.ELLIPSOID), got {kind}"
     )
 
 
@@ -100,6 +104,8 @@ def _shape_fields(shape: Shape) -> tuple[ShapeType, tuple[float, ...], Floats, N
             return ShapeType.CYLINDER, (radius, length), no_vertices, no_triangles
         case Cone(radius, length):
             return ShapeType.CONE, (radius, length), no_vertices, no_triangles
+        case Ellipsoid(radii):
+            return ShapeType.ELLIPSOID, tuple(radii), no_vertices, no_triangles
         case HalfSpace(normal, offset):
             return ShapeType.HALF_SPACE, (*normal, offset), no_vertices, no_triangles
         case Circle(radius):
@@ -108,8 +114,9 @@ def _shape_fields(shape: Shape) -> tuple[ShapeType, tuple[float, ...], Floats, N
             return ShapeType.CONVEX_HULL, (), points, no_triangles
         case Mesh(vertices, faces):
             return ShapeType.MESH, (), vertices, faces
-        case Polygon(points):
-            return ShapeType.POLYGON, (), np.column_stack([points, np.zeros(len(points))]), no_triangles
+        case Polygon(points, radius):
+            level = np.column_stack([points, np.zeros(len(points))])
+            return ShapeType.POLYGON, (radius,) if radius else (), level, no_triangles
     raise MessageError(
         f"Shape: expected one of the shapes of collision_monitor.geometry.shapes, got {type(shape).__name__}"
     )

@@ -19,11 +19,12 @@ from collision_monitor.tolerances import FEATURE_TIE
 
 
 class FeatureType(IntEnum):
-    """Type of a polyhedron's feature; the values of Contact.msg."""
+    """Type of a solid's feature; the values of Contact.msg. SURFACE: a curved surface."""
 
     VERTEX = 1
     EDGE = 2
     FACE = 3
+    SURFACE = 4
 
 
 class FeaturePair(Enum):
@@ -38,13 +39,18 @@ class FeaturePair(Enum):
 
 
 class Feature(NamedTuple):
-    """type; vertices: index of the vertex, the edge's two or the face's three; face: index of the face, or -1."""
+    """type; vertices: index of the vertex, the edge's two or the face's three; face: index of the face, or -1.
+
+    The rim of a cylinder or a cone is an edge with one number in place of two vertices; their faces have no vertices.
+    """
 
     type: FeatureType
     vertices: tuple[int, ...]
     face: int
 
     def __str__(self) -> str:
+        if self.type is FeatureType.SURFACE:
+            return "surface"
         number = self.face if self.type is FeatureType.FACE else "-".join(map(str, self.vertices))
         return f"{self.type.name.lower()} {number}"
 
@@ -56,8 +62,10 @@ class FeatureContact(NamedTuple):
     b: Feature
 
     @property
-    def pair(self) -> FeaturePair:
-        """The pair of feature types."""
+    def pair(self) -> FeaturePair | None:
+        """The pair of feature types; None if one is a curved surface."""
+        if FeatureType.SURFACE in (self.a.type, self.b.type):
+            return None
         return FeaturePair["".join(t.name[0] for t in sorted((self.a.type, self.b.type)))]
 
     def __str__(self) -> str:

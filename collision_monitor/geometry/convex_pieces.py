@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from collision_monitor.geometry.bounded_cache import bounded_cache
 from collision_monitor.geometry.polygons import is_convex
-from collision_monitor.geometry.polyhedra import is_closed
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.qhull import HEIGHTS_AT_ONCE
 from collision_monitor.geometry.shapes import ConvexHull, Mesh, Polygon, Shape, Triangle, array_bytes
@@ -33,14 +32,14 @@ def convex_pieces(shape: Shape) -> tuple[tuple[Shape, Pose], ...]:
     """Return the convex pieces of a shape, each with its pose in the shape's frame.
 
     A concave polygon gives convex parts, a closed convex mesh its hull, any other mesh its triangles. Triangles are
-    only the surface, so the inside of a closed mesh needs a separate test (`is_closed`). Shapes are immutable, so the
+    only the surface, so the inside of a closed mesh needs a separate test (`inside.py`). Shapes are immutable, so the
     result is cached. Raises ShapeError.
     """
     match shape:
-        case Polygon() if not is_convex(shape.points):
-            return tuple((Polygon(shape.points[part]), Pose()) for part in convex_parts(shape.points))
+        case Polygon() if len(shape.points) > 2 and not is_convex(shape.points):
+            return tuple((Polygon(shape.points[part], shape.radius), Pose()) for part in convex_parts(shape.points))
         case Mesh() if is_convex_mesh(shape):
-            return ((ConvexHull(shape.vertices[np.unique(shape.faces)]), Pose()),)
+            return ((ConvexHull(shape.vertices[np.unique(shape.surface.faces)]), Pose()),)
         case Mesh():
             corners: NDArray[np.float64] = shape.vertices[shape.faces]
             # a triangle about its own centre has a small bounding sphere and loses no digits
@@ -61,16 +60,17 @@ def _own_memory(_: bool, mesh: Mesh) -> int:
 @bounded_cache(REMEMBERED_PIECES, _own_memory)
 def is_convex_mesh(mesh: Mesh) -> bool:
     """Whether a mesh bounds a solid and no vertex is outside the plane of any face, up to round-off."""
-    if not is_closed(mesh.faces):
+    if not (mesh.surface.closed and len(mesh.surface.faces)):
         return False
-    a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
+    faces = mesh.surface.faces
+    a, b, c = np.moveaxis(mesh.vertices[faces], 1, 0)
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=1)
     size = float(np.ptp(mesh.vertices, axis=0).max())
     if not (length > 0.0).all():
         return False
     normal /= length[:, None]
-    used = mesh.vertices[np.unique(mesh.faces)]
+    used = mesh.vertices[np.unique(faces)]
     offset = np.einsum("ij,ij->i", a, normal)
     flat = HULL_DROP * 16 * size
     # all faces must point outward, or all inward, and the mesh must not be a sheet folded onto itself

@@ -70,31 +70,52 @@ def locate_in_polyhedron(points: ArrayLike, vertices: ArrayLike, faces: ArrayLik
     """
     points = coordinates(points, "points", 3)
     vertices, faces = closed_mesh(vertices, faces)
+    p = points.reshape(-1, 3)
+    found = ray_crossings(p, vertices, faces)
+    odd = np.bincount(found.point, minlength=len(p)) % 2 == 1
+    location = np.where(found.on_face, Location.BOUNDARY, np.where(odd, Location.INSIDE, Location.OUTSIDE))
+    return location.reshape(points.shape[:-1]).astype(np.int8)
+
+
+class Crossings(NamedTuple):
+    """Faces that rays towards +z meet: indices point (k,) and face (k,), and turn (k,), 1 if the face looks up.
+
+    on_face (n,): whether each point lies on a face, exactly.
+    """
+
+    point: Indices
+    face: Indices
+    turn: Array
+    on_face: Booleans
+
+
+def ray_crossings(points: Array, vertices: Array, faces: Indices) -> Crossings:
+    """Faces (m, 3) that the rays from the points (n, 3) towards +z meet, as in `locate_in_polyhedron`."""
     a, b, c = (vertices[corner] for corner in faces.T)
     low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-    p = points.reshape(-1, 3)
-    on_face, odd = np.zeros(len(p), bool), np.zeros(len(p), bool)
-    order = np.argsort(p[:, 0])
+    on_face = np.zeros(len(points), bool)
+    order = np.argsort(points[:, 0])
+    nothing = np.zeros(0, np.int64)
+    met: list[tuple[Indices, Indices, Array]] = [(nothing, nothing, np.zeros(0))]
     least, most = POINTS_AT_ONCE
     at_once = min(max(TESTS_AT_ONCE // len(faces), least), most)
-    for first in range(0, len(p), at_once):  # points in order of x, so that few faces are near each batch
+    for first in range(0, len(points), at_once):  # points in order of x, so that few faces are near each batch
         some = order[first : first + at_once]
-        near = np.flatnonzero((low[:, 0] <= p[some[-1], 0]) & (p[some[0], 0] <= high[:, 0]))
-        beside = (low[near, :2] <= p[some, None, :2]) & (p[some, None, :2] <= high[near, :2])
-        below = p[some, None, 2] <= high[near, 2]
+        near = np.flatnonzero((low[:, 0] <= points[some[-1], 0]) & (points[some[0], 0] <= high[:, 0]))
+        beside = (low[near, :2] <= points[some, None, :2]) & (points[some, None, :2] <= high[near, :2])
+        below = points[some, None, 2] <= high[near, 2]
         i, j = np.nonzero(beside.all(axis=-1) & below)
-        j = near[j]
-        q, corners = p[some][i], (a[j], b[j], c[j])
+        i, j = some[i], near[j]
+        q, corners = points[i], (a[j], b[j], c[j])
         height = np.asarray(orient3d(*corners, q))
         in_plane = height == 0.0
-        touching = np.zeros(len(i), bool)
-        touching[in_plane] = _in_flat_triangle(q[in_plane], *(corner[in_plane] for corner in corners))
+        on_face[i[in_plane][_in_flat_triangle(q[in_plane], *(corner[in_plane] for corner in corners))]] = True
         turn = _perturbed_turn(q, *corners)
-        on_face[some] = np.bincount(i, touching, len(p[some])) > 0
         # the ray meets the face if its point is behind a face that looks up, or in front of one that looks down
-        odd[some] = np.bincount(i, turn * height < 0.0, len(p[some])) % 2 == 1
-    location = np.where(on_face, Location.BOUNDARY, np.where(odd, Location.INSIDE, Location.OUTSIDE))
-    return location.reshape(points.shape[:-1]).astype(np.int8)
+        through = turn * height < 0.0
+        met.append((i[through], j[through], turn[through]))
+    point, face, turn = (np.concatenate(column) for column in zip(*met, strict=True))
+    return Crossings(point, face, turn, on_face)
 
 
 class EdgeFace(NamedTuple):

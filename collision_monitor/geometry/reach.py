@@ -16,6 +16,7 @@ from collision_monitor.geometry.shapes import (
     Cone,
     ConvexHull,
     Cylinder,
+    Ellipsoid,
     HalfSpace,
     Mesh,
     Polygon,
@@ -50,6 +51,8 @@ def _reach(shape: Shape, d: Array) -> Array:
         case Cone():
             height = d[..., 2] * shape.length / 2
             return np.asarray(np.maximum(height, shape.radius * rim - height))
+        case Ellipsoid():
+            return np.asarray(np.linalg.norm(d * shape.radii, axis=-1))
         case ConvexHull() | Triangle():
             return np.asarray((d @ shape.points.T).max(axis=-1))
         case Mesh():
@@ -59,5 +62,5 @@ def _reach(shape: Shape, d: Array) -> Array:
         case Circle():
             return np.asarray(shape.radius * rim)
         case Polygon():
-            return np.asarray((d[..., :2] @ shape.points.T).max(axis=-1))
+            return np.asarray((d[..., :2] @ shape.points.T).max(axis=-1) + shape.radius * rim)
     raise UnsupportedError(f"{type(shape).__name__} has no support function")

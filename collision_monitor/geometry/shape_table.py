@@ -33,13 +33,14 @@ CONVEX_HULL: Final = int(ShapeType.CONVEX_HULL)
 HALF_SPACE: Final = int(ShapeType.HALF_SPACE)
 CIRCLE: Final = int(ShapeType.CIRCLE)
 POLYGON: Final = int(ShapeType.POLYGON)
+ELLIPSOID: Final = int(ShapeType.ELLIPSOID)
 MESH: Final = int(ShapeType.MESH)
 
 TREE: Final = 3
 """Column of `size` with the first block of the shape's tree plus 1, or 0; a half-space has its offset there."""
 
 SUPPORTED_SHAPES: Final = (
-    "Sphere, Box, Capsule, Cylinder, Cone, ConvexHull, HalfSpace; Circle, Polygon (convex) in the plane"
+    "Sphere, Box, Capsule, Cylinder, Cone, Ellipsoid, ConvexHull, HalfSpace; Circle, Polygon (convex) in the plane"
 )
 
 SHARED: Final = ("vertices", "vertex_index", "blocks")
@@ -53,7 +54,8 @@ class ShapeTable(NamedTuple):
     """K slots of shapes, and the hull vertices (m). A slot with kind 0 is free. Kernels take this as one argument.
 
     size holds, by kind: sphere r | box half extents x, y, z | capsule r, half core length | cylinder r, half height |
-    cone r, half height | half-space normal x, y, z, offset | hull nothing | circle r | polygon number of corners.
+    cone r, half height | half-space normal x, y, z, offset | hull nothing | circle r | polygon number of corners |
+    ellipsoid half axes x, y, z. The radius of a polygon is part of its margin.
     The last number of any other kind is its tree (TREE); a mesh always has one, and nothing else.
     Hull vertices come in blocks padded to a multiple of LANES with the last vertex, so that the support scan has no
     tail.
@@ -129,6 +131,8 @@ def triangle_table(corners: Array) -> ShapeTable:
 
 def convex_ring(points: Array) -> NDArray[np.int32]:
     """Corner indices (n,) of a polygon (m, 2), counter-clockwise. Raises ShapeError if it is not convex."""
+    if len(points) == 2:
+        return np.arange(2, dtype=np.int32)
     if not is_convex(points):
         raise ShapeError("Polygon points: expected a convex polygon, got a concave one; see triangulation.convex_parts")
     ring = corners(points)
@@ -218,6 +222,10 @@ class ShapeTableBuilder:
             case shapes.Cone():
                 kind, size = CONE, (shape.radius, shape.length / 2)
                 radius = float(np.hypot(*size))
+            case shapes.Ellipsoid() if len(set(shape.radii)) == 1:
+                kind, size, radius = SPHERE, shape.radii[:1], shape.radii[0]  # which has closed forms
+            case shapes.Ellipsoid():
+                kind, size, radius = ELLIPSOID, shape.radii, max(shape.radii)
             case shapes.HalfSpace():
                 kind, size, radius = HALF_SPACE, (*shape.normal, shape.offset), inf
             case shapes.ConvexHull() | shapes.Triangle():
@@ -231,6 +239,7 @@ class ShapeTableBuilder:
                 ring = convex_ring(shape.points)
                 kind, size, radius = POLYGON, (len(ring),), float(np.linalg.norm(shape.points, axis=1).max())
                 start, count = self._share(np.pad(shape.points, ((0, 0), (0, 1))), ring)
+                margin += shape.radius
             case shapes.Mesh() if tree is not None:
                 kind, size, radius = MESH, (), float(tree[REACH])
             case _:
@@ -366,6 +375,10 @@ def bounds(table: Any, slot: int, R: Any, out: Any) -> None:
             rim = s0 * sqrt(x * x + y * y)
             upper = max(z * s1, rim - z * s1)
             lower = min(z * s1, -rim - z * s1)
+        elif kind == ELLIPSOID:
+            s2 = table.size[slot, 2]
+            upper = sqrt(x * x * s0 * s0 + y * y * s1 * s1 + z * z * s2 * s2)
+            lower = -upper
         elif kind == CIRCLE:
             upper = s0 * sqrt(x * x + y * y)
             lower = -upper

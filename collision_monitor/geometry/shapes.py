@@ -6,6 +6,7 @@ Every constructor raises ShapeError for impossible values.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import ShapeError
+from collision_monitor.geometry.surface import Surface
 from collision_monitor.tolerances import LARGEST_INPUT
 
 Array = NDArray[np.float64]
@@ -138,6 +140,22 @@ class Cone(Shape):
         object.__setattr__(self, "length", _positive(self.length, "Cone length"))
 
 
+@dataclass(frozen=True)
+class Ellipsoid(Shape):
+    """Ellipsoid; radii: half axes along x, y, z in m."""
+
+    radii: Any
+
+    def __post_init__(self) -> None:
+        try:
+            radii = tuple(self.radii)
+        except TypeError:
+            raise ShapeError(f"Ellipsoid radii: expected 3 half axes in metres, got {self.radii!r}") from None
+        if len(radii) != 3:
+            raise ShapeError(f"Ellipsoid radii: expected 3 half axes in metres, got {self.radii!r}")
+        object.__setattr__(self, "radii", tuple(_positive(radius, "Ellipsoid radii") for radius in radii))
+
+
 @dataclass(frozen=True, eq=False)
 class ConvexHull(Shape):
     """Convex hull of points (n, 3) in m, n >= 4 and not all in one plane; interior points are allowed.
@@ -157,11 +175,12 @@ class ConvexHull(Shape):
         object.__setattr__(self, "points", points)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Mesh(Shape):
     """Triangle surface, convex or not: vertices (n, 3) in m, faces (m, 3) of vertex indices.
 
-    Faces are counter-clockwise seen from outside.
+    Faces are counter-clockwise seen from outside. Vertices with equal coordinates are one point. Where the surface is
+    not closed, the bounds of answers include what its unknown inside may change (see `surface`).
 
     >>> Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]).faces.shape
     (1, 3)
@@ -187,6 +206,15 @@ class Mesh(Shape):
         faces.setflags(write=False)
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces)
+
+    @cached_property
+    def surface(self) -> Surface:
+        """Welded faces, and whether they close and are oriented. Computed on first access, 2 s for 10^6 faces."""
+        return Surface(self.vertices, self.faces)
+
+    def __repr__(self) -> str:
+        welded = f", {self.surface.welded} of them welded" if self.surface.welded else ""
+        return f"Mesh({len(self.vertices)} vertices{welded}, {len(self.faces)} faces: {self.surface})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,12 +277,19 @@ class Circle(Shape):
 class Polygon(Shape):
     """Polygon in the x-y plane: points (n, 2) in m around the boundary of a simple polygon, convex or concave.
 
+    radius: the polygon is grown by this length (m), which rounds its corners. With a radius, two points make a capsule.
+
     >>> Polygon([(0, 0), (1, 0), (0, 1)]).points.shape
     (3, 2)
     """
 
     points: Any
+    radius: float = 0.0
 
     def __post_init__(self) -> None:
-        points = _points(self.points, "Polygon points", 2, 3)
+        radius = self.radius if self.radius == 0.0 else _positive(self.radius, "Polygon radius")
+        points = _points(self.points, "Polygon points", 2, 2 if radius else 3)
+        if len(points) == 2 and (points[0] == points[1]).all():
+            raise ShapeError("Polygon points: expected two different points, got the same twice (use a Circle)")
         object.__setattr__(self, "points", points)
+        object.__setattr__(self, "radius", float(radius))

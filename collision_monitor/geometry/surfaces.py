@@ -13,6 +13,7 @@ from collision_monitor.geometry.shapes import (
     Cone,
     ConvexHull,
     Cylinder,
+    Ellipsoid,
     HalfSpace,
     Mesh,
     Polygon,
@@ -50,6 +51,9 @@ def surface_triangles(shape: Shape) -> Triangles:
         case Cone():
             h = shape.length / 2
             return _revolve(np.array([0.0, shape.radius, 0.0]), np.array([-h, -h, h]))
+        case Ellipsoid():
+            angles = np.linspace(-np.pi / 2, np.pi / 2, SIDES // 2 + 1)
+            return np.asarray(_revolve(np.cos(angles), np.sin(angles)) * shape.radii)
         case Circle():
             return _revolve(np.array([0.0, shape.radius]), np.zeros(2))
         case Mesh():
@@ -58,7 +62,10 @@ def surface_triangles(shape: Shape) -> Triangles:
         case ConvexHull():
             return _hull(np.asarray(shape.points))
         case Polygon():
-            return _outline(np.asarray(shape.points))
+            turn = np.linspace(0.0, 2 * np.pi, SIDES, endpoint=False)
+            corner = shape.radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+            rounded = shape.points if shape.radius else shape.points[:0]
+            return np.concatenate([_outline(ring) for ring in (shape.points, *(at + corner for at in rounded))])
         case HalfSpace():
             return _plane(np.asarray(shape.normal), shape.offset)
     raise TypeError(f"no surface for {type(shape).__name__}")

@@ -1,4 +1,4 @@
-"""Whether a point is inside a closed surface: by the parity of a ray, through the tree of its triangles."""
+"""Whether a point is inside a closed, oriented surface: by its winding number, from a ray through the tree."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus
 from collision_monitor.tolerances import EPSILON
 
 OUTSIDE, UNKNOWN, INSIDE = 0, 1, 2
+
+UNDECIDED: Final = 1 << 62
+"""Not a winding number."""
 
 DIRECTIONS: Final = (
     (0.5377, 0.2871, 0.7928), (-0.3138, 0.9102, 0.2702), (0.8791, -0.4418, 0.1789), (0.1, -0.61, -0.7861)
@@ -31,9 +34,9 @@ def locate(blocks: Any, root: int, x: Vector, work: Any) -> int:
     if abs(y[0]) > e[0] or abs(y[1]) > e[1] or abs(y[2]) > e[2]:
         return OUTSIDE
     for d in DIRECTIONS:
-        crossed = _crossed(blocks, root, x, d, work)
-        if crossed >= 0:
-            return INSIDE if crossed % 2 else OUTSIDE
+        winding = _winding(blocks, root, x, d, work)
+        if winding != UNDECIDED:
+            return INSIDE if winding != 0 else OUTSIDE
     return UNKNOWN
 
 
@@ -79,8 +82,11 @@ def _ray_meets(blocks: Any, block: int, k: int, x: Vector, d: Vector) -> bool:
 
 
 @device
-def _crossed(blocks: Any, root: int, x: Vector, d: Vector, work: Any) -> int:
-    """Number of triangles that the ray from x along d crosses; -1 if round-off leaves it open."""
+def _winding(blocks: Any, root: int, x: Vector, d: Vector, work: Any) -> int:
+    """Crossings of the ray from x along d out of the surface less those into it; UNDECIDED if round-off leaves it open.
+
+    It counts the solids that contain the point, so that their common part is inside too, and a cavity outside.
+    """
     work[0] = WIDTH * root
     waiting, count = 1, 0
     while waiting > 0:
@@ -107,7 +113,7 @@ def _crossed(blocks: Any, root: int, x: Vector, d: Vector, work: Any) -> int:
                 continue
             volume = dot(cross(a, b), c)  # its sign, against that of the turns, says on which side of x the triangle is
             if abs(u) <= slack or abs(v) <= slack or abs(w) <= slack or abs(volume) <= slack * scale**0.5:
-                return -1
+                return UNDECIDED
             if (volume > 0.0) == (u > 0.0):
-                count += 1
+                count += 1 if u > 0.0 else -1
     return count

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.convex_pieces import is_concave_mesh
-from collision_monitor.geometry.polyhedra import is_closed
 from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Mesh, Shape, Sphere, Triangle
 from collision_monitor.meshes.tree import tree_of
 
@@ -26,15 +25,20 @@ def shape_tree(shape: Shape) -> Array | None:
     """
     kept = shape.__dict__.get(_KEPT)
     if kept is None:
-        kept = shape.__dict__[_KEPT] = (made_tree(shape), is_concave_mesh(shape))
+        is_certain = not isinstance(shape, Mesh) or shape.surface.certain
+        kept = shape.__dict__[_KEPT] = (made_tree(shape), is_concave_mesh(shape), is_certain)
     tree: Array | None = kept[0]
     return tree
 
 
 def trees_of_pair(a: Shape, b: Shape) -> tuple[Array, Array] | None:
-    """Trees of two shapes; None unless one of them is a concave mesh and the other has a tree."""
+    """Trees of two shapes; None unless one of them is a concave mesh and the other has a tree.
+
+    Also None if it is not certain what is inside of a mesh.
+    """
     tree_a, tree_b = shape_tree(a), shape_tree(b)
-    if tree_a is None or tree_b is None or not (a.__dict__[_KEPT][1] or b.__dict__[_KEPT][1]):
+    (_, concave_a, certain_a), (_, concave_b, certain_b) = a.__dict__[_KEPT], b.__dict__[_KEPT]
+    if tree_a is None or tree_b is None or not (concave_a or concave_b) or not (certain_a and certain_b):
         return None
     return tree_a, tree_b
 
@@ -43,8 +47,11 @@ def made_tree(shape: Shape) -> Array | None:
     """As `shape_tree`, but made anew."""
     match shape:
         case Mesh():
-            parts = shape.vertices[shape.faces[one_of_each_part(shape.faces, len(shape.vertices)), 0]]
-            return tree_of(shape.vertices[shape.faces], closed=is_closed(shape.faces), parts=parts)
+            surface = shape.surface
+            faces = surface.faces if len(surface.faces) else shape.faces[:1]
+            first = np.unique(surface.part, return_index=True)[1] if len(surface.faces) else [0]
+            closed = surface.closed and surface.certain
+            return tree_of(shape.vertices[shape.faces], closed=closed, parts=shape.vertices[faces[first, 0]])
         case Sphere():
             return tree_of(np.zeros((1, 3, 3)), shape.radius)
         case Capsule():
@@ -57,13 +64,3 @@ def made_tree(shape: Shape) -> Array | None:
             return tree_of(shape.points[None])
     return None
 
-
-def one_of_each_part(faces: NDArray[np.int_], vertices: int) -> NDArray[np.int_]:
-    """Index of one face of each connected part of a mesh."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    graph = coo_array((np.ones(len(start), np.int8), (start, end)), shape=(vertices, vertices))
-    _, part = connected_components(graph, directed=False)
-    return np.asarray(np.unique(part[faces[:, 0]], return_index=True)[1])

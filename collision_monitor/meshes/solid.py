@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor._jit.vectors import LANES
-from collision_monitor.geometry.shape_table import CONVEX_HULL, HALF_SPACE
+from collision_monitor.geometry.shape_table import CONVEX_HULL, ELLIPSOID, HALF_SPACE
 from collision_monitor.meshes.approach import Approach, time_until
 from collision_monitor.meshes.boxes import half_of
 from collision_monitor.meshes.layout import CENTER, CHILD, RADIUS, WIDTH
@@ -42,6 +42,10 @@ def _outside(table: Any, b: int, x: Vector) -> tuple[float, Vector]:
     if table.kind[b] == HALF_SPACE:
         n = table.size[b, 0], table.size[b, 1], table.size[b, 2]
         return dot(n, x) - table.size[b, 3], n
+    if table.kind[b] == ELLIPSOID:
+        length = sqrt(dot(x, x))
+        out = (x[0] / length, x[1] / length, x[2] / length) if length > 0.0 else (1.0, 0.0, 0.0)
+        return length - max(table.size[b, 0], max(table.size[b, 1], table.size[b, 2])), out
     r, h = table.size[b, 0], table.size[b, 1]
     rim = sqrt(x[0] * x[0] + x[1] * x[1])
     side, end = rim - r, abs(x[2]) - h  # of the cylinder around it

@@ -13,6 +13,7 @@ from collision_monitor import records
 from collision_monitor._jit import kernel
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.active_pairs import ActivePairs
+from collision_monitor.monitor.contact_details import complete_contacts
 from collision_monitor.monitor.event_list import EventList
 from collision_monitor.monitor.patches import with_patches
 from collision_monitor.monitor.result import StepResult, StepStatus
@@ -56,6 +57,7 @@ class Answers(Stage):
         """Contacts (records.CONTACT) of the active pairs, sorted by ids, with the END of contacts of removed pairs."""
         roster, multibody = step.roster, step.roster.multibody
         contacts = np.empty(len(active.pairs), records.CONTACT)
+        complete_contacts(multibody, active.pairs, active.results, step.now, np.empty((1, 4)), np.empty((3, 3, 3)))
         n = write_contacts(active.pairs, active.results, roster.bodies, roster.parts.index, step.now, contacts)
         contacts = contacts[:n]
         if step.profile.contact_points > 1:

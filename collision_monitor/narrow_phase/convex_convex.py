@@ -9,8 +9,8 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
-from collision_monitor._jit import device
-from collision_monitor.geometry.shape_table import CONE, CYLINDER
+from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.shape_table import CONE, CYLINDER, ELLIPSOID
 from collision_monitor.narrow_phase.contact_row import write
 from collision_monitor.narrow_phase.core import CorePair, core_length, core_pair, core_radius, rounding
 from collision_monitor.narrow_phase.epa import epa
@@ -32,6 +32,12 @@ def _place(pose: PairPose, work: Any) -> None:
         for j in range(3):
             work[R_AB + 3 * i + j] = RA[0, i] * RB[0, j] + RA[1, i] * RB[1, j] + RA[2, i] * RB[2, j]
         work[P_AB + i] = RA[0, i] * px + RA[1, i] * py + RA[2, i] * pz
+
+
+@inlined
+def _is_curved(kind: int) -> bool:
+    """Whether a core has a round surface, which EPA approximates."""
+    return kind == CYLINDER or kind == CONE or kind == ELLIPSOID
 
 
 @device
@@ -69,7 +75,7 @@ def cores_contact(
     count, lower, normal = gjk(cores, work, size, limit + ra + rb)
     if count == 0:
         return False
-    curved = A.kind == CYLINDER or A.kind == CONE or B.kind == CYLINDER or B.kind == CONE
+    curved = _is_curved(A.kind) or _is_curved(B.kind)
     if lower > 0.0:
         # the length of a point of B - A: an upper bound even if the simplex is too thin for its own length to be one
         w = point_a = (0.0, 0.0, 0.0)

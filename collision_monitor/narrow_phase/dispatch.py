@@ -20,6 +20,7 @@ from collision_monitor.geometry.shape_table import (
     CONE,
     CONVEX_HULL,
     CYLINDER,
+    ELLIPSOID,
     HALF_SPACE,
     POLYGON,
     SPHERE,
@@ -58,6 +59,7 @@ KIND_NAMES: Final = {
     HALF_SPACE: "half-space",
     CIRCLE: "circle",
     POLYGON: "polygon",
+    ELLIPSOID: "ellipsoid",
 }
 
 TEST_METHODS: Final = {
@@ -114,13 +116,21 @@ PAIR_TESTS: Final = {
     (CONVEX_HULL, CONVEX_HULL): CONVEX_CONVEX,
     (CONVEX_HULL, HALF_SPACE): HALF_SPACE_ANY,
     (HALF_SPACE, HALF_SPACE): HALF_SPACE_ANY,
+    (SPHERE, ELLIPSOID): CONVEX_CONVEX,
+    (BOX, ELLIPSOID): CONVEX_CONVEX,
+    (CAPSULE, ELLIPSOID): CONVEX_CONVEX,
+    (CYLINDER, ELLIPSOID): CONVEX_CONVEX,
+    (CONE, ELLIPSOID): CONVEX_CONVEX,
+    (CONVEX_HULL, ELLIPSOID): CONVEX_CONVEX,
+    (ELLIPSOID, ELLIPSOID): CONVEX_CONVEX,
+    (ELLIPSOID, HALF_SPACE): HALF_SPACE_ANY,
     (CIRCLE, CIRCLE): POLYGON_POLYGON,
     (CIRCLE, POLYGON): POLYGON_POLYGON,
     (POLYGON, POLYGON): POLYGON_POLYGON,
 }
-"""Test of each pair of kinds, the smaller kind first. Plane shapes and solids are never paired."""
+"""Test of each pair of kinds, the smaller kind first, a half-space last. Plane shapes and solids are never paired."""
 
-_TEST_OF: Final = np.full((POLYGON + 1, POLYGON + 1), CONVEX_CONVEX, np.uint8)
+_TEST_OF: Final = np.full((ELLIPSOID + 1, ELLIPSOID + 1), CONVEX_CONVEX, np.uint8)
 """PAIR_TESTS for the kernels: a row for each kind of A, a column for each kind of B."""
 
 for _kinds, _test in PAIR_TESTS.items():
@@ -128,15 +138,18 @@ for _kinds, _test in PAIR_TESTS.items():
 
 
 def pair_test(kind_a: int, kind_b: int) -> str:
-    """Name of the test of two kinds, kind_a <= kind_b, and of its file."""
-    return tuple(TEST_METHODS)[_TEST_OF[kind_a, kind_b]]
+    """Name of the test of two kinds, and of its file."""
+    first, second = sorted((kind_a, kind_b), key=lambda kind: (kind == HALF_SPACE, kind))
+    return tuple(TEST_METHODS)[_TEST_OF[first, second]]
 
 
 @inlined
 def _is_swapped(table: Any, a: int, b: int) -> bool:
     """Whether the canonical order is b, a."""
     ka, kb = table.kind[a], table.kind[b]
-    return ka > kb or (ka == kb and a > b)
+    if ka == kb:
+        return a > b
+    return ka == HALF_SPACE or (ka > kb and kb != HALF_SPACE)
 
 
 @merged

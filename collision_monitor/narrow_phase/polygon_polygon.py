@@ -1,6 +1,6 @@
 """Circles and convex polygons in the x-y plane: separating axes if they overlap, vertices against edges if not.
 
-A circle is one vertex grown by its radius, so that one test covers every pair of the two kinds.
+A circle is one vertex grown by its radius, and a capsule is two, so that one test covers every pair of the two kinds.
 (Slides "Separating Axis Theorem (SAT) - in 2D"; Ericson, Real-Time Collision Detection, 5.1.2)
 """
 
@@ -63,6 +63,14 @@ def _widest_gap(table: Any, a: int, b: int, pose: PairPose, tie: float) -> Any:
             along = 0.5 * (min(max(first, 0.0), length) + min(max(last, 0.0), length))
             best, nx, ny = gap, ty, -tx
             x, y = x0 + along * tx, y0 + along * ty
+        if n == 2:
+            # the end of a segment: no edge has the normal along it
+            gap = inf
+            for j in range(m):
+                cx, cy = _corner(table, b, RB, j)
+                gap = min(gap, tx * (px + cx - x1) + ty * (py + cy - y1))
+            if gap > best:
+                best, nx, ny, x, y = gap, tx, ty, x1, y1
         x0, y0 = x1, y1
     return best, nx, ny, x, y
 

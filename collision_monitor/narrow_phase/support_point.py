@@ -10,7 +10,7 @@ from math import copysign, sqrt
 from typing import Any
 
 from collision_monitor._jit import inlined
-from collision_monitor.geometry.shape_table import BOX, CAPSULE, CONE, CYLINDER, SPHERE
+from collision_monitor.geometry.shape_table import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, SPHERE
 from collision_monitor.narrow_phase.core import Core, CorePair
 from collision_monitor.narrow_phase.vector import Vector, minus, opposite
 from collision_monitor.narrow_phase.vertex_scan import farthest_vertex
@@ -37,6 +37,12 @@ def support_point(core: Core, vertices: Any, d: Vector) -> Vector:
         return 0.0, 0.0, z
     if kind == SPHERE:
         return 0.0, 0.0, 0.0
+    if kind == ELLIPSOID:
+        x, y, z = s0 * dx, s1 * dy, s2 * dz
+        length = sqrt(x * x + y * y + z * z)
+        if length > 0.0:
+            return s0 * (x / length), s1 * (y / length), s2 * (z / length)
+        return 0.0, 0.0, s2
     best = farthest_vertex(vertices, core.first, core.count, dx, dy, dz)
     return vertices[0, best], vertices[1, best], vertices[2, best]
 

@@ -6,7 +6,17 @@ from math import inf, sqrt
 from typing import Any
 
 from collision_monitor._jit import inlined
-from collision_monitor.geometry.shape_table import BOX, CAPSULE, CIRCLE, CONE, CONVEX_HULL, CYLINDER, POLYGON, SPHERE
+from collision_monitor.geometry.shape_table import (
+    BOX,
+    CAPSULE,
+    CIRCLE,
+    CONE,
+    CONVEX_HULL,
+    CYLINDER,
+    ELLIPSOID,
+    POLYGON,
+    SPHERE,
+)
 
 
 @inlined
@@ -25,6 +35,9 @@ def core_support(table: Any, slot: int, x: float, y: float, z: float) -> float:
         return abs(z) * s1 + s0 * sqrt(x * x + y * y)
     if kind == CONE:
         return max(z * s1, s0 * sqrt(x * x + y * y) - z * s1)
+    if kind == ELLIPSOID:
+        u, v, w = x * s0, y * s1, z * table.size[slot, 2]
+        return sqrt(u * u + v * v + w * w)
     if kind == CIRCLE:
         return s0 * sqrt(x * x + y * y)
     if kind == CONVEX_HULL or kind == POLYGON:

@@ -31,7 +31,7 @@ def bounding_box_model(shapes: Sequence[tuple[Shape, Pose]]) -> Modelled:
     planar = is_planar(shapes[0][0])
     placed = [(shape, flat_pose(pose) if planar else pose) for shape, pose in shapes]
     points = [_own_points(shape) @ pose.rotation.T + pose.position for shape, pose in placed]
-    round_ones = [pair for pair in placed if not isinstance(pair[0], ConvexHull | Mesh | Polygon)]
+    round_ones = [(shape, pose) for shape, pose in placed if not _has_corners(shape)]
     outer = np.concatenate(points)
     low, high = outer.min(axis=0), outer.max(axis=0)
     if round_ones:
@@ -45,6 +45,11 @@ def bounding_box_model(shapes: Sequence[tuple[Shape, Pose]]) -> Modelled:
     if planar:
         piece = Polygon(half[:2] * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]))
     return Modelled([(piece, Pose(centre))], [0], Model.AABB, excess, convex=False)
+
+
+def _has_corners(shape: Shape) -> bool:
+    """Whether a shape is the hull of its points."""
+    return isinstance(shape, ConvexHull | Mesh) or (isinstance(shape, Polygon) and shape.radius == 0.0)
 
 
 def _own_points(shape: Shape) -> Array:

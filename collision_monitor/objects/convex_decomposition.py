@@ -18,7 +18,7 @@ from collision_monitor.geometry.bounding_volumes import Hull, convex_hull
 from collision_monitor.geometry.coordinates import Array, Indices
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.point_triangle import closest_point_on_triangle
-from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
+from collision_monitor.geometry.polyhedra import locate_in_polyhedron
 from collision_monitor.geometry.shapes import ConvexHull, Mesh, array_bytes
 
 CONCAVITY: Final = 0.05
@@ -94,26 +94,25 @@ def convex_decomposition(mesh: Mesh, concavity: float = CONCAVITY) -> Decomposit
         coacd: Any = import_module("coacd")
     except ImportError:
         raise UnsupportedError(f"model convex_decomposition needs CoACD: {INSTALL}") from None
-    if not is_closed(mesh.faces):
-        raise ShapeError(
-            "convex decomposition: expected a closed mesh, got edges that belong to an odd number of faces"
-        )
+    welded = mesh.surface.faces.astype(np.int32)
+    if not mesh.surface.closed:
+        raise ShapeError(f"convex decomposition: expected a closed mesh, got {mesh!r}")
     coacd.set_log_level("error")
     # centred and scaled to size 1, so that the result does not depend on position and size
-    used = mesh.vertices[np.unique(mesh.faces)]
+    used = mesh.vertices[np.unique(welded)]
     center = 0.5 * used.min(axis=0) + 0.5 * used.max(axis=0)
     size = float(np.ptp(used, axis=0).max())
     vertices = (mesh.vertices - center) / (size or 1.0)
-    solid = abs(Hull(vertices, mesh.faces.astype(np.int64)).volume)
+    solid = abs(Hull(vertices, welded.astype(np.int64)).volume)
     if not solid > THINNEST * convex_hull((used - center) / (size or 1.0)).volume:  # raises ShapeError if it is flat
         raise ShapeError("convex decomposition: expected a mesh with an inside, got one without volume")
     hulls = []
-    for points, _ in coacd.run_coacd(coacd.Mesh(vertices, mesh.faces), threshold=concavity, seed=SEED):
+    for points, _ in coacd.run_coacd(coacd.Mesh(vertices, welded), threshold=concavity, seed=SEED):
         try:
             hulls.append(convex_hull(points))
         except ShapeError:
             continue  # a flat part contains nothing that its neighbours do not
-    faces = list(vertices[mesh.faces])
+    faces = list(vertices[welded])
     grown = COVERED
     for _ in range(MOST_GROWTHS):
         if not _uncovered(faces, hulls, grown):
@@ -128,12 +127,12 @@ def convex_decomposition(mesh: Mesh, concavity: float = CONCAVITY) -> Decomposit
         for polygon in _uncovered(list(hull.vertices[hull.faces]), hulls[:k] + hulls[k + 1 :], 0.0)
     ]
     middles = np.array([polygon.mean(axis=0) for polygon in outer])
-    inside = locate_in_polyhedron(middles, vertices, mesh.faces) == Location.INSIDE
-    if inside.any() and float(_to_surface(middles[inside], vertices[mesh.faces])[0].max()) > 4.0 * grown:
+    inside = locate_in_polyhedron(middles, vertices, welded) == Location.INSIDE
+    if inside.any() and float(_to_surface(middles[inside], vertices[welded])[0].max()) > 4.0 * grown:
         raise UnsupportedError("convex decomposition: CoACD's parts leave a hollow in this mesh; use convex_hull")
     return Decomposition(
         parts=tuple(ConvexHull(center + size * hull.vertices) for hull in hulls),
-        surface_error=size * _farthest(outer, vertices[mesh.faces]),
+        surface_error=size * _farthest(outer, vertices[welded]),
         volume_error=sum(hull.volume for hull in hulls) / solid - 1.0,
     )
 

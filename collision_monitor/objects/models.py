@@ -17,9 +17,10 @@ from collision_monitor.geometry.bounding_spheres import minimal_sphere
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
 from collision_monitor.geometry.convex_pieces import convex_pieces, is_concave_mesh
 from collision_monitor.geometry.coordinates import coordinates
+from collision_monitor.geometry.inside import locate_in_surface
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
 from collision_monitor.geometry.planar import is_planar
-from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
+from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shape_table import ShapeTableBuilder, take
@@ -29,6 +30,7 @@ from collision_monitor.geometry.shapes import (
     Cone,
     ConvexHull,
     Cylinder,
+    Ellipsoid,
     HalfSpace,
     Mesh,
     Shape,
@@ -121,10 +123,31 @@ def containing_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | 
 
 
 def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | int) -> Modelled:
-    """Compute the model that a monitor uses, as `containing_model`; but an exact concave mesh stays one piece."""
+    """Compute the model that a monitor uses, as `containing_model`; but an exact concave mesh stays one piece.
+
+    A mesh of which the inside is not certain (`Surface.certain`) has no exact model: its convex hull replaces it.
+    """
     chosen = parse_model(model)
     if chosen not in (Model.AUTO, Model.EXACT):
         return containing_model(shapes, chosen)
+    uncertain = [isinstance(shape, Mesh) and not shape.surface.certain for shape, _ in shapes]
+    if not any(uncertain):
+        return exact_model(shapes)
+    parts = [
+        containing_model([pair], Model.CONVEX_HULL) if open_ else exact_model([pair])
+        for pair, open_ in zip(shapes, uncertain, strict=True)
+    ]
+    return Modelled(
+        pieces=[piece for part in parts for piece in part.pieces],
+        shapes=[k for k, part in enumerate(parts) for _ in part.pieces],
+        model=Model.CONVEX_HULL,
+        excess=max(part.excess for part in parts),
+        convex=False,
+    )
+
+
+def exact_model(shapes: Sequence[tuple[Shape, Pose]]) -> Modelled:
+    """Convex pieces and concave meshes that are exactly the object."""
     pieces: PosedShapes = []
     index = []
     for k, (shape, pose) in enumerate(shapes):
@@ -162,7 +185,7 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
     single = len(pieces) == 1
     match model:
         case Model.SPHERE:
-            if single and isinstance(shape, Sphere | Box | Capsule | Cylinder):
+            if single and isinstance(shape, Sphere | Box | Capsule | Cylinder | Ellipsoid):
                 return Sphere(float(reach([(shape, Pose())], _widest(shape))) * (1 + ROUNDED_UP)), pose
             ball = minimal_sphere(_corners(pieces))
             return Sphere(float(ball.radius) * (1 + ROUNDED_UP)), Pose(ball.center)
@@ -181,7 +204,7 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
             turned = Rotation.from_matrix(axes).as_quat()
             return _box(2 * box.half_extents), Pose(box.center, turned)
         case Model.CONVEX_HULL:
-            if any(isinstance(s, Sphere | Capsule | Cylinder | Cone) for s, _ in pieces):
+            if any(isinstance(s, Sphere | Capsule | Cylinder | Cone | Ellipsoid) for s, _ in pieces):
                 if single:
                     return shape, pose
                 raise UnsupportedError("model convex_hull: the hull of several shapes with round ones is not offered")
@@ -189,11 +212,13 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
     return _kdop(pieces, np.array(KDOP_DIRECTIONS[KDOPS[model]], float), model.name.lower())
 
 
-def _widest(shape: Sphere | Box | Capsule | Cylinder) -> Array:
+def _widest(shape: Sphere | Box | Capsule | Cylinder | Ellipsoid) -> Array:
     """Direction in which a shape that is symmetric about its origin extends farthest."""
     match shape:
         case Box():
             d = np.array(shape.size)
+        case Ellipsoid():
+            d = np.eye(3)[int(np.argmax(shape.radii))]
         case Cylinder():
             d = np.array([shape.radius, 0.0, shape.length / 2])
         case _:
@@ -289,9 +314,10 @@ def _excess_around_concave(
         centres = centres[_distances(centres, [(model, pose)]) <= slack]
     inside = np.zeros(len(centres), bool)
     for shape, offset in shapes:
-        if isinstance(shape, Mesh) and is_closed(shape.faces):
+        if isinstance(shape, Mesh):
             own = (centres - offset.position) @ offset.rotation
-            inside |= locate_in_polyhedron(own, shape.vertices, shape.faces) >= 0
+            location = locate_in_surface(own, shape.surface)
+            inside |= (location == Location.INSIDE) | (location == Location.BOUNDARY)
     centres = centres[~inside]
     if not len(centres):
         return slack

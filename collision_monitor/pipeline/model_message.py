@@ -57,12 +57,12 @@ def decode_model(data: bytes) -> Modelled | str:
 def _decoded(arrays: dict[str, Any]) -> Modelled | str:
     if _REASON in arrays:
         return str(arrays[_REASON])
-    fields: list[dict[str, Any]] = [{} for _ in arrays["kinds"]]
+    values: list[dict[str, Any]] = [{} for _ in arrays["kinds"]]
     for key, value in arrays.items():
         k, dot, name = key.partition(".")
         if dot:
-            fields[int(k)][name] = value
-    pieces = [_KINDS[kind](**values) for kind, values in zip(arrays["kinds"].tolist(), fields, strict=True)]
+            values[int(k)][name] = value
+    pieces = [_KINDS[kind](**own) for kind, own in zip(arrays["kinds"].tolist(), values, strict=True)]
     poses = [_pose(*numbers) for numbers in zip(arrays["positions"], arrays["quaternions"], strict=True)]
     return Modelled(
         pieces=list(zip(pieces, poses, strict=True)),

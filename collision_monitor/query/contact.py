@@ -14,9 +14,9 @@ from collision_monitor.errors import PoseError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
 from collision_monitor.geometry.compound import shape_pairs
 from collision_monitor.geometry.convex_pieces import is_concave_mesh
+from collision_monitor.geometry.inside import UNKNOWN, locate_in_surface
 from collision_monitor.geometry.planar import is_planar
 from collision_monitor.geometry.point_in_polygon import Location
-from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import Capsule, HalfSpace, Mesh, Shape, Sphere
@@ -36,6 +36,7 @@ from collision_monitor.narrow_phase.contact_row import (
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.objects.models import containing_kdop, containing_model, parse_model
 from collision_monitor.query.convex_pairs import convex_contact
+from collision_monitor.query.fillings import fillings
 from collision_monitor.query.nearest_pieces import NearestPieces
 from collision_monitor.query.piece_table import PieceTable, exact_piece_table, piece_table
 from collision_monitor.records import Model
@@ -164,6 +165,12 @@ class _Posed:
         return exact_piece_table(self.shapes) if self.model is Model.EXACT else piece_table(self.outline)
 
     @cached_property
+    def is_uncertain(self) -> bool:
+        """Whether it has a mesh of which the inside is not certain."""
+        meshes = [shape for shape, _ in self.shapes if isinstance(shape, Mesh)] if self.model is Model.EXACT else []
+        return not all(mesh.surface.certain for mesh in meshes)
+
+    @cached_property
     def is_concave(self) -> bool:
         """Whether it has several pieces."""
         return any(is_concave_mesh(shape) for shape, _ in self.outline) or len(self.pieces) > 1
@@ -178,7 +185,8 @@ def contact(
     is coarser; the error bound includes its error. Directions (k/2, 3) in the frame of each object are a k-DOP of your
     own, reported as CONVEX_HULL.
     If one of them is concave and they overlap, the depth is that of the deepest pair of their convex pieces, and the
-    bound extends to a translation that certainly parts them.
+    bound extends to a translation that certainly parts them. Where a mesh is not closed, the distance is that of its
+    surface, and the bound includes the solids that the surface may belong to (see `fillings`).
     Raises ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, or a model that is not available.
 
     >>> import collision_monitor as cm
@@ -198,7 +206,7 @@ def contact(
         kinds = sorted({type(shape).__name__ for shape, _ in (*a.shapes, *b.shapes)})
         raise UnsupportedError(
             "Circle and Polygon meet each other only; supported are pairs of Circle, Polygon, or of "
-            f"Sphere, Box, Capsule, Cylinder, Cone, ConvexHull, Mesh, HalfSpace; got {', '.join(kinds)}"
+            f"Sphere, Box, Capsule, Cylinder, Cone, Ellipsoid, ConvexHull, Mesh, HalfSpace; got {', '.join(kinds)}"
         )
     if planes == {True}:
         _check_in_plane(a)
@@ -208,6 +216,14 @@ def contact(
     if deepest is None:
         deepest = _by_pieces(a, b, offset)
     row, enclosed = deepest.row, deepest.enclosed
+    least = np.inf
+    if row[DISTANCE] > 0.0 and (a.is_uncertain or b.is_uncertain):
+        where = _where(a, b, offset), _where(b, a, -offset)
+        enclosed = Location.INSIDE in where
+        if enclosed:
+            _turn_inward(row)
+        else:
+            least = -np.inf if UNKNOWN in where else min(_distance_of_fillings(a, b), _distance_of_fillings(b, a))
     distance, bound = float(row[DISTANCE]), float(row[BOUND])
     normal = row[NORMAL : NORMAL + 3].copy()
     point = a.pose.position + row[POINT_A : POINT_A + 3]
@@ -215,6 +231,9 @@ def contact(
     unbounded = distance == -np.inf  # exact: no length is involved that could be wrong
     if distance <= 0.0 and not convex and not unbounded:
         bound += max(_parting_translation(a, b, offset, normal) + distance, 0.0)
+    if least < distance:
+        # the solids that the surfaces may belong to are at least this far apart, or can be parted
+        bound = max(bound, distance - (least if least > 0.0 else -_parting_translation(a, b, offset, normal)))
     excess = a.excess + b.excess
     if distance <= 0.0 and excess > 0.0 and not all(len(exact_piece_table(side.shapes)) == 1 for side in (a, b)):
         bound -= distance  # the models may overlap deeply although the concave objects are apart
@@ -289,11 +308,16 @@ def _by_pieces(a: _Posed, b: _Posed, offset: Array) -> _Deepest:
     found = NearestPieces(a.pieces, (a.rotation, np.zeros(3)), b.pieces, (b.rotation, offset))
     row = found.best.copy()
     row[POINT_A : POINT_A + 3] += found.position[found.pair[0]]
-    enclosed = bool(row[DISTANCE] > 0.0 and (_holds(a, b, offset) or _holds(b, a, -offset)))
-    if enclosed:  # at least this deep
-        row[DISTANCE] *= -1.0
-        row[NORMAL : NORMAL + 3] *= -1.0
+    enclosed = bool(row[DISTANCE] > 0.0 and Location.INSIDE in (_where(a, b, offset), _where(b, a, -offset)))
+    if enclosed:
+        _turn_inward(row)
     return _Deepest(row, lambda: found, enclosed)
+
+
+def _turn_inward(row: Array) -> None:
+    """Make the contact of two surfaces that of a solid inside the other, which is at least this deep."""
+    row[DISTANCE] *= -1.0
+    row[NORMAL : NORMAL + 3] *= -1.0
 
 
 def _by_trees(a: _Posed, b: _Posed) -> _Deepest | None:
@@ -346,21 +370,36 @@ def _check_in_plane(side: _Posed) -> None:
         raise PoseError(f"expected a turn about z for a shape of the plane, got the quaternion {side.pose.quaternion}")
 
 
-def _holds(outer: _Posed, inner: _Posed, offset: Array) -> bool:
-    """Whether a closed mesh of `outer` contains a piece of `inner`, at `offset` (m) from it; no surfaces meet."""
+def _where(inner: _Posed, outer: _Posed, offset: Array) -> int:
+    """Location of `inner` in the meshes of `outer`, at `offset` (m) from it; no surfaces meet."""
+    found: int = Location.OUTSIDE
     if outer.model is not Model.EXACT or not outer.is_concave:
-        return False
-    points = offset + inner.pieces.inner @ inner.rotation.T
+        return found
+    points = inner.pieces.inner @ inner.rotation.T - offset
     for shape, pose in outer.shapes:
         if not isinstance(shape, Mesh):
             continue
         own = (points - outer.rotation @ pose.position) @ (outer.rotation @ pose.rotation)
         own = own[((own >= shape.vertices.min(axis=0)) & (own <= shape.vertices.max(axis=0))).all(axis=1)]
-        if not len(own) or not is_closed(shape.faces):
-            continue
-        if (locate_in_polyhedron(own, shape.vertices, shape.faces) >= Location.BOUNDARY).any():
-            return True
-    return False
+        if len(own):
+            location = locate_in_surface(own, shape.surface)
+            if ((location == Location.INSIDE) | (location == Location.BOUNDARY)).any():
+                return Location.INSIDE
+            if (location == UNKNOWN).any():
+                found = UNKNOWN
+    return found
+
+
+def _distance_of_fillings(a: _Posed, b: _Posed) -> float:
+    """Lower bound (m) of the distances of A's fillings from B and from its fillings; infinite if A has none."""
+    least = np.inf
+    for filling in fillings(a.shapes) if a.model is Model.EXACT else ():
+        own = _Posed([filling], a.pose, [filling])
+        for shapes in ([shape] for shape in (*b.outline, *(fillings(b.shapes) if b.model is Model.EXACT else ()))):
+            other = _Posed(shapes, b.pose, shapes)
+            deepest = _by_trees(own, other) or _by_pieces(own, other, b.pose.position - a.pose.position)
+            least = min(least, float(deepest.row[DISTANCE] - deepest.row[BOUND]))
+    return least
 
 
 def _parting_translation(a: _Posed, b: _Posed, offset: Array, normal: Array) -> float:

@@ -1,4 +1,4 @@
-"""Features of two polytopes in contact: "vertex 3 of A on face 7 of B"."""
+"""Features of two shapes in contact: "vertex 3 of A on face 7 of B"."""
 
 from __future__ import annotations
 
@@ -11,8 +11,26 @@ from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.contact_features import Feature, FeatureContact, FeatureType, feature_at
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape
+from collision_monitor.geometry.round_features import (
+    ROUND_TIE,
+    feature_of_cone,
+    feature_of_cylinder,
+    feature_of_outline,
+)
+from collision_monitor.geometry.shapes import (
+    Box,
+    Capsule,
+    Cone,
+    ConvexHull,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    Mesh,
+    Polygon,
+    Shape,
+)
 from collision_monitor.query.contact import Contact
+from collision_monitor.tolerances import FEATURE_TIE
 
 Array = NDArray[np.float64]
 
@@ -23,41 +41,60 @@ _TRIANGLES: Final = _QUADS[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
 
 
 def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Shape, pose_b: Pose) -> FeatureContact:
-    """Features of A and of B at the witness points of their contact, for Box, ConvexHull and Mesh.
+    """Features of A and of B at the witness points of their contact, for shapes with vertices, edges or faces.
 
     A mesh keeps its own numbers of vertices and faces. A hull has the vertex numbers of its points and the face numbers
     of `convex_hull`. A box numbers its corners by their sides (bit 0: +x, 1: +y, 2: +z) and its faces in the order
-    +x -x +y -y +z -z. Raises UnsupportedError for other shapes.
+    +x -x +y -y +z -z. A cylinder has faces and rims 0 (+z) and 1 (-z), a cone vertex 0, rim 0 and face 0, and both a
+    curved surface. A polygon has the corners of its points, a capsule corner 0 (-z) and 1 (+z) and the edge between
+    them. A half-space is face 0. Raises UnsupportedError for Sphere, Ellipsoid and Circle, which are one surface.
 
     >>> import collision_monitor as cm
     >>> box, pose, above = cm.Box((1, 1, 1)), cm.Pose(), cm.Pose((0, 0, 1.5))
     >>> cm.contact_features(cm.contact(box, pose, box, above), box, pose, box, above).a.type.name
     'FACE'
     """
+    curved = any(isinstance(shape, Cylinder | Cone | Ellipsoid) for shape in (shape_a, shape_b))
+    tie = ROUND_TIE if curved else FEATURE_TIE
     return FeatureContact(
-        feature_of(shape_a, pose_a, contact.point_a, contact.normal),
-        feature_of(shape_b, pose_b, contact.point_b, -contact.normal),
+        feature_of(shape_a, pose_a, contact.point_a, contact.normal, tie),
+        feature_of(shape_b, pose_b, contact.point_b, -contact.normal, tie),
     )
 
 
-def feature_of(shape: Shape, pose: Pose, point: Array, normal: Array) -> Feature:
-    """Feature of a Box, ConvexHull or Mesh at a point (3,) in m with an outward normal (3,), both in the world frame.
+def feature_of(shape: Shape, pose: Pose, point: Array, normal: Array, tie: float = FEATURE_TIE) -> Feature:
+    """Feature of a shape at a point (3,) in m with an outward normal (3,), both in the world frame.
 
-    Numbered as in `contact_features`. Raises UnsupportedError for other shapes.
+    Numbered as in `contact_features`, with the same errors. tie: largest difference of equal heights, relative.
     """
     at, towards = (point - pose.position) @ pose.rotation, normal @ pose.rotation
     match shape:
         case Mesh():
-            return feature_at(at, towards, shape.vertices, shape.faces)
+            return feature_at(at, towards, shape.vertices, shape.faces, tie)
         case ConvexHull():
             hull = convex_hull(shape.points)
-            found = feature_at(at, towards, hull.vertices, hull.faces)
+            found = feature_at(at, towards, hull.vertices, hull.faces, tie)
             same = (shape.points == hull.vertices[list(found.vertices), None]).all(axis=-1)
             return found._replace(vertices=tuple(same.argmax(axis=1).tolist()))
         case Box():
-            found = feature_at(at, towards, _SIDES * shape.size, _TRIANGLES)
+            found = feature_at(at, towards, _SIDES * shape.size, _TRIANGLES, tie)
             if found.type is FeatureType.FACE:
                 return Feature(FeatureType.FACE, tuple(_QUADS[found.face // 2].tolist()), found.face // 2)
             return found
+        case Cylinder():
+            return feature_of_cylinder(at, towards, shape.radius, shape.length)
+        case Cone():
+            return feature_of_cone(at, towards, shape.radius, shape.length)
+        case Capsule():
+            ends = np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]]) * shape.length
+            return feature_of_outline(at - shape.radius * towards, towards, ends)
+        case Polygon():
+            core = at[:2] - shape.radius * towards[:2]
+            return feature_of_outline(core, towards[:2], shape.points)
+        case HalfSpace():
+            return Feature(FeatureType.FACE, (), 0)
     kind = type(shape).__name__
-    raise UnsupportedError(f"{kind} has no vertices, edges and faces; supported are Box, ConvexHull, Mesh")
+    raise UnsupportedError(
+        f"{kind} has no vertices, edges and faces; supported are Box, ConvexHull, Mesh, Cylinder, Cone, Capsule, "
+        "Polygon, HalfSpace"
+    )

@@ -17,7 +17,7 @@ from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shape_table import ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape
 from collision_monitor.meshes.shape_trees import shape_tree
-from collision_monitor.objects.models import PosedShapes, containing_model, monitored_model
+from collision_monitor.objects.models import PosedShapes, containing_model, exact_model
 from collision_monitor.prediction.bodies import Bodies, Multibody, make_bodies, make_parts
 from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.body_layout import lay_out_body
@@ -62,7 +62,7 @@ def make_moving_shape(shape: Compound, motion: Motion, name: str) -> MovingShape
         x, y, _ = motion.linear
         level = (*motion.acceleration[:2], 0.0)
         motion = Motion(flat_pose(motion.pose), (x, y, 0.0), (0.0, 0.0, motion.angular[2]), level)
-    modelled = monitored_model(shapes, "exact")
+    modelled = exact_model(shapes)
     return MovingShape(shapes, modelled.pieces, modelled.shapes, motion)
 
 

@@ -13,7 +13,6 @@ from collision_monitor.geometry.compound import shape_pairs
 from collision_monitor.geometry.coordinates import Array
 from collision_monitor.geometry.planar import flat_pose
 from collision_monitor.geometry.polygon_overlap import Evidence, polygons_intersect, sat_2d
-from collision_monitor.geometry.polyhedra import is_closed
 from collision_monitor.geometry.polyhedron_sat import sat_3d
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Polygon, Shape
@@ -108,8 +107,7 @@ def _polyhedron(shape: Shape, test: str) -> Hull:
             return convex_hull(shape.corners)
         case ConvexHull():
             return convex_hull(shape.points)
-        case Mesh() if test == "cascade" and is_closed(shape.faces):
-            vertices: Array = shape.vertices
-            return Hull(vertices, shape.faces)
+        case Mesh() if test == "cascade" and shape.surface.closed:
+            return Hull(shape.surface.vertices, shape.surface.faces)
     kinds = "Box, ConvexHull, closed Mesh" if test == "cascade" else "Box, ConvexHull"
     raise UnsupportedError(f"test {test}: {type(shape).__name__} is no such polyhedron; supported are {kinds}")

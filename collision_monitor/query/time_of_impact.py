@@ -10,11 +10,12 @@ import numpy as np
 
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.pose import Motion
-from collision_monitor.geometry.shapes import HalfSpace, Sphere
+from collision_monitor.geometry.shapes import HalfSpace, Mesh, Sphere
 from collision_monitor.prediction.impact_record import HIT
 from collision_monitor.query.arguments import finite_number, whole_number
 from collision_monitor.query.contact import Compound, Contact, contact
 from collision_monitor.query.convex_pairs import convex_impact
+from collision_monitor.query.fillings import fillings
 from collision_monitor.query.moving_pair import (
     MotionQuery,
     MovingShape,
@@ -37,7 +38,7 @@ class Impact:
 
     "hit": it lies within [lower, upper]. "clear": there is none within the horizon; lower and upper are infinite.
     "unresolved": there is none before lower, but the shapes come so near that round-off or the budget leaves open
-    whether they meet; upper is infinite. Treat it as a hit.
+    whether they meet, or the inside of a mesh is uncertain; upper is infinite. Treat it as a hit.
     contact: the contact at upper, or at lower if upper is infinite; None if clear. method: what found the interval.
 
     >>> import collision_monitor as cm
@@ -107,16 +108,32 @@ def time_of_impact(
 
         duration = finite_number("step", step, positive=True)
         return impact_by_method(shape_a, motion_a, shape_b, motion_b, query, method, duration)
-    found = convex_impact(shape_a, motion_a, shape_b, motion_b, query)
-    if found is not None:
-        return _of_times(found, (shape_a, motion_a, shape_b, motion_b))
+    quick = convex_impact(shape_a, motion_a, shape_b, motion_b, query)
+    if quick is not None:
+        return _of_times(quick, (shape_a, motion_a, shape_b, motion_b))
     a, b = make_moving_shape(shape_a, motion_a, "A"), make_moving_shape(shape_b, motion_b, "B")
     check_bounded(a, b)
+    found = _first_impact(a, b, query)
+    if all(shape.surface.certain for body in (a, b) for shape, _ in body.shapes if isinstance(shape, Mesh)):
+        return found
+    solid_a, solid_b = (make_moving_shape([*s.shapes, *fillings(s.shapes)], s.motion, "filled") for s in (a, b))
+    possible = _first_impact(solid_a, solid_b, query, uncertain=True).lower
+    if possible >= found.lower:
+        return found
+    if found.status == "hit":
+        return Impact("hit", possible, found.upper, found.contact)
+    meeting = contact(a.shapes, a.motion.at(possible), b.shapes, b.motion.at(possible))
+    return Impact("unresolved", possible, math.inf, meeting)
+
+
+def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain: bool = False) -> Impact:
+    """First impact of the shapes, of an open mesh its surface; `uncertain`: a possible overlap at the start counts."""
     start = contact(a.shapes, a.motion.pose, b.shapes, b.motion.pose)
     multibody = lay_out_pair(a, b, query.horizon)
     radii = multibody.bodies.motion["radius"]
     round_off = GJK_TOUCHING * float(radii[np.isfinite(radii)].sum())
-    if start.signed_distance < query.separation - round_off:
+    least = start.signed_distance - (start.error_bound if uncertain else 0.0)
+    if least < query.separation - round_off:
         return Impact("hit", 0.0, 0.0, start)
     events = first_impacts(multibody, np.array([[0, 1]], np.int32), 0.0, query)
     if not len(events):

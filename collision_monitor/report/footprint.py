@@ -26,7 +26,7 @@ _NORMAL: Final = np.stack([np.cos(_ANGLE), np.sin(_ANGLE), np.zeros(VIEWING_DIRE
 def footprint(described: ObjectDescription, position: Floats, quaternion: Floats) -> list[Floats]:
     """Return the outline (n, 2) in m of each shape of an object. A nearly level half-space (a ground plane) has none.
 
-    Outlines are convex, except those of polygons.
+    Outlines are convex, except those of polygons without a radius.
     """
     pose = Pose(position, quaternion)
     outlines = [_outline(shape, pose @ offset) for shape, offset in described.shapes]
@@ -37,7 +37,7 @@ def _outline(shape: Shape, pose: Pose) -> Floats | None:
     match shape:
         case HalfSpace():
             return _half_plane(shape, pose)
-        case Polygon():
+        case Polygon() if shape.radius == 0.0:
             return _from_above(np.pad(shape.points, ((0, 0), (0, 1))), pose)
         case Box():
             return _hull(shape.corners, pose)

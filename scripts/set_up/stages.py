@@ -281,8 +281,8 @@ STAGES = (
     Stage("tools", "installing tools for the tests", _tools_inputs, _install_tools, for_demo=False),
 )
 
-MODULES = ("scipy", "numba", "mcap", "rich", "matplotlib", "yaml", "rosbags", "colcon_core")
-TOOL_MODULES = ("trimesh", "fcl", "pytest", "hypothesis", "mypy")
+MODULES = ("scipy", "numba", "trimesh", "collada", "mcap", "rich", "matplotlib", "yaml", "rosbags", "colcon_core")
+TOOL_MODULES = ("fcl", "pytest", "hypothesis", "mypy")
 
 _HEALTH = """
 import importlib.util, sys

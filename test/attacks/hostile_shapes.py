@@ -50,12 +50,13 @@ _DIMENSIONS: Final = {
     ShapeType.CONE: 2,
     ShapeType.HALF_SPACE: 4,
     ShapeType.CIRCLE: 1,
+    ShapeType.ELLIPSOID: 3,
 }
 
 _COMMON: Final = (
     *(ShapeType.SPHERE, ShapeType.BOX, ShapeType.CAPSULE, ShapeType.CYLINDER, ShapeType.CONE) * 2,
     *(ShapeType.CONVEX_HULL, ShapeType.MESH) * 2,
-    *(ShapeType.HALF_SPACE, ShapeType.CIRCLE, ShapeType.POLYGON),
+    *(ShapeType.HALF_SPACE, ShapeType.CIRCLE, ShapeType.POLYGON, ShapeType.ELLIPSOID),
 )
 
 
@@ -71,6 +72,8 @@ def any_shape(dice: Dice) -> ShapeFields:
         vertices, triangles = _mesh(dice)
     elif kind in (ShapeType.CONVEX_HULL, ShapeType.POLYGON):
         vertices = _points(dice) if kind == ShapeType.CONVEX_HULL else _boundary(dice)
+    if kind == ShapeType.POLYGON and dice.chance(0.2):
+        dimensions = dice.numbers(1, 0.1, 2.0)
     if dice.is_hostile and dice.chance(0.2):  # fields that do not belong to the kind
         dimensions = dimensions + dice.numbers(dice.random.randrange(5), -1, 1)
         vertices = np.concatenate([vertices, dice.random.choice((none, _CORNERS))])

@@ -21,6 +21,7 @@ from collision_monitor.geometry.shapes import (
     Cone,
     ConvexHull,
     Cylinder,
+    Ellipsoid,
     HalfSpace,
     Mesh,
     Polygon,
@@ -36,11 +37,13 @@ EVERY_SHAPE = [
     Capsule(0.1, 2),
     Cylinder(0.2, 3),
     Cone(0.3, 4),
+    Ellipsoid((0.3, 4, 5)),
     ConvexHull(TETRAHEDRON),
     Mesh(TETRAHEDRON, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
     HalfSpace((0, 0, 1), -0.25),
     Circle(1.5),
     Polygon([[0, 0], [2, 0], [2, 1], [0.5, 0.2], [0, 1]]),
+    Polygon([[0, 0], [2, 0]], 0.5),
 ]
 DECODERS = {
     "states": codec.decode_states,

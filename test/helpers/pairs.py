@@ -61,6 +61,8 @@ def size(shape) -> float:
             return abs(shape.offset)
         case shapes.ConvexHull():
             return float(np.abs(shape.points).max())
+        case shapes.Ellipsoid():
+            return max(shape.radii)
     return shape.radius + shape.length
 
 
@@ -81,6 +83,8 @@ def support(shape, R, n) -> float:
             return max(d[2] * shape.length / 2, shape.radius * rim - d[2] * shape.length / 2)
         case shapes.ConvexHull():
             return float((shape.points @ d).max())
+        case shapes.Ellipsoid():
+            return float(np.linalg.norm(d * shape.radii))
     raise AssertionError
 
 

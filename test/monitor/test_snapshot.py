@@ -20,6 +20,7 @@ from collision_monitor.geometry.shapes import (
     Cone,
     ConvexHull,
     Cylinder,
+    Ellipsoid,
     HalfSpace,
     Mesh,
     Polygon,
@@ -42,13 +43,14 @@ def solids(rng: np.random.Generator) -> list[Shape]:
     tetrahedron = ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
     return [
         Sphere(0.4), Box((0.8, 0.5, 0.3)), Capsule(0.2, 0.6), Cylinder(0.3, 0.5), Cone(0.3, 0.6), Mesh(*tetrahedron),
+        Ellipsoid((0.2, 0.3, 0.4)),
         ConvexHull(points), ConvexHull(points), ConvexHull(points[:8]),
     ]  # fmt: skip
 
 
 def flats(rng: np.random.Generator) -> list[Shape]:
     square = [[-0.4, -0.4], [0.4, -0.4], [0.4, 0.4], [-0.4, 0.4]]
-    return [Circle(0.4), Polygon(square), Polygon([[0, 0], [0.9, 0], [0.3, 0.3], [0, 0.9]]), Polygon(square)]
+    return [Circle(0.4), Polygon(square), Polygon([[0, 0], [0.9, 0], [0.3, 0.3], [0, 0.9]]), Polygon(square, 0.1)]
 
 
 def inputs(shapes: list[Shape], walls: list[ObjectDescription], steps: int, seed: int) -> Iterator[tuple[str, bytes]]:

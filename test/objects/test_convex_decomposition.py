@@ -101,7 +101,7 @@ CLOSED = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 @pytest.mark.parametrize("corners", FLAT.values(), ids=FLAT)
 def test_a_mesh_without_an_inside_is_refused(corners):
     pytest.importorskip("coacd")
-    with pytest.raises(cm.ShapeError, match="expected points that span a solid"):
+    with pytest.raises(cm.ShapeError, match=r"expected points that span a solid|expected a closed mesh"):
         module.convex_decomposition(Mesh(np.array(corners, float), CLOSED))
 
 
@@ -109,7 +109,7 @@ def test_a_bent_sheet_with_two_sides_is_refused():
     pytest.importorskip("coacd")
     corners = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 1)], float)
     sheet = np.array([(0, 1, 2), (1, 3, 2)])
-    with pytest.raises(cm.ShapeError, match="without volume"):
+    with pytest.raises(cm.ShapeError, match="expected a closed mesh"):
         module.convex_decomposition(Mesh(corners, np.concatenate([sheet, sheet[:, ::-1]])))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 import trimesh
@@ -36,9 +38,10 @@ def test_a_model_comes_back_to_the_bit(model):
         assert pose.position.tobytes() == pose_again.position.tobytes()
         assert pose.quaternion.tobytes() == pose_again.quaternion.tobytes()
         assert not pose_again.position.flags.writeable
-        for name, value in vars(piece).items():
-            assert np.asarray(vars(piece_again)[name]).tobytes() == np.asarray(value).tobytes(), name
-            assert isinstance(vars(piece_again)[name], type(value)), name
+        for name in (field.name for field in fields(piece)):
+            value, again_value = getattr(piece, name), getattr(piece_again, name)
+            assert np.asarray(again_value).tobytes() == np.asarray(value).tobytes(), name
+            assert isinstance(again_value, type(value)), name
     for corners_of_one, corners_again in zip(found.corners, again.corners, strict=True):
         np.testing.assert_array_equal(corners_of_one, corners_again)
 

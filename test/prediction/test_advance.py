@@ -24,6 +24,7 @@ SHAPES: dict[str, Any] = {
     "capsule": cm.Capsule(0.1, 1.2),
     "cylinder": cm.Cylinder(0.3, 0.8),
     "cone": cm.Cone(0.3, 0.8),
+    "ellipsoid": cm.Ellipsoid((0.2, 0.4, 0.6)),
     "hull": cm.ConvexHull(np.random.default_rng(1).normal(0, 0.3, (12, 3))),
 }
 

@@ -8,7 +8,17 @@ from numpy.typing import NDArray
 
 from collision_monitor.geometry.pose import from_rotation_vector, multiply, rotation_matrix
 from collision_monitor.geometry.shape_table import ShapeTableBuilder
-from collision_monitor.geometry.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, HalfSpace, Shape, Sphere
+from collision_monitor.geometry.shapes import (
+    Box,
+    Capsule,
+    Cone,
+    ConvexHull,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    Shape,
+    Sphere,
+)
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.prediction.bodies import Multibody, make_bodies, make_parts
 from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
@@ -91,6 +101,7 @@ KINDS = {
     "capsule": lambda rng: Capsule(rng.uniform(0.1, 0.4), rng.uniform(0.2, 1.0)),
     "cylinder": lambda rng: Cylinder(rng.uniform(0.1, 0.4), rng.uniform(0.2, 1.0)),
     "cone": lambda rng: Cone(rng.uniform(0.1, 0.4), rng.uniform(0.2, 1.0)),
+    "ellipsoid": lambda rng: Ellipsoid(rng.uniform(0.1, 0.6, 3)),
     "hull": lambda rng: ConvexHull(rng.normal(0, 0.3, (12, 3))),
     "half-space": lambda rng: HalfSpace(rng.normal(0, 1, 3), -1.0),
 }

@@ -19,6 +19,7 @@ ROCK = cm.ConvexHull(np.random.default_rng(3).normal(size=(24, 3)) * 0.4)
 CUBE = trimesh.creation.box((1, 1, 1))
 L_SHAPE = [(cm.Box((2, 0.5, 0.5)), Pose()), (cm.Box((0.5, 0.5, 2)), Pose((0.75, 0, 0.75)))]
 SOLIDS = [cm.Sphere(0.4), cm.Box((0.7, 0.9, 0.5)), cm.Capsule(0.3, 0.8), cm.Cylinder(0.4, 0.7), cm.Cone(0.5, 0.9), ROCK]
+SOLIDS += [cm.Ellipsoid((0.3, 0.5, 0.6))]
 MODELS = ["sphere", "aabb", "obb", "kdop6", "kdop14", "kdop18", "kdop26"]
 
 

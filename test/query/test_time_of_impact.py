@@ -18,6 +18,7 @@ from collision_monitor.prediction.pair_impacts import predict_pairs
 
 ROCK = cm.ConvexHull(np.random.default_rng(3).normal(size=(16, 3)) * 0.4)
 SOLIDS = [cm.Sphere(0.4), cm.Box((0.7, 0.9, 0.5)), cm.Capsule(0.2, 0.8), cm.Cylinder(0.4, 0.7), cm.Cone(0.5, 0.9), ROCK]
+SOLIDS += [cm.Ellipsoid((0.3, 0.5, 0.6))]
 BOX = cm.Box((1, 1, 1))
 FLOOR = cm.HalfSpace((0, 0, 1), 0)
 BOARD = [(cm.Box((9, 9, 1)), Pose((0, 0, -0.5)))]

@@ -1,0 +1,151 @@
+"""Surface of a triangle mesh: equal vertices welded, connected parts, open edges, orientation.
+
+Two vertices with equal coordinates are one point, although a mesh may list them twice: STL files list three vertices
+for each face. Whether a surface encloses a volume is a property of the welded faces.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+SHEET: Final = 0.5
+"""Length of the sum of the area vectors, as part of the area, from which an open surface counts as a sheet. The sum is
+0 for a closed surface, 0.5 for half a sphere and 1 for a plane. Larger: a rough terrain counts as a solid with a hole.
+Smaller: a solid that misses a large part counts as a sheet, which has no inside."""
+
+
+class Surface:
+    """Connectivity of a mesh with vertices (n, 3) in m and faces (m, 3).
+
+    faces (k, 3): its distinct faces, each vertex replaced by the first equal one; a face with two equal vertices and a
+    repeated face are left out. vertices: as given.
+    """
+
+    def __init__(self, vertices: Array, faces: NDArray[Any]) -> None:
+        self.vertices = vertices
+        first = first_equal(vertices)
+        self.welded = int((first != np.arange(len(first))).sum())
+        """Number of vertices that equal an earlier one."""
+        solid = _without_collapsed(first[faces])
+        self.faces: Indices = _distinct(solid)
+        self.repeats = len(self.faces) < len(solid)
+        """Whether a face repeats another, in any order of its vertices."""
+
+    @cached_property
+    def _edges(self) -> tuple[Indices, Indices, NDArray[np.bool_]]:
+        """Edges (e, 2), the number of faces at each (e,), and whether as many faces pass it one way as the other."""
+        start, end = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
+        low, high = np.minimum(start, end), np.maximum(start, end)
+        n = len(self.vertices)
+        key = low * n + high
+        order = np.argsort(key, kind="stable")
+        begin = np.flatnonzero(np.diff(key[order], prepend=-1))
+        count = np.diff(begin, append=len(order))
+        way = np.add.reduceat(np.where(start < end, 1, -1)[order], begin) if len(begin) else count
+        edge = key[order[begin]]
+        return np.column_stack([edge // n, edge % n]), count, way == 0
+
+    @cached_property
+    def open_edges(self) -> Indices:
+        """Edges (e, 2) that belong to an odd number of faces."""
+        edges, count, _ = self._edges
+        return np.asarray(edges[count % 2 == 1])
+
+    @property
+    def closed(self) -> bool:
+        """Whether the surface encloses a volume without a gap."""
+        return len(self.faces) > 0 and len(self.open_edges) == 0
+
+    @cached_property
+    def oriented(self) -> bool:
+        """Whether neighbouring faces have the same side outside, at every edge that is not open."""
+        _, count, balanced = self._edges
+        return bool((balanced | (count % 2 == 1)).all())
+
+    @cached_property
+    def part(self) -> Indices:
+        """Number (k,) of the connected part of each face."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        start, end = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
+        ones = np.ones(len(start), np.int8)
+        graph = coo_array((ones, (start, end)), shape=(len(self.vertices),) * 2)
+        return np.asarray(connected_components(graph, directed=False)[1][self.faces[:, 0]], np.int64)
+
+    @cached_property
+    def in_open_part(self) -> NDArray[np.bool_]:
+        """Whether each face (k,) belongs to a connected part with an open edge."""
+        of_vertex = np.zeros(len(self.vertices), np.int64)
+        of_vertex[self.faces] = self.part[:, None]
+        return np.isin(self.part, of_vertex[self.open_edges[:, 0]])
+
+    @cached_property
+    def sheet(self) -> bool:
+        """Whether the open parts look mostly one way, as a terrain or a wall does; a sheet has no inside."""
+        if self.closed or not self.oriented:
+            return False
+        a, b, c = np.moveaxis(self.vertices[self.faces[self.in_open_part]], 1, 0)
+        area = np.cross(b - a, c - a)
+        return bool(np.linalg.norm(area.sum(axis=0)) >= SHEET * np.linalg.norm(area, axis=1).sum())
+
+    @cached_property
+    def hole(self) -> Array:
+        """Corners (h, 3) of the open edges (m); none if the surface is closed or a sheet.
+
+        A surface that completes the solid is assumed to lie in the convex hull of these points.
+        """
+        ends = self.open_edges[:0] if self.sheet else self.open_edges
+        return np.asarray(self.vertices[np.unique(ends)])
+
+    @property
+    def certain(self) -> bool:
+        """Whether the winding number of the faces as given tells what is inside: no hole, no repeats, and oriented."""
+        return self.sheet or (self.closed and self.oriented and not self.repeats)
+
+    @cached_property
+    def volume(self) -> float:
+        """Enclosed volume (m³) if the surface is closed, negative if the faces look inward."""
+        a, b, c = np.moveaxis(self.vertices[self.faces] - self.vertices.mean(axis=0), 1, 0)
+        return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+
+    def __str__(self) -> str:
+        if self.closed:
+            way = "outward" if self.volume >= 0.0 else "inward"
+            return f"closed, oriented {way}" if self.oriented else "closed, not oriented"
+        kind = "a sheet without an inside" if self.sheet else "its inside is uncertain"
+        return f"open at {len(self.open_edges)} edges, {kind}"
+
+
+def first_equal(points: Array) -> Indices:
+    """Index (n,) of the first point equal to each of the points (n, 3)."""
+    order = np.lexsort(points.T)
+    ordered = points[order]
+    new = np.ones(len(points), bool)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    # lexsort is stable, so the first of equal points has the smallest index
+    first = np.empty(len(points), np.int64)
+    first[order] = order[np.maximum.accumulate(np.where(new, np.arange(len(points)), 0))]
+    return first
+
+
+def _without_collapsed(faces: Indices) -> Indices:
+    """Faces without those that have two equal vertices."""
+    a, b, c = faces.T
+    return faces[(a != b) & (b != c) & (c != a)]
+
+
+def _distinct(faces: Indices) -> Indices:
+    """Faces without repetitions in any order of the vertices; the first is kept."""
+    ordered = np.sort(faces, axis=1)
+    order = np.lexsort(ordered.T)
+    new = np.ones(len(faces), bool)
+    new[1:] = (ordered[order[1:]] != ordered[order[:-1]]).any(axis=1)
+    return faces[np.sort(order[new])]

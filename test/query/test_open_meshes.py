@@ -1,0 +1,118 @@
+"""Contact and time of impact of meshes that do not close: the bounds hold what is not known, and nothing is clear."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import collision_monitor as cm
+from collision_monitor import Motion, Pose
+
+CUBE = trimesh.creation.box((2, 2, 2))
+TORUS = trimesh.creation.torus(1.0, 0.4, major_sections=12, minor_sections=8)
+CAPSULE = trimesh.creation.capsule(1.0, 0.5, count=(8, 8))
+BALL = cm.Sphere(0.2)
+
+
+def soup(mesh, faces=slice(None), noise=0.0):
+    corners = mesh.vertices[mesh.faces[faces]].reshape(-1, 3)
+    corners = corners + noise * np.random.default_rng(1).normal(size=corners.shape)
+    return cm.Mesh(corners, np.arange(len(corners)).reshape(-1, 3))
+
+
+def random_pose(rng, reach):
+    q = rng.normal(size=4)
+    return Pose(rng.uniform(-reach, reach, 3), q / np.linalg.norm(q))
+
+
+def test_a_ball_in_a_soup_of_triangles_is_inside():
+    at = Pose((0.3, 0, 0))
+    c = cm.contact(soup(CUBE), Pose(), BALL, at)
+    assert c.signed_distance == pytest.approx(-0.9, abs=1e-12) and c.error_bound < 1e-9
+    i = cm.time_of_impact(soup(CUBE), Motion(Pose()), BALL, Motion(at))
+    assert (i.status, i.lower, i.upper) == ("hit", 0.0, 0.0)
+    ring = cm.contact(soup(TORUS), Pose(), BALL, Pose((1, 0, 0)))
+    assert ring.overlaps and ring.signed_distance - ring.error_bound < -0.5
+
+
+@pytest.mark.parametrize("mesh", [soup(CUBE, slice(2, None)), soup(CUBE, noise=1e-9)], ids=["no side", "cracks"])
+def test_a_ball_in_an_open_box_is_not_clear(mesh):
+    at = Pose((0.3, 0, 0))
+    for c in (cm.contact(mesh, Pose(), BALL, at), cm.contact(BALL, at, mesh, Pose())):
+        assert c.signed_distance == pytest.approx(0.5, abs=1e-6)
+        assert c.signed_distance - c.error_bound <= -0.9 + 1e-6
+    i = cm.time_of_impact(mesh, Motion(Pose()), BALL, Motion(at))
+    assert (i.status, i.lower) == ("unresolved", 0.0)
+
+
+def test_a_ball_that_flies_in_and_out_through_the_holes():
+    tube = cm.Mesh(CUBE.vertices, CUBE.faces[np.abs(CUBE.face_normals[:, 2]) < 0.5])
+    assert "open" in repr(tube)
+    i = cm.time_of_impact(tube, Motion(Pose()), BALL, Motion(Pose((0, 0, 3)), (0, 0, -1)), horizon=8.0)
+    assert i.status == "unresolved" and i.lower == pytest.approx(1.8, abs=1e-5)
+    aside = cm.time_of_impact(tube, Motion(Pose()), BALL, Motion(Pose((3, 0, 3)), (0, 0, -1)), horizon=8.0)
+    assert aside.status == "clear"
+    slanted = cm.time_of_impact(tube, Motion(Pose()), BALL, Motion(Pose((0, 0, 3)), (0.3, 0, -1)), horizon=8.0)
+    assert slanted.status == "hit" and slanted.lower == pytest.approx(1.8, abs=1e-5)
+    assert slanted.upper == pytest.approx(0.8 / 0.3, abs=1e-4)
+
+
+def test_a_terrain_is_a_surface_without_an_inside():
+    x, y = np.meshgrid(np.linspace(-3, 3, 9), np.linspace(-3, 3, 9), indexing="ij")
+    vertices = np.column_stack([x.ravel(), y.ravel(), 0.3 * np.sin(3 * x.ravel())])
+    k = (np.arange(8)[:, None] * 9 + np.arange(8)).ravel()
+    faces = np.concatenate([np.column_stack([k, k + 9, k + 10]), np.column_stack([k, k + 10, k + 1])])
+    terrain = cm.Mesh(vertices, faces)
+    c = cm.contact(terrain, Pose(), BALL, Pose((0.1, 0.2, 0.5)))
+    assert c.signed_distance > 0.0 and c.error_bound < 1e-9
+    drive = Motion(Pose((0.1, 0.2, 0.6)), (0.1, 0, 0))
+    assert cm.time_of_impact(terrain, Motion(Pose()), BALL, drive).status == "clear"
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32))
+def test_the_bound_holds_the_closed_solid(seed):
+    """A closed mesh loses some faces: its true distance stays within the bound of the open mesh."""
+    rng = np.random.default_rng(seed)
+    solid = (CUBE, TORUS, CAPSULE)[seed % 3]
+    left = np.delete(np.arange(len(solid.faces)), rng.integers(0, len(solid.faces), rng.integers(1, 6)))
+    mesh = soup(solid, left)
+    if mesh.surface.sheet:
+        return
+    other = (BALL, cm.Box((0.3, 0.2, 0.5)), soup(trimesh.creation.icosphere(subdivisions=1, radius=0.3)))[seed % 5 % 3]
+    X, Y = random_pose(rng, 0.5), random_pose(rng, 1.5)
+    truth = cm.contact(soup(solid), X, other, Y)
+    c = cm.contact(mesh, X, other, Y)
+    upper, lower = truth.signed_distance + truth.error_bound, truth.signed_distance - truth.error_bound
+    assert c.signed_distance - c.error_bound <= upper + 1e-12
+    assert lower - 1e-12 <= c.signed_distance + c.error_bound
+    swapped = cm.contact(other, Y, mesh, X)
+    assert swapped.signed_distance == pytest.approx(c.signed_distance, abs=1e-12)
+    assert swapped.error_bound == pytest.approx(c.error_bound, abs=1e-11)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32))
+def test_no_impact_of_the_closed_solid_comes_before_the_lower_end(seed):
+    rng = np.random.default_rng(seed)
+    left = np.delete(np.arange(len(TORUS.faces)), rng.integers(0, len(TORUS.faces), 4))
+    X, Y = random_pose(rng, 0.2), Pose(rng.normal(size=3) * 1.5)
+    a, b = Motion(X, angular=rng.normal(size=3)), Motion(Y, -Y.position + rng.normal(size=3) * 0.3)
+    truth = cm.time_of_impact(soup(TORUS), a, BALL, b)
+    found = cm.time_of_impact(soup(TORUS, left), a, BALL, b)
+    assert found.lower <= truth.upper
+    if found.status == "clear":
+        assert truth.status == "clear"
+    if found.status == "hit":
+        assert truth.lower <= found.upper + 1e-9
+
+
+def test_parts_that_overlap_are_one_solid():
+    """The space that two closed parts share is inside, not outside as the parity of a ray would say."""
+    apart = trimesh.creation.box((2, 2, 2), trimesh.transformations.translation_matrix((1, 0.3, 0.2)))
+    both = soup(trimesh.util.concatenate([CUBE, apart]))
+    c = cm.contact(both, Pose(), cm.Sphere(0.1), Pose((0.5, 0, 0)))
+    assert c.overlaps and c.signed_distance == pytest.approx(-0.4)
