@@ -277,7 +277,7 @@ class ShapeTableBuilder:
             else:
                 del self._users[start], self._blocks[key]
                 self._free_blocks.setdefault(int(self.table.vertex_count[slot]), []).append(start)
-        if self.table.size[slot, TREE] and self.table.kind[slot] != HALF_SPACE:
+        if self.table.size[slot, TREE] > 0.0 and self.table.kind[slot] != HALF_SPACE:
             self._forest.drop(int(self.table.size[slot, TREE]) - 1)
         self.table.size[slot] = 0.0
         self.table.kind[slot] = 0

@@ -50,7 +50,8 @@ def tree_contact(
     """
     X = relative(pose.R_A, pose.R_B, pose.p)
     round_off = SAT_ROUND_OFF * (reach_in(blocks_a, root_a) + reach_in(blocks_b, root_b) + sum_of_sizes(pose.p))
-    distance = nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work)
+    # beyond the limit by round-off, because a search for less than 0 would find no surfaces that touch
+    distance = nearest(blocks_a, root_a, blocks_b, root_b, X, limit + round_off, answer, work)
     if distance == 0.0:
         count, _ = touching(blocks_a, root_a, blocks_b, root_b, X, MOST_PAIRS, work)
         if count > 0:

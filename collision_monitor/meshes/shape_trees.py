@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.convex_pieces import is_concave_mesh
 from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Mesh, Shape, Sphere, Triangle
@@ -21,7 +22,8 @@ _KEPT: Final = "_tree"
 def shape_tree(shape: Shape) -> Array | None:
     """Tree of a shape's surface; None for a shape that triangles with a radius cannot represent exactly.
 
-    A sphere is a point with a radius, a capsule an edge with a radius; a box and a hull are closed surfaces.
+    A sphere is a point with a radius, a capsule an edge with a radius; a box and a hull are closed surfaces, unless
+    they are too flat.
     """
     kept = shape.__dict__.get(_KEPT)
     if kept is None:
@@ -58,7 +60,10 @@ def made_tree(shape: Shape) -> Array | None:
             half = shape.length / 2
             return tree_of(np.array([[[0.0, 0.0, -half], [0.0, 0.0, half], [0.0, 0.0, half]]]), shape.radius)
         case Box() | ConvexHull():
-            hull = convex_hull(shape.corners if isinstance(shape, Box) else shape.points)
+            try:
+                hull = convex_hull(shape.corners if isinstance(shape, Box) else shape.points)
+            except ShapeError:  # too flat for faces
+                return None
             return tree_of(hull.vertices[hull.faces], closed=True)
         case Triangle():
             return tree_of(shape.points[None])

@@ -1,8 +1,8 @@
-"""Trees of the convex shapes of a table, for their pairs with meshes."""
+"""Trees of the convex shapes of a table, for their pairs with meshes. Shapes without one are searched by GJK."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,12 @@ from collision_monitor.meshes.shape_trees import made_tree
 
 Array = NDArray[np.float64]
 
+NO_TREE: Final = -1.0
+"""In place of a tree, for a box or a hull that is too flat for one, so that it is not tried again."""
+
 
 def slot_tree(table: Any, slot: int) -> Array | None:
-    """Tree of the convex shape in a slot, without its margin; None for a kind that triangles cannot represent."""
+    """Tree of the convex shape in a slot, without its margin; None for one that triangles cannot represent."""
     size = table.size[slot]
     match int(table.kind[slot]):
         case kind if kind == SPHERE:
@@ -41,3 +44,5 @@ def plant_trees(builder: ShapeTableBuilder) -> None:
         tree = slot_tree(table, slot)
         if tree is not None:
             builder.plant(slot, tree)
+        else:
+            table.size[slot, TREE] = NO_TREE

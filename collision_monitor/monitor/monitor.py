@@ -390,12 +390,13 @@ class Monitor:
         return snapshot
 
     @classmethod
-    def restored(cls, profile: Profile | str, snapshot: Snapshot) -> Self:
+    def restored(cls, profile: Profile | str, snapshot: Snapshot, *, warns: bool = True) -> Self:
         """Return a monitor without a clock that continues from a snapshot with the same answers.
 
+        warns: as in the constructor.
         Raises InputError if the snapshot is damaged, or was written by a program that saves other state.
         """
-        monitor = cls(profile, timed=False)
+        monitor = cls(profile, timed=False, warns=warns)
         try:
             for stage in monitor.stages:
                 stage.restore(snapshot, snapshot.facts[FACTS])

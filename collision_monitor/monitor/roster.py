@@ -190,11 +190,11 @@ class Roster(Stage):
                 tree = shape_tree(shape) if isinstance(shape, Mesh) else None
                 placed = flat_pose(offset) if planar else offset
                 slots.append(self._shapes.append(shape, placed, d.padding, chosen, tree))
+            plant_trees(self._shapes)
         except Exception:
             for slot in slots:
                 self._shapes.remove(slot)
             raise
-        plant_trees(self._shapes)
         i = self._slots.get(d.object_id)
         if i is None:
             i = self._slots[d.object_id] = self._new_body()

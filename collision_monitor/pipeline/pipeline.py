@@ -369,7 +369,7 @@ class Pipeline:
             facts = snapshot.facts[_PIPELINE]
             profile = Profile.from_dict({**facts["profile"], **settings})
             pipeline = cls(profile, frame_id, timed=False, kept=settings)
-            pipeline.monitor = Monitor.restored(profile, snapshot)
+            pipeline.monitor = Monitor.restored(profile, snapshot, warns=False)
             pipeline._lost = LostMessages(facts["messages_lost"], facts["sequence"])
             pipeline.catalogue = Catalogue.restored(facts)
         except (KeyError, TypeError, ValueError, AttributeError) as error:

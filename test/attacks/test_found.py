@@ -142,3 +142,27 @@ def test_a_concave_mesh_beside_other_shapes_is_estimated_by_its_faces() -> None:
     beside = [(surface, Pose()), (Cylinder(0.1, 1.0), Pose())]
     assert Budget().fits([(surface, Pose())], Model.CONVEX_HULL)
     assert not Budget().fits(beside, Model.CONVEX_HULL)
+
+
+@pytest.mark.parametrize("flat", [Box((1.0, 1.0, 1e-13)), Box((1.0, 1e-200, 1e-200))], ids=["plate", "needle"])
+def test_a_flat_box_does_not_refuse_the_objects_after_it(flat: Box) -> None:
+    """The tree of a box was made of its convex hull, which a flat box has not; every later object was refused."""
+    pipeline = Pipeline()
+    x, y = np.meshgrid(np.arange(6.0), np.arange(6.0))
+    k = np.arange(30)[np.arange(30) % 6 != 5]
+    surface = Mesh(np.column_stack([x.ravel(), y.ravel(), np.sin(x * y).ravel()]), np.column_stack([k, k + 6, k + 1]))
+    objects = [
+        ObjectDescription(1, flat, static=True, pose=Pose((2.0, 2.0, np.sin(4.0)))),
+        ObjectDescription(2, surface, model=Model.EXACT),
+        ObjectDescription(3, Sphere(0.5)),
+    ]
+    for each in objects:
+        pipeline.on_shapes(encode_descriptions(0, "world", [each]))
+    assert pipeline.monitor.ids == [1, 2, 3]
+    states = np.zeros(2, STATE)
+    states["id"], states["quaternion"][:, 3] = (2, 3), 1.0
+    states["position"][1] = 2.0, 2.0, np.sin(4.0) + 0.2
+    outputs = pipeline.on_states(encode_states(0, "world", 0, states))
+    assert outputs is not None
+    found = {(int(row["id_a"]), int(row["id_b"])) for row in outputs.result.contacts}
+    assert found >= {(1, 2), (2, 3)} | ({(1, 3)} if flat.size[1] == 1.0 else set())

@@ -13,7 +13,7 @@ from pathlib import Path
 import known_scene
 import numpy as np
 import pytest
-from campaign import START, Campaign, Failure, is_broken_by
+from campaign import START, Campaign, Failure, is_broken_by, load_kernels
 from message_fuzzer import hostile_message
 
 from collision_monitor.codec import ContactArray, PredictedCollisionArray, decode_contacts, decode_predictions
@@ -89,6 +89,7 @@ def test_an_exception_a_slow_input_and_a_wrong_answer_are_failures(monkeypatch: 
     def broken(self: Pipeline, data: bytes) -> None:
         raise ZeroDivisionError("on purpose")
 
+    load_kernels()
     with monkeypatch.context() as patched:
         patched.setattr(Pipeline, "on_settings", broken)
         (failure,) = Campaign(1).run(300).failures

@@ -40,7 +40,7 @@ def test_72_simulated_seconds_agree_with_plain_recomputation() -> None:
 def test_objects_that_are_smaller_in_one_of_both_monitors_are_a_problem(soak: object) -> None:
     run = soak.Soak(10, seed=1, every=10)  # type: ignore[attr-defined]
     for object_id in run.traffic.states["id"].tolist():
-        run.plain.add(object_id, Sphere(0.01))
+        run.plain.add(object_id, Sphere(0.01), replace=True)
     for number in range(300):
         run.step(number)
     assert any("touches in one answer only" in each or "never does" in each for each in run.report.problems)

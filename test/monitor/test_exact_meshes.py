@@ -145,3 +145,26 @@ def test_the_plan_names_meshes():
     plan = scene(Profile()).plan
     assert plan.shapes["mesh"] == 2 and plan.tests["sphere", "mesh"] == "meshes"
     assert "trees of triangles" in str(plan)
+
+
+def test_every_overlap_at_rest_is_a_contact_without_a_margin() -> None:
+    """A search for surfaces nearer than 0 finds none that touch; all of these contacts were missed once."""
+    x, y = np.meshgrid(np.arange(6.0), np.arange(6.0))
+    k = np.arange(30)[np.arange(30) % 6 != 5]
+    corners = np.column_stack([x.ravel(), y.ravel(), np.sin(x * y).ravel()])
+    sheet = cm.Mesh(corners, np.column_stack([k, k + 6, k + 1]))
+    ring = trimesh.creation.torus(1.0, 0.3, major_sections=16, minor_sections=8)
+    rng = np.random.default_rng(4)
+    poses = np.zeros((2, 7))
+    poses[:, 6] = 1.0
+    for mesh in (sheet, cm.Mesh(ring.vertices, ring.faces)):
+        low, high = mesh.vertices.min(axis=0) - 0.3, mesh.vertices.max(axis=0) + 0.3
+        for solid in (cm.Sphere(0.5), cm.Box((0.5, 0.6, 0.7)), cm.Capsule(0.2, 0.5), cm.Cylinder(0.3, 0.6)):
+            for position in rng.uniform(low, high, (8, 3)):
+                monitor = cm.Monitor("exact")
+                monitor.add(1, mesh)
+                monitor.add(2, solid)
+                poses[1, :3] = position
+                truth = cm.contact(mesh, cm.Pose(), solid, cm.Pose(position))
+                found = len(monitor.step(0, [1, 2], poses).contacts)
+                assert found == truth.overlaps or abs(truth.signed_distance) < 1e-9, (mesh, solid, position)

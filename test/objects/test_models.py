@@ -72,7 +72,7 @@ def test_a_concave_mesh_is_exact_and_its_hull_is_a_coarser_model_that_says_so():
     monitor.add(2, cm.Sphere(0.1))
     poses = [(0, 0, 0, 0, 0, 0, 1)] * 2
     assert not len(monitor.step(SECOND, [1, 2], poses).contacts)  # in the hole of the ring
-    monitor.add(1, cm.Mesh(TORUS.vertices, TORUS.faces), model=Model.CONVEX_HULL)
+    monitor.add(1, cm.Mesh(TORUS.vertices, TORUS.faces), model=Model.CONVEX_HULL, replace=True)
     (row,) = monitor.step(2 * SECOND, [1, 2], poses).contacts
     assert row["status"] == ContactStatus.UNRESOLVED  # the hull fills the hole
     assert (row["model_a"], row["model_b"]) == (Model.CONVEX_HULL, Model.EXACT)

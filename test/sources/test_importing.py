@@ -118,7 +118,7 @@ def test_the_answers_are_those_of_a_monitor_that_is_fed_directly(
     predictions = [decode_predictions(m.data) for m in messages_of(tmp_path / "a.mcap", "PredictedCollisionArray")]
     assert len(contacts) == len(predictions) == len(results) == done.steps == 180
     for ours, contact, prediction in zip(results, contacts, predictions, strict=True):
-        assert ours.contacts.tobytes() == contact.contacts.tobytes()
+        assert ours.contact_rows.tobytes() == contact.contacts.tobytes()
         assert ours.predictions.tobytes() == prediction.predictions.tobytes()
     assert sum(len(r.contacts) for r in results) > 20
     assert sum(len(r.predictions) for r in results) > 50
