@@ -23,7 +23,7 @@ from typing import Any, Final
 import yaml
 
 from collision_monitor.errors import CollisionMonitorError, InputError
-from collision_monitor.settings.yaml_file import SafeLoader, read_yaml
+from collision_monitor.settings.yaml_file import read_yaml
 from collision_monitor.sources.object_entry import ObjectEntry, read_entries
 from collision_monitor.sources.yaml_table import number, table, text
 
@@ -109,7 +109,7 @@ def make_mapping(content: Any, path: str = "", lines: dict[str, int] | None = No
 def _lines(path: Path) -> dict[str, int]:
     """Return the line of each key of a file that `read_yaml` accepted: `frame`, and below a section `cart, shape`."""
     with path.open(encoding="utf-8-sig") as file:
-        root = yaml.compose(file, SafeLoader)
+        root = yaml.compose(file, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     found: dict[str, int] = {}
     for key, value in _pairs(root):
         found[key.value] = key.start_mark.line + 1
