@@ -71,7 +71,7 @@ _HOME = {
     "vertex_face_impact": "query.feature_impact",
     "edge_edge_impact": "query.feature_impact",
     "FeatureImpact": "query.feature_impact",
-    "plot": "report.contact_plot",
+    "plot": "query.contact_plot",
     "CollisionMonitorError": "errors",
     "InputError": "errors",
     "ShapeError": "errors",
@@ -121,6 +121,7 @@ if TYPE_CHECKING:
     from collision_monitor.objects.description import ObjectDescription as ObjectDescription
     from collision_monitor.query.contact import Contact as Contact
     from collision_monitor.query.contact import contact as contact
+    from collision_monitor.query.contact_plot import plot as plot
     from collision_monitor.query.contacts import Contacts as Contacts
     from collision_monitor.query.contacts import contacts as contacts
     from collision_monitor.query.containment import contains as contains
@@ -138,7 +139,6 @@ if TYPE_CHECKING:
     from collision_monitor.query.time_of_impact_batch import time_of_impact_batch as time_of_impact_batch
     from collision_monitor.query.times_of_impact import times_of_impact as times_of_impact
     from collision_monitor.records import Model as Model
-    from collision_monitor.report.contact_plot import plot as plot
     from collision_monitor.settings.profile import Profile as Profile
 
 

@@ -73,7 +73,8 @@ def test_a_heavy_mesh_holds_up_neither_the_answers_nor_the_end(start, team, tmp_
     team.describe(*(ObjectDescription(k, Sphere(0.5)) for k in (1, 2)))
     team.status(lambda s: s.objects == 2)
     heavy = torus()
-    team.describe(ObjectDescription(4, heavy), ObjectDescription(3, heavy, model=Model.CONVEX_DECOMPOSITION))
+    models = {4: Model.CONVEX_HULL, 3: Model.CONVEX_DECOMPOSITION}
+    team.describe(*(ObjectDescription(k, heavy, model=model) for k, model in models.items()))
     team.status(lambda s: s.objects == 4)
     seen, slowest = [], 0.0
     deadline = time.monotonic() + 40.0

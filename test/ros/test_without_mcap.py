@@ -15,11 +15,13 @@ class Blocked(importlib.abc.MetaPathFinder):
 
 sys.meta_path.insert(0, Blocked())
 import rclpy
-from collision_monitor.ros.node import MonitorNode
+from collision_monitor.ros.monitor_node import MonitorNode
 from collision_monitor.ros.process import StopRequest
 rclpy.init(args=["--ros-args", *sys.argv[1:]])
 node = MonitorNode(StopRequest())
-print(node._recording, node._recording.status().get("recording_error", ""))
+assert node.start()
+recording = node._monitoring._recording
+print(recording, recording.status().get("recording_error", ""))
 """
 
 

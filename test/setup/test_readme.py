@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -25,15 +26,20 @@ def test_the_python_example_predicts_the_impact() -> None:
     assert float(times[1]) <= 1.5 <= float(times[2]) + 1e-3
 
 
-def test_the_examples_of_two_shapes_run() -> None:
+def test_the_examples_of_two_shapes_run(tmp_path: Path) -> None:
     example = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[1]
     stand_ins = (
-        "import collision_monitor as cm; mesh_a = mesh_b = cm.Box((1, 1, 1)); pose_a = cm.Pose(); "
+        "import collision_monitor as cm; a = b = mesh_a = mesh_b = cm.Box((1, 1, 1)); pose_a = cm.Pose(); "
         "pose_b = cm.Pose((3, 0, 0)); x = [[0.0, 0.0, 0.0]] * 8\n"
     )
     checks = "assert i.status == 'hit' and i.lower <= 2.81 <= i.upper + 0.01\n"
     answer = subprocess.run(
-        [sys.executable, "-c", stand_ins + example + checks], capture_output=True, text=True, timeout=300
+        [sys.executable, "-c", stand_ins + example + checks],
+        cwd=tmp_path,
+        env={**os.environ, "MPLBACKEND": "agg"},
+        capture_output=True,
+        text=True,
+        timeout=300,
     )
     assert answer.returncode == 0, answer.stderr
 
