@@ -49,6 +49,8 @@ def first_hits(shape: Shape, p: Array, d: Array) -> tuple[Array, Array]:
     """
     if isinstance(shape, Mesh):
         return _mesh_hits(shape, p, d)
+    if isinstance(shape, Polygon) and shape.radius > 0.0:
+        raise UnsupportedError("Polygon with a radius: rays are not offered for it")
     if isinstance(shape, Polygon):
         return _polygon_hits(shape, p, d)
     parts = _solids(shape, p, d)

@@ -157,3 +157,13 @@ def test_the_boundary_belongs_to_the_shape() -> None:
 def test_bad_input_is_refused(call: Any, error: type[Exception], text: str) -> None:
     with pytest.raises(error, match=text):
         call()
+
+
+def test_a_polygon_with_a_radius_is_refused_and_never_answered_without_it():
+    import collision_monitor as cm
+
+    rounded = cm.Polygon([(0, 0), (1, 0), (0, 1)], 0.5)
+    with pytest.raises(cm.UnsupportedError, match="Polygon with a radius"):
+        cm.contains(rounded, cm.Pose(), (-0.2, 0.2))
+    with pytest.raises(cm.UnsupportedError, match="Polygon with a radius"):
+        cm.cast_ray(rounded, cm.Pose(), (-5, 0.2, 0), (1, 0, 0))
