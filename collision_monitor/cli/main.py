@@ -16,7 +16,7 @@ from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.errors import CollisionMonitorError
 
 COMMANDS: Final = (
-    "demo", "run", "sources", "world", "replay", "report", "compare",
+    "demo", "run", "view", "sources", "world", "replay", "report", "compare",
     "check", "salvage", "import", "tradeoff", "tune", "extremes", "bench",
 )  # fmt: skip
 """Commands in the order of `--help`. Each is a module of this package (`import_` for import) with an `add_parser`."""
