@@ -51,8 +51,8 @@ class Pieces:
 class Bodies:
     """Described objects (n,), ascending by id: ids (n,), static (n,), reach (n,) m, and their pieces by form's name.
 
-    pieces_by_id: as of `described_pieces`. The reach is the radius about an object's origin that contains it, without
-    half-spaces. boxed: pieces that are drawn as their bounding boxes, because there are more than MOST_FORMS.
+    pieces_by_id: as of `described_pieces`. The reach is the radius about an object's origin of a ball that contains it,
+    without half-spaces. boxed: pieces that are drawn as their bounding boxes, because there are more than MOST_FORMS.
     """
 
     def __init__(
@@ -83,7 +83,9 @@ class Bodies:
         position = np.array([piece.pose.position for _, piece in rows])
         scale = np.array([piece.scale for _, piece in rows], np.float64)
         if form.name != PLANE:
-            np.maximum.at(self.reach, body, np.linalg.norm(position, axis=1) + scale.max(axis=1) * form.reach)
+            centre, half = form.bounds
+            far = np.linalg.norm(position, axis=1) + np.linalg.norm((np.abs(centre) + half) * scale, axis=1)
+            np.maximum.at(self.reach, body, far)
         return Pieces(form, body, position, np.array([piece.pose.quaternion for _, piece in rows]), scale)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from hashlib import blake2b
 from typing import Final, NamedTuple
 
@@ -58,10 +58,11 @@ class Form:
     closed: bool
     own: bool = False
 
-    @property
-    def reach(self) -> float:
-        """Largest distance of a vertex from the origin."""
-        return float(np.linalg.norm(self.vertices, axis=1).max())
+    @cached_property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Centre (3,) and half extents (3,) of the bounding box."""
+        low, high = self.vertices.min(axis=0).astype(np.float64), self.vertices.max(axis=0).astype(np.float64)
+        return 0.5 * (low + high), 0.5 * (high - low)
 
 
 class Piece(NamedTuple):
@@ -73,10 +74,9 @@ class Piece(NamedTuple):
 
     def boxed(self) -> Piece:
         """Return the bounding box of the piece."""
-        low, high = self.form.vertices.min(axis=0), self.form.vertices.max(axis=0)
-        centre = Pose(0.5 * (low + high) * self.scale)
-        x, y, z = (float(size) for size in (high - low) * self.scale)
-        return Piece(unit_forms()["box"], self.pose @ centre, (x, y, z))
+        centre, half = self.form.bounds
+        x, y, z = (float(size) for size in 2.0 * half * self.scale)
+        return Piece(unit_forms()["box"], self.pose @ Pose(centre * self.scale), (x, y, z))
 
 
 def pieces_of(shape: Shape, pose: Pose) -> Iterator[Piece]:

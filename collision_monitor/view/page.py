@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from collision_monitor.view.levels import COLORS, Level
 from collision_monitor.view.picture import Batch, Picture, Role
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
     import viser
 
 _OPACITY: Final = {Role.MOVING: None, Role.STATIC: 0.55, Role.IMPACT: 0.3}
+_LIGHTS: Final = (("key", (-3.0, -4.0, 6.0), 1.8), ("fill", (4.0, 1.0, 2.0), 0.7))
+"""Directional lights: name, where the light comes from, intensity. Weak enough that no colour turns white."""
+
+_LINEAR: Final = np.round(255.0 * (np.arange(256) / 255.0) ** 2.2).astype(np.uint8)
 _WHITE: Final = (255, 255, 255)
 _TUBE: Final = (240, 200, 110)
 
@@ -34,7 +39,11 @@ class Page:
         self._others: dict[str, Any] = {}
         self.hidden: set[str] = set()
         server.scene.set_up_direction("+z")
-        server.scene.configure_default_lights(True, cast_shadow=False)
+        server.scene.configure_default_lights(False)
+        server.scene.configure_environment_map(None)
+        server.scene.add_light_ambient("/lights/all around", intensity=1.2)
+        for name, position, intensity in _LIGHTS:
+            server.scene.add_light_directional(f"/lights/{name}", intensity=intensity, position=position)
 
     def show(self, picture: Picture) -> None:
         """Show a picture."""
@@ -64,7 +73,7 @@ class Page:
                 batched_wxyzs=batch.wxyz,
                 batched_positions=batch.position,
                 batched_scales=batch.scale,
-                batched_colors=batch.color,
+                batched_colors=_linear(batch.color),
                 opacity=_OPACITY[role],
                 flat_shading=form.flat,
                 side="front" if form.closed else "double",
@@ -77,7 +86,7 @@ class Page:
                 handle.on_click(lambda event: self._picked(key, event.instance_index))
             return
         handle.batched_positions, handle.batched_wxyzs = batch.position, batch.wxyz
-        handle.batched_scales, handle.batched_colors = batch.scale, batch.color
+        handle.batched_scales, handle.batched_colors = batch.scale, _linear(batch.color)
         handle.visible = visible
 
     def _picked(self, key: tuple[Role, str], instance: int | None) -> None:
@@ -105,7 +114,7 @@ class Page:
     def _show_lines(self, picture: Picture) -> None:
         normals = np.tile(np.array(_WHITE, np.uint8), (*picture.normals.shape[:2], 1))
         self._lines("contacts/normals", picture.normals, normals, 3.0)
-        self._lines("paths", picture.paths, picture.path_colors, 2.0)
+        self._lines("paths", picture.paths, _linear(picture.path_colors), 2.0)
 
     def _lines(self, name: str, points: Any, colors: Any, thickness: float) -> None:
         handle = self._others.get(name)
@@ -142,6 +151,11 @@ class Page:
             handle.text, handle.position, handle.visible = text, place, True
         for handle in self._labels[len(labels) :]:
             handle.visible = False
+
+
+def _linear(colors: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return sRGB colours as linear ones, which viser wants for instances and lines, but not for points."""
+    return _LINEAR[colors]
 
 
 def color_of(level: Level) -> tuple[int, int, int]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable
+from functools import partial
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Final
 
@@ -26,7 +27,7 @@ PARTS: Final = {
     "impacts": "places of impact",
     "paths": "predicted paths",
     "tubes": "tubes of uncertainty",
-    "names": "names of the pairs",
+    "names": "labels",
     "static": "objects that do not move",
 }
 """What can be hidden: names of `Page.hidden`, and texts."""
@@ -55,7 +56,7 @@ class Panel:
             self._buttons = [gui.add_button("–", visible=False) for _ in range(ROWS)]
             self._none = gui.add_html(_text("no pair touches, and none is predicted to"))
         for k, button in enumerate(self._buttons):
-            button.on_click(lambda event, k=k: self._jump(k, event.client))
+            button.on_click(partial(self._jump, k))
         with gui.add_folder("Object"):
             self._object = gui.add_html(_text("click an object"))
         with gui.add_folder("Show", expand_by_default=False):
@@ -91,11 +92,11 @@ class Panel:
 
         box.on_update(lambda _: self._requests.put(change))
 
-    def _jump(self, k: int, client: Any) -> None:
-        """Move the camera of this browser to a pair."""
+    def _jump(self, k: int, event: Any) -> None:
+        """Move the camera of the browser that clicked to a pair."""
         place = self._rows[k].place if k < len(self._rows) else None
-        if place is not None and client is not None:
-            look_at(client, place - self._origin, 8.0 * self._unit)
+        if place is not None and event.client is not None:
+            look_at(event.client, place - self._origin, 8.0 * self._unit)
 
     def _home(self, client: Any) -> None:
         if client is not None:

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.geometry.pose import rotation_matrix
 from collision_monitor.records import Phase, PredictionStatus
 from collision_monitor.view.bodies import Bodies, Floats, Indices
 from collision_monitor.view.forms import PLANE, Form
@@ -20,14 +21,14 @@ from collision_monitor.view.paths import paths, radii, tubes
 Singles = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 
-ROWS: Final = 10
+ROWS: Final = 8
 """Pairs of the list."""
 
 IMPACTS: Final = 24
 """Soonest predicted pairs that are drawn with their paths, and in their poses of impact. More would hide the scene."""
 
-LABELS: Final = 24
-"""Largest number of names."""
+NAMED: Final = 3
+"""Soonest pairs with a label in the scene. More labels would hide each other."""
 
 FAR: Final = 1e3
 """m: a scene farther away than this is drawn about an origin of its own, because a browser computes in single
@@ -59,7 +60,7 @@ class Picture:
 
     batches: by role and form. contacts (c, 3): points; normals (c, 2, 3): lines, from A to B. impacts (i, 3): places of
     predicted collisions, with colours (i, 3). paths (p, 2, 3): line segments, with colours (p, 2, 3). tubes: vertices
-    (v, 3) and faces (f, 3). labels: names and their places. rows: the list. extent: radius of the scene. unit: size of
+    (v, 3) and faces (f, 3). labels: texts and their places. rows: the list. extent: radius of the scene. unit: size of
     a typical object.
     """
 
@@ -82,7 +83,7 @@ class Picture:
 def draw(moment: Moment, *, origin: Floats | None = None, selected: int | None = None, alerts: bool = False) -> Picture:
     """Return the picture of a moment.
 
-    origin (3,): m, in the world; None: chosen. selected: id of an object that is always labelled. alerts: colour by
+    origin (3,): m, in the world; None: chosen. selected: id of an object to label with its name. alerts: colour by
     alerts instead of answers.
     """
     bodies = moment.bodies
@@ -122,12 +123,18 @@ def draw(moment: Moment, *, origin: Floats | None = None, selected: int | None =
 
 def _bounds(moment: Moment) -> tuple[Floats, float]:
     """Return the centre (3,) and the radius of what there is, without half-spaces (m)."""
-    reach = moment.bodies.reach[moment.body]
-    solid = reach > 0.0
-    if not solid.any():
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for name, pieces in moment.bodies.pieces.items():
+        piece, which = pieces.of(moment.body)
+        if name != PLANE and len(piece):
+            state, (centre, half) = moment.state[which], pieces.form.bounds
+            at, turned = pieces.placed(piece, state["position"], state["quaternion"])
+            rotation, scale = rotation_matrix(turned), pieces.scale[piece]
+            at = at + np.einsum("nij,nj->ni", rotation, centre * scale)
+            reach = np.einsum("nij,nj->ni", np.abs(rotation), half * scale)
+            low, high = np.minimum(low, (at - reach).min(axis=0)), np.maximum(high, (at + reach).max(axis=0))
+    if not np.isfinite(low).all():
         return np.zeros(3), 10.0
-    position, reach = moment.state["position"][solid], reach[solid, None]
-    low, high = (position - reach).min(axis=0), (position + reach).max(axis=0)
     return 0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), 1e-3)
 
 
@@ -162,8 +169,8 @@ def _placed(
             scale = pieces.scale[piece] * (2.5 * extent if name == PLANE else 1.0)
             wxyz = turned[:, [3, 0, 1, 2]]
             ids = moment.ids[rows[which]]
-            at, wxyz, scale = (each.astype(np.float32) for each in (at, wxyz, scale))
-            found[name] = Batch(pieces.form, at, wxyz, scale, color[which], ids)
+            placed: list[Singles] = [each.astype(np.float32) for each in (at, wxyz, scale)]
+            found[name] = Batch(pieces.form, placed[0], placed[1], placed[2], color[which], ids)
     return found
 
 
@@ -211,12 +218,10 @@ def _paths(
 
 
 def _labels(moment: Moment, rows: list[PairRow], selected: int | None, origin: Floats) -> list[tuple[str, Singles]]:
-    """Return the names of the objects of the list and of the selected one, each above its object."""
-    wanted = dict.fromkeys([*([] if selected is None else [selected]), *(i for row in rows for i in row.pair)])
-    ids = np.array(list(wanted)[:LABELS], np.uint32)
-    at = moment.rows_of(ids)
-    ids, at = ids[at >= 0], at[at >= 0]
-    place = moment.state["position"][at] - origin
-    place[:, 2] += 1.1 * np.minimum(moment.bodies.reach[moment.body[at]], 2.0 * _unit(moment))
-    names = [moment.name_of(int(object_id)) for object_id in ids]
-    return list(zip(names, place.astype(np.float32), strict=True))
+    """Return the texts of the soonest pairs, each at its place, and the name of the selected object above it."""
+    labels = [(row.text, row.place - origin) for row in rows[:NAMED] if row.place is not None]
+    at = moment.rows_of(np.array([] if selected is None else [selected], np.uint32))
+    for row in at[at >= 0]:
+        up = min(moment.bodies.reach[moment.body[row]], 2.0 * _unit(moment))
+        labels.append((moment.name_of(int(moment.ids[row])), moment.state["position"][row] - origin + (0.0, 0.0, up)))
+    return [(text, place.astype(np.float32)) for text, place in labels]

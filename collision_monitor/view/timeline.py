@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,6 +18,9 @@ SPEEDS: Final = ("0.1 ×", "0.25 ×", "0.5 ×", "1 ×", "2 ×", "5 ×", "10 ×")
 LISTED: Final = 200
 """Contacts in the list to jump to."""
 
+MARKS: Final = 16
+"""Contacts that the slider marks. More marks would hide it."""
+
 _CHOOSE: Final = "–"
 
 
@@ -27,21 +31,22 @@ class Timeline:
         self, server: viser.ViserServer, recording: Recording, player: Player, requests: SimpleQueue[Request]
     ) -> None:
         self._recording, self._player, self._requests = recording, player, requests
+        self._shown = 0.0
         gui = server.gui
         end = max(player.end, 1e-3)
         marks = tuple(dict.fromkeys(recording.times[each.frame] for each in recording.begins[:LISTED]))
-        self._slider = gui.add_slider(
-            "time (s)", 0.0, end, min(0.001, end), 0.0, marks=tuple(map(float, marks)) or None
+        self._slider: Any = gui.add_slider(
+            "time (s)", 0.0, end, min(0.01, end), 0.0, marks=tuple(map(float, marks)) if len(marks) <= MARKS else None
         )
-        self._slider.on_update(lambda event: self._ask(event, lambda: self._scrub(self._slider.value)))
+        self._slider.on_update(lambda event: self._ask(event, partial(self._scrub, event.target.value)))
         self._play = gui.add_button("play", icon=None)
         self._play.on_click(lambda _: requests.put(player.toggle))
         self._steps = gui.add_button_group("step", ("|‹", "‹ contact", "‹", "›", "contact ›", "›|"))
-        self._steps.on_click(lambda event: self._ask(event, lambda step=self._steps.value: self._step(step)))
+        self._steps.on_click(lambda event: self._ask(event, partial(self._step, event.target.value)))
         self._speed = gui.add_dropdown("speed", SPEEDS, initial_value="1 ×")
         self._speed.on_update(lambda event: self._ask(event, self._change_speed))
         self._places = {self._text(each): each for each in recording.begins[:LISTED]}
-        self._contacts = gui.add_dropdown("contacts", (_CHOOSE, *self._places), visible=bool(self._places))
+        self._contacts: Any = gui.add_dropdown("contacts", (_CHOOSE, *self._places), visible=bool(self._places))
         self._contacts.on_update(lambda event: self._ask(event, self._go_to_contact))
 
     def _text(self, begin: Beginning) -> str:
@@ -51,7 +56,9 @@ class Timeline:
 
     def show(self) -> None:
         """Show where the player is."""
-        self._slider.value = round(self._player.time, 3)
+        if self._player.time != self._shown:  # else a browser that drags the slider would be disturbed
+            self._shown = self._player.time
+            self._slider.value = self._shown
         self._play.label = "pause" if self._player.playing else "play"
 
     def _ask(self, event: Any, request: Request) -> None:

@@ -71,7 +71,8 @@ class View:
         """Set the camera and the grid for a scene of this size."""
         extent, centre = picture.extent, picture.centre
         camera = self._server.initial_camera
-        camera.look_at, camera.position = centre, centre + extent * np.array([-0.75, -1.05, 1.0])
+        camera.look_at, camera.position = centre, centre + extent * np.array([-0.9, -1.3, 1.3])
+        camera.fov = np.radians(50.0)
         camera.near, camera.far = 1e-3 * extent, 50.0 * extent
         for client in self._server.get_clients().values():
             look_at(client, centre, 1.6 * extent)

@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
-from urllib.parse import urlsplit
 
 from websockets.sync.client import connect
 
@@ -32,6 +31,7 @@ FLAGS: Final = (
     "--disable-sync",
     "--disable-default-apps",
     "--remote-debugging-port=0",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",  # keeps what Chromium itself asks for on this machine
 )
 
 
@@ -130,14 +130,19 @@ class Browser:
         self._process.wait()
         self._socket.close()
 
-    def requested_hosts(self) -> set[str]:
-        """Return the hosts of all requests of the closed browser, of workers and of web sockets too."""
+    def requests(self) -> list[str]:
+        """Return the addresses that the pages requested, their workers and web sockets too. Only when it is closed.
+
+        Chromium itself also asks for updates and the like. Those requests have no page as their initiator.
+        """
         events = json.loads(self._log.read_text())["events"]
-        urls = {each["params"]["url"] for each in events if isinstance(each.get("params", {}).get("url"), str)}
-        return {str(urlsplit(url).hostname) for url in urls if urlsplit(url).scheme in ("http", "https", "ws", "wss")}
+        asked = [each["params"] for each in events if "initiator" in each.get("params", {})]
+        return [each["url"] for each in asked if each["initiator"] != "not an origin"]
 
 
-def until(condition: Callable[[], Any], what: Callable[[], str] = lambda: "the condition", timeout: float = START) -> None:
+def until(
+    condition: Callable[[], Any], what: Callable[[], str] = lambda: "a condition", timeout: float = START
+) -> None:
     """Wait until a condition holds."""
     deadline = time.monotonic() + timeout
     while not condition():
