@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from collision_monitor.cli.quantities import whole
 from collision_monitor.errors import InputError, MessageError
 from collision_monitor.pipeline.topics import NODE
 from collision_monitor.ros.process import StopRequest, ros_context, stay_on_this_machine
-from collision_monitor.view.server import LOOPBACK, PORT, start_server
+from collision_monitor.view.server import LOOPBACK, PORT, start_server, stop_server
 
 if TYPE_CHECKING:
     from collision_monitor.settings.profile import Profile
@@ -115,7 +116,7 @@ def _view_session(args: argparse.Namespace, stop: StopRequest) -> None:
             shown = frame
         timeline.show()
         time.sleep(max(0.0, now + PERIOD - time.monotonic()))
-    server.stop()
+    stop_server(server)
 
 
 def _view_live(args: argparse.Namespace, stop: StopRequest) -> None:
@@ -154,10 +155,11 @@ def _view_live(args: argparse.Namespace, stop: StopRequest) -> None:
                     notes = [f"waiting for answers of /{monitor}"]
                 elif is_silent:
                     notes.insert(0, f"NO ANSWERS for {silence:.0f} s: this is the past")
+                moment = replace(moment, is_known=moment.is_known and not is_silent)
                 view.show(moment, f"/{monitor}, step {moment.step}", notes)
             listener.listen(until=now + PERIOD)
         listener.close()
-    server.stop()
+    stop_server(server)
 
 
 def _profile(recorded: Profile, replay: str | None) -> Profile | None:

@@ -49,7 +49,7 @@ TEXTS: Final[dict[Level, str]] = {
     Level.CLEAR: "no collision predicted",
     Level.POSSIBLE: "may collide, by its uncertainty",
     Level.PREDICTED: "will collide",
-    Level.UNRESOLVED: "not known: unresolved",
+    Level.UNRESOLVED: "not known, or unresolved",
     Level.TOUCHING: "touches",
     Level.CAUTION: "alert: caution",
     Level.WARNING: "alert: warning",
@@ -82,16 +82,19 @@ def prediction_levels(predictions: NDArray[np.void]) -> NDArray[np.uint8]:
 def object_levels(
     ids: NDArray[np.uint32],
     static: NDArray[np.bool_],
+    is_known: bool,
     contacts: NDArray[np.void],
     predictions: NDArray[np.void],
     alerts: Mapping[Pair, Level] | None = None,
 ) -> NDArray[np.uint8]:
     """Return the level of each object (n,). This is the one place that decides it.
 
-    ids (n,), ascending; static (n,). contacts, predictions: of one step. alerts: the raised ones; None: colour by the
+    ids (n,), ascending; static (n,). is_known: whether there are answers. contacts, predictions: of one step. alerts: the raised ones; None: colour by the
     answers.
     """
-    level = np.where(static, np.uint8(Level.STATIC), np.uint8(Level.CLEAR))
+    level = np.where(static, np.uint8(Level.STATIC), np.uint8(Level.CLEAR if is_known else Level.UNRESOLVED))
+    if not is_known:
+        return level
     if alerts is None:
         for rows, of_pair in ((predictions, prediction_levels(predictions)), (contacts, contact_levels(contacts))):
             raised = of_pair > Level.CLEAR

@@ -22,6 +22,7 @@ class Moment:
     body (n,): rows of `bodies` with a pose, ascending by id; state (n,): the last one of each, records.STATE (of a
     static one: its pose); age (n,): s from that state to the step. contacts, predictions: of the step, records.CONTACT
     and PREDICTION. names: of the objects that the answers mention. alerts: the raised ones; None without rules.
+    is_known: whether there are answers; without them, nothing may be shown as clear.
     """
 
     bodies: Bodies
@@ -35,6 +36,7 @@ class Moment:
     stamp_ns: int = 0
     step: int = 0
     alerts: Mapping[Pair, Level] | None = None
+    is_known: bool = True
 
     @property
     def ids(self) -> NDArray[np.uint32]:

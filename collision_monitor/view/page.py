@@ -17,7 +17,7 @@ from collision_monitor.view.picture import Batch, Picture, Role
 if TYPE_CHECKING:
     import viser
 
-_OPACITY: Final = {Role.MOVING: None, Role.STATIC: 0.55, Role.IMPACT: 0.3}
+_OPACITY: Final = {Role.MOVING: None, Role.STATIC: 0.55, Role.IMPACT: 0.35}
 _LIGHTS: Final = (("key", (-3.0, -4.0, 6.0), 1.8), ("fill", (4.0, 1.0, 2.0), 0.7))
 """Directional lights: name, where the light comes from, intensity. Weak enough that no colour turns white."""
 
@@ -97,7 +97,7 @@ class Page:
     def _show_points(self, picture: Picture) -> None:
         white = np.tile(np.array(_WHITE, np.uint8), (len(picture.contacts), 1))
         self._points("contacts", picture.contacts, white, 0.12 * picture.unit)
-        self._points("impacts", picture.impacts, picture.impact_colors, 0.2 * picture.unit)
+        self._points("impacts", picture.impacts, picture.impact_colors, 0.14 * picture.unit)
 
     def _points(self, name: str, points: Any, colors: Any, size: float) -> None:
         handle = self._others.get(name)

@@ -32,6 +32,9 @@ PARTS: Final = {
 }
 """What can be hidden: names of `Page.hidden`, and texts."""
 
+_CLEAR: Final = "no pair touches, and none is predicted to"
+_UNKNOWN: Final = "not known: there are no answers"
+
 Request = Callable[[], None]
 
 
@@ -54,7 +57,7 @@ class Panel:
         gui = self._server.gui
         with gui.add_folder("Soonest pairs"):
             self._buttons = [gui.add_button("–", visible=False) for _ in range(ROWS)]
-            self._none = gui.add_html(_text("no pair touches, and none is predicted to"))
+            self._none = gui.add_html(_text(_CLEAR))
         for k, button in enumerate(self._buttons):
             button.on_click(partial(self._jump, k))
         with gui.add_folder("Object"):
@@ -79,6 +82,7 @@ class Panel:
             if k < len(picture.rows):
                 button.label, button.color = picture.rows[k].text, color_of(picture.rows[k].level)
         self._none.visible = not picture.rows
+        self._set(self._none, _text(_CLEAR if picture.is_known else _UNKNOWN))
 
     def _set(self, handle: Any, content: str) -> None:
         if handle.content != content:

@@ -60,7 +60,8 @@ class Picture:
 
     batches: by role and form. contacts (c, 3): points; normals (c, 2, 3): lines, from A to B. impacts (i, 3): places of
     predicted collisions, with colours (i, 3). paths (p, 2, 3): line segments, with colours (p, 2, 3). tubes: vertices
-    (v, 3) and faces (f, 3). labels: texts and their places. rows: the list. extent: radius of the scene. unit: size of
+    (v, 3) and faces (f, 3). labels: texts and their places. rows: the list. is_known: whether
+    there are answers. extent: radius of the scene. unit: size of
     a typical object.
     """
 
@@ -75,6 +76,7 @@ class Picture:
     tubes: tuple[Singles, NDArray[np.uint32]]
     labels: list[tuple[str, Singles]]
     rows: list[PairRow]
+    is_known: bool
     centre: Floats
     extent: float
     unit: float
@@ -92,7 +94,9 @@ def draw(moment: Moment, *, origin: Floats | None = None, selected: int | None =
     if origin is None:
         origin = np.round(centre) if np.abs(centre).max() > FAR else np.zeros(3)
     raised = (moment.alerts or {}) if alerts else None
-    levels = object_levels(moment.ids, bodies.static[moment.body], moment.contacts, moment.predictions, raised)
+    levels = object_levels(
+        moment.ids, bodies.static[moment.body], moment.is_known, moment.contacts, moment.predictions, raised
+    )
     batches = _batches(moment, position - origin, quaternion, levels, extent)
     shown = moment.predictions[:IMPACTS]
     batches |= _impact_batches(moment, shown, origin)
@@ -115,6 +119,7 @@ def draw(moment: Moment, *, origin: Floats | None = None, selected: int | None =
         tubes=tube,
         labels=_labels(moment, rows, selected, origin),
         rows=rows,
+        is_known=moment.is_known,
         centre=centre - origin,
         extent=extent,
         unit=unit,

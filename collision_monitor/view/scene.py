@@ -100,7 +100,16 @@ class Scene:
         names = {
             object_id: name for each in answers for object_id, name in zip(each.ids.tolist(), each.names, strict=False)
         }
-        moment = Moment(bodies, body, state, age, names=names, stamp_ns=stamp, step=0 if last is None else last.step)
+        moment = Moment(
+            bodies,
+            body,
+            state,
+            age,
+            names=names,
+            stamp_ns=stamp,
+            step=0 if last is None else last.step,
+            is_known=contacts is not None and predictions is not None,
+        )
         if contacts is not None:
             moment = replace(moment, contacts=contacts.contacts)
         if predictions is not None:

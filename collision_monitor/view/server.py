@@ -31,9 +31,15 @@ def start_server(host: str = LOOPBACK, port: int = PORT) -> viser.ViserServer:
     with contextlib.redirect_stdout(io.StringIO()):  # its banner
         server = viser.ViserServer(host=host, port=chosen, label="collision_monitor", verbose=False)
     if server.get_port() != chosen:  # another program took it meanwhile, and viser went on to the next one
-        server.stop()
+        stop_server(server)
         raise InputError(f"--port: expected a free port, {chosen} is in use; choose another one, or 0 for any")
     return server
+
+
+def stop_server(server: viser.ViserServer) -> None:
+    """Stop serving; browsers that show the page wait for another server."""
+    with contextlib.redirect_stdout(io.StringIO()):  # its last line
+        server.stop()
 
 
 def _free_port(host: str, port: int) -> int:

@@ -14,6 +14,8 @@ from collision_monitor.view.moment import Moment
 def state_html(title: str, moment: Moment, notes: list[str]) -> str:
     """Return the state: title, counts of a moment, and notes that warn."""
     contacts, predictions = moment.contacts, moment.predictions
+    if not moment.is_known:
+        notes = [*notes, "touching and predicted pairs are not known"]
     touching = int(np.count_nonzero((contacts["phase"] != Phase.END) & (contacts["point_index"] == 0)))
     counts = [f"{len(moment.ids)} objects", f"{touching} touching", f"{len(predictions)} predicted"]
     unresolved = int(np.count_nonzero(predictions["status"] == PredictionStatus.UNRESOLVED))
