@@ -22,6 +22,7 @@ from collision_monitor.geometry.shapes import (
     Capsule,
     Circle,
     Cone,
+    ConvexHull,
     Cylinder,
     Ellipsoid,
     HalfSpace,
@@ -103,6 +104,8 @@ def pieces_of(shape: Shape, pose: Pose) -> Iterator[Piece]:
             yield Piece(unit[PLANE], pose @ _plane_pose(shape), (1.0, 1.0, 1.0))
         case Polygon():
             yield Piece(_own_form("polygon", _filled(shape), closed=False), pose, (1.0, 1.0, 1.0))
+        case ConvexHull():
+            yield Piece(_own_form("hull", _outward(surface_triangles(shape)), closed=True), pose, (1.0, 1.0, 1.0))
         case _:
             closed = not isinstance(shape, Mesh)
             yield Piece(
@@ -155,6 +158,13 @@ def _welded(name: str, triangles: Floats, *, closed: bool, own: bool = False) ->
 def _own_form(kind: str, triangles: Floats, *, closed: bool) -> Form:
     digest = blake2b(np.ascontiguousarray(triangles).tobytes(), digest_size=8).hexdigest()
     return _welded(f"{kind}_{digest}", triangles, closed=closed, own=True)
+
+
+def _outward(triangles: Floats) -> Floats:
+    """Return the triangles (n, 3, 3) of a convex surface counter-clockwise from outside. Qhull does not order them."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    inward = np.einsum("ni,ni->n", np.cross(b - a, c - a), a - triangles.mean(axis=(0, 1))) < 0.0
+    return np.where(inward[:, None, None], triangles[:, ::-1], triangles)
 
 
 def _filled(polygon: Polygon) -> Floats:

@@ -89,8 +89,8 @@ def object_levels(
 ) -> NDArray[np.uint8]:
     """Return the level of each object (n,). This is the one place that decides it.
 
-    ids (n,), ascending; static (n,). is_known: whether there are answers. contacts, predictions: of one step. alerts: the raised ones; None: colour by the
-    answers.
+    ids (n,), ascending; static (n,). is_known: whether there are answers. contacts, predictions: of one step.
+    alerts: the raised ones; None: colour by the answers.
     """
     level = np.where(static, np.uint8(Level.STATIC), np.uint8(Level.CLEAR if is_known else Level.UNRESOLVED))
     if not is_known:

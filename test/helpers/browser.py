@@ -108,6 +108,13 @@ class Browser:
         script = f"[...document.querySelectorAll('button')].find(b => b.innerText.includes({json.dumps(text)})).click()"
         self.run(script)
 
+    def dismiss_notification(self) -> None:
+        """Close the notification that viser shows first."""
+        button = "document.querySelector('.mantine-Notification-closeButton')"
+        until(lambda: self.run(f"!!{button}"))
+        self.run(f"{button}.click()")
+        until(lambda: not self.run(f"!!{button}"))
+
     def press(self, x: float, y: float) -> None:
         """Press and release the mouse at a place of the page (pixels)."""
         self.ask("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
