@@ -30,6 +30,8 @@ EPILOG = """\
 examples:
   collision-monitor demo                                   live demo with a simulated scene
   collision-monitor run --record run.mcap                  run the monitor node and record a session
+  collision-monitor view                                   show the running monitor in the browser
+  collision-monitor view run.mcap                          show a session, with a time line
   collision-monitor sources                                list topics of robots that it can monitor
   collision-monitor world --list                           list the simulated scenes
   collision-monitor world crossing                         publish one of them
