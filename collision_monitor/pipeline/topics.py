@@ -45,6 +45,12 @@ class Topic(Enum):
     PREDICTIONS = "predictions", "collision_monitor_msgs/msg/PredictedCollisionArray", Quality(10)
     """Contacts and predictions are reliable: a subscriber that keeps up loses none."""
 
+    ALERTS = "alerts", "collision_monitor_msgs/msg/CollisionAlert", Quality(1000)
+    """One message for each change. Reliable; the depth covers a step in which many alerts change at once."""
+
+    RAISED_ALERTS = "raised_alerts", "collision_monitor_msgs/msg/CollisionAlertArray", Quality(1, durability=LATCHED)
+    """All that are raised, for a subscriber that starts late. Not recorded, because the changes are."""
+
     STATUS = "status", "collision_monitor_msgs/msg/MonitorStatus", Quality(1, durability=LATCHED)
     """A new subscriber gets the last status at once."""
 
@@ -71,5 +77,7 @@ class Topic(Enum):
         return f"/{node}/{self.path}"
 
 
-RECORDED: Final = (Topic.SHAPES, Topic.STATES, Topic.SETTINGS, Topic.CONTACTS, Topic.PREDICTIONS, Topic.STATUS)
+RECORDED: Final = (
+    *(Topic.SHAPES, Topic.STATES, Topic.SETTINGS, Topic.CONTACTS, Topic.PREDICTIONS, Topic.STATUS, Topic.ALERTS),
+)
 """The topics that the node records, in the order of a session's channels."""
