@@ -16,8 +16,9 @@ class Scene:
 
     present (N,): the body is described and has a state, and lies in the region of interest. position, velocity, angular
     (N, 3): extrapolated from the last states. radius (N,): of the sphere about the origin that holds the body (m); may
-    be infinite. speed (N,): bound on the speed of any of its points (m/s). doubt (N,): how far it may have left its
-    path since its last state (m). stale (N,): the last state is too old, or there is none.
+    be infinite. turning (N,): bound on the speed of its points about the origin (m/s); speed (N,): on any.
+    doubt (N,): how far it may have left its path since its last state (m). stale (N,): the last state is too old, or
+    there is none.
     """
 
     def __init__(self, roster: Roster, profile: Profile, now: float) -> None:
@@ -31,7 +32,8 @@ class Scene:
         self.angular: Array = b.angular[:top]
         self.doubt: Array = 0.5 * profile.stale_acceleration * age**2
         reach = np.where(turning > 0.0, b.spin_radius[:top], 0.0)
-        self.speed: Array = np.sqrt((self.velocity**2).sum(axis=1)) + turning * reach
+        self.turning: Array = turning * reach
+        self.speed: Array = np.sqrt((self.velocity**2).sum(axis=1)) + self.turning
         self.stale: NDArray[np.bool_] = (age > profile.stale_after) | ~(b.seen[:top] | b.static[:top])
         self.present: NDArray[np.bool_] = b.used[:top] & (b.seen[:top] | b.static[:top])
         if is_bounded(profile.region_min, profile.region_max):
