@@ -17,6 +17,9 @@ STATUS_PERIOD: Final = 50_000_000
 SOURCES: Final = "~/sources"
 """Topic of a DiagnosticArray about the other programs' topics that the node reads, about once a second."""
 
+RULES: Final = "~/rules"
+"""Topic of a String with the rules of the alerts (YAML), from a latched publisher."""
+
 LATCHED: Final = "transient_local"
 """The durability that delivers earlier messages to a late subscriber."""
 

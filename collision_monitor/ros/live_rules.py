@@ -1,4 +1,4 @@
-"""Rules of the alerts that change while the monitor runs, by the parameter `rules` or by the latched topic `~/rules`.
+"""Rules of the alerts that change while the monitor runs, by the parameter `rules` or by a latched topic.
 
     ros2 param set /object_monitor rules night.yaml
 """
@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
@@ -16,10 +15,8 @@ from std_msgs.msg import String
 
 from collision_monitor.alerts.rules import Rules
 from collision_monitor.errors import InputError
+from collision_monitor.pipeline import topics
 from collision_monitor.pipeline.settings_event import RULES
-
-TOPIC: Final = "~/rules"
-"""Topic of a String with the YAML of the rules; its publisher is latched (transient local)."""
 
 
 class LiveRules:
@@ -36,13 +33,13 @@ class LiveRules:
     def subscribe(self) -> None:
         """Subscribe to the topic."""
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._node.create_subscription(String, TOPIC, self._on_text, latched)
+        self._node.create_subscription(String, topics.RULES, self._on_text, latched)
 
     def _on_text(self, message: String) -> None:
         text = message.data if "\n" in message.data else f"{message.data}\n"  # never the path of a file
         (result,) = self._node.set_parameters([Parameter(RULES, value=text)])
         if not result.successful:
-            self._node.get_logger().warning(f"{TOPIC}: the rules stay as they are: {result.reason}")
+            self._node.get_logger().warning(f"{topics.RULES}: the rules stay as they are: {result.reason}")
 
     def _check(self, parameters: list[Parameter]) -> SetParametersResult:
         for each in parameters:
