@@ -91,8 +91,8 @@ def test_alerts_are_published_changed_at_run_time_recorded_and_replayed(start, t
 
     replay = start("replay", "run.mcap")
     assert replay.wait() == 0, replay.words
-    expected = "- alert: [cart, person_1]\n  level: critical\n  rule: near\n- no_alert: [cart, cart]\n- replay: identical\n"
-    (tmp_path / "expect.yaml").write_text(f"expect:\n{expected}")
+    expected = "expect:\n- alert: [cart, person_1]\n  level: critical\n  rule: near\n- no_alert: [cart, cart]\n"
+    (tmp_path / "expect.yaml").write_text(f"{expected}- replay: identical\n")
     check = start("check", "run.mcap", "--expect", "expect.yaml")
     assert check.wait() == 0, check.words
 
