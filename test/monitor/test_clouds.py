@@ -1,4 +1,4 @@
-"""The monitor with clouds: contacts as `contact` finds them, replaced at every step, over the wire, saved and replayed."""
+"""The monitor with clouds: contacts as `contact` finds them, replaced at every step, over the wire, restored."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ def test_contacts_and_impacts_with_a_cloud_that_each_step_replaces(other):
         assert np.linalg.norm(at - row["point_b"]) == pytest.approx(0.03, abs=1e-9)
         overlapping += bool(truth.overlaps)
         if truth.overlaps:  # a translation along the normal parts them
-            out = cm.Pose(Y.position + (row["error_bound"] - row["signed_distance"] + 1e-6) * row["normal"], Y.quaternion)
-            assert not cm.overlap(other, X, cloud, out)
+            apart = row["error_bound"] - row["signed_distance"] + 1e-6
+            assert not cm.overlap(other, X, cloud, cm.Pose(Y.position + apart * row["normal"], Y.quaternion))
     assert overlapping
 
 
@@ -84,8 +84,8 @@ def test_predictions_with_a_cloud_are_certified():
 def clouds_and_robot(pipeline: Pipeline, step: int) -> list[bytes]:
     """The answers of a step of a pipeline, with a new scan as a message before it."""
     rng = np.random.default_rng(step)
-    scan = cm.Points(rng.normal(size=(300, 3)) + (3, 0, 0), 0.05)
-    data = encode_descriptions(step, "world", [ObjectDescription(7, scan, static=True, pose=cm.Pose((0, 0, 0.1 * step)))])
+    scan = ObjectDescription(7, cm.Points(rng.normal(size=(300, 3)), 0.05), static=True, pose=cm.Pose((3, 0, 0.1 * step)))
+    data = encode_descriptions(step, "world", [scan])
     assert len(pipeline.on_shapes(data)) == 1
     states = np.zeros(1, STATE)
     states["id"], states["quaternion"] = 1, (0, 0, 0, 1)
