@@ -84,7 +84,8 @@ def test_predictions_with_a_cloud_are_certified():
 def clouds_and_robot(pipeline: Pipeline, step: int) -> list[bytes]:
     """The answers of a step of a pipeline, with a new scan as a message before it."""
     rng = np.random.default_rng(step)
-    scan = ObjectDescription(7, cm.Points(rng.normal(size=(300, 3)), 0.05), static=True, pose=cm.Pose((3, 0, 0.1 * step)))
+    cloud, pose = cm.Points(rng.normal(size=(300, 3)), 0.05), cm.Pose((3, 0, 0.1 * step))
+    scan = ObjectDescription(7, cloud, static=True, pose=pose)
     data = encode_descriptions(step, "world", [scan])
     assert len(pipeline.on_shapes(data)) == 1
     states = np.zeros(1, STATE)
