@@ -41,6 +41,7 @@ class LineReport(NamedTuple):
     states: int
     refused: int
     last_refusal: str
+    points_dropped: int
     level: bytes
     text: str
 
@@ -166,7 +167,8 @@ class LiveSources:
         else:
             level, text = (DiagnosticStatus.WARN, refusal) if refused else (DiagnosticStatus.OK, "ok")
         kind = self._found.get(topic, "")
-        return LineReport(name, topic, kind, messages, states, refused, refusal, level, text)
+        dropped = scene.points_dropped.get(name, 0)
+        return LineReport(name, topic, kind, messages, states, refused, refusal, dropped, level, text)
 
     def _report(self) -> None:
         """Publish the state of each line of the file."""
