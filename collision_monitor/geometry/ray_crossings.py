@@ -20,7 +20,7 @@ ROUND_OFF: Final = 16 * EPSILON
 
 
 def edge_hits(p: Array, d: Array, start: Array, end: Array) -> Array:
-    """Distances (n, k) in m along rays p, d (n, 1, 2) to edges (k, 2); infinite for none and for edges along the ray."""
+    """Distances (n, k) in m along rays p, d (n, 1, 2) to edges (k, 2); infinite for none and for edges along it."""
     middle = (start.min(axis=0) + start.max(axis=0)) / 2
     reach = np.linalg.norm(start - middle, axis=1).max()
     length = 2.0 * (np.linalg.norm(p - middle, axis=-1) + reach)
