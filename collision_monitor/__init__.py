@@ -11,6 +11,7 @@
     query.overlap                  overlap                                yes or no, with a choice of tests
     query.containment              contains                              which points are in a shape
     query.rays                     cast_ray, RayHits                     where rays and segments meet a shape
+    query.kdop                     kdop, Enclosure                       bounding slabs with directions of your own
     query.time_of_impact           time_of_impact, Impact                 time of impact of two shapes, as an interval
     query.time_of_impact_batch     time_of_impact_batch, Impacts          the same for many motions of two shapes
     query.feature_impact           vertex_face_impact, edge_edge_impact   the same for features in linear motion
@@ -62,6 +63,8 @@ _HOME = {
     "contains": "query.containment",
     "cast_ray": "query.rays",
     "RayHits": "query.rays",
+    "kdop": "query.kdop",
+    "Enclosure": "query.kdop",
     "convex_decomposition": "objects.convex_decomposition",
     "Decomposition": "objects.convex_decomposition",
     "time_of_impact": "query.time_of_impact",
@@ -130,6 +133,8 @@ if TYPE_CHECKING:
     from collision_monitor.query.feature_impact import edge_edge_impact as edge_edge_impact
     from collision_monitor.query.feature_impact import vertex_face_impact as vertex_face_impact
     from collision_monitor.query.features import contact_features as contact_features
+    from collision_monitor.query.kdop import Enclosure as Enclosure
+    from collision_monitor.query.kdop import kdop as kdop
     from collision_monitor.query.overlap import overlap as overlap
     from collision_monitor.query.rays import RayHits as RayHits
     from collision_monitor.query.rays import cast_ray as cast_ray

@@ -63,7 +63,7 @@ def first_hits(shape: Shape, p: Array, d: Array) -> tuple[Array, Array]:
 
 
 def _solids(shape: Shape, p: Array, d: Array) -> list[Interval]:
-    """Intervals of convex solids whose union is the shape."""
+    """Intervals of convex solids that make up the shape."""
     match shape:
         case Sphere():
             return [_ball(p, d, shape.radius)]
