@@ -117,7 +117,7 @@ def containing_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | 
 def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | int) -> Modelled:
     """Compute the model that a monitor uses, as `containing_model`; but an exact concave mesh stays one piece.
 
-    A mesh of which the inside is not certain (`Surface.certain`) has no exact model: its convex hull replaces it.
+    A mesh with an uncertain inside (`Surface.certain`) has no exact model. Its convex hull replaces it.
     """
     chosen = parse_model(model)
     if chosen not in (Model.AUTO, Model.EXACT):
