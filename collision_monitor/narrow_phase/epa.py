@@ -142,6 +142,20 @@ def _grow(cores: CorePair, work: Any, flat: float, count: int) -> tuple[int, flo
     return count, inf, (0.0, 0.0, 0.0)
 
 
+@inlined
+def _least_along_axes(cores: CorePair, work: Any) -> tuple[float, Vector]:
+    """Upper bound of the depth (m) and its direction: the least support along the six directions of A's axes."""
+    least = inf
+    direction = (1.0, 0.0, 0.0)
+    for step in range(6):
+        d = _probe(work, 1, step)
+        h = dot(d, support_difference(cores, work, d, SPARE))
+        if h < least:
+            least = h
+            direction = d
+    return least, direction
+
+
 @device
 def _weighted_point_on_a(work: Any, count: int) -> Vector:
     """Point on A with the weights of the first `count` simplex points."""
@@ -276,5 +290,8 @@ def epa(
     if count < 4:
         return upper, min(upper, -flat), opposite(outward), _weighted_point_on_a(work, count)
     upper, lower, outward, plane, faces = _expand(cores, work, size, tolerance, most)
+    if not upper < inf:  # every face of the first tetrahedron is a sliver
+        upper, outward = _least_along_axes(cores, work)
+        lower = min(upper, -flat)
     reach = plane + max(upper - plane, 64.0 * EPSILON * size)
     return upper, lower, opposite(outward), _witness(work, faces, scaled(outward, upper), reach)

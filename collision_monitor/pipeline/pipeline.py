@@ -28,7 +28,6 @@ from collision_monitor.codec import (
 )
 from collision_monitor.codec.states import COVARIANCE_SIZE
 from collision_monitor.errors import InputError, MessageError, ProfileError, Refusal, TooCostlyError, reason_of
-from collision_monitor.geometry.shapes import HalfSpace
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.snapshot import Snapshot
@@ -223,9 +222,6 @@ class Pipeline:
             return change
         own, boxes = budgets
         model = self.monitor.model_of(change)
-        if model not in (Model.AUTO, Model.EXACT) and any(isinstance(shape, HalfSpace) for shape, _ in change.shapes):
-            self.monitor.describe(change)  # refuses it, with the same text as in a replay
-            return change
         if model is not Model.AABB:
             if ready is None and self._preparation is not None:
                 if own.fits(change.shapes, model) and self._described_within(own, change):

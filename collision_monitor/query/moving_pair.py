@@ -17,7 +17,8 @@ from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shape_table import ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape
 from collision_monitor.meshes.shape_trees import shape_tree
-from collision_monitor.objects.models import PosedShapes, containing_model, exact_model
+from collision_monitor.objects.excess import PosedShapes
+from collision_monitor.objects.models import containing_model, exact_model
 from collision_monitor.prediction.bodies import Bodies, Multibody, make_bodies, make_parts
 from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.body_layout import lay_out_body
