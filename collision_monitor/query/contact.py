@@ -391,7 +391,7 @@ def _place(side: _Posed) -> tuple[Array, Array]:
 def _posed(shape: Compound, pose: Pose, model: Model | str | ArrayLike, name: str) -> _Posed:
     shapes = shape_pairs(shape, f"shape {name}")
     if not isinstance(pose, Pose):
-        raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
+        raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
     if isinstance(model, str | int):
         if parse_model(model) in (Model.AUTO, Model.EXACT):
             return _Posed(shapes, pose, shapes)

@@ -26,7 +26,7 @@ def contains(shape: Compound, pose: Pose, points: ArrayLike, test: str = "closed
     InputError; UnsupportedError for a shape that the test does not take, and a mesh that is not closed.
     """
     if not isinstance(pose, Pose):
-        raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}")
+        raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
     if test not in TESTS:
         raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")
     given = coordinates(points, "points")

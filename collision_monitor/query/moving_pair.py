@@ -60,7 +60,7 @@ def make_moving_shape(shape: Compound, motion: Motion, name: str) -> MovingShape
     """
     shapes = shape_pairs(shape, f"shape {name}")
     if not isinstance(motion, Motion):
-        raise PoseError(f"motion {name}: expected a Motion, got {type(motion).__name__}")
+        raise PoseError(f"motion {name}: expected a Motion, got {type(motion).__name__}; write Motion(pose)")
     if any(isinstance(s, HalfSpace) for s, _ in shapes) and motion.angular.any():
         raise UnsupportedError(f"shape {name}: a HalfSpace has no end and cannot turn")
     if is_planar(shapes[0][0]):

@@ -45,7 +45,7 @@ def cast_ray(
     Raises ShapeError, PoseError, InputError.
     """
     if not isinstance(pose, Pose):
-        raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}")
+        raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
     p, d = coordinates(origin, "origin", 3), coordinates(direction, "direction", 3)
     limit = np.asarray(length, dtype=np.float64)
     if not (limit >= 0.0).all():
