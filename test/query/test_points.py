@@ -125,7 +125,8 @@ def test_a_time_of_impact_is_certified(other):
         hits += found.status == "hit"
         for t in np.linspace(0.0, min(found.lower, 2.0), 12)[:-1]:
             assert cm.distance(cloud, A.at(t), other, B.at(t)) > 0.0
-        if found.status == "hit":
+        certain = not isinstance(other, cm.Mesh) or other.surface.certain  # else it may meet what is missing
+        if found.status == "hit" and certain:
             assert cm.distance(cloud, A.at(found.lower), other, B.at(found.lower)) <= 2e-6
             assert found.upper - found.lower < 1e-5
         twists = [np.concatenate([each.linear, each.angular]) for each in (A, B)]

@@ -423,9 +423,9 @@ def test_a_scan_is_one_object_without_the_points_on_the_robot_that_carries_the_s
     assert cloud.radius == 0.02 and fed.feed.scene.points_dropped["scan"] == 2
     fed.give("/scan", at(3), point_cloud("map", at(3), [(3.1, 0, 0)]))
     assert fed.names[-1].startswith("-")  # nothing is left
-    with pytest.raises(InputError, match="scan, without: 'robto' is unknown: did you mean 'robot'"):
-        unknown = Fed({"robot": robot, "scan": {**scan, "without": ["robto"]}})
-        unknown.give("/scan", START, laser_scan("map", START, [1]))
+    fed = Fed({"robot": robot, "scan": {**scan, "without": ["robto"]}})
+    (problem,) = fed.feed.bind("/scan", laser_scan("map", START, [1])[0]).values()
+    assert "scan, without: 'robto' is unknown: did you mean 'robot'" in problem
     fed = Fed({"scan": {"topic": "/scan"}})
     fed.give("/scan", at(0), laser_scan("map", at(0), [1, np.inf, np.nan, 2]))
     (cloud, _), = fed.changes[-1].shapes  # type: ignore[union-attr]
