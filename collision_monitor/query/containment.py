@@ -22,6 +22,9 @@ def contains(shape: Compound, pose: Pose, points: ArrayLike, test: str = "closed
     frame. Points of two coordinates are in the x-y plane. (Slides "Point in polygon - ray test", "Point in convex
     polygon", "A vertex is inside a convex polyhedron if …") Raises ShapeError, PoseError, InputError; UnsupportedError
     for a shape that the test does not take.
+
+    >>> contains(cm.Sphere(0.5), cm.Pose(), [(0, 0, 0.4), (0, 0, 0.6)])
+    array([ True, False])
     """
     if not isinstance(pose, Pose):
         raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
