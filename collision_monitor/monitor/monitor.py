@@ -227,6 +227,16 @@ class Monitor:
         return self._timeline.restarts
 
     @property
+    def roster(self) -> Roster:
+        """The objects and their last states, for reading."""
+        return self._roster
+
+    @property
+    def now(self) -> float:
+        """The latest time (s after the first stamp); the states in `roster` have such times."""
+        return self._timeline.now
+
+    @property
     def stale_ids(self) -> list[int]:
         """Ids of the objects that are stale at the latest time, ascending."""
         if self._answers.last is None or not self._timeline.has_begun:

@@ -43,8 +43,9 @@ def cast_ray(
 
     origin (..., 3) m and direction (..., 3) of any length, in the world frame; length (...): of the rays in m. A
     segment from p to q has the direction q - p and the length |q - p|. A closed mesh is solid, an open one a surface.
-    For plane shapes, directions lie in the plane. Errors are some 1e-15 of the distance of the shape from the origin
-    of the ray; a ray that grazes may count either way. (Slides "Ray test", "Line intersection")
+    For plane shapes, directions lie in the plane. The answer is right for a ray that is moved by some 1e-15 of the
+    size of the shape and of its distance from the origin of the ray. So a ray that grazes may count either way, but no
+    ray passes between two faces or edges. (Slides "Ray test", "Line intersection")
     Raises ShapeError, PoseError, InputError.
 
     >>> cast_ray(cm.Box((1, 1, 1)), cm.Pose(), origin=(0, 0, 2), direction=(0, 0, -1)).point

@@ -282,7 +282,7 @@ STAGES = (
 )
 
 MODULES = ("scipy", "numba", "trimesh", "collada", "mcap", "rich", "matplotlib", "yaml", "rosbags", "colcon_core")
-TOOL_MODULES = ("fcl", "pytest", "hypothesis", "mypy")
+TOOL_MODULES = ("fcl", "pytest", "hypothesis", "mypy", "viser")
 
 _HEALTH = """
 import importlib.util, sys
