@@ -65,6 +65,7 @@ class LoadedKernel(JITCodeLibrary):  # type: ignore[misc]
     def __init__(self, codegen: Any, name: str, code: bytes, intermediate: bytes, symbols: list[str]) -> None:
         super().__init__(codegen, name)
         self._intermediate = intermediate
+        self._shared_module: Any = None
         self.enable_object_caching()
         self._set_compiled_object(code)
         self._finalize_final_module()

@@ -151,7 +151,11 @@ class Cone(Shape):
 
 @dataclass(frozen=True)
 class Ellipsoid(Shape):
-    """Ellipsoid; radii: half axes along x, y, z in m."""
+    """Ellipsoid; radii: half axes along x, y, z in m.
+
+    >>> Ellipsoid((0.3, 0.2, 0.1))
+    Ellipsoid(radii=(0.3, 0.2, 0.1))
+    """
 
     radii: Any
 

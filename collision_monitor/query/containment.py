@@ -24,6 +24,9 @@ def contains(shape: Compound, pose: Pose, points: ArrayLike, test: str = "closed
     that are not oriented leave it open. Points of two coordinates are in the x-y plane. (Slides "Point in polygon -
     ray test", "Point in convex polygon", "A vertex is inside a convex polyhedron if …") Raises ShapeError, PoseError,
     InputError; UnsupportedError for a shape that the test does not take, and a mesh that is not closed.
+
+    >>> contains(cm.Sphere(0.5), cm.Pose(), [(0, 0, 0.4), (0, 0, 0.6)])
+    array([ True, False])
     """
     if not isinstance(pose, Pose):
         raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
