@@ -15,7 +15,7 @@ matplotlib.use("agg")
 
 PUBLIC = {name: getattr(cm, name) for name in cm.__all__}
 ERRORS = {name for name, it in PUBLIC.items() if inspect.isclass(it) and issubclass(it, Exception)}
-WITHOUT = {"__version__", "response", "world", "contains", "cast_ray", "RayHits", "Ellipsoid", "load_mesh"} | ERRORS
+WITHOUT = {"__version__", "response", "world", "RayHits", "Ellipsoid", "load_mesh"} | ERRORS
 """Names without an example in their docstrings. Those of rays and of the response are in docs/geometry.md and
 docs/response.md, which run as tests too."""
 

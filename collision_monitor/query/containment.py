@@ -24,6 +24,10 @@ def contains(shape: Compound, pose: Pose, points: ArrayLike, test: str = "closed
     that are not oriented leave it open. Points of two coordinates are in the x-y plane. (Slides "Point in polygon -
     ray test", "Point in convex polygon", "A vertex is inside a convex polyhedron if …") Raises ShapeError, PoseError,
     InputError; UnsupportedError for a shape that the test does not take, and a mesh that is not closed.
+
+    >>> import collision_monitor as cm
+    >>> cm.contains(cm.Sphere(1.0), cm.Pose((5, 0, 0)), [(5.5, 0, 0), (0, 0, 0)])
+    array([ True, False])
     """
     if not isinstance(pose, Pose):
         raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}")

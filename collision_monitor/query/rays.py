@@ -43,6 +43,10 @@ def cast_ray(
     size of the shape and of its distance from the origin of the ray. So a ray that grazes may count either way, but no
     ray passes between two faces or edges. (Slides "Ray test", "Line intersection")
     Raises ShapeError, PoseError, InputError.
+
+    >>> import collision_monitor as cm
+    >>> cm.cast_ray(cm.Sphere(1.0), cm.Pose((5, 0, 0)), [(0, 0, 0), (0, 3, 0)], (1, 0, 0)).distance
+    array([ 4., inf])
     """
     if not isinstance(pose, Pose):
         raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}")
