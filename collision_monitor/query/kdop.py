@@ -14,7 +14,12 @@ from collision_monitor.query.contact import Compound
 
 
 class Enclosure(NamedTuple):
-    """pieces: shapes with their poses in the object's frame. excess: how far they exceed the object at most (m)."""
+    """pieces: shapes with their poses in the object's frame. excess: how far they exceed the object at most (m).
+
+    >>> import collision_monitor as cm
+    >>> round(cm.kdop(cm.Sphere(1.0), [(1, 0, 0), (0, 1, 0), (0, 0, 1)]).excess, 2)  # at the corners of a cube
+    0.73
+    """
 
     pieces: list[tuple[Shape, Pose]]
     excess: float
