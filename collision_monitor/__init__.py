@@ -12,6 +12,7 @@
     query.containment              contains                              which points are in a shape
     query.rays                     cast_ray, RayHits                     where rays and segments meet a shape
     query.points_within            points_within                         which points of a cloud are near a shape
+    query.kdop                     kdop, Enclosure                       bounding slabs with directions of your own
     query.time_of_impact           time_of_impact, Impact                 time of impact of two shapes, as an interval
     query.time_of_impact_batch     time_of_impact_batch, Impacts          the same for many motions of two shapes
     query.feature_impact           vertex_face_impact, edge_edge_impact   the same for features in linear motion
@@ -26,6 +27,7 @@ first use.
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -65,6 +67,8 @@ _HOME = {
     "cast_ray": "query.rays",
     "points_within": "query.points_within",
     "RayHits": "query.rays",
+    "kdop": "query.kdop",
+    "Enclosure": "query.kdop",
     "convex_decomposition": "objects.convex_decomposition",
     "Decomposition": "objects.convex_decomposition",
     "time_of_impact": "query.time_of_impact",
@@ -134,6 +138,8 @@ if TYPE_CHECKING:
     from collision_monitor.query.feature_impact import edge_edge_impact as edge_edge_impact
     from collision_monitor.query.feature_impact import vertex_face_impact as vertex_face_impact
     from collision_monitor.query.features import contact_features as contact_features
+    from collision_monitor.query.kdop import Enclosure as Enclosure
+    from collision_monitor.query.kdop import kdop as kdop
     from collision_monitor.query.overlap import overlap as overlap
     from collision_monitor.query.points_within import points_within as points_within
     from collision_monitor.query.rays import RayHits as RayHits
@@ -152,7 +158,8 @@ def __getattr__(name: str) -> Any:
     if name in _MODULES:
         return import_module(f"{__name__}.{name}")
     if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        # with name and obj, Python suggests the nearest name
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])
     value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
     globals()[name] = value
     return value

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -80,11 +80,17 @@ class Box(Shape):
 
     size: Any
 
+    def __new__(cls, *args: Any, **kwargs: Any) -> Self:
+        """Refuse three numbers in place of one size."""
+        if len(args) > 1:
+            raise ShapeError(f"Box: expected one size, got {len(args)} arguments; write Box((x, y, z))")
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
         try:
             size = tuple(float(s) for s in self.size)
         except (TypeError, ValueError):
-            raise ShapeError(f"Box size: expected 3 full extents in metres, got {self.size!r}") from None
+            raise ShapeError(f"Box size: expected 3 full extents in m, as Box((1, 1, 1)), got {self.size!r}") from None
         if len(size) != 3 or not all(0.0 <= s <= LARGEST_INPUT for s in size) or max(size) == 0.0:
             raise ShapeError(f"Box size: expected 3 extents from 0 to {LARGEST_INPUT:g}, not all zero, got {size}")
         object.__setattr__(self, "size", size)
@@ -145,7 +151,11 @@ class Cone(Shape):
 
 @dataclass(frozen=True)
 class Ellipsoid(Shape):
-    """Ellipsoid; radii: half axes along x, y, z in m."""
+    """Ellipsoid; radii: half axes along x, y, z in m.
+
+    >>> Ellipsoid((0.3, 0.2, 0.1))
+    Ellipsoid(radii=(0.3, 0.2, 0.1))
+    """
 
     radii: Any
 

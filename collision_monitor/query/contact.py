@@ -167,7 +167,7 @@ class _Posed:
 
     @cached_property
     def is_uncertain(self) -> bool:
-        """Whether it has a mesh of which the inside is not certain."""
+        """Whether it has a mesh with an uncertain inside (`Surface.certain`)."""
         meshes = [shape for shape, _ in self.shapes if isinstance(shape, Mesh)] if self.model is Model.EXACT else []
         return not all(mesh.surface.certain for mesh in meshes)
 
@@ -279,7 +279,7 @@ def _nearest(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -
 
 
 def _meshes_apart(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -> Contact | None:
-    """The contact of two single shapes, one of which is a concave mesh, if they are apart; else None."""
+    """The contact of a concave mesh and another single shape if they are apart; else None."""
     if not (type(shape_a) is Mesh or type(shape_b) is Mesh):
         return None
     if not (isinstance(shape_a, Shape) and isinstance(shape_b, Shape)):
@@ -357,7 +357,7 @@ def _by_clouds(a: _Posed, b: _Posed, offset: Array) -> _Deepest | None:
 
 
 def _by_trees(a: _Posed, b: _Posed) -> _Deepest | None:
-    """The contact through the trees of two single shapes, one of which is a concave mesh; None for others.
+    """The contact of a concave mesh and another single shape through their trees; None for other pairs.
 
     The pieces also know how deep a triangle is inside a convex solid, so an overlap with one is left to them.
     """
@@ -391,7 +391,7 @@ def _place(side: _Posed) -> tuple[Array, Array]:
 def _posed(shape: Compound, pose: Pose, model: Model | str | ArrayLike, name: str) -> _Posed:
     shapes = shape_pairs(shape, f"shape {name}")
     if not isinstance(pose, Pose):
-        raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
+        raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
     if isinstance(model, str | int):
         if parse_model(model) in (Model.AUTO, Model.EXACT):
             return _Posed(shapes, pose, shapes)

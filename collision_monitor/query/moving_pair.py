@@ -17,7 +17,8 @@ from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shape_table import ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Points, Shape, Sphere, Triangle
 from collision_monitor.meshes.shape_trees import shape_tree
-from collision_monitor.objects.models import PosedShapes, containing_model, exact_model
+from collision_monitor.objects.excess import PosedShapes
+from collision_monitor.objects.models import containing_model, exact_model
 from collision_monitor.prediction.bodies import Bodies, Multibody, make_bodies, make_parts
 from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.body_layout import lay_out_body
@@ -59,7 +60,7 @@ def make_moving_shape(shape: Compound, motion: Motion, name: str) -> MovingShape
     """
     shapes = shape_pairs(shape, f"shape {name}")
     if not isinstance(motion, Motion):
-        raise PoseError(f"motion {name}: expected a Motion, got {type(motion).__name__}")
+        raise PoseError(f"motion {name}: expected a Motion, got {type(motion).__name__}; write Motion(pose)")
     if any(isinstance(s, HalfSpace) for s, _ in shapes) and motion.angular.any():
         raise UnsupportedError(f"shape {name}: a HalfSpace has no end and cannot turn")
     if is_planar(shapes[0][0]):
