@@ -28,8 +28,8 @@ BLOCK: Final = 4
 """Cells of a block along each axis."""
 
 BLOCKS: Final = 6
-"""Blocks along each axis. The stated excess is up to 2 / (BLOCK * BLOCKS) of the size too large. The time grows at least
-with the square of BLOCKS."""
+"""Blocks along each axis. The stated excess is up to 2 / (BLOCK * BLOCKS) of the size too large.
+The time grows at least with the square of BLOCKS."""
 
 AT_ONCE: Final = 16
 """Blocks searched together. More: fewer calls, but cells that the first ones would have left out."""

@@ -29,6 +29,7 @@ from collision_monitor.geometry.shapes import (
     Ellipsoid,
     HalfSpace,
     Mesh,
+    Points,
     Shape,
     Sphere,
     Triangle,
@@ -76,7 +77,7 @@ def parse_model(model: Model | str | int) -> Model:
 
 def shape_class(shapes: Sequence[tuple[Shape, Pose]]) -> str | None:
     """Class of an object: primitive, hull, mesh or compound, each with a setting; None if there is no coarser model."""
-    if any(is_planar(shape) or isinstance(shape, HalfSpace) for shape, _ in shapes):
+    if any(is_planar(shape) or isinstance(shape, HalfSpace | Points) for shape, _ in shapes):
         return None
     if len(shapes) > 1:
         return "compound"
@@ -103,7 +104,7 @@ def containing_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | 
     if chosen in (Model.AUTO, Model.EXACT):
         return Modelled(pieces, index, Model.EXACT, 0.0, convex)
     for shape, _ in shapes:
-        if is_planar(shape) or isinstance(shape, HalfSpace):
+        if is_planar(shape) or isinstance(shape, HalfSpace | Points):
             raise UnsupportedError(
                 f"{type(shape).__name__}: model {chosen.name.lower()} is not offered; supported are auto, exact"
             )
@@ -138,11 +139,11 @@ def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | i
 
 
 def exact_model(shapes: Sequence[tuple[Shape, Pose]]) -> Modelled:
-    """Convex pieces and concave meshes that are exactly the object."""
+    """Convex pieces, concave meshes and clouds that are exactly the object."""
     pieces: PosedShapes = []
     index = []
     for k, (shape, pose) in enumerate(shapes):
-        if is_concave_mesh(shape):
+        if is_concave_mesh(shape) or isinstance(shape, Points):
             pieces.append((shape, pose))
             index.append(k)
             continue
@@ -150,7 +151,7 @@ def exact_model(shapes: Sequence[tuple[Shape, Pose]]) -> Modelled:
         for part, offset in convex_pieces(shape):
             pieces.append((part, pose @ offset if placed else offset))
             index.append(k)
-    convex = len(pieces) == 1 and not isinstance(pieces[0][0], Mesh)
+    convex = len(pieces) == 1 and not isinstance(pieces[0][0], Mesh | Points)
     return Modelled(pieces, index, Model.EXACT, 0.0, convex)
 
 
@@ -238,7 +239,7 @@ def containing_kdop(shapes: Sequence[tuple[Shape, Pose]], directions: ArrayLike)
     if np.linalg.matrix_rank(normals, tol=1e-6) < 3:
         raise InputError("k-DOP directions: expected three or more that are not in one plane, got a slab without end")
     for shape, _ in shapes:
-        if is_planar(shape) or isinstance(shape, HalfSpace):
+        if is_planar(shape) or isinstance(shape, HalfSpace | Points):
             raise UnsupportedError(f"{type(shape).__name__}: a k-DOP is not offered; supported are auto, exact")
     pieces = [(piece, pose @ offset) for shape, pose in shapes for piece, offset in convex_pieces(shape)]
     solid, pose = _kdop(pieces, normals, "of these directions")

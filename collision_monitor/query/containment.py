@@ -25,12 +25,11 @@ def contains(shape: Compound, pose: Pose, points: ArrayLike, test: str = "closed
     ray test", "Point in convex polygon", "A vertex is inside a convex polyhedron if …") Raises ShapeError, PoseError,
     InputError; UnsupportedError for a shape that the test does not take, and a mesh that is not closed.
 
-    >>> import collision_monitor as cm
-    >>> cm.contains(cm.Sphere(1.0), cm.Pose((5, 0, 0)), [(5.5, 0, 0), (0, 0, 0)])
+    >>> contains(cm.Sphere(0.5), cm.Pose(), [(0, 0, 0.4), (0, 0, 0.6)])
     array([ True, False])
     """
     if not isinstance(pose, Pose):
-        raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}")
+        raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
     if test not in TESTS:
         raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")
     given = coordinates(points, "points")

@@ -71,7 +71,7 @@ def _named(
 ) -> tuple[tuple[Compound, Pose, str], tuple[Compound, Pose, str]]:
     for pose, name in ((pose_a, "A"), (pose_b, "B")):
         if not isinstance(pose, Pose):
-            raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
+            raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
     return (shape_a, pose_a, "A"), (shape_b, pose_b, "B")
 
 

@@ -20,6 +20,10 @@ class RayHits(NamedTuple):
     """distance (...) in m, infinite for no hit; point (..., 3) and outward unit normal (..., 3) in the world frame.
 
     Without a hit the point is NaN. The normal is zero without a hit, and for a ray that starts inside, at distance 0.
+
+    >>> hits = cast_ray(cm.Sphere(0.5), cm.Pose(), [(0, 0, 2), (0, 1, 2)], (0, 0, -1))
+    >>> hits.hit, hits.distance
+    (array([ True, False]), array([1.5, inf]))
     """
 
     distance: Array
@@ -44,12 +48,11 @@ def cast_ray(
     ray passes between two faces or edges. (Slides "Ray test", "Line intersection")
     Raises ShapeError, PoseError, InputError.
 
-    >>> import collision_monitor as cm
-    >>> cm.cast_ray(cm.Sphere(1.0), cm.Pose((5, 0, 0)), [(0, 0, 0), (0, 3, 0)], (1, 0, 0)).distance
-    array([ 4., inf])
+    >>> cast_ray(cm.Box((1, 1, 1)), cm.Pose(), origin=(0, 0, 2), direction=(0, 0, -1)).point
+    array([0. , 0. , 0.5])
     """
     if not isinstance(pose, Pose):
-        raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}")
+        raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
     p, d = coordinates(origin, "origin", 3), coordinates(direction, "direction", 3)
     limit = np.asarray(length, dtype=np.float64)
     if not (limit >= 0.0).all():

@@ -25,5 +25,6 @@ class LineReport(NamedTuple):
     states: int
     refused: int
     last_refusal: str
+    points_dropped: int
     level: Level
     text: str

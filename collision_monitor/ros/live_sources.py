@@ -153,7 +153,8 @@ class LiveSources:
         else:
             level, text = (Level.WARN, refusal) if refused else (Level.OK, "ok")
         kind = self._found.get(topic, "")
-        return LineReport(name, topic, kind, messages, states, refused, refusal, level, text)
+        dropped = scene.points_dropped.get(name, 0)
+        return LineReport(name, topic, kind, messages, states, refused, refusal, dropped, level, text)
 
     def _report(self) -> None:
         """Publish the state of each line of the file."""

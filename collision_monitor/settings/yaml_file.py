@@ -40,6 +40,11 @@ def read_yaml(path: Path, *, aliases: bool = False, nodes: int = NODES) -> Any:
 
     Raises InputError with the file and the line.
     """
+    return parse_yaml(read_text(path), str(path), aliases=aliases, nodes=nodes)
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a YAML file, of LARGEST bytes at most. Raises InputError."""
     try:
         with path.open("rb") as file:
             data = file.read(LARGEST + 1)
@@ -50,11 +55,10 @@ def read_yaml(path: Path, *, aliases: bool = False, nodes: int = NODES) -> Any:
     if len(data) > LARGEST:
         raise InputError(f"{path}: expected YAML of at most {LARGEST} bytes, got more")
     try:
-        text = data.decode("utf-8-sig")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise InputError(f"{path}, line {line}: expected YAML in UTF-8, got bytes that are not") from None
-    return parse_yaml(text, str(path), aliases=aliases, nodes=nodes)
 
 
 def parse_yaml(text: str, name: str, *, aliases: bool = False, nodes: int = NODES) -> Any:

@@ -53,6 +53,12 @@ class Mapping:
     path: str = ""
 
     @property
+    def robots(self) -> list[str]:
+        """The names of the robots."""
+        section = self.sections.get("robots", {})
+        return list(section) if isinstance(section, dict) else []
+
+    @property
     def topics(self) -> dict[str, list[ObjectEntry]]:
         """The entries of each topic."""
         found: dict[str, list[ObjectEntry]] = {}

@@ -97,7 +97,7 @@ def test_a_counter_that_grows_no_more_is_reported_for_ten_reports() -> None:
 
 
 def source(refused: int, level: Level = Level.OK, text: str = "ok") -> LineReport:
-    return LineReport("cart", "/odom", "nav_msgs/msg/Odometry", 9, 9, refused, "why" if refused else "", level, text)
+    return LineReport("cart", "/odom", "nav_msgs/msg/Odometry", 9, 9, refused, "why" if refused else "", 0, level, text)
 
 
 @pytest.mark.parametrize(
