@@ -1,10 +1,11 @@
 """Measures the CPU that a node needs for an arm of seven joints at 500 Hz, beside the monitor.
 
-    python benchmarks/arm_cost.py [--seconds 20] [--rate 500] [--executor events]
+    python benchmarks/arm_cost.py [--seconds 20] [--rate 500] [--executor events] [--tracks 200]
 
 The node runs twice in turns: with the sources file of examples/arm, and with the states that it made of it, on the
 node's own topics. The difference of the two is the price of the joint states: DDS, decoding, kinematics. Then the same
-messages are fed without ROS. CPU is that of the whole process, in percent of one core.
+messages are fed without ROS. CPU is that of the whole process, in percent of one core. --tracks adds tracked objects
+at 20 Hz to the sources.
 """
 
 from __future__ import annotations
@@ -18,9 +19,11 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import yaml
 from rclpy.node import Node
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
+from sources import people, raw, seen
 
 from collision_monitor.cli.child import Child
 from collision_monitor.pipeline.topics import Topic
@@ -30,7 +33,10 @@ from collision_monitor.ros.process import ros_context, stay_on_this_machine
 from collision_monitor.session import Session
 from collision_monitor.sources import Decoder, Feed, Input, RawMessage, load_mapping
 
-SOURCES: Final = Path(__file__).parents[1] / "examples/arm/sources.yaml"
+ARM: Final = Path(__file__).parents[1] / "examples/arm"
+TRACKED: Final = "autoware_perception_msgs/msg/TrackedObjects"
+TRACK_RATE: Final = 20.0
+"""Hz of the tracked objects."""
 NAMES: Final = [*(f"joint_{k}" for k in range(1, 8)), "finger_joint"]
 KIND: Final = "sensor_msgs/msg/JointState"
 STORE: Final = get_typestore(Stores.ROS2_JAZZY)
@@ -65,14 +71,48 @@ def pace(rate: float, seconds: float) -> Any:
         yield k
 
 
-def with_sources(node: Node, rate: float, seconds: float, record: Path, options: list[str]) -> float:
-    """Return the CPU (% of a core) of a node that reads joint states."""
-    out = node.create_publisher(JointState, "/joint_states", 10)
-    with Child("run", "--sources", str(SOURCES), "--record", str(record), *options) as child:
-        wait_for(lambda: bool(out.get_subscription_count()), child)
-        share = measured(child, rate, seconds, lambda k: out.publish(joint_state(time.time_ns(), k / rate)))
+def sources_file(folder: Path, tracks: int) -> Path:
+    """Write the sources of examples/arm, with tracked objects if there are any."""
+    content = yaml.safe_load((ARM / "sources.yaml").read_text())
+    for robot in content["robots"].values():
+        robot |= {key: str(ARM / robot[key]) for key in ("urdf", "srdf") if key in robot}
+    if tracks:
+        content["objects"]["people"] = {"topic": "/tracks"}
+    path = folder / "sources.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+def tracked(count: int) -> list[Any]:
+    """Return a second of TrackedObjects of this many walking people."""
+    places, velocities = people(np.random.default_rng(1), count)
+    return [seen(places, velocities, k / TRACK_RATE, 0, "world")[1] for k in range(int(TRACK_RATE))]
+
+
+def with_sources(
+    node: Node, rate: float, seconds: float, sources: Path, tracks: int, record: Path, options: list[str]
+) -> float:
+    """Return the CPU (% of a core) of a node that reads joint states, and tracked objects if there are any."""
+    outs = [node.create_publisher(JointState, "/joint_states", 10)]
+    if tracks:
+        from autoware_perception_msgs.msg import TrackedObjects
+
+        outs.append(node.create_publisher(TrackedObjects, "/tracks", 10))
+    messages, every = tracked(tracks), round(rate / TRACK_RATE)
+
+    def publish(k: int) -> None:
+        outs[0].publish(joint_state(time.time_ns(), k / rate))
+        if tracks and k % every == 0:
+            message = messages[k // every % len(messages)]
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(time.time_ns(), 10**9)
+            outs[1].publish(raw("/tracks", (TRACKED, message)).data)
+
+    with Child("run", "--sources", str(sources), "--record", str(record), *options) as child:
+        wait_for(lambda: all(each.get_subscription_count() for each in outs), child)
+        share = measured(child, rate, seconds, publish)
         child.finish()
-    node.destroy_publisher(out)
+    for each in outs:
+        node.destroy_publisher(each)
     return share
 
 
@@ -124,8 +164,8 @@ def wait_for(is_there: Any, child: Child) -> None:
 
 
 def fed(rate: float, count: int) -> float:
-    """Return the µs for each message of a feed without ROS."""
-    feed = Feed(load_mapping(SOURCES), Decoder({}))
+    """Return the µs for each joint state of a feed without ROS."""
+    feed = Feed(load_mapping(ARM / "sources.yaml"), Decoder({}))
     inputs: list[Input] = feed.begin(0)
     start = 1_700_000_000 * 10**9
     raw = [
@@ -143,6 +183,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--rate", type=float, default=500.0)
     parser.add_argument("--turns", type=int, default=3)
+    parser.add_argument("--tracks", type=int, default=0, help="tracked objects at 20 Hz beside the arm (0)")
     parser.add_argument("--executor", choices=("single", "events"), default="single", help="parameter of the node")
     arguments = parser.parse_args()
     rate, seconds = arguments.rate, arguments.seconds
@@ -152,15 +193,17 @@ def main() -> None:
     pairs = []
     with ros_context(["arm_cost"]), tempfile.TemporaryDirectory() as folder:
         node = Node("arm_cost")
+        sources = sources_file(Path(folder), arguments.tracks)
         for turn in range(arguments.turns):
             record = Path(folder) / f"{turn}.mcap"
-            share = with_sources(node, rate, seconds, record, options)
+            share = with_sources(node, rate, seconds, sources, arguments.tracks, record, options)
             pairs.append((share, without_sources(node, seconds, record, options)))
-            print(f"with joint states {pairs[-1][0]:.1f} %, with states {pairs[-1][1]:.1f} % of a core", flush=True)
+            print(f"with sources {pairs[-1][0]:.1f} %, with states {pairs[-1][1]:.1f} % of a core", flush=True)
         node.destroy_node()
     differences = [a - b for a, b in pairs]
     print(
-        f"joint states at {rate:g} Hz: {min(differences):.1f} to {max(differences):.1f} % of a core beside the monitor"
+        f"joint states at {rate:g} Hz, {arguments.tracks} tracks: {min(differences):.1f} to {max(differences):.1f} % "
+        "of a core beside the monitor"
     )
     print(f"without ROS: {min(fed(rate, 5000) for _ in range(5)):.0f} µs for each message, steps at 50 Hz included")
 

@@ -24,6 +24,7 @@ from collision_monitor.geometry.shapes import (
     Ellipsoid,
     HalfSpace,
     Mesh,
+    Points,
     Polygon,
     Shape,
     Sphere,
@@ -83,6 +84,8 @@ def _closed_form(shape: Shape, p: Array) -> Booleans:
             )
         case Mesh():
             found = locate_in_surface(p, shape.surface) != Location.OUTSIDE
+        case Points():
+            found = _to_nearest(shape.points, p) <= shape.radius
         case Polygon() if shape.radius > 0.0:
             return _in_rounded_polygon(shape, p[:, :2])
         case Polygon():
@@ -90,6 +93,13 @@ def _closed_form(shape: Shape, p: Array) -> Booleans:
         case _:
             raise UnsupportedError(f"{type(shape).__name__}: containment is not offered for it")
     return np.asarray(found)
+
+
+def _to_nearest(cloud: Array, p: Array) -> Array:
+    """Distances (n,) of points (n, 3) from the nearest one of a cloud (k, 3)."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(cloud).query(p)[0])
 
 
 def _in_rounded_polygon(shape: Polygon, p: Array) -> Booleans:

@@ -25,6 +25,7 @@ from collision_monitor.geometry.shapes import (
     Ellipsoid,
     HalfSpace,
     Mesh,
+    Points,
     Polygon,
     Shape,
     Sphere,
@@ -51,6 +52,8 @@ def first_hits(shape: Shape, p: Array, d: Array) -> tuple[Array, Array]:
         return _mesh_hits(shape, p, d)
     if isinstance(shape, Polygon):
         return _polygon_hits(shape, p, d)
+    if isinstance(shape, Points):
+        return _cloud_hits(shape, p, d)
     parts = _solids(shape, p, d)
     best, normals = np.full(len(p), np.inf), np.zeros_like(p)
     for part in parts:
@@ -220,6 +223,21 @@ def _polygon_hits(shape: Polygon, p: Array, d: Array) -> tuple[Array, Array]:
         rows, which = np.arange(len(t)), t.argmin(axis=1)
         best[first : first + step], normal[first : first + step] = t[rows, which], n[rows, which]
     return _from_outside(inside(shape, p, "closed form"), best, normal)
+
+
+def _cloud_hits(shape: Points, p: Array, d: Array) -> tuple[Array, Array]:
+    """Nearest ball on the way."""
+    if shape.radius == 0.0:
+        raise UnsupportedError("Points with radius 0: a ray passes between points without a size; give them a radius")
+    best, normal = np.full(len(p), np.inf), np.zeros_like(p)
+    step = max(AT_ONCE // len(shape.points), 1)
+    for first in range(0, len(p), step):
+        o, way = p[first : first + step, None], d[first : first + step, None]
+        ball = _ball(o - shape.points, way, shape.radius)
+        t = np.where((ball.enter <= ball.leave) & (ball.leave >= 0.0), np.maximum(ball.enter, 0.0), np.inf)
+        rows, which = np.arange(len(t)), t.argmin(axis=1)
+        best[first : first + step], normal[first : first + step] = t[rows, which], ball.normal[rows, which]
+    return _from_outside(best == 0.0, best, normal)
 
 
 def _mesh_hits(shape: Mesh, p: Array, d: Array) -> tuple[Array, Array]:

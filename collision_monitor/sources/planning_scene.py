@@ -13,9 +13,7 @@ from typing import Any, Final
 from collision_monitor.errors import CollisionMonitorError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.robots.srdf import ordered
 from collision_monitor.sources.carried_bodies import Body
-from collision_monitor.sources.collision_matrix import CollisionMatrix
 from collision_monitor.sources.collision_objects import (
     REMOVE,
     CollisionObject,
@@ -24,9 +22,11 @@ from collision_monitor.sources.collision_objects import (
     operation_of,
 )
 from collision_monitor.sources.frames import FrameMotion, MissingFrame
+from collision_monitor.sources.link_rules import LinkRules
 from collision_monitor.sources.mapping import Mapping as SourcesFile
 from collision_monitor.sources.object_entry import ObjectEntry
-from collision_monitor.sources.robot_source import LinkRules, RobotSource
+from collision_monitor.sources.planning_rules import PlanningRules
+from collision_monitor.sources.robot_source import RobotSource
 from collision_monitor.sources.scene import Scene
 
 PLANNING_SCENE: Final = "moveit_msgs/msg/PlanningScene"
@@ -82,9 +82,7 @@ class PlanningSceneSource:
         self._robot = robot
         self._world: dict[str, WorldObject] = {}
         self._held: dict[str, HeldObject] = {}
-        self._matrix: CollisionMatrix | None = None
-        self._padding: dict[str, float] = {}
-        self._scale: dict[str, float] = {}
+        self._rules = PlanningRules(name)
         self._ids: dict[str, int] = {}
         self._is_changed = False
         self._waits = False  # whether an object is not placed yet
@@ -115,7 +113,7 @@ class PlanningSceneSource:
             self._change_world(each, scene)
         if len(content.world.octomap.octomap.data):
             scene.refuse(self.name, "the octomap of the planning scene is not monitored; give its points as a topic")
-        self._take_rules(content, scene)
+        self._is_changed |= self._rules.take(content, scene)
         attached = content.robot_state.attached_collision_objects
         if self._robot is None:
             if attached:
@@ -127,26 +125,6 @@ class PlanningSceneSource:
                 self._is_changed = True
         for each in attached:
             self._change_held(each, stamp_ns, scene)
-
-    def _take_rules(self, content: Any, scene: Scene) -> None:
-        """Take over what the message states of padding, scale and allowed pairs. An empty list states nothing."""
-        matrix = content.allowed_collision_matrix
-        if len(matrix.entry_names) or len(matrix.default_entry_names):
-            try:
-                self._matrix, self._is_changed = CollisionMatrix(matrix), True
-            except CollisionMonitorError as error:
-                scene.refuse(self.name, str(error))
-        for rows, field, known in (
-            (content.link_padding, "padding", self._padding),
-            (content.link_scale, "scale", self._scale),
-        ):
-            for row in rows:
-                value, link = float(getattr(row, field)), str(row.link_name)
-                if not (0.0 <= value < 1e3 and (value > 0.0 or field == "padding")):
-                    scene.refuse(self.name, f"{field} of {link:.80}: expected a positive number, got {value}")
-                elif known.get(link) != value and len(known) < MOST_OBJECTS:
-                    known[link] = value
-                    self._is_changed = True
 
     def _change_world(self, message: Any, scene: Scene) -> None:
         name = str(message.id)
@@ -254,7 +232,7 @@ class PlanningSceneSource:
                 for name, it in self._held.items()
                 if it.offset is not None
             }
-            robot.carry(bodies, self._rules(robot), scene)
+            robot.carry(bodies, self._carried_rules(robot.link_ids), scene)
 
     def _place_in_world(self, name: str, it: WorldObject, now_ns: int, scene: Scene, is_new: bool) -> None:
         frame = scene.frames.motion(scene.frame, it.content.frame or scene.frame, now_ns)
@@ -289,25 +267,8 @@ class PlanningSceneSource:
         between = link.inverse() @ other
         return Pose(between.position, between.quaternion) @ held.content.pose
 
-    def _rules(self, robot: RobotSource) -> LinkRules:
-        """Return what the scene says about the links and the attached objects."""
-        if self._matrix is None:
-            return LinkRules(dict(self._padding), dict(self._scale))
-        links = robot.link_ids
+    def _carried_rules(self, links: dict[str, int]) -> LinkRules:
+        """Return what the scene states about the links of the robot and the attached objects."""
         ids = {name: it.object_id for name, it in self._world.items()}
         ids |= {name: held.object_id for name, held in self._held.items()} | links
-        allowed: dict[str, set[int]] = {}
-        checked = set()
-        for a in (*links, *self._held):
-            for b, object_id in ids.items():
-                answer = self._matrix.allows(a, b) if a != b else None
-                if answer:
-                    allowed.setdefault(a, set()).add(object_id)
-                elif answer is False and a in links and b in links:
-                    checked.add(ordered(a, b))
-        return LinkRules(
-            dict(self._padding),
-            dict(self._scale),
-            {name: frozenset(found) for name, found in allowed.items()},
-            frozenset(checked),
-        )
+        return self._rules.of(links, self._held, ids)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping as Table
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -16,11 +15,11 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
 from collision_monitor.robots import link_motions
 from collision_monitor.robots.robot import Description, Robot, make_robot
-from collision_monitor.robots.srdf import Pair
 from collision_monitor.sources.carried_bodies import Body, CarriedBodies
 from collision_monitor.sources.collision_objects import pose_bytes, shape_bytes
 from collision_monitor.sources.frames import FrameMotion
 from collision_monitor.sources.joint_table import JointTable
+from collision_monitor.sources.link_rules import LinkRules, allowed_contacts
 from collision_monitor.sources.mapping import Mapping
 from collision_monitor.sources.robot_base import BaseMotion, FixedBase, at_links, robot_base
 from collision_monitor.sources.robot_entry import RobotEntry
@@ -35,20 +34,6 @@ TEXT: Final = "std_msgs/msg/String"
 _SHOWN: Final = 8
 
 _STDDEVS: Final = ("position_stddev", "orientation_stddev", "velocity_stddev", "angular_velocity_stddev")
-
-
-@dataclass(frozen=True)
-class LinkRules:
-    """What a planning scene changes about links, by their names.
-
-    padding: m, more than the file's. scale: of the shapes. allowed: ids of objects whose contact is expected. checked:
-    pairs that are monitored although the SRDF disables them.
-    """
-
-    padding: Table[str, float] = field(default_factory=dict)
-    scale: Table[str, float] = field(default_factory=dict)
-    allowed: Table[str, frozenset[int]] = field(default_factory=dict)
-    checked: frozenset[Pair] = frozenset()
 
 
 class RobotSource:
@@ -225,7 +210,7 @@ class RobotSource:
     def _describe(self, scene: Scene) -> None:
         assert self.robot is not None
         rules, bodies = self._rules, [*self._links.values(), *self.attached.values()]
-        allowed = self._allowed()
+        allowed = allowed_contacts(self.robot, self._links, self.attached, self._entry.allowed, rules)
         for body in bodies:
             is_link = body is self._links.get(body.link)
             at = self._standing.get(body.object_id)
@@ -260,24 +245,6 @@ class RobotSource:
             model=entry.model,
             allowed=allowed,
         )
-
-    def _allowed(self) -> dict[int, tuple[int, ...]]:
-        """Return the ids of the objects that each body may touch."""
-        assert self.robot is not None
-        bodies = (*self._links.values(), *self.attached.values())
-        found: dict[int, set[int]] = {body.object_id: set() for body in bodies}
-        for a, b in self.robot.touching | (self.robot.disabled - self._rules.checked):
-            found[self._ids[a]].add(self._ids[b])
-            found[self._ids[b]].add(self._ids[a])
-        for link, others in [*self._entry.allowed.items(), *self._rules.allowed.items()]:
-            if link in self._links:
-                found[self._ids[link]] |= set(others)
-        for name, body in self.attached.items():
-            links = {*body.touch, body.link} & self._links.keys()
-            found[body.object_id] |= {self._ids[link] for link in links}
-            found[body.object_id] |= self._rules.allowed.get(name, frozenset())
-            found[body.object_id] |= {other.object_id for other in self.attached.values() if other.link == body.link}
-        return {object_id: tuple(sorted(others - {object_id})) for object_id, others in found.items()}
 
     # -- states
 

@@ -18,12 +18,13 @@ from collision_monitor.sources.mapping import make_mapping
 class Fed:
     """Feeds messages (topic, received, (type, message)). steps: the state arrays; changes: the descriptions."""
 
-    def __init__(self, objects: dict[str, Any], **top: Any) -> None:
-        self.feed = Feed(make_mapping({"frame": "map", "objects": objects, **top}), decoder())
+    def __init__(self, objects: dict[str, Any] | None = None, *, begin: int = 0, **top: Any) -> None:
+        content = {"frame": "map", **top, **({} if objects is None else {"objects": objects})}
+        self.feed = Feed(make_mapping(content), decoder())
         self.steps: list[ObjectStateArray] = []
         self.changes: list[Change] = []
         self._bound: set[str] = set()
-        self._keep(self.feed.begin(0))
+        self._keep(self.feed.begin(begin))
 
     def give(self, topic: str, received: int, message: tuple[str, Any]) -> None:
         kind, content = message

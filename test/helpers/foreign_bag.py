@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ros_messages import SECOND, store
 from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
+STORE = store()
 T = STORE.types
-SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND
 
 

@@ -4,20 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from foreign_bag import STORE, T, header, pose, vector
-from rosbags.typesys import get_types_from_msg
+from foreign_bag import T, header, pose, vector
+from ros_messages import definitions
 
 from collision_monitor.sources import Decoder
-
-INTERFACES = Path(__file__).parents[2] / "interfaces"
-DEFINITIONS: dict[str, Any] = {}
-for _path in sorted(INTERFACES.glob("*/msg/*.msg")):
-    DEFINITIONS |= get_types_from_msg(_path.read_text(), f"{_path.parts[-3]}/msg/{_path.stem}")
-STORE.register({name: fields for name, fields in DEFINITIONS.items() if name not in STORE.fielddefs})
 
 AUTOWARE = "autoware_perception_msgs/msg/"
 BOX, CYLINDER, POLYGON = 0, 1, 2
@@ -25,7 +18,7 @@ BOX, CYLINDER, POLYGON = 0, 1, 2
 
 @cache
 def decoder() -> Decoder:
-    return Decoder(DEFINITIONS)
+    return Decoder(definitions())
 
 
 def uuid(number: int) -> Any:

@@ -1,21 +1,17 @@
-"""Sources files played without ROS: messages into the feed, and the objects and states that come out."""
+"""Robots and planning scenes played without ROS: a feed that knows its objects and last states by name."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from ros_messages import SECOND, cdr, definitions, header, message, pose, vector
+from fed import Fed
+from ros_messages import SECOND, header, message, pose, vector
 
-from collision_monitor.codec import ObjectDescriptionArray, ObjectStateArray, decode_descriptions, decode_states
 from collision_monitor.geometry.pose import from_rotation_vector
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.pipeline.topics import Topic
 from collision_monitor.robots.robot import Robot
-from collision_monitor.sources.decoding import Decoder
-from collision_monitor.sources.feed import Feed
-from collision_monitor.sources.mapping import make_mapping
-from collision_monitor.sources.source import RawMessage
+from collision_monitor.sources import Input
 
 START = 1_700_000_000 * SECOND
 MILLISECOND = 1_000_000
@@ -23,38 +19,28 @@ JOINT_STATE, TF = "sensor_msgs/msg/JointState", "tf2_msgs/msg/TFMessage"
 JOINTS = [*(f"joint_{k}" for k in range(1, 8)), "finger_joint"]
 
 
-class Played:
-    """A feed with the objects and the last states of its answers."""
+class Played(Fed):
+    """objects: by name. states: of the last message, by the objects' names. messages: number of inputs so far."""
 
     def __init__(self, robot: dict[str, Any] | None, **file: Any) -> None:
-        content = {"frame": "map", **file, **({"robots": {"arm": robot}} if robot is not None else {})}
-        self.feed = Feed(make_mapping(content), Decoder(definitions()))
         self.objects: dict[str, ObjectDescription] = {}
         self.states: dict[str, Any] = {}
-        self.steps: list[ObjectStateArray] = []
         self.messages = 0
-        self.bound: set[str] = set()
-        self._read(self.feed.begin(START))
+        super().__init__(begin=START, **file, **({} if robot is None else {"robots": {"arm": robot}}))
 
     def send(self, topic: str, kind: str, content: Any, received: int = START) -> None:
         self.states = {}
-        if topic in self.feed.mapping.topics and topic not in self.bound:
-            self.bound.add(topic)
-            self.feed.bind(topic, kind)
-        self._read(self.feed.take(RawMessage(topic, kind, cdr(kind, content), received)))
+        self.give(topic, received, (kind, content))
 
-    def _read(self, inputs: Any) -> None:
+    def _keep(self, inputs: list[Input]) -> None:
         for each in inputs:
+            steps, changes = len(self.steps), len(self.changes)
+            super()._keep([each])
             self.messages += 1
-            if each.topic is Topic.STATES:
-                step = decode_states(each.data)
-                self.steps.append(step)
+            for step in self.steps[steps:]:
                 names = {it.object_id: name for name, it in self.objects.items()}
                 self.states = {names[int(row["id"])]: row for row in step.states}
-                continue
-            described: ObjectDescriptionArray = decode_descriptions(each.data)
-            assert not described.refused
-            for change in described.objects:
+            for change in self.changes[changes:]:
                 self.objects = {name: it for name, it in self.objects.items() if it.object_id != change.object_id}
                 if isinstance(change, ObjectDescription):
                     self.objects[change.name] = change

@@ -29,6 +29,7 @@ SOLIDS: dict[str, Any] = {
     "hull": cm.ConvexHull(RNG.normal(size=(20, 3))),
     "mesh": cm.Mesh(RING.vertices, RING.faces),
     "ellipsoid": cm.Ellipsoid((0.5, 0.9, 0.7)),
+    "cloud": cm.Points(RNG.normal(size=(60, 3)) * 0.6, 0.2),
     "half-space": cm.HalfSpace((1, 2, 3), 0.2),
     "compound": [(cm.Sphere(0.4), cm.Pose((1, 0, 0))), (cm.Box((1, 1, 1)), cm.Pose((-1, 0, 0)))],
 }
@@ -161,6 +162,7 @@ def test_the_boundary_belongs_to_the_shape() -> None:
         (lambda: cm.contains(cm.Sphere(1), cm.Pose(), (0, 0, np.inf)), cm.InputError, "points"),
         (lambda: cm.contains(cm.Sphere(1), cm.Pose(), (0, 0, 0), "magic"), cm.InputError, "closed form, ray, sides"),
         (lambda: cm.contains(cm.Sphere(1), cm.Pose(), (0, 0, 0), "ray"), cm.UnsupportedError, "Polygon, Box"),
+        (lambda: cm.cast_ray(cm.Points([(0, 0, 0)]), cm.Pose(), (0, 0, 5), (0, 0, -1)), cm.UnsupportedError, "radius"),
         (lambda: cm.contains(cm.Polygon(L_SHAPE, 1), cm.Pose(), (0, 0), "ray"), cm.UnsupportedError, "with a radius"),
     ],
 )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import machine
 import pytest
-from foreign_messages import DEFINITIONS
+from ros_messages import definitions
 from rosbags.typesys import Stores, get_typestore
 
 import interfaces
@@ -21,7 +21,7 @@ PUBLISHED = {
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_the_type_hashes_are_the_published_ones(name: str) -> None:
     store = get_typestore(Stores.EMPTY)
-    store.register({**get_typestore(Stores.ROS2_JAZZY).fielddefs, **DEFINITIONS})
+    store.register({**get_typestore(Stores.ROS2_JAZZY).fielddefs, **definitions()})
     assert store.hash_rihs01(name) == PUBLISHED[name]
 
 
