@@ -6,7 +6,7 @@ import argparse
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.progress import session_bar
@@ -15,9 +15,6 @@ from collision_monitor.errors import InputError, MessageError
 from collision_monitor.pipeline.topics import NODE
 from collision_monitor.ros.process import StopRequest, ros_context, stay_on_this_machine
 from collision_monitor.view.server import LOOPBACK, PORT, start_server, stop_server
-
-if TYPE_CHECKING:
-    from collision_monitor.settings.profile import Profile
 
 SILENCE = 1.0
 """Time without answers (s) from which the page warns that it shows the past."""
@@ -95,7 +92,7 @@ def _view_session(args: argparse.Namespace, stop: StopRequest) -> None:
 
     session = Session(args.session)
     with stop.ending(), session_bar("view", session) as progress:
-        recording = Recording(session, _profile(session.profile, args.replay), progress)
+        recording = Recording(session, args.replay, progress)
     server = start_server(args.host, args.port)
     view = View(server)
     player = Player(recording.times[-1])
@@ -160,14 +157,6 @@ def _view_live(args: argparse.Namespace, stop: StopRequest) -> None:
             listener.listen(until=now + PERIOD)
         listener.close()
     stop_server(server)
-
-
-def _profile(recorded: Profile, replay: str | None) -> Profile | None:
-    from collision_monitor.settings.profile import Profile
-
-    if replay is None:
-        return None
-    return Profile.named(replay) if replay else recorded
 
 
 def _announce(server: Any, args: argparse.Namespace, what: str) -> None:

@@ -19,7 +19,7 @@ from collision_monitor.meshes.contact import reach_in
 from collision_monitor.meshes.feature import triangle_feature
 from collision_monitor.meshes.layout import CENTER, CHILD, FACE, RADIUS, WIDTH
 from collision_monitor.meshes.nearest import NEAR_A, triangle_at
-from collision_monitor.meshes.placing import Placing, inverse, place_point, relative, turn_back
+from collision_monitor.meshes.placing import Placing, inverse, place_point, relative, turn_back, turned_back
 from collision_monitor.meshes.point_solid import point_distance
 from collision_monitor.meshes.touching import repeats
 from collision_monitor.meshes.triangle_pair import Triangle
@@ -72,6 +72,23 @@ def _middle(T: Triangle) -> tuple[Vector, float]:
     )
     a, b, d = minus(T.a, c), minus(T.b, c), minus(T.c, c)
     return c, sqrt(max(dot(a, a), max(dot(b, b), dot(d, d)))) * (1.0 + 1e-14)
+
+
+@inlined
+def _push(work: Any, first: int, waiting: int, bound: float, place: float) -> None:
+    """Push a box between those from `first` on, the one with the least bound last."""
+    at = waiting
+    while at > first and work[2 * (at - 1)] < bound:
+        work[2 * at], work[2 * at + 1] = work[2 * (at - 1)], work[2 * (at - 1) + 1]
+        at -= 1
+    work[2 * at], work[2 * at + 1] = bound, place
+
+
+@inlined
+def _reach_along(blocks: Any, block: int, k: int, n: Vector) -> float:
+    """How far a box reaches from its centre along n, of any length, in the frame of its tree (m)."""
+    e, m = half_of(blocks, block, k), turned_back(blocks, block, k, n)
+    return abs(m[0]) * e[0] + abs(m[1]) * e[1] + abs(m[2]) * e[2]
 
 
 @inlined
@@ -142,7 +159,8 @@ def solid_contact(
     out: Any, memory: SolidMemory,
 ) -> bool:
     """Write the contact of a tree A, enlarged by a margin (m), and a solid b; False if it is farther than the limit."""
-    Y = inverse(relative(pose.R_A, pose.R_B, pose.p))
+    X = relative(pose.R_A, pose.R_B, pose.p)
+    Y = inverse(X)
     work, row = memory.tree, memory.tree[NEAR_A : NEAR_A + CONTACT_SIZE]
     best, found = limit, False
     work[0], work[1] = -inf, WIDTH * root
@@ -153,17 +171,17 @@ def solid_contact(
             continue
         place = int(work[2 * waiting + 1])
         child = blocks[place // WIDTH, CHILD, place % WIDTH]
-        block = root + int(abs(child))
+        block, first = root + int(abs(child)), waiting
         for k in range(WIDTH):
             if child > 0.0:
                 if blocks[block, CHILD, k] == 0.0:
                     continue
-                e = half_of(blocks, block, k)
                 c = blocks[block, CENTER, k], blocks[block, CENTER + 1, k], blocks[block, CENTER + 2, k]
-                bound, _, _ = point_distance(table, b, place_point(Y, c))
-                bound -= sqrt(dot(e, e)) + margin + table.margin[b]
+                bound, n, _ = point_distance(table, b, place_point(Y, c))
+                n = minus(place_point(X, n), (X.x, X.y, X.z))
+                bound -= _reach_along(blocks, block, k, n) + margin + table.margin[b]
                 if bound <= best:
-                    work[2 * waiting], work[2 * waiting + 1] = bound, WIDTH * block + k
+                    _push(work, first, waiting, bound, float(WIDTH * block + k))
                     waiting += 1
                 continue
             if repeats(blocks, block, k):
@@ -189,11 +207,14 @@ def solid_contact(
 
 @device
 def _solid_time(
-    table: Any, b: int, X: Placing, n: Vector, gap: float, x: Vector, size: float, move: Approach
+    table: Any, b: int, X: Placing, n: Vector, gap: float, x: Vector, size: float, turn: float, move: Approach
 ) -> float:
-    """Time until which the points of A in a ball (centre x, radius size) keep their gap along n from the solid b."""
+    """Time until which the points of A in a ball (centre x, radius size) keep their gap along n from the solid b.
+
+    turn: largest n x w_a . (p - x) over these points p (m/s).
+    """
     k, m = cross(n, move.w_a), cross(n, move.w_b)
-    speed = dot(x, k) + size * sqrt(dot(k, k)) - dot(n, move.v) + move.growth
+    speed = dot(x, k) + turn - dot(n, move.v) + move.growth
     own = 0.0
     if table.kind[b] != HALF_SPACE and move.bend_b > 0.0:
         d = turn_back(X, m)
@@ -223,35 +244,42 @@ def advance_to_solid(
             continue
         place = int(work[2 * waiting + 1])
         child = blocks[place // WIDTH, CHILD, place % WIDTH]
-        block = root + int(abs(child))
+        block, first = root + int(abs(child)), waiting
         for k in range(WIDTH):
             if child > 0.0:
                 if blocks[block, CHILD, k] == 0.0:
                     continue
-                e = half_of(blocks, block, k)
                 c = blocks[block, CENTER, k], blocks[block, CENTER + 1, k], blocks[block, CENTER + 2, k]
-                size, radius = sqrt(dot(e, e)), 0.0
+                e = half_of(blocks, block, k)
+                size = sqrt(dot(e, e))
             else:
                 if repeats(blocks, block, k):
                     continue
                 c, size = _middle(triangle_at(blocks, block, k))
-                radius = blocks[block, RADIUS, k]
             bound, n, _ = point_distance(table, b, place_point(Y, c))
             n = opposite(minus(place_point(X, n), (X.x, X.y, X.z)))
-            time = _solid_time(table, b, X, n, bound - size - radius - move.start, c, size, move)
+            across = cross(n, move.w_a)
+            if child > 0.0:
+                gap, turn = bound - _reach_along(blocks, block, k, n), _reach_along(blocks, block, k, across)
+            else:
+                turn = size * sqrt(dot(across, across))
+                gap = bound - size - blocks[block, RADIUS, k]
+            time = _solid_time(table, b, X, n, gap - move.start, c, size, turn, move)
             if not time < best:
                 continue
             if child > 0.0:
-                work[2 * waiting], work[2 * waiting + 1] = time, WIDTH * block + k
+                _push(work, first, waiting, time, float(WIDTH * block + k))
                 waiting += 1
                 continue
-            if not _triangle_contact(table, b, pose, triangle_at(blocks, block, k), radius, inf, row, memory):
+            T = triangle_at(blocks, block, k)
+            if not _triangle_contact(table, b, pose, T, blocks[block, RADIUS, k], inf, row, memory):
                 continue
             gap = row[DISTANCE] - row[BOUND] - start
             if gap <= tolerance:
                 return 0.0, gap
             n = rotate_back(pose.R_A, (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2]))
-            time = _solid_time(table, b, X, n, gap - aim, c, size, move)
+            across = cross(n, move.w_a)
+            time = _solid_time(table, b, X, n, gap - aim, c, size, size * sqrt(dot(across, across)), move)
             if time < best:
                 best, least = time, gap
     return best, least

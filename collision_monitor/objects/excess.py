@@ -32,10 +32,10 @@ BLOCKS: Final = 6
 The time grows at least with the square of BLOCKS."""
 
 AT_ONCE: Final = 16
-"""Blocks searched together. More: fewer calls, but cells that the first ones would have left out."""
+"""Blocks that are searched first. The next search takes twice as many, and so on."""
 
 FARTHEST_FIRST: Final = 64
-"""Cells that are first tested for the inside of a mesh, which takes longest. Then twice as many are, and so on."""
+"""Cells that are first tested for the inside of a mesh, which takes longest. The next test takes 8 times as many."""
 
 
 def excess_of(shapes: Sequence[tuple[Shape, Pose]], pieces: PosedShapes, model: Shape, pose: Pose) -> float:
@@ -76,11 +76,11 @@ def _excess_around_concave(
     bound = distance((block + 0.5) * (BLOCK * cell) + low) + diagonal * (BLOCK - 1) / 2
     order = np.argsort(-bound)
     farthest = -np.inf
-    for begin in range(0, len(order), AT_ONCE):
-        some = order[begin : begin + AT_ONCE]
+    begin = 0
+    while begin < len(order) and bound[order[begin]] > farthest:
+        some = order[begin : 2 * begin + AT_ONCE]
+        begin += len(some)
         some = some[bound[some] > farthest]
-        if not len(some):
-            break
         index = (block[some, None] * BLOCK + _grid(BLOCK)).reshape(-1, 3)
         centres = (index + 0.5) * cell + low
         if not isinstance(model, Box):
@@ -100,7 +100,7 @@ def _farthest_outside(points: Array, distance: Array, shapes: Sequence[tuple[Sha
     order = order[distance[order] > beyond]
     begin = 0
     while begin < len(order):
-        some = order[begin : 2 * begin + FARTHEST_FIRST]
+        some = order[begin : 8 * begin + FARTHEST_FIRST]
         outside = ~_inside_of_meshes(points[some], shapes)
         if outside.any():
             return float(distance[some[np.argmax(outside)]])

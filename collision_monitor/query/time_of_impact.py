@@ -148,11 +148,8 @@ def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain:
             lower, upper = 0.0, math.inf
         if lower == math.inf:
             return _CLEAR
-    certain = upper <= query.horizon
-    at = upper if certain else lower
-    meeting = contact(a.shapes, a.motion.at(at), b.shapes, b.motion.at(at))
-    used = Method(int(events[0]["method"]))
-    return Impact("hit" if certain else "unresolved", lower, upper if certain else math.inf, meeting, used)
+    arguments = a.shapes, a.motion, b.shapes, b.motion
+    return _impact(lower, upper if upper <= query.horizon else math.inf, Method(int(events[0]["method"])), arguments)
 
 
 def _of_times(times: tuple[float, float], arguments: tuple[Any, Any, Any, Any]) -> Impact:
@@ -164,10 +161,14 @@ def _of_times(times: tuple[float, float], arguments: tuple[Any, Any, Any, Any]) 
     are_spheres = type(shape_a) is type(shape_b) is Sphere
     if lower > 0.0 and are_spheres and (motion_a.acceleration == motion_b.acceleration).all():
         used = Method.CLOSED_FORM
+    return _impact(lower, upper, used, arguments)
+
+
+def _impact(lower: float, upper: float, method: Method, arguments: tuple[Any, Any, Any, Any]) -> Impact:
+    """Return an impact that computes its contact when that is read."""
     made = object.__new__(Impact)
-    made.__dict__.update(
-        status="hit" if upper < math.inf else "unresolved", lower=lower, upper=upper, method=used, _arguments=arguments
-    )
+    status = "hit" if upper < math.inf else "unresolved"
+    made.__dict__.update(status=status, lower=lower, upper=upper, method=method, _arguments=arguments)
     return made
 
 

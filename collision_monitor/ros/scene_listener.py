@@ -12,7 +12,7 @@ from rclpy.executors import SingleThreadedExecutor
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.ros.endpoints import subscription
 
-TOPICS: Final = (Topic.SHAPES, Topic.STATES, Topic.CONTACTS, Topic.PREDICTIONS, Topic.STATUS)
+TOPICS: Final = (*(Topic.SHAPES, Topic.STATES, Topic.CONTACTS, Topic.PREDICTIONS, Topic.RAISED_ALERTS, Topic.STATUS),)
 
 
 class SceneListener:

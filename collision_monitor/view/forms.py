@@ -37,7 +37,7 @@ from collision_monitor.geometry.triangulation import triangulate
 Floats = NDArray[np.float64]
 Scale = tuple[float, float, float]
 
-SIDES: Final = 24
+SIDES: Final = 16
 """Number of sides of a round form."""
 
 PLANE: Final = "plane"

@@ -51,14 +51,14 @@ TEXTS: Final[dict[Level, str]] = {
     Level.PREDICTED: "will collide",
     Level.UNRESOLVED: "not known, or unresolved",
     Level.TOUCHING: "touches",
-    Level.CAUTION: "alert: caution",
-    Level.WARNING: "alert: warning",
-    Level.CRITICAL: "alert: critical",
+    Level.CAUTION: "caution",
+    Level.WARNING: "warning",
+    Level.CRITICAL: "critical",
 }
 """The legend."""
 
 ANSWER_LEVELS: Final = (Level.CLEAR, Level.POSSIBLE, Level.PREDICTED, Level.UNRESOLVED, Level.TOUCHING, Level.STATIC)
-ALERT_LEVELS: Final = (Level.CLEAR, Level.CAUTION, Level.WARNING, Level.CRITICAL, Level.STATIC)
+ALERT_LEVELS: Final = (Level.CLEAR, Level.CAUTION, Level.WARNING, Level.CRITICAL, Level.UNRESOLVED, Level.STATIC)
 
 Pair = tuple[int, int]
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from collision_monitor.view.levels import ALERT_LEVELS, ANSWER_LEVELS, TEXTS, Level
+from collision_monitor.view.moment import Moment
 from collision_monitor.view.page import color_of
 from collision_monitor.view.pair_list import PairRow
 from collision_monitor.view.picture import ROWS, Picture
@@ -51,6 +52,8 @@ class Panel:
         gui = server.gui
         gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False, control_width="large")
         self._state = gui.add_html("")
+        self._by_alerts = gui.add_checkbox("colour by alerts", True, visible=False)
+        self._by_alerts.on_update(lambda _: requests.put(lambda: None))  # draws again
 
     def add_rest(self) -> None:
         """Add the parts below the time line, if there is one."""
@@ -69,6 +72,11 @@ class Panel:
             home.on_click(lambda event: self._home(event.client))
         with gui.add_folder("Colours"):
             self._legend = gui.add_html(legend(alerts=False))
+
+    def colours_by_alerts(self, moment: Moment) -> bool:
+        """Return whether to colour by alerts. The choice is offered if the monitor has rules for them."""
+        self._by_alerts.visible = moment.alerts is not None
+        return moment.alerts is not None and self._by_alerts.value
 
     def show(self, picture: Picture, state: str, selected: str, *, alerts: bool) -> None:
         """Show the list of a picture, the state and the selected object, both as HTML."""
@@ -122,10 +130,10 @@ def legend(*, alerts: bool) -> str:
     lines = []
     for level in ALERT_LEVELS if alerts else ANSWER_LEVELS:
         red, green, blue = color_of(level)
-        text = "no alert" if alerts and level is Level.CLEAR else TEXTS[level]
+        text = {Level.CLEAR: "no alert", Level.UNRESOLVED: "not known"}.get(level) if alerts else None
         lines.append(
             f'<div><span style="display:inline-block;width:.8em;height:.8em;border-radius:50%;margin-right:.5em;'
-            f'background:rgb({red},{green},{blue})"></span>{html.escape(text)}</div>'
+            f'background:rgb({red},{green},{blue})"></span>{html.escape(text or TEXTS[level])}</div>'
         )
     return f'<div style="font-size:.85em;padding:0 .9em .3em">{"".join(lines)}</div>'
 

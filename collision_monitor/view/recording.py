@@ -8,12 +8,20 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from collision_monitor.codec import Removal, decode_contacts, decode_descriptions, decode_predictions, decode_states
+from collision_monitor.codec import (
+    Removal,
+    decode_alert,
+    decode_contacts,
+    decode_descriptions,
+    decode_predictions,
+    decode_states,
+)
 from collision_monitor.errors import MessageError, SessionError
 from collision_monitor.monitor.timeline import NANOSECOND
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.records import Phase
 from collision_monitor.session.history.growing_rows import LEAST_LEFT, available_memory
+from collision_monitor.session.history.read_history import AS_RECORDED
 from collision_monitor.session.reader import Recorded, Session
 from collision_monitor.settings.profile import Profile
 from collision_monitor.view.levels import Pair
@@ -26,7 +34,7 @@ APART: Final = 64
 _CHECKED: Final = 64 << 20
 """Bytes of messages between two looks at the memory that is left."""
 
-ANSWERS: Final = ("ContactArray", "PredictedCollisionArray", "MonitorStatus")
+ANSWERS: Final = ("ContactArray", "PredictedCollisionArray", "CollisionAlert", "MonitorStatus")
 
 
 class Beginning(NamedTuple):
@@ -37,15 +45,15 @@ class Beginning(NamedTuple):
 
 
 class Recording:
-    """The steps of a session. times: s from the first one, never falling. begins: the contacts that begin.
-    names: of all objects, by id.
+    """The steps of a session.
 
-    problems: why parts may be missing. Raises SessionError for a session without steps or states, or one that does not
-    fit into memory.
+    times: s from the first one, never falling. begins: the contacts that begin. names: of all objects, by id.
+    problems: why parts may be missing. replay_with: as of `read_history`.
+    Raises SessionError for a session without states or one that does not fit into memory, and ProfileError.
     """
 
     def __init__(
-        self, session: Session, replay_with: Profile | None = None, progress: Callable[[], None] = lambda: None
+        self, session: Session, replay_with: Profile | str | None = None, progress: Callable[[], None] = lambda: None
     ) -> None:
         self.name = session.path.name
         self.problems: list[str] = []
@@ -57,7 +65,7 @@ class Recording:
         messages = session.messages() if replay_with is None else _answered(session, replay_with)
         self.times = self._read(messages, progress)
         self.problems += session.damage
-        self._kept = [Scene(session.frame_id)]
+        self._kept = [Scene(session.frame_id, has_rules=bool(session.rules.text))]
         self._scene, self._frame = self._kept[0].copy(), -1
 
     def _read(self, messages: Iterator[Recorded], progress: Callable[[], None]) -> list[float]:
@@ -109,6 +117,9 @@ class Recording:
             case "PredictedCollisionArray":
                 predictions = decode_predictions(message.data)
                 return predictions.stamp_ns, predictions.step
+            case "CollisionAlert":
+                alert = decode_alert(message.data)
+                return alert.stamp_ns, alert.step
             case "ObjectDescriptionArray":
                 described = decode_descriptions(message.data).objects
                 self.names |= {each.object_id: each.name for each in described if not isinstance(each, Removal)}
@@ -146,20 +157,29 @@ class Recording:
             return
 
 
-def _answered(session: Session, profile: Profile) -> Iterator[Recorded]:
-    """Yield the messages of a session with the answers of this program in place of the recorded ones."""
-    pipeline = Pipeline(profile, frame_id=session.frame_id, timed=False)
+def _answered(session: Session, replay_with: Profile | str) -> Iterator[Recorded]:
+    """Yield the messages of a session with the answers of this program in place of the recorded ones.
+
+    replay_with: as of `read_history`.
+    """
+    profile = session.profile if replay_with == AS_RECORDED else replay_with
+    kept = () if replay_with == AS_RECORDED else tuple(setting.name for setting in Profile.fields())
+    pipeline = Pipeline(profile, session.frame_id, timed=False, kept=kept, rules=session.rules)
     for message in session.messages():
         if message.type in ANSWERS:
             continue
         yield message
         if message.type == "ObjectDescriptionArray":
             pipeline.on_shapes(message.data)
+        elif message.type == "ParameterEvent":
+            pipeline.on_settings(message.data)
         elif message.type == "ObjectStateArray":
             outputs = pipeline.on_states(message.data)
             if outputs is not None:
                 yield message._replace(type="ContactArray", data=outputs.contacts)
                 yield message._replace(type="PredictedCollisionArray", data=outputs.predictions)
+                for alert in outputs.alerts:
+                    yield message._replace(type="CollisionAlert", data=alert)
 
 
 def _check_memory(name: str) -> None:

@@ -11,30 +11,40 @@ from numpy.typing import NDArray
 
 from collision_monitor import records
 from collision_monitor.codec import (
+    CollisionAlert,
     ContactArray,
     MonitorStatus,
     ObjectDescriptionArray,
     ObjectStateArray,
     PredictedCollisionArray,
     Removal,
+    decode_alert,
+    decode_alerts,
     decode_contacts,
     decode_descriptions,
+    decode_parameter_event,
     decode_predictions,
     decode_states,
     decode_status,
 )
+from collision_monitor.codec.alerts import AlertLevel
 from collision_monitor.codec.states import COVARIANCE_SIZE
 from collision_monitor.geometry.pose import multiply
 from collision_monitor.monitor.timeline import NANOSECOND
 from collision_monitor.pipeline.catalogue import Catalogue
+from collision_monitor.pipeline.settings_event import RULES
 from collision_monitor.prediction.spread import worst_stddevs
 from collision_monitor.records import StateFlag
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 from collision_monitor.view.bodies import Bodies, described_pieces
 from collision_monitor.view.forms import Piece
+from collision_monitor.view.levels import Level, Pair
 from collision_monitor.view.moment import Moment
 
 States = NDArray[np.void]
+
+_ALERTS_LAST: Final = 1_500_000_000
+"""ns for which the raised alerts of a live monitor hold without being repeated."""
 
 _NEVER: Final = np.iinfo(np.int64).min
 
@@ -43,11 +53,14 @@ class Scene:
     """The newest content of a monitor's topics, live or from a session.
 
     frame_id: states and descriptions in another frame are ignored, as the monitor refuses them; empty: not known yet,
-    the answers tell it.
+    the answers tell it. has_rules: whether the monitor of a session begins with rules for alerts.
     """
 
-    def __init__(self, frame_id: str = "") -> None:
+    def __init__(self, frame_id: str = "", *, has_rules: bool = False) -> None:
         self.frame_id = frame_id
+        self._has_rules = has_rules
+        self._raised: dict[tuple[str, Pair], Level] = {}
+        self._raised_ns = 0
         self.status: MonitorStatus | None = None
         self._catalogue = Catalogue()
         self._is_shared = False
@@ -76,6 +89,15 @@ class Scene:
             case "PredictedCollisionArray":
                 self._predictions = decode_predictions(data)
                 self.frame_id = self._predictions.frame_id
+            case "CollisionAlert":
+                self._raise(decode_alert(data))
+            case "CollisionAlertArray":
+                array = decode_alerts(data)
+                self._raised, self._raised_ns = {}, array.stamp_ns
+                for alert in array.alerts:
+                    self._raise(alert)
+            case "ParameterEvent":
+                self._has_rules = bool(decode_parameter_event(data).changed.get(RULES, self._has_rules))
             case "MonitorStatus":
                 self.status = decode_status(data)
 
@@ -84,7 +106,7 @@ class Scene:
         self._is_shared = True
         other = copy.copy(self)
         other._state, other._stamp = self._state.copy(), self._stamp.copy()
-        other._removed = set(self._removed)
+        other._removed, other._raised = set(self._removed), dict(self._raised)
         return other
 
     def moment(self) -> Moment:
@@ -109,12 +131,33 @@ class Scene:
             stamp_ns=stamp,
             step=0 if last is None else last.step,
             is_known=contacts is not None and predictions is not None,
+            alerts=self._alerts(stamp),
         )
         if contacts is not None:
             moment = replace(moment, contacts=contacts.contacts)
         if predictions is not None:
             moment = replace(moment, predictions=predictions.predictions, horizon=predictions.horizon)
         return moment
+
+    # -- alerts
+
+    def _raise(self, alert: CollisionAlert) -> None:
+        key = alert.rule, (alert.id_a, alert.id_b)
+        self._raised.pop(key, None)
+        if alert.level:
+            self._raised[key] = Level[AlertLevel(alert.level).name]
+
+    def _alerts(self, stamp_ns: int) -> dict[Pair, Level] | None:
+        """Return the highest raised level of each pair; None without rules.
+
+        A live monitor with rules repeats what is raised twice a second, and one without rules does not.
+        """
+        if not self._has_rules and not (self._raised_ns and abs(stamp_ns - self._raised_ns) <= _ALERTS_LAST):
+            return None
+        pairs: dict[Pair, Level] = {}
+        for (_, pair), level in self._raised.items():
+            pairs[pair] = max(level, pairs.get(pair, level))
+        return pairs
 
     # -- objects
 

@@ -25,7 +25,8 @@ def start_server(host: str = LOOPBACK, port: int = PORT) -> viser.ViserServer:
         import viser
     except ImportError as error:
         raise UnsupportedError(
-            f"view: expected the package viser, got: {error}; `make setup` installs it, or pip install viser"
+            f"view: expected the package viser, got: {error}; "
+            "`make setup` installs it, or `pip install 'collision_monitor[view]'`"
         ) from None
     chosen = _free_port(host, port)
     with contextlib.redirect_stdout(io.StringIO()):  # its banner

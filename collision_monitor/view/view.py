@@ -50,7 +50,7 @@ class View:
 
     def show(self, moment: Moment, title: str, notes: list[str]) -> Picture:
         """Show a moment. title, notes: text above it."""
-        alerts = moment.alerts is not None
+        alerts = self.panel.colours_by_alerts(moment)
         picture = draw(moment, origin=self._origin, selected=self._selected, alerts=alerts)
         if self._origin is None and len(moment.ids):
             self._origin = picture.origin

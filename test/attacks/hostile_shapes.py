@@ -51,12 +51,13 @@ _DIMENSIONS: Final = {
     ShapeType.HALF_SPACE: 4,
     ShapeType.CIRCLE: 1,
     ShapeType.ELLIPSOID: 3,
+    ShapeType.POINTS: 1,
 }
 
 _COMMON: Final = (
     *(ShapeType.SPHERE, ShapeType.BOX, ShapeType.CAPSULE, ShapeType.CYLINDER, ShapeType.CONE) * 2,
     *(ShapeType.CONVEX_HULL, ShapeType.MESH) * 2,
-    *(ShapeType.HALF_SPACE, ShapeType.CIRCLE, ShapeType.POLYGON, ShapeType.ELLIPSOID),
+    *(ShapeType.HALF_SPACE, ShapeType.CIRCLE, ShapeType.POLYGON, ShapeType.ELLIPSOID, ShapeType.POINTS),
 )
 
 
@@ -70,8 +71,8 @@ def any_shape(dice: Dice) -> ShapeFields:
     vertices, triangles = none, []
     if kind == ShapeType.MESH:
         vertices, triangles = _mesh(dice)
-    elif kind in (ShapeType.CONVEX_HULL, ShapeType.POLYGON):
-        vertices = _points(dice) if kind == ShapeType.CONVEX_HULL else _boundary(dice)
+    elif kind in (ShapeType.CONVEX_HULL, ShapeType.POINTS, ShapeType.POLYGON):
+        vertices = _boundary(dice) if kind == ShapeType.POLYGON else _points(dice)
     if kind == ShapeType.POLYGON and dice.chance(0.2):
         dimensions = dice.numbers(1, 0.1, 2.0)
     if dice.is_hostile and dice.chance(0.2):  # fields that do not belong to the kind

@@ -168,3 +168,17 @@ def test_every_overlap_at_rest_is_a_contact_without_a_margin() -> None:
                 truth = cm.contact(mesh, cm.Pose(), solid, cm.Pose(position))
                 found = len(monitor.step(0, [1, 2], poses).contacts)
                 assert found == truth.overlaps or abs(truth.signed_distance) < 1e-9, (mesh, solid, position)
+
+
+def test_a_plate_without_thickness_meets_a_mesh_where_it_is():
+    plate = cm.Box((2.0, 1.0, 0.0))
+    monitor = Monitor(Profile(contact_margin=10.0))
+    monitor.add(1, RING)
+    monitor.add(2, plate)
+    for step in range(6):
+        poses = states(2, 50 + step, 1.0)
+        (row,) = monitor.step((1 + step) * SECOND, [1, 2], poses).contacts
+        truth = cm.contact(RING, cm.Pose(poses[0, :3], poses[0, 3:]), plate, cm.Pose(poses[1, :3], poses[1, 3:]))
+        assert (row["signed_distance"] > 0.0) == (truth.signed_distance > 0.0)
+        if truth.signed_distance > 0.0:
+            assert row["signed_distance"] == pytest.approx(truth.signed_distance, abs=1e-9)

@@ -137,14 +137,14 @@ def test_a_time_of_impact_is_certified(other):
 
 
 def test_a_cloud_that_touches_at_the_start_may_part_slide_or_go_deeper():
-    floor = np.array([(x, y, 0.0) for x in (-1, 0, 1) for y in (-1, 0, 1)], float)
+    floor = np.array([(0.0, 0.0, 0.0), (0.1, 0.1, 0.0), (3.0, 0.0, -0.5), (-1.0, 1.0, -0.5)])
     cloud, box = cm.Points(floor, 0.25), cm.Box((1, 1, 1))
     on_top = cm.Pose((0, 0, 0.75))
     still = cm.Motion(cm.Pose())
     assert cm.time_of_impact(cloud, still, box, cm.Motion(on_top, linear=(0, 0, 1))).status == "clear"
     assert cm.time_of_impact(cloud, still, box, cm.Motion(on_top, linear=(1, 0, 0))).status == "clear"
     sinks = cm.time_of_impact(cloud, still, box, cm.Motion(on_top, linear=(0, 0, -1)))
-    assert sinks.lower == 0.0 and sinks.upper < 1e-6
+    assert sinks.lower == 0.0 and sinks.upper < 1e-5
     bare = cm.Points(floor)
     slides = cm.time_of_impact(bare, still, box, cm.Motion(cm.Pose((0, 0, 0.5)), linear=(1, 0, 0)))
     assert slides.status == "clear"
@@ -208,8 +208,6 @@ def test_what_a_cloud_does_not_offer_is_refused_with_text():
         cm.contact(cloud, cm.Pose(), cm.Circle(1), cm.Pose())
     with pytest.raises(cm.UnsupportedError, match="points_within: expected solid shapes"):
         cm.points_within(cloud, cm.Pose(), cm.Circle(1), cm.Pose())
-    with pytest.raises(cm.UnsupportedError, match="Points"):
-        cm.time_of_impact(cloud, cm.Motion(cm.Pose()), cm.Sphere(1), cm.Motion(cm.Pose((3, 0, 0))), method="bisection")
 
 
 @pytest.mark.parametrize("points", [np.zeros((300, 3)), np.full((9, 3), 1e-300), 1e9 * np.eye(3)])

@@ -12,7 +12,16 @@ import numpy as np
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from foreign_bag import SECOND, START, STORE, T, marker, markers, odometry, pose_stamped, transforms, write_bag
-from foreign_messages import detection, detections, footprint, predicted_objects, track, tracked_objects
+from foreign_messages import (
+    detection,
+    detections,
+    footprint,
+    laser_scan,
+    point_cloud,
+    predicted_objects,
+    track,
+    tracked_objects,
+)
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from collision_monitor.session import Session
@@ -87,6 +96,8 @@ def everything(steps: int = 12) -> tuple[dict[str, Any], Messages]:
             ("/tracked", stamp, tracked_objects("base", stamp, track(1, (20 + t, 0, 0), linear=(1, 0, 0)))),
             ("/predicted", stamp, predicted_objects("map", stamp, track(2, (0, 30, 0), predicted=True))),
             ("/detections", stamp, detections("base", stamp, detection((2, -t, 0), name="7", variance=0.01))),
+            ("/scan", stamp, laser_scan("base", stamp, [3 + t, np.inf, np.nan, 4, 5])),
+            ("/cloud", stamp, point_cloud("base", stamp, [(0.1, 0, 0), (9, t, 0), (np.nan, 0, 0), (9, 1, t)])),
         ]
     entries = {
         "cup": {"topic": "/covariance", "shape": {"sphere": 0.1}},
@@ -97,6 +108,8 @@ def everything(steps: int = 12) -> tuple[dict[str, Any], Messages]:
         "cars": {"topic": "/tracked"},
         "others": {"topic": "/predicted"},
         "people": {"topic": "/detections"},
+        "walls": {"topic": "/scan", "radius": 0.1},
+        "depth": {"topic": "/cloud", "voxel": 0.01, "without": ["robot"]},
     }
     return entries, found
 

@@ -80,7 +80,7 @@ def test_the_pieces_of_a_solid_have_its_volume_and_point_outwards(shape: Shape, 
             assert (np.einsum("ni,ni->n", np.cross(b - a, c - a)[:, :2], (a + b + c)[:, :2]) > 0).all()
         else:
             found += np.einsum("ni,ni->n", a, np.cross(b, c)).sum() / 6.0
-    assert found == pytest.approx(volume, rel=0.03)
+    assert 0.9 * volume < found < 1.001 * volume  # facets are within a round solid
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,7 @@ def test_flat_shapes_lie_where_they_are(shape: Shape) -> None:
         assert not vertices[:, 2].any()
         a, b, c = vertices[form.faces].swapaxes(0, 1)
         area = 0.5 * np.abs(np.cross(b - a, c - a)[:, 2]).sum()
-        assert area == pytest.approx(np.pi * 0.16 if isinstance(shape, Circle) else 1.2, rel=0.02)
+        assert area == pytest.approx(np.pi * 0.16 if isinstance(shape, Circle) else 1.2, rel=0.03)
 
 
 def test_equal_meshes_share_a_form_and_too_many_become_boxes() -> None:
