@@ -171,7 +171,8 @@ class Monitoring:
     def _publish_alerts(self, alerts: tuple[bytes, ...]) -> None:
         for each in alerts:
             self._alerts_out.publish(each)
-        if alerts:
+        raised = self._pipeline.has_raised_alerts and self._raised_out.get_subscription_count()
+        if alerts or raised:
             self._raised_out.publish(self._pipeline.raised_alerts())
 
     def _record_step(self, states: bytes, outputs: Outputs, received: int) -> None:
