@@ -52,7 +52,7 @@ def main() -> None:
     parser.add_argument("--list", action="store_true", help="print every alert")
     args = parser.parse_args()
     rules = Rules.given(str(ROOT / "config/rules.yaml"))
-    heads = ("clip", "runs of predictions", "of these shorter than 3 frames", "alerts raised", *LEVELS, "shortest alert (s)")
+    heads = ("clip", "runs of predictions", "of 1 or 2 frames", "alerts raised", *LEVELS, "shortest alert (s)")
     print(f"| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
     for path in sorted(args.folder.glob("*_ped.csv")):
         prefix = path.with_name(path.name.removesuffix("_ped.csv"))

@@ -37,7 +37,7 @@ def _from_first(work: Any, k: int) -> Vector:
     return minus(simplex_point(work, k), simplex_point(work, 0))
 
 
-@device
+@inlined
 def _normal(work: Any, i: int, j: int, k: int) -> tuple[Vector, float]:
     """Cross product of the edges ij and ik, and the product of their squared lengths."""
     a = simplex_point(work, i)
@@ -45,7 +45,7 @@ def _normal(work: Any, i: int, j: int, k: int) -> tuple[Vector, float]:
     return cross(u, v), dot(u, u) * dot(v, v)
 
 
-@device
+@inlined
 def _set_face(work: Any, f: int, i: int, j: int, k: int) -> None:
     """Face f through the points i, j, k, counter-clockwise from outside; a sliver gets distance inf and no normal."""
     n, product = _normal(work, i, j, k)
@@ -99,7 +99,7 @@ def _off(work: Any, count: int, n: Vector) -> float:
     return sqrt(dot(d, d))
 
 
-@device
+@inlined
 def _push_edge(work: Any, count: int, i: float, j: float) -> int:
     """Add a directed edge to the horizon, or cancel it against its reverse: the edge is then inside the hole."""
     for e in range(count):

@@ -122,8 +122,10 @@ class GuardNode(Node):
             message = codec.decode_states(data)
         except MessageError:
             return
-        rows = message.states[message.states["id"] == self._robot] if self._robot is not None else ()
-        if not len(rows) or message.stamp_ns == self._robot_stamp:
+        if self._robot is None or message.stamp_ns == self._robot_stamp:
+            return
+        rows = message.states[message.states["id"] == self._robot]
+        if not len(rows):
             return
         row = rows[-1]
         x, y, z, w = row["quaternion"].tolist()

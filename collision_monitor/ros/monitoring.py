@@ -324,6 +324,7 @@ class Monitoring:
             deferred=deferred,
             unresolved=unresolved,
             other_nodes=self._name_conflict.others,
+            sources=None if self._sources is None else tuple(self._sources.lines()),
         )
 
     def _now(self) -> int:

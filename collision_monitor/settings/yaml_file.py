@@ -77,6 +77,27 @@ def parse_yaml(text: str, name: str, *, aliases: bool = False, nodes: int = NODE
         raise InputError(f"{name}: expected YAML, got a value that does not fit its tag: {error!r:.{_SHOWN}}") from None
 
 
+def key_lines(path: Path) -> dict[str, int]:
+    """Return the line of each key in the first three levels of a file that `read_yaml` accepted.
+
+    Keys of the first two levels are by their names, and those of the third by `second, third`.
+    """
+    with path.open(encoding="utf-8-sig") as file:
+        root = yaml.compose(file, SafeLoader)
+    found: dict[str, int] = {}
+    for key, value in _pairs(root):
+        found[key.value] = key.start_mark.line + 1
+        for name, entry in _pairs(value):
+            found[name.value] = name.start_mark.line + 1
+            for inner, _ in _pairs(entry):
+                found[f"{name.value}, {inner.value}"] = inner.start_mark.line + 1
+    return found
+
+
+def _pairs(node: Any) -> list[tuple[Any, Any]]:
+    return node.value if isinstance(node, yaml.MappingNode) else []
+
+
 def _refused(expected: str, found: str, mark: Any) -> yaml.MarkedYAMLError:
     return yaml.MarkedYAMLError(None, None, f"{found} ({expected})", mark)
 
