@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import cos, hypot, isfinite, isnan, sin, sqrt
-from typing import NamedTuple
+from math import cos, hypot, inf, isfinite, isnan, sin, sqrt
+from typing import Final, NamedTuple
 
 from collision_monitor.codec import AlertLevel, CollisionAlert
+
+STANDS: Final = 0.05
+"""m/s: an obstacle that comes nearer no faster than this stands."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,8 @@ def verdict(
 ) -> Verdict:
     """Return the smallest factor that any alert of the robot asks for.
 
-    A command that moves away from the nearest point of the obstacle passes, so that a stopped robot can retreat.
+    A command that moves away from the nearest point of an obstacle passes, so that a stopped robot can retreat; from
+    one that approaches it has to move away as fast.
     """
     worst = PASSES
     for alert in alerts:
@@ -93,23 +97,36 @@ def _of_alert(braking: Braking, alert: CollisionAlert, is_a: bool, pose: RobotPo
     nx, ny = to[0] - at[0], to[1] - at[1]
     length = hypot(nx, ny)
     speed = hypot(command.x, command.y) + abs(command.turn) * (0.0 if isnan(lever) else lever)
-    closing = speed
+    closing, approach = speed, 0.0
     if alert.distance > 0.0 and length > 0.0:  # else the direction is not known
+        nx, ny = nx / length, ny / length
         vx = command.x * cos(pose.heading) - command.y * sin(pose.heading)
         vy = command.x * sin(pose.heading) + command.y * cos(pose.heading)
         # the points of the robot that a turn moves may meet the obstacle at any place
-        closing = (vx * nx + vy * ny) / length + abs(command.turn) * lever
-        if closing <= 0.0:
+        closing = vx * nx + vy * ny + abs(command.turn) * lever
+        if isfinite(alert.closing_speed):
+            approach = max(0.0, alert.closing_speed - (pose.vx * nx + pose.vy * ny))
+        if closing + approach <= (STANDS if closing <= 0.0 else 0.0):
             return PASSES
     factor = braking.factor(alert.level)
     reason = f"{name}: {alert.text}"
-    if isfinite(alert.distance) and closing > 0.0:
-        toward = (pose.vx * nx + pose.vy * ny) / length if length > 0.0 else 0.0
-        approach = alert.closing_speed - toward if isfinite(alert.closing_speed) else 0.0
-        allowed = braking.speed(alert.distance, approach)
-        if factor * closing > allowed:
-            factor = allowed / closing
-            reason = f"{name}: {other} at {alert.distance:.2f} m allows {allowed:.2f} m/s"
+    allowed = _allowed(braking, alert.distance, speed, closing, approach)
+    if factor * speed > allowed:
+        factor = allowed / speed
+        reason = f"{name}: {other} at {alert.distance:.2f} m allows {allowed:.2f} m/s"
     return Verdict(0.0 if factor < 1e-3 else factor, alert.rule, reason)
 
 
+def _allowed(braking: Braking, distance: float, speed: float, closing: float, approach: float) -> float:
+    """Return the largest speed (m/s) of a command with which the robot stands when the obstacle is at the clearance.
+
+    speed: of the command; closing: its part toward the obstacle; approach: of the obstacle toward the robot (m/s).
+    """
+    if not isfinite(distance) or speed == 0.0:
+        return inf
+    toward = braking.speed(distance, approach) * speed / closing if closing > 0.0 else inf
+    if approach <= STANDS:
+        return toward
+    # the obstacle may come from the side: the robot has to stand before it arrives, whichever way it drives
+    arrival = (distance - braking.clearance) / (approach + max(closing, 0.0))
+    return min(toward, braking.deceleration * max(0.0, arrival - braking.reaction))

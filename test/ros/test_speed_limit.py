@@ -69,6 +69,19 @@ def test_a_command_away_from_the_obstacle_passes_and_one_beside_it_is_limited_by
     assert factor(turned, Twist2(1.0, 0, 0), pose=RobotPose(0, 0, -math.pi / 2)) == 1.0
 
 
+def test_a_robot_stands_before_an_obstacle_from_the_side_arrives() -> None:
+    """Its command has no part toward the obstacle."""
+    for speed in (0.3, 0.8, 2.0):
+        aside = alert(1.0, closing=1.2, direction=math.pi / 2)
+        passed = factor(aside, Twist2(speed, 0, 0), pose=RobotPose(0, 0, 0, speed, 0.0)) * speed
+        assert 0.2 + passed / 1.5 <= (1.0 - 0.1) / 1.2 + 1e-9
+        assert passed == pytest.approx(min(speed, 1.5 * (0.9 / 1.2 - 0.2)))
+    near = alert(0.3, AlertLevel.CRITICAL, closing=1.2, direction=math.pi / 2)
+    assert factor(near, Twist2(0.5, 0, 0)) == 0.0
+    assert factor(near, Twist2(0.0, -1.3, 0)) == 1.0
+    assert factor(near, Twist2(0.0, -0.5, 0)) == 0.0  # slower than the obstacle
+
+
 def test_levels_scale_where_no_distance_is_known() -> None:
     for level, expected in ((1, 1.0), (2, 0.5), (3, 0.0)):
         unknown = replace(alert(1.0, level), distance=NAN, point_a=(NAN,) * 3, point_b=(NAN,) * 3)
