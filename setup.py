@@ -23,6 +23,7 @@ setup(
         "console_scripts": [
             "collision-monitor = collision_monitor.cli.main:main",
             "monitor = collision_monitor.ros.executables:monitor",
+            "guard = collision_monitor.ros.executables:guard",
             "world = collision_monitor.ros.executables:world",
             "replay = collision_monitor.cli.main:replay_main",
         ],

@@ -10,6 +10,8 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.alerts.alerts import Alerts
+from collision_monitor.alerts.rules import Rules
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape, Sphere
 from collision_monitor.monitor.monitor import Monitor
@@ -57,8 +59,20 @@ def _step_uncertain(monitor: Monitor, poses: NDArray[np.float64]) -> None:
     monitor.step(3_020_000_000, states, covariance=np.zeros((len(poses), 12)))
 
 
+def warm_up_alerts() -> None:
+    """Evaluate rules about states once. A node without rules does not need their kernels."""
+    monitor = Monitor()
+    monitor.add(1, Box((1, 1, 1)))
+    monitor.add(2, Sphere(0.5))
+    result = monitor.step(0, [1, 2], np.array([[0, 0, 0, 0, 0, 0, 1], [2, 0, 0, 0, 0, 0, 1]]))
+    level = "{distance: 2, distance_at_closest_approach: 2}"
+    alerts = Alerts(Rules.parse(f"rules: {{near: {{between: [any, any], caution: {level}, quiet_at_rest: false}}}}"))
+    alerts.step(monitor, result, "", str)
+
+
 def warm_up_functions() -> None:
     """Call the functions that need no monitor, once with each kind of argument that has a kernel of its own."""
+    warm_up_alerts()
     # imported here because a node, which warms up the monitor at its start, needs none of it
     from collision_monitor.detection.detector import WORTH_THREADS, Detector, default_threads
     from collision_monitor.query.contact import contact

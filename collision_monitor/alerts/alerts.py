@@ -11,7 +11,7 @@ from collision_monitor.alerts.answered import answered
 from collision_monitor.alerts.debounce import ENTRY, Conditions, Delays, Entries, advance, lasting, restart
 from collision_monitor.alerts.evaluation import evaluate
 from collision_monitor.alerts.measures import Measures, Slots
-from collision_monitor.alerts.messages import Change, Head, NameOf, message
+from collision_monitor.alerts.messages import Change, Head, NameOf, measured, message
 from collision_monitor.alerts.rules import Rule, Rules
 from collision_monitor.alerts.scene import Scene
 from collision_monitor.alerts.selection import Classes
@@ -41,6 +41,7 @@ class Alerts:
         self._gone: dict[str, Entries] = {}  # of rules that were taken out, until the next step
         self._last: list[int] | None = None  # stamp (ns) of the last step, and number of restarts of the timeline
         self._raised: dict[tuple[str, int, int], CollisionAlert] = {}
+        self._measured: dict[str, Measures] = {}  # by each rule in the last step
 
     def use(self, rules: Rules) -> None:
         """Use these rules from the next step on. The alerts of a rule whose name stays go on; the others end."""
@@ -54,13 +55,22 @@ class Alerts:
         self._is_outdated = True
 
     @property
+    def has_raised(self) -> bool:
+        """Whether `raised` has any."""
+        return bool(self._raised)
+
+    @property
     def empty_classes(self) -> list[str]:
         """The classes of the rules that no object belongs to, as of the last step."""
         return self._classes.without_members()
 
     def raised(self, stamp_ns: int, frame_id: str, step: int) -> CollisionAlertArray:
-        """Return all alerts that are raised. After a restart from a snapshot, those that have changed since then."""
-        alerts = sorted(self._raised.values(), key=lambda each: (-each.level, each.rule, each.id_a, each.id_b))
+        """Return all alerts that are raised, with the measures of the last step.
+
+        After a restart from a snapshot, only those that have changed since then.
+        """
+        now = [measured(each, self._measured.get(each.rule)) for each in self._raised.values()]
+        alerts = sorted(now, key=lambda each: (-each.level, each.rule, each.id_a, each.id_b))
         highest = alerts[0].level if alerts else 0
         return CollisionAlertArray(stamp_ns, frame_id, step, self.number, highest, tuple(alerts))
 
@@ -83,6 +93,7 @@ class Alerts:
         answers = answered(scene, result)
         for rule in self.rules.rules:
             found, changes = self._advance(rule, scene, answers, result.stamp_ns)
+            self._measured[rule.name] = found
             made += self._messages(head, rule.name, (rule, found), changes)
         return made
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -46,11 +47,6 @@ def message(head: Head, number: int, rule: str, change: Change, of: tuple[Rule, 
     id_a, id_b = change.key >> 32, change.key & 0xFFFFFFFF
     names = head.name_of(id_a), head.name_of(id_b)
     at = -1 if of is None else _find(of[1], change.key)
-    values: dict[str, Any] = dict.fromkeys(COLUMNS, np.nan)
-    points = _UNKNOWN, _UNKNOWN
-    if of is not None and at >= 0:
-        values = {name: float(of[1][name][at]) for name in COLUMNS}
-        points = tuple(of[1].points[at, 0].tolist()), tuple(of[1].points[at, 1].tolist())
     reason = _reason(head, change, of, at)
     return CollisionAlert(
         head.stamp_ns,
@@ -58,9 +54,7 @@ def message(head: Head, number: int, rule: str, change: Change, of: tuple[Rule, 
         head.step,
         number,
         change.since_ns,
-        **values,
-        point_a=points[0],
-        point_b=points[1],
+        **_values(None if of is None else of[1], at),
         id_a=id_a,
         id_b=id_b,
         level=change.level,
@@ -73,6 +67,22 @@ def message(head: Head, number: int, rule: str, change: Change, of: tuple[Rule, 
         class_b=change.classes[1],
         text=f"{names[0]} and {names[1]}: {reason}",
     )
+
+
+def measured(alert: CollisionAlert, measures: Measures | None) -> CollisionAlert:
+    """Return the alert with these measures; without them, if its pair is not among them."""
+    if measures is None:
+        return alert
+    return replace(alert, **_values(measures, _find(measures, alert.id_a << 32 | alert.id_b)))
+
+
+def _values(measures: Measures | None, at: int) -> dict[str, Any]:
+    """Return the measures of the pair with that index as fields of the message; NaN without a pair."""
+    if measures is None or at < 0:
+        return {**dict.fromkeys(COLUMNS, np.nan), "point_a": _UNKNOWN, "point_b": _UNKNOWN}
+    points = measures.points[at].tolist()
+    numbers = {name: float(measures[name][at]) for name in COLUMNS}
+    return {**numbers, "point_a": tuple(points[0]), "point_b": tuple(points[1])}
 
 
 def _find(measures: Measures, key: int) -> int:

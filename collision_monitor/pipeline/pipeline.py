@@ -335,8 +335,13 @@ class Pipeline:
         self._alerts.use(rules)
         return encode_settings(stamp_ns, node, {RULES: rules.text})
 
+    @property
+    def has_raised_alerts(self) -> bool:
+        """Whether any alert is raised."""
+        return self._alerts.has_raised
+
     def raised_alerts(self) -> bytes:
-        """Return a CollisionAlertArray of all alerts that are raised."""
+        """Return a CollisionAlertArray of all alerts that are raised, with the measures of the last step."""
         last = self.monitor.last
         stamp_ns, step = (last.stamp_ns, last.step) if last is not None else (0, 0)
         return encode_alerts(self._alerts.raised(stamp_ns, self.frame_id, step))

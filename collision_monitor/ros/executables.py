@@ -22,6 +22,11 @@ def world(args: Sequence[str] | None = None) -> int:
     return _run(_world, args)
 
 
+def guard(args: Sequence[str] | None = None) -> int:
+    """Run the guard until SIGINT or SIGTERM. `args`: as sys.argv. Returns the exit code."""
+    return _run(_guard, args)
+
+
 def _run(body: Callable[[StopRequest], None], args: Sequence[str] | None) -> int:
     stop = StopRequest().install()
     stay_on_this_machine()
@@ -45,6 +50,14 @@ def _monitor(stop: StopRequest) -> None:
         spin(node, stop, events=node.settings.executor == "events")
     finally:
         node.close()
+
+
+def _guard(stop: StopRequest) -> None:
+    from collision_monitor.ros.guard_node import GuardNode
+
+    node = GuardNode()
+    spin(node, stop)
+    node.destroy_node()
 
 
 def _world(stop: StopRequest) -> None:

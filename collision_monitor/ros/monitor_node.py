@@ -60,6 +60,8 @@ class MonitorNode(Managed, Node):
         text = "compiling the kernels, once for this machine and version: this takes a minute or two"
         with stop.ending(), on_first_compilation(lambda: log(text)):
             warm_up.warm_up_monitor()
+            if self._rules.rules:
+                warm_up.warm_up_alerts()
 
     # -- life cycle
 

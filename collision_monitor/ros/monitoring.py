@@ -32,6 +32,7 @@ from collision_monitor.ros.status_line import status_line
 from collision_monitor.ros.step_peaks import StepPeaks
 from collision_monitor.ros.step_times import StepTimes
 from collision_monitor.settings.profile import Profile
+from collision_monitor.warm_up import warm_up_alerts
 
 if TYPE_CHECKING:
     from collision_monitor.ros.live_sources import LiveSources
@@ -170,7 +171,8 @@ class Monitoring:
     def _publish_alerts(self, alerts: tuple[bytes, ...]) -> None:
         for each in alerts:
             self._alerts_out.publish(each)
-        if alerts:
+        raised = self._pipeline.has_raised_alerts and self._raised_out.get_subscription_count()
+        if alerts or raised:
             self._raised_out.publish(self._pipeline.raised_alerts())
 
     def _record_step(self, states: bytes, outputs: Outputs, received: int) -> None:
@@ -229,6 +231,8 @@ class Monitoring:
 
     def change_rules(self, rules: Rules) -> None:
         """Change the rules of the alerts from the next step on."""
+        if rules.rules:
+            warm_up_alerts()
         now = self._now()
         event = self._pipeline.change_rules(rules, now, self._name)
         self._recording.write(Topic.SETTINGS, event, now, now, settings=self._pipeline.settings())

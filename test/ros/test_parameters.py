@@ -42,7 +42,8 @@ def test_the_file_with_every_line_in_force_gives_the_defaults(read, tmp_path):
     values = next(iter(yaml.safe_load(EVERY_LINE).values()))["ros__parameters"]
     recording = {"record", *(f"record_{n}" for n in ("mode", "before", "after", "split_size", "split_duration"))}
     running = {"executor", "autostart", "diagnostic_updater.period", "diagnostic_updater.use_fqn"}
-    assert set(values) == {"profile", "frame_id", "sources", *running, *recording, *(s.name for s in Profile.fields())}
+    others = {"profile", "frame_id", "sources", "rules"}
+    assert set(values) == {*others, *running, *recording, *(s.name for s in Profile.fields())}
     (tmp_path / "all.yaml").write_text(EVERY_LINE)
     assert read("--params-file", str(tmp_path / "all.yaml"))[0].profile == Profile()
 
