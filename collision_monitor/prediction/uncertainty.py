@@ -56,7 +56,7 @@ coarse lattice of samples. The test is repeated after each further one."""
 
 
 @device
-def _first_contact(multibody, i, j, window, tube, query, work):
+def first_contact(multibody, i, j, window, tube, query, work):
     """First time in the window at which bodies i and j are within query.margin and the tube; infinite: never.
 
     They move as in work.motion. Time 0 of the motions and of the tube is now.
@@ -191,10 +191,10 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
         roughly, whole = ImpactQuery(query.margin, coarse, query.iterations), Window(0.0, horizon)
         if not stated:
             wide = Tube(sampling.sigmas * tube.start, sampling.sigmas * tube.growth)
-            if _first_contact(multibody, i, j, whole, wide, roughly, work) == inf:
+            if first_contact(multibody, i, j, whole, wide, roughly, work) == inf:
                 continue
         wide = Tube(sampling.safe_sigmas * tube.start, sampling.safe_sigmas * tube.growth)
-        safe = _first_contact(multibody, i, j, whole, wide, roughly, work)
+        safe = first_contact(multibody, i, j, whole, wide, roughly, work)
         t = _lay_along(multibody, i, j, tube, sampling, work)
         work.joint[:] = 0.0
         if not bodies.static[i]:
@@ -240,7 +240,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                         times[n] = inf
                         continue
                 window = Window(max(begin, parted), horizon)
-                times[n] = _first_contact(multibody, i, j, window, Tube(bias, 0.0), roughly, work)
+                times[n] = first_contact(multibody, i, j, window, Tube(bias, 0.0), roughly, work)
                 if straight:
                     pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
                     remember(table, parts, pair, times[n] == inf, n, work.scratch, work.axes)
