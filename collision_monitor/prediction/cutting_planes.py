@@ -7,14 +7,11 @@ their gap gives a new plane.
 from __future__ import annotations
 
 from math import inf
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.prediction.obstacle_planes import AT_REST, MOST_PLANES, separation_at, set_plane
 from collision_monitor.prediction.straight_samples import enter_plane
-
-VERIFIED: Final = 12
-"""Samples that must need no new plane; half of them after the last plane."""
 
 
 class CutSettings(NamedTuple):
@@ -23,6 +20,7 @@ class CutSettings(NamedTuple):
     margin: float  # m
     tolerance: float  # m: gap up to which a sample has entered
     samples: int  # number of samples to try
+    verified: int  # samples that must need no new plane; half of them after the last plane
     turn: Any  # (bool, bool): whether the bodies turn
 
 
@@ -52,11 +50,12 @@ def _cut(table, pair, n, t, direction, error, k, settings, memory):
     obstacle, off, samples, entry, leave = memory.obstacle, memory.off, settings.samples, memory.entry, memory.leave
     trial_entry, trial_leave = memory.trial[0], memory.trial[1]
     a, b, plane = pair.a, pair.b, obstacle.planes[k, obstacle.count[k]]
+    closer = settings.margin - 0.5 * settings.tolerance  # between planes the obstacle is farther by up to a tolerance
     best, fewest = AT_REST, samples + 1
     if settings.turn[0] or settings.turn[1]:
         for mode in range(3):
             if mode == AT_REST or settings.turn[mode]:
-                set_plane(table, a, b, direction, mode, k, t, settings.margin, error, obstacle, plane)
+                set_plane(table, a, b, direction, mode, k, t, closer, error, obstacle, plane)
                 for m in range(samples):
                     trial_entry[m] = entry[m]
                     trial_leave[m] = leave[m]
@@ -66,7 +65,7 @@ def _cut(table, pair, n, t, direction, error, k, settings, memory):
                     hits += 1 if trial_entry[m] <= trial_leave[m] else 0
                 if hits < fewest:
                     best, fewest = mode, hits
-    set_plane(table, a, b, direction, best, k, t, settings.margin, error, obstacle, plane)
+    set_plane(table, a, b, direction, best, k, t, closer, error, obstacle, plane)
     before = entry[n]
     enter_plane(plane, off, 0, samples, entry, leave)
     obstacle.count[k] += 1
@@ -75,9 +74,10 @@ def _cut(table, pair, n, t, direction, error, k, settings, memory):
 
 @device
 def cut_planes(table, parts, pair, k, settings, memory, scratch):
-    """Find the planes of segment k of memory.obstacle for a pair of shapes (ShapePair), with the first samples.
+    """Add planes to segment k of memory.obstacle for a pair of shapes (ShapePair), where the first samples need them.
 
-    Samples with a time in memory.alone met before; it gets the times of the others.
+    Every second sample is the one that passes the planes most briefly, because it may miss the shapes.
+    memory.alone: times of the samples that met in an earlier segment, else infinite; it gets those of this segment.
     """
     obstacle, off, samples = memory.obstacle, memory.off, settings.samples
     entry, leave, checked, times = memory.entry, memory.leave, memory.checked, memory.alone
@@ -86,9 +86,11 @@ def cut_planes(table, parts, pair, k, settings, memory, scratch):
         entry[n] = begin if times[n] == inf else inf
         leave[n] = end
         checked[n] = 0.0
+    for m in range(obstacle.count[k]):
+        enter_plane(obstacle.planes[k, m], off, 0, samples, entry, leave)
     verified = cursor = 0
     briefest = True
-    while verified < VERIFIED and obstacle.count[k] < MOST_PLANES:
+    while verified < settings.verified and obstacle.count[k] < MOST_PLANES:
         n = _next_sample(entry, leave, checked, samples, briefest, cursor)
         if n < 0 and briefest:
             break

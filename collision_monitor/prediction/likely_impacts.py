@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel, device, inlined
-from collision_monitor.geometry.shape_table import MESH, SPHERE
+from collision_monitor.geometry.shape_table import SPHERE
 from collision_monitor.prediction.bodies import next_pair, place_shape
 from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window
 from collision_monitor.prediction.cutting_planes import CutSettings, cut_planes
@@ -36,15 +36,19 @@ from collision_monitor.prediction.obstacle_planes import (
 )
 from collision_monitor.prediction.sphere_interval import sphere_interval
 from collision_monitor.prediction.spread import is_uncertain, surface_spread
-from collision_monitor.prediction.straight_samples import ERRORS, enter_planes, enter_sphere, set_errors
+from collision_monitor.prediction.straight_samples import ERRORS, enter_sphere, set_errors
 from collision_monitor.prediction.time_order import sort_times
-from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE, first_contact
+from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE, body_has_mesh, first_contact
 
 BENDING: Final = 0.05
 """Largest deviation of a gap from a straight line in a segment, in standard deviations of the gap."""
 
-FACETS: Final = 0.03
+FACETS: Final = 0.02
 """Distance between the planes and the obstacle, in standard deviations of the gap, up to which no plane is added."""
+
+VERIFIED_IN_PILOT: Final = 8
+VERIFIED: Final = 24
+"""Samples of the pilot lattice, and of all, that must need no new plane of a segment."""
 
 FURTHEST: Final = 4.5
 """Standard deviations beyond which errors are neglected; 7 of a million are larger."""
@@ -218,7 +222,7 @@ def _enter_pair(table, parts, pair, window, bend, sigma, sampling, lattice, memo
     segments = min(MOST_SEGMENTS, 1 + int(length * sqrt(bend / (8.0 * BENDING * max(sigma, 1e-300)))))
     set_nodes(table, parts, pair, window, segments, work.scratch, obstacle)
     tolerance, turn = max(FACETS * sigma, sampling.query.tolerance), (_rate(A) > 0.0, _rate(B) > 0.0)
-    settings = CutSettings(margin, tolerance, pilot, turn)
+    settings = CutSettings(margin, tolerance, pilot, VERIFIED_IN_PILOT, turn)
     alone = memory.alone
     for n in range(pilot):
         alone[n] = inf
@@ -227,12 +231,15 @@ def _enter_pair(table, parts, pair, window, bend, sigma, sampling, lattice, memo
     seen = 0.0
     for n in range(pilot):
         seen += weights[n] if alone[n] < inf else 0.0
-        times[n] = min(times[n], alone[n])
     if seen * size < pilot * PILOT_PART * sampling.min_probability and not sampling.stated:
         return
+    settings = CutSettings(margin, tolerance, size, VERIFIED, turn)
+    for n in range(size):
+        alone[n] = inf
     for k in range(segments):
-        part = Window(obstacle.time[k], obstacle.time[k + 1])
-        enter_planes(obstacle.planes[k], obstacle.count[k], part, off, pilot, memory.entry, memory.leave, times)
+        cut_planes(table, parts, pair, k, settings, memory, work.scratch)
+    for n in range(size):
+        times[n] = min(times[n], alone[n])
 
 
 @allocating_kernel
@@ -252,7 +259,7 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         answers[k, :] = nan
         if not (is_uncertain(spread, i) or is_uncertain(spread, j)):
             continue
-        if _has_mesh(table, parts, bodies.first_shape[i]) or _has_mesh(table, parts, bodies.first_shape[j]):
+        if body_has_mesh(table, parts, bodies.first_shape[i]) or body_has_mesh(table, parts, bodies.first_shape[j]):
             answers[k, PROBABILITY] = LEFT
             continue
         ages = (carry_on(bodies, i, now, work.quaternion, A), carry_on(bodies, j, now, work.quaternion, B))
@@ -306,16 +313,6 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
             roughly = ImpactQuery(query.margin, max(query.tolerance, SAMPLE_TOLERANCE * tube.start), query.iterations)
             safe = first_contact(multibody, i, j, Window(0.0, horizon), wide, roughly, work)
             answer[EARLIEST] = min(safe, times[memory.order[0]])
-
-
-@inlined
-def _has_mesh(table, parts, shape):
-    """Whether one of a body's shapes, from its first on, is a mesh."""
-    found = False
-    while shape >= 0:
-        found |= table.kind[shape] == MESH
-        shape = parts.next[shape]
-    return found
 
 
 @inlined

@@ -23,7 +23,7 @@ from collision_monitor.prediction.motion import relative_position, rotation_at
 MOST_SEGMENTS: Final = 16
 """Largest number of parts of the time, in each of which the gaps are linear in time."""
 
-MOST_PLANES: Final = 24
+MOST_PLANES: Final = 64
 """Largest number of planes in a segment. Each costs 1 to 2 ns per sample."""
 
 GAP, RATE, PLANE_SIZE = 3, 4, 5

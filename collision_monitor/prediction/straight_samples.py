@@ -15,10 +15,6 @@ from collision_monitor.prediction.obstacle_planes import GAP, RATE
 ERRORS: Final = 6
 """Rows of the errors: position at time 0 (m) and velocity (m/s) of B relative to A."""
 
-BLOCK: Final = 256
-"""Samples that pass all planes before the next ones, so that they stay in the first cache."""
-
-
 @device
 def set_errors(root, frame, t, points, off):
     """Write the errors of the samples into off (ERRORS, S).
@@ -62,22 +58,6 @@ def enter_plane(plane, off, first, last, entry, leave):
         closes = rate < 0.0
         entry[n] = at if closes and at > entry[n] else entry[n]
         leave[n] = at if not closes and at < leave[n] else leave[n]
-
-
-@device
-def enter_planes(planes, count, window, off, first, entry, leave, times):
-    """Lower the times (S,) of samples from `first` on to where they are behind all `count` planes within the window."""
-    begin, end = window
-    for block in range(first, times.size, BLOCK):
-        stop = min(block + BLOCK, times.size)
-        into, out, until = entry[block:stop], leave[block:stop], times[block:stop]
-        for n in range(into.size):
-            into[n] = begin
-            out[n] = end
-        for m in range(count):
-            enter_plane(planes[m], off, block, stop, entry, leave)
-        for n in range(into.size):
-            until[n] = into[n] if into[n] <= out[n] and into[n] < until[n] else until[n]
 
 
 @device

@@ -15,6 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import allocating_kernel, device, inlined
+from collision_monitor.geometry.shape_table import MESH
 from collision_monitor.narrow_phase.contact_row import NORMAL
 from collision_monitor.prediction.bodies import next_pair
 from collision_monitor.prediction.body_impact import (
@@ -115,6 +116,16 @@ def _is_straight(parts, bodies, i, j, A, B):
     return not turns and not round and parts.next[a] < 0 and parts.next[b] < 0
 
 
+@inlined
+def body_has_mesh(table, parts, shape):
+    """Whether one of a body's shapes, from its first on, is a mesh."""
+    found = False
+    while shape >= 0:
+        found |= table.kind[shape] == MESH
+        shape = parts.next[shape]
+    return found
+
+
 @device
 def _lay_along(multibody, i, j, tube, sampling, work):
     """Return the time that matters most, and write the frame along which to lay the samples into work.frame.
@@ -211,7 +222,10 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
         coarse = max(query.tolerance, SAMPLE_TOLERANCE * work.joint[0, 0])
         roughly = ImpactQuery(query.margin, coarse, query.iterations)
         begin = safe if safe < inf else 0.0
-        bias = 0.0 if r_i == 0.0 and r_j == 0.0 else -0.75 * coarse
+        # a search for the overlap of half a tolerance; the surface of a mesh has no gap below 0
+        exact = body_has_mesh(table, parts, bodies.first_shape[i]) or body_has_mesh(table, parts, bodies.first_shape[j])
+        exact = exact or (r_i == 0.0 and r_j == 0.0)
+        bias = 0.0 if exact else -0.75 * coarse
         p, v = (B.x, B.y, B.z), (B.vx, B.vy, B.vz)
         w_i, w_j = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
         straight = (
