@@ -11,13 +11,15 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.cli.progress import progress_bar
+from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Sphere
+from collision_monitor.report.footprint import footprint
 from collision_monitor.world import make_scene
 from collision_monitor.world.impulse_response import ImpulseResponse
 from collision_monitor.world.penalty_response import PenaltyResponse
@@ -44,16 +46,38 @@ def responses(restitution: float, gravity: float, speed: float) -> dict[str, Res
     }
 
 
-def drop(response: Response, seconds: float) -> tuple[Array, float]:
-    """Heights (n,) of a ball of 0.1 m dropped from 1 m, every millisecond (m), and the cost (s per s)."""
+class View(NamedTuple):
+    """How a scene is drawn: for how long (s), from above or from the side, ranges (m), and names of hidden bodies."""
+
+    seconds: float
+    from_above: bool
+    x: tuple[float, float]
+    y: tuple[float, float]
+    left_out: tuple[str, ...] = ()
+
+
+VIEWS: Final = {
+    "billiards": View(1.2, True, (-1.45, 1.45), (-0.8, 0.8)),
+    "pile": View(4.0, False, (-1.5, 1.5), (-0.25, 2.3), ("wall_left", "wall_right")),
+    "slope": View(4.0, False, (-5.2, 3.5), (-0.3, 2.2)),
+    "pendulums": View(1.2, False, (-0.45, 0.85), (0.0, 0.3)),
+}
+FROM_THE_SIDE: Final = Pose((0, 0, 0), (-np.sqrt(0.5), 0, 0, np.sqrt(0.5)))
+"""Turns z to y, so that the view from above shows x and z."""
+FINE: Final = 2e-5
+"""Step (s) of the drawing of an impact, which takes a millisecond."""
+
+
+def drop(response: Response, seconds: float, step: float = 1e-3) -> tuple[Array, float]:
+    """Heights (n,) in m of a ball of 0.1 m dropped from 1 m, after each step (s), and the cost (s per s)."""
     shapes = [Sphere(0.1), Box((4, 4, 1))]
     world = RigidBodies(
         shapes, np.array([[0, 0, 1.1], [0, 0, -0.5]]), np.tile([0, 0, 0, 1.0], (2, 1)), np.arange(2) == 1, np.ones(2)
     )
     response.advance(world, 1e-6)
     begin, heights = time.process_time(), []
-    for _ in range(int(1000 * seconds)):
-        response.advance(world, 1e-3)
+    for _ in range(int(seconds / step + 1e-6)):
+        response.advance(world, step)
         heights.append(world.position[0, 2] - 0.1)
     return np.array(heights), (time.process_time() - begin) / seconds
 
@@ -122,26 +146,47 @@ def draw(folder: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
-    figure, axes = plt.subplots(1, 2, figsize=(11, 3.6), layout="constrained")
+    figure, (far, near) = plt.subplots(1, 2, figsize=(11, 3.8), layout="constrained")
     for name, response in responses(0.8, GRAVITY, 5.0).items():
         heights, _ = drop(response, 2.5)
-        at = 1e-3 * np.arange(1, len(heights) + 1)
-        axes[0].plot(at, heights, label=name)
-        axes[1].plot(at, np.maximum(-heights, 0.0) * 1e3, label=name)
-    axes[0].set(xlabel="time (s)", ylabel="height (m)", title="a ball dropped from 1 m, restitution 0.8")
-    axes[1].set(xlabel="time (s)", ylabel="penetration (mm)", title="penetration of the ground")
-    axes[0].legend()
+        far.plot(1e-3 * np.arange(1, len(heights) + 1), heights, label=name)
+    landing = np.sqrt(2.0 / GRAVITY)
+    for color, name in (("C1", "penalty"), ("C2", "damped")):
+        heights, _ = drop(responses(0.8, GRAVITY, 5.0)[name], landing + 0.003, FINE)
+        at = FINE * np.arange(1, len(heights) + 1) - landing
+        near.plot(1e3 * at, 1e3 * heights, color)
+    near.axhspan(-2.0, 0.0, color="0.9", zorder=0)
+    near.text(2.95, -1.9, "ground", ha="right", va="bottom", color="0.4")
+    far.set(xlabel="time (s)", ylabel="height (m)", title="A ball dropped from 1 m, restitution 0.8")
+    near.set(xlabel="time since it reached the ground (ms)", ylabel="height (mm)", title="First impact of the springs")
+    near.set(ylim=(-2.0, 4.0), xlim=(-1.0, 3.0))
+    figure.legend(*far.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     figure.savefig(folder / "responses.png", dpi=110)
 
-    figure, panels = plt.subplots(2, 2, figsize=(11, 7), layout="constrained")
-    views = {"billiards": ((0, 1), 1.2), "slope": ((0, 2), 4.0), "pile": ((0, 2), 4.0), "pendulums": ((0, 2), 1.2)}
-    for panel, (name, ((x, y), seconds)) in zip(panels.ravel(), views.items(), strict=True):
-        scene = make_scene(name, objects=5 if name == "pendulums" else None)
-        tracks = np.array([scene.step()["position"] for _ in range(int(seconds * scene.rate))])
-        panel.plot(tracks[:, :, x], tracks[:, :, y], lw=0.8, alpha=0.8)
-        panel.plot(tracks[-1, :, x], tracks[-1, :, y], "k.", ms=5)
-        panel.set(title=f"{name}, {seconds:g} s", xlabel="m", ylabel="m", aspect="equal")
+    figure, panels = plt.subplots(2, 2, figsize=(11, 6.2), layout="constrained", width_ratios=(1.25, 1))
+    for panel, (name, view) in zip(panels.ravel(), VIEWS.items(), strict=True):
+        draw_scene(panel, name, view)
     figure.savefig(folder / "response_scenes.png", dpi=110)
+
+
+def draw_scene(panel: Any, name: str, view: View) -> None:
+    """Draw the paths of the bodies, and where they are in the end."""
+    scene = make_scene(name, objects=5 if name == "pendulums" else None)
+    states = [scene.step() for _ in range(int(view.seconds * scene.rate))]
+    turn = Pose() if view.from_above else FROM_THE_SIDE
+    moving = {int(state["id"]): Pose(state["position"], state["quaternion"]) for state in states[-1]}
+    for described in scene.descriptions:
+        pose = moving.get(described.object_id) or described.pose
+        if pose is not None and described.name not in view.left_out:
+            seen = turn @ pose
+            still = described.object_id not in moving
+            for outline in footprint(described, seen.position, seen.quaternion):
+                colors = {"fc": "0.88", "ec": "0.5"} if still else {"fc": f"C{described.object_id % 10}", "ec": "k"}
+                panel.fill(*outline.T, **colors, lw=0.6, zorder=1 if still else 3)
+    tracks = np.array([state["position"] for state in states]) @ turn.rotation.T
+    for k, each in enumerate(np.moveaxis(tracks, 1, 0)):
+        panel.plot(each[:, 0], each[:, 1], lw=0.8, color=f"C{(k + 1) % 10}", zorder=2)
+    panel.set(title=f"{name}, {view.seconds:g} s", xlabel="m", ylabel="m", aspect="equal", xlim=view.x, ylim=view.y)
 
 
 def main() -> None:

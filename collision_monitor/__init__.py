@@ -11,6 +11,8 @@
     query.overlap                  overlap                                yes or no, with a choice of tests
     query.containment              contains                              which points are in a shape
     query.rays                     cast_ray, RayHits                     where rays and segments meet a shape
+    query.points_within            points_within                         which points of a cloud are near a shape
+    query.kdop                     kdop, Enclosure                       bounding slabs with directions of your own
     query.time_of_impact           time_of_impact, Impact                 time of impact of two shapes, as an interval
     query.time_of_impact_batch     time_of_impact_batch, Impacts          the same for many motions of two shapes
     query.feature_impact           vertex_face_impact, edge_edge_impact   the same for features in linear motion
@@ -25,6 +27,7 @@ first use.
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +50,7 @@ _HOME = {
     "Ellipsoid": "geometry.shapes",
     "ConvexHull": "geometry.shapes",
     "Mesh": "geometry.shapes",
+    "Points": "geometry.shapes",
     "HalfSpace": "geometry.shapes",
     "Circle": "geometry.shapes",
     "Polygon": "geometry.shapes",
@@ -61,7 +65,10 @@ _HOME = {
     "times_of_impact": "query.times_of_impact",
     "contains": "query.containment",
     "cast_ray": "query.rays",
+    "points_within": "query.points_within",
     "RayHits": "query.rays",
+    "kdop": "query.kdop",
+    "Enclosure": "query.kdop",
     "convex_decomposition": "objects.convex_decomposition",
     "Decomposition": "objects.convex_decomposition",
     "time_of_impact": "query.time_of_impact",
@@ -111,6 +118,7 @@ if TYPE_CHECKING:
     from collision_monitor.geometry.shapes import Ellipsoid as Ellipsoid
     from collision_monitor.geometry.shapes import HalfSpace as HalfSpace
     from collision_monitor.geometry.shapes import Mesh as Mesh
+    from collision_monitor.geometry.shapes import Points as Points
     from collision_monitor.geometry.shapes import Polygon as Polygon
     from collision_monitor.geometry.shapes import Sphere as Sphere
     from collision_monitor.monitor.monitor import Monitor as Monitor
@@ -130,7 +138,10 @@ if TYPE_CHECKING:
     from collision_monitor.query.feature_impact import edge_edge_impact as edge_edge_impact
     from collision_monitor.query.feature_impact import vertex_face_impact as vertex_face_impact
     from collision_monitor.query.features import contact_features as contact_features
+    from collision_monitor.query.kdop import Enclosure as Enclosure
+    from collision_monitor.query.kdop import kdop as kdop
     from collision_monitor.query.overlap import overlap as overlap
+    from collision_monitor.query.points_within import points_within as points_within
     from collision_monitor.query.rays import RayHits as RayHits
     from collision_monitor.query.rays import cast_ray as cast_ray
     from collision_monitor.query.time_of_impact import Impact as Impact
@@ -147,7 +158,8 @@ def __getattr__(name: str) -> Any:
     if name in _MODULES:
         return import_module(f"{__name__}.{name}")
     if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        # with name and obj, Python suggests the nearest name
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])
     value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
     globals()[name] = value
     return value

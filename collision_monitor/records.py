@@ -160,6 +160,7 @@ class ShapeType(IntEnum):
     CIRCLE = 9
     POLYGON = 10
     ELLIPSOID = 11
+    POINTS = 12
 
 
 Rows = NDArray[np.void]

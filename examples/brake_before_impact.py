@@ -6,12 +6,10 @@ stops it before the wall. In place of the simulated robot, publish the factor to
 
 from __future__ import annotations
 
-import subprocess
 import sys
-import time
 from pathlib import Path
 
-import rclpy
+from beside_monitor import PREDICTIONS, listen, monitored, wait_for_subscribers
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 
@@ -20,7 +18,6 @@ from collision_monitor_msgs.msg import PredictedCollisionArray
 SOURCES = Path(__file__).with_name("robot_from_odometry.yaml")
 PERIOD = 0.05  # s
 WALL = 3.5 - 0.1 - 0.3 - 0.05  # m: where the padded front of the robot touches
-LISTENERS = 60.0  # s to wait for the monitor, which compiles its kernels on its first start
 
 
 class Brake:
@@ -28,7 +25,7 @@ class Brake:
 
     def __init__(self, node: Node) -> None:
         self.factor = 1.0
-        node.create_subscription(PredictedCollisionArray, "/object_monitor/predictions", self._on_predictions, 10)
+        node.create_subscription(PredictedCollisionArray, PREDICTIONS, self._on_predictions, 10)
 
     def _on_predictions(self, message: PredictedCollisionArray) -> None:
         soonest = min((each.lower for each in message.predictions), default=float("inf"))  # `lower` is safe
@@ -54,34 +51,16 @@ class Robot:
         self.out.publish(message)
 
 
-def listen(node: Node, seconds: float) -> None:
-    """Run the callbacks of the node for this time."""
-    end = time.monotonic() + seconds
-    while (left := end - time.monotonic()) > 0.0:
-        rclpy.spin_once(node, timeout_sec=left)
-
-
 def main() -> int:
     """Start the monitor, drive at 0.8 m/s for up to 12 s, and return 0 if the robot stopped before the wall."""
-    monitor = subprocess.Popen([sys.executable, "-m", "collision_monitor", "run", "--sources", SOURCES])
-    rclpy.init()
-    node = rclpy.create_node("robot")
-    robot, brake = Robot(node), Brake(node)
-    try:
-        waited = 0.0
-        while not robot.out.get_subscription_count() and waited < LISTENERS:
-            listen(node, 0.1)
-            waited += 0.1
+    with monitored(SOURCES, "robot") as node:
+        robot, brake = Robot(node), Brake(node)
+        wait_for_subscribers(node, robot.out)
         for tick in range(240):
             robot.drive(0.8 * brake.factor)
             listen(node, PERIOD)
             if tick > 60 and robot.speed < 0.02:
                 break
-    finally:
-        monitor.terminate()
-        monitor.wait()
-        node.destroy_node()
-        rclpy.shutdown()
     print(f"stopped {WALL - robot.position:.2f} m before the wall at {robot.speed:.2f} m/s")
     return 0 if robot.position < WALL else 1
 

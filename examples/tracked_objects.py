@@ -6,24 +6,17 @@ gets its speed over ground. A pedestrian crosses before the car. Needs `make int
 
 from __future__ import annotations
 
-import subprocess
-import sys
-import time
 import uuid
 from pathlib import Path
 
 import numpy as np
-import rclpy
 from autoware_perception_msgs.msg import ObjectClassification, Shape, TrackedObject, TrackedObjects
+from beside_monitor import listen, monitored, print_predictions, wait_for_subscribers
 from geometry_msgs.msg import TransformStamped
-from rclpy.node import Node
 from tf2_msgs.msg import TFMessage
-
-from collision_monitor_msgs.msg import PredictedCollisionArray
 
 SOURCES = Path(__file__).with_suffix(".yaml")
 CAR, WALK = 5.0, 1.2  # m/s
-LISTENERS = 60.0  # s to wait for the monitor, which compiles its kernels on its first start
 
 
 def pedestrian(time: float) -> TrackedObject:
@@ -43,32 +36,13 @@ def pedestrian(time: float) -> TrackedObject:
     return track
 
 
-def listen(node: Node, seconds: float) -> None:
-    """Run the callbacks of the node for this time."""
-    end = time.monotonic() + seconds
-    while (left := end - time.monotonic()) > 0.0:
-        rclpy.spin_once(node, timeout_sec=left)
-
-
 def main() -> None:
     """Start the monitor, drive for 2 s, and print what it predicts."""
-    monitor = subprocess.Popen([sys.executable, "-m", "collision_monitor", "run", "--sources", SOURCES])
-    rclpy.init()
-    node = rclpy.create_node("perception")
-    tracks = node.create_publisher(TrackedObjects, "/perception/tracked_objects", 10)
-    frames = node.create_publisher(TFMessage, "/tf", 10)
-
-    def show(message: PredictedCollisionArray) -> None:
-        names = dict(zip(message.ids, message.names, strict=True))
-        for each in message.predictions:
-            print(f"{names[each.id_a]} meets {names[each.id_b]} in {each.lower:.2f} to {each.upper:.2f} s", flush=True)
-
-    node.create_subscription(PredictedCollisionArray, "/object_monitor/predictions", show, 10)
-    try:
-        waited = 0.0
-        while not (tracks.get_subscription_count() and frames.get_subscription_count()) and waited < LISTENERS:
-            listen(node, 0.1)
-            waited += 0.1
+    with monitored(SOURCES, "perception") as node:
+        tracks = node.create_publisher(TrackedObjects, "/perception/tracked_objects", 10)
+        frames = node.create_publisher(TFMessage, "/tf", 10)
+        print_predictions(node)
+        wait_for_subscribers(node, tracks, frames)
         for tick in range(40):
             stamp = node.get_clock().now().to_msg()
             car = TransformStamped()
@@ -80,11 +54,6 @@ def main() -> None:
             message.objects = [pedestrian(tick * 0.05)]
             tracks.publish(message)
             listen(node, 0.05)
-    finally:
-        monitor.terminate()
-        monitor.wait()
-        node.destroy_node()
-        rclpy.shutdown()
 
 
 if __name__ == "__main__":

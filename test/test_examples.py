@@ -15,9 +15,8 @@ matplotlib.use("agg")
 
 PUBLIC = {name: getattr(cm, name) for name in cm.__all__}
 ERRORS = {name for name, it in PUBLIC.items() if inspect.isclass(it) and issubclass(it, Exception)}
-WITHOUT = {"__version__", "response", "world", "contains", "cast_ray", "RayHits", "Ellipsoid", "load_mesh"} | ERRORS
-"""Names without an example in their docstrings. Those of rays and of the response are in docs/geometry.md and
-docs/response.md, which run as tests too."""
+WITHOUT = {"__version__"} | ERRORS
+"""Names without an example in their docstrings."""
 
 FINDER = doctest.DocTestFinder(recurse=True)
 FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
@@ -26,7 +25,8 @@ FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
 def examples(name: str) -> list[doctest.DocTest]:
     """Examples of a public name, and of the methods of a class."""
     value: Any = getattr(cm, name)
-    globs = {**vars(inspect.getmodule(value)), "cm": cm} if inspect.getmodule(value) else {"cm": cm}
+    module = value if inspect.ismodule(value) else inspect.getmodule(value)
+    globs = {**(vars(module) if module else {}), "cm": cm}
     return [test for test in FINDER.find(value, name, globs=globs) if test.examples]
 
 

@@ -22,6 +22,7 @@ FLOORS: Final = (
     {"meshes"},
     {"objects", "prediction", "robots"},
     {"query", "detection", "monitor", "codec", "world"},
+    {"alerts"},
     {"pipeline", "warm_up"},
     {"sources", "session"},
     {"accuracy", "report", "view", "ros"},

@@ -8,34 +8,27 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
-import numba
-
-from collision_monitor._jit import cache
+from collision_monitor._jit.function import Function
 
 F = TypeVar("F", bound=Callable[..., Any])
-
-_CACHE_IS_CHOSEN = bool(os.environ.get("NUMBA_CACHE_DIR"))
 
 # Waiting threads of GNU OpenMP go to sleep early. If other programs need the cores too, a waiting thread that spins
 # occupies the core of the thread it waits for (40 ms instead of 0.1 ms). OpenMP reads this when its first loop starts.
 os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 
 _OPTIONS: dict[str, Any] = {
-    "cache": True,
     "fastmath": False,
     "error_model": "numpy",
     "nogil": True,
     "boundscheck": False,
+    "forceinline": False,  # a callee that does not say it inherits it from the caller that is compiled first
 }
 
 
-def _compile(function: F, options: dict[str, Any]) -> F:
-    if not _CACHE_IS_CHOSEN:
-        numba.config.CACHE_DIR = cache.folder(function.__module__)
-    compiled: F = numba.njit(**options)(function)
-    return compiled
+def _compile(function: F, options: dict[str, Any], *, is_device: bool = False) -> F:
+    return cast(F, Function(function, options, is_device=is_device))
 
 
 # Reference counts of array arguments are atomic memory traffic: one pair of spheres costs 300 ns with them and 18 ns
@@ -56,20 +49,16 @@ def allocating_kernel(function: F) -> F:
 
 def device(function: F) -> F:
     """Compile a function that only kernels call; it borrows its arrays and returns numbers."""
-    return _compile(function, _BORROWING)
-
-
-def merged(function: F) -> F:
-    """Compile a device function that LLVM inlines into its callers, for a large one with many arrays as arguments.
-
-    numba compiles it once; `inlined` repeats the whole compilation at each call.
-    """
-    return _compile(function, {**_BORROWING, "forceinline": True})
+    return _compile(function, _BORROWING, is_device=True)
 
 
 def inlined(function: F) -> F:
-    """Compile a device function that numba inlines into its callers, for functions that cost less than their call."""
-    return _compile(function, {**_BORROWING, "inline": "always"})
+    """Compile a device function that LLVM inlines into its callers, for functions that cost less than their call.
+
+    numba compiles it once. numba's own `inline="always"` repeats the compilation, before LLVM's, at each call: it took
+    two thirds of all compile time.
+    """
+    return _compile(function, {**_BORROWING, "forceinline": True}, is_device=True)
 
 
 def parallel_kernel(function: F) -> F:

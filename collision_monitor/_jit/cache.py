@@ -13,8 +13,6 @@ import os
 import sys
 from pathlib import Path
 
-import numba
-
 from collision_monitor._jit.imports import source_file, with_dependencies
 
 
@@ -27,6 +25,8 @@ def _file_digest(module: str) -> bytes:
 @functools.cache
 def folder(module: str) -> str:
     """Return the cache folder of the kernels of `module`, a dotted name."""
+    import numba
+
     digest = hashlib.blake2b(f"{numba.__version__} {sys.version_info[:2]}".encode(), digest_size=8)
     for name in with_dependencies(module):
         digest.update(name.encode() + _file_digest(name))
@@ -34,7 +34,9 @@ def folder(module: str) -> str:
 
 
 def _root() -> Path:
-    """Return a folder in the virtual environment if it is writable, else one in the user's cache folder."""
+    """Return NUMBA_CACHE_DIR, or a folder in the virtual environment if it is writable, or one in the user's cache."""
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(chosen)
     prefix = Path(sys.prefix)
     if sys.prefix != sys.base_prefix and os.access(prefix, os.W_OK):
         return prefix / "var" / "cache" / "collision_monitor"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 import re
 import sys
 from pathlib import Path
@@ -13,12 +14,13 @@ _IMPORT = re.compile(
 )
 
 
+@functools.cache
 def source_file(module: str) -> Path | None:
     """Return the file of a module of this package or of a loaded module, such as a benchmark; None if there is none."""
-    base = _PACKAGE.parent.joinpath(*module.split("."))
+    base = f"{os.path.dirname(_PACKAGE)}/{module.replace('.', '/')}"
     loaded = getattr(sys.modules.get(module), "__file__", None)
-    candidates = [base.with_suffix(".py"), base / "__init__.py", *([Path(loaded)] if loaded else [])]
-    return next((path for path in candidates if path.is_file()), None)
+    places = (f"{base}.py", f"{base}/__init__.py", *([loaded] if loaded else []))
+    return next((Path(place) for place in places if os.path.isfile(place)), None)
 
 
 @functools.cache
@@ -28,7 +30,9 @@ def direct_imports(module: str) -> frozenset[str]:
     found: set[str] = set()
     for origin, names, plain in _IMPORT.findall(path.read_bytes()) if path else ():
         base = (origin or plain).decode()
-        members = {f"{base}.{name}" for name in re.findall(r"\w+", names.decode())}
+        file = source_file(base)
+        is_package = file is not None and file.name == "__init__.py"
+        members = {f"{base}.{name}" for name in re.findall(r"\w+", names.decode())} if is_package else set()
         found.update({member for member in members if source_file(member)} or {base})
     return frozenset(found)
 

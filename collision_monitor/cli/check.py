@@ -16,6 +16,7 @@ from collision_monitor.cli.progress import progress_bar
 from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
+    from collision_monitor.alerts.rules import Rules
     from collision_monitor.session.history.check import Checked
 
 EXAMPLE = """\
@@ -27,6 +28,12 @@ expect:
     under: 0.5                    # s
   - warned: any                   # every contact is predicted without a break for this long before it
     before: 0.8                   # s
+  - alert: [cart, person_3]       # the first alert of the two is raised in this window
+    level: warning                # to this level or above: caution, warning, critical
+    between: [2.0, 4.0]           # s from the first step of the session
+  - no_alert: any                 # no alert of the rule reaches the level
+    rule: people
+    level: critical
   - step_time_p99: 0.005          # s; 99 % of the steps take at most this long
   - replay: identical             # a replay gives the same answers, byte by byte
   - complete: true                # no message is missing, refused or lost
@@ -70,6 +77,11 @@ def add_parser(subparsers: Any) -> None:
         "--replay", nargs="?", const="", metavar="PROFILE",
         help="check the answers of a replay, with the recorded profile or with PROFILE",
     )  # fmt: skip
+    parser.add_argument(
+        "--rules",
+        metavar="FILE",
+        help="rules of alerts (YAML) that replace those of the sessions, for which it replays them",
+    )
     add_engine(parser)
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
     parser.add_argument("--json", action="store_true", help="print the results as one JSON object")
@@ -87,6 +99,7 @@ def check_command(args: argparse.Namespace) -> int:
         expectations = read_expectations(args.expect)
         if args.replay:
             Profile.named(args.replay)
+        rules = None if args.rules is None else Rules.given(args.rules)
     except InputError as error:
         print_error(error)
         return ExitCode.USAGE
@@ -96,7 +109,7 @@ def check_command(args: argparse.Namespace) -> int:
             args.junit.open("a").close()
     results = []
     with progress_bar("check", len(paths)) as done:
-        for each in check_sessions(paths, expectations, with_profile=args.replay, engine=engine_of(args)):
+        for each in check_sessions(paths, expectations, with_profile=args.replay, rules=rules, engine=engine_of(args)):
             results.append(each)
             done(1)
             if not args.json:

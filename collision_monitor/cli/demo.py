@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from collision_monitor.cli.child import Child, ProcessError
+from collision_monitor.cli.child import PATIENCE, Child, ProcessError
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.quantities import positive, whole
 from collision_monitor.errors import InputError
@@ -84,7 +84,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def demo_command(args: argparse.Namespace) -> int:
     """Run the demo and return the exit code: 0 if the replay gave the same bytes. Raises ProcessError, InputError."""
-    stop = StopRequest().install()
+    stop = StopRequest(within=2.5 * PATIENCE, code=ExitCode.INTERRUPTED).install()  # both processes end before
     from collision_monitor.world import describe
 
     describe(args.scene)

@@ -64,6 +64,7 @@ def add_parser(subparsers: Any) -> None:
         metavar="NAME",
         help="profile of the monitor: fast, balanced (default) or exact",
     )
+    parser.add_argument("--rules", metavar="FILE", default="", help="rules of the alerts (YAML), see docs/alerts.md")
     parser.add_argument(
         "--node", metavar="NAME", help="without --map: monitor whose inputs are imported, if there are several"
     )
@@ -74,6 +75,7 @@ def add_parser(subparsers: Any) -> None:
 
 def import_command(args: argparse.Namespace) -> int:
     """Run the command and return the exit code. Raises SessionError, InputError."""
+    from collision_monitor.alerts.rules import Rules
     from collision_monitor.sources import import_bag, load_mapping
 
     mapping = None if args.map is None else load_mapping(args.map)
@@ -83,6 +85,7 @@ def import_command(args: argparse.Namespace) -> int:
             args.output,
             mapping,
             profile=args.profile,
+            rules=Rules.given(args.rules),
             node=args.node,
             overwrite=args.force,
             progress=progress,

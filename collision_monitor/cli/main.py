@@ -16,7 +16,7 @@ from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.errors import CollisionMonitorError
 
 COMMANDS: Final = (
-    "demo", "run", "sources", "world", "replay", "report", "compare",
+    "demo", "run", "view", "sources", "world", "replay", "report", "compare",
     "check", "salvage", "import", "tradeoff", "tune", "extremes", "bench",
 )  # fmt: skip
 """Commands in the order of `--help`. Each is a module of this package (`import_` for import) with an `add_parser`."""
@@ -30,6 +30,8 @@ EPILOG = """\
 examples:
   collision-monitor demo                                   live demo with a simulated scene
   collision-monitor run --record run.mcap                  run the monitor node and record a session
+  collision-monitor view                                   show the running monitor in the browser
+  collision-monitor view run.mcap                          show a session, with a time line
   collision-monitor sources                                list topics of robots that it can monitor
   collision-monitor world --list                           list the simulated scenes
   collision-monitor world crossing                         publish one of them

@@ -12,7 +12,7 @@ from collision_monitor.errors import SessionError
 
 DESCRIPTION = """\
 Write one HTML page about a session: the verdict, a timeline, predicted against actual times of
-contact, distances, tracks from above, and step times. The page is a single file that loads nothing
+contact, alerts, distances, tracks from above, and step times. The page is a single file that loads nothing
 else. The command prints the path of each file that it writes.
 """
 EPILOG = """\
@@ -47,23 +47,26 @@ def add_parser(subparsers: Any) -> None:
         "--replay", nargs="?", const="", metavar="PROFILE",
         help="report the answers of a replay, with the recorded profile or with PROFILE",
     )  # fmt: skip
+    parser.add_argument("--rules", metavar="FILE", help="report the alerts of a replay, by these rules (YAML)")
     parser.add_argument("--force", action="store_true", help="overwrite existing files")
     parser.set_defaults(command=report_command)
 
 
 def report_command(args: argparse.Namespace) -> int:
     """Run the command and return the exit code. Raises SessionError, ProfileError."""
+    from collision_monitor.alerts.rules import Rules
     from collision_monitor.report import check_outputs, write_report
     from collision_monitor.session import Session
     from collision_monitor.session.history.read_history import read_history
 
+    rules = None if args.rules is None else Rules.given(args.rules)
     session = Session(args.session)
     output = args.output or Path(f"{args.session.resolve().stem}.html")
     if output.exists() and output.samefile(args.session):
         raise SessionError(f"{output}: expected another file than the session itself")
     check_outputs([output], args.force)  # before the long work
     with session_bar("report", session) as show:
-        history = read_history(session, args.replay, show)
+        history = read_history(session, args.replay, show, rules)
     for file in write_report(history, output, pictures=args.png, overwrite=args.force):
         print(file)
     return ExitCode.DONE

@@ -13,13 +13,14 @@ from collision_monitor.ros.executables import monitor
 
 DESCRIPTION = """\
 Run the monitor as the ROS 2 node object_monitor. It subscribes to ~/objects/shapes and
-~/objects/states, and publishes ~/contacts, ~/predictions, ~/status and ~/markers. It prints ROS log
-messages. Ctrl-C stops the node and completes the recording.
+~/objects/states, and publishes ~/contacts, ~/predictions, ~/status and ~/markers, and with --rules
+~/alerts and ~/raised_alerts. It prints ROS log messages. Ctrl-C stops the node and completes the recording.
 """
 EPILOG = """\
 examples:
   collision-monitor run --params config/monitor.yaml
   collision-monitor run --sources sources.yaml            odometry, tf, tracks, scans: see `collision-monitor sources`
+  collision-monitor run --rules config/rules.yaml         alerts by rules about who comes how near whom
   collision-monitor run --record shift_1 --split-size 500M            a rosbag2 folder of files
   collision-monitor run --record near_misses --on-event --before 20   one file per collision
   collision-monitor run --record run.mcap --ros-args -p horizon:=1.0 -r __ns:=/hall_2
@@ -48,6 +49,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--sources", type=Path, metavar="FILE", help="sources file (YAML): topics of other programs to monitor"
     )
+    parser.add_argument("--rules", type=Path, metavar="FILE", help="rules of the alerts (YAML), see docs/alerts.md")
     parser.add_argument(
         "--record", type=Path, metavar="PATH", help="record the session to a new .mcap file or a new folder"
     )
@@ -92,6 +94,7 @@ def run_command(args: argparse.Namespace) -> int:
     found += parameters(
         profile=args.profile,
         sources=args.sources,
+        rules=args.rules,
         record=args.record,
         record_mode="on_event" if args.on_event else None,
         record_before=args.before,

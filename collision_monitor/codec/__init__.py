@@ -3,6 +3,16 @@
 The elements of the hot messages have in the bytes exactly the layout of `records`, so decoding returns views of them.
 """
 
+from collision_monitor.codec.alerts import (
+    AlertCause,
+    AlertLevel,
+    CollisionAlert,
+    CollisionAlertArray,
+    decode_alert,
+    decode_alerts,
+    encode_alert,
+    encode_alerts,
+)
 from collision_monitor.codec.contacts import ContactArray, decode_contacts, encode_contacts
 from collision_monitor.codec.descriptions import (
     Change,
@@ -17,7 +27,11 @@ from collision_monitor.codec.states import ObjectStateArray, decode_states, enco
 from collision_monitor.codec.status import MonitorStatus, decode_status, encode_status
 
 __all__ = [
+    "AlertCause",
+    "AlertLevel",
     "Change",
+    "CollisionAlert",
+    "CollisionAlertArray",
     "ContactArray",
     "MonitorStatus",
     "ObjectDescriptionArray",
@@ -25,12 +39,16 @@ __all__ = [
     "ParameterEvent",
     "PredictedCollisionArray",
     "Removal",
+    "decode_alert",
+    "decode_alerts",
     "decode_contacts",
     "decode_descriptions",
     "decode_parameter_event",
     "decode_predictions",
     "decode_states",
     "decode_status",
+    "encode_alert",
+    "encode_alerts",
     "encode_contacts",
     "encode_descriptions",
     "encode_parameter_event",

@@ -19,6 +19,7 @@ from collision_monitor.geometry.shapes import (
     Ellipsoid,
     HalfSpace,
     Mesh,
+    Points,
     Polygon,
     Shape,
     Sphere,
@@ -74,8 +75,12 @@ def make_shape(kind: int, dimensions: Floats, vertices: Floats, triangles: Ids) 
         if len(triangles) % 3:
             raise ShapeError(f"Mesh triangles: expected three indices for each face, got {len(triangles)} indices")
         return Mesh(vertices, triangles.astype(np.int64).reshape(-1, 3))
+    if kind == ShapeType.POINTS:
+        if len(dimensions) != 1:
+            raise ShapeError(f"Points: expected 1 dimension (radius), got {len(dimensions)}")
+        return Points(vertices, float(dimensions[0]))
     raise ShapeError(
-        f"shape type: expected {min(ShapeType)} to {max(ShapeType)} (Shape.SPHERE to Shape.ELLIPSOID), got {kind}"
+        f"shape type: expected {min(ShapeType)} to {max(ShapeType)} (Shape.SPHERE to Shape.POINTS), got {kind}"
     )
 
 
@@ -114,6 +119,8 @@ def _shape_fields(shape: Shape) -> tuple[ShapeType, tuple[float, ...], Floats, N
             return ShapeType.CONVEX_HULL, (), points, no_triangles
         case Mesh(vertices, faces):
             return ShapeType.MESH, (), vertices, faces
+        case Points(points, radius):
+            return ShapeType.POINTS, (radius,), points, no_triangles
         case Polygon(points, radius):
             level = np.column_stack([points, np.zeros(len(points))])
             return ShapeType.POLYGON, (radius,) if radius else (), level, no_triangles

@@ -20,7 +20,8 @@ def shape_pairs(value: Any, what: str) -> tuple[tuple[Shape, Pose], ...]:
     for pair in pairs:
         is_pair = isinstance(pair, tuple) and len(pair) == 2
         if not (is_pair and isinstance(pair[0], Shape) and isinstance(pair[1], Pose)):
-            raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), got {pair!r} in the list")
+            got = f"got {pair!r} in the list; write [(shape, Pose()), …]"
+            raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), {got}")
     if not pairs:
         raise ShapeError(f"{what}: expected at least one shape, got none")
     return pairs

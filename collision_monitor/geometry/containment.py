@@ -9,9 +9,11 @@ import numpy as np
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.coordinates import Array, Booleans
+from collision_monitor.geometry.inside import locate_in_surface
 from collision_monitor.geometry.point_in_polygon import Location, locate, locate_in_convex
+from collision_monitor.geometry.points import closest_point_on_segment
 from collision_monitor.geometry.polygons import is_convex
-from collision_monitor.geometry.polyhedra import is_closed, locate_in_convex_polyhedron, locate_in_polyhedron
+from collision_monitor.geometry.polyhedra import locate_in_convex_polyhedron, locate_in_polyhedron
 from collision_monitor.geometry.shapes import (
     Box,
     Capsule,
@@ -19,6 +21,7 @@ from collision_monitor.geometry.shapes import (
     Cone,
     ConvexHull,
     Cylinder,
+    Ellipsoid,
     HalfSpace,
     Mesh,
     Polygon,
@@ -31,12 +34,12 @@ TESTS: Final = ("closed form", "ray", "sides")
 
 def inside(shape: Shape, p: Array, test: str) -> Booleans:
     """Mask (n,) of points p (n, 3) in m in the shape. test: one of TESTS. Raises UnsupportedError."""
-    if isinstance(shape, Polygon) and shape.radius > 0.0:
-        raise UnsupportedError("Polygon with a radius: containment is not offered for it")
     if test == "closed form":
         return _closed_form(shape, p)
     ray = test == "ray"
     match shape:
+        case Polygon() if shape.radius > 0.0:
+            raise UnsupportedError(f"test {test}: Polygon with a radius is not offered; use the test 'closed form'")
         case Polygon() if ray:
             return np.asarray(locate(p[:, :2], shape.points)) != Location.OUTSIDE
         case Polygon() if is_convex(shape.points):
@@ -45,8 +48,8 @@ def inside(shape: Shape, p: Array, test: str) -> Booleans:
             hull = convex_hull(shape.corners if isinstance(shape, Box) else shape.points)
             find = locate_in_polyhedron if ray else locate_in_convex_polyhedron
             return np.asarray(find(p, hull.vertices, hull.faces)) != Location.OUTSIDE
-        case Mesh() if ray and is_closed(shape.faces):
-            return np.asarray(locate_in_polyhedron(p, shape.vertices, shape.faces)) != Location.OUTSIDE
+        case Mesh() if ray and shape.surface.closed:
+            return np.asarray(locate_in_polyhedron(p, shape.vertices, shape.surface.faces)) != Location.OUTSIDE
     kinds = "Polygon, Box, ConvexHull, closed Mesh" if ray else "convex Polygon, Box, ConvexHull"
     raise UnsupportedError(f"test {test}: {type(shape).__name__} is not offered; supported are {kinds}")
 
@@ -65,16 +68,35 @@ def _closed_form(shape: Shape, p: Array) -> Booleans:
             found = np.hypot(rim, np.maximum(height - shape.length / 2, 0.0)) <= shape.radius
         case Cone():
             found = (height <= shape.length / 2) & (rim * shape.length <= shape.radius * (shape.length / 2 - p[:, 2]))
+        case Ellipsoid():
+            with np.errstate(over="ignore"):  # a point that is far from a small ellipsoid
+                found = np.linalg.norm(p / shape.radii, axis=1) <= 1.0
         case HalfSpace():
             found = p @ shape.normal <= shape.offset
         case Circle():
             found = rim <= shape.radius
         case ConvexHull():
             return inside(shape, p, "sides")
-        case Mesh() if not is_closed(shape.faces):
-            raise UnsupportedError("Mesh: expected a closed surface, as an open one has no inside")
-        case Mesh() | Polygon():
+        case Mesh() if not shape.surface.closed:
+            raise UnsupportedError(
+                f"Mesh: expected a closed surface, which has an inside, got one that is {shape.surface}"
+            )
+        case Mesh():
+            found = locate_in_surface(p, shape.surface) != Location.OUTSIDE
+        case Polygon() if shape.radius > 0.0:
+            return _in_rounded_polygon(shape, p[:, :2])
+        case Polygon():
             return inside(shape, p, "ray")
         case _:
             raise UnsupportedError(f"{type(shape).__name__}: containment is not offered for it")
     return np.asarray(found)
+
+
+def _in_rounded_polygon(shape: Polygon, p: Array) -> Booleans:
+    """Whether points (n, 2) are in the polygon or within its radius of an edge."""
+    start = np.asarray(shape.points)
+    at, _ = closest_point_on_segment(p[:, None], start, np.roll(start, -1, axis=0))
+    near = (np.hypot(*np.moveaxis(at - p[:, None], -1, 0)) <= shape.radius).any(axis=1)
+    if len(start) == 2:
+        return np.asarray(near)
+    return np.asarray(near | (np.asarray(locate(p, start)) != Location.OUTSIDE))

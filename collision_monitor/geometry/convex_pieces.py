@@ -7,11 +7,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.bounded_cache import bounded_cache
 from collision_monitor.geometry.polygons import is_convex
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.qhull import HEIGHTS_AT_ONCE
-from collision_monitor.geometry.shapes import ConvexHull, Mesh, Polygon, Shape, Triangle, array_bytes
+from collision_monitor.geometry.shapes import ConvexHull, Mesh, Points, Polygon, Shape, Triangle, array_bytes
 from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.tolerances import HULL_DROP
 
@@ -33,9 +34,11 @@ def convex_pieces(shape: Shape) -> tuple[tuple[Shape, Pose], ...]:
 
     A concave polygon gives convex parts, a closed convex mesh its hull, any other mesh its triangles. Triangles are
     only the surface, so the inside of a closed mesh needs a separate test (`inside.py`). Shapes are immutable, so the
-    result is cached. Raises ShapeError.
+    result is cached. Raises ShapeError; UnsupportedError for a cloud.
     """
     match shape:
+        case Points():
+            raise UnsupportedError("Points: a cloud has no convex pieces; supported are the models auto, exact")
         case Polygon() if len(shape.points) > 2 and not is_convex(shape.points):
             return tuple((Polygon(shape.points[part], shape.radius), Pose()) for part in convex_parts(shape.points))
         case Mesh() if is_convex_mesh(shape):

@@ -17,7 +17,7 @@ from collision_monitor.geometry.polyhedra import Crossings, ray_crossings
 from collision_monitor.geometry.surface import Surface
 
 UNKNOWN = 2
-"""Result of `locate_in_surface` for a point of which the surface does not say whether it is inside."""
+"""Result of `locate_in_surface` for a point that may be inside or outside."""
 
 
 def locate_in_surface(points: Array, surface: Surface) -> Signs:

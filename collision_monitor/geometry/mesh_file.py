@@ -37,6 +37,11 @@ def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
     The axes are those of the file. Equal vertices are one point, and if the surface does not close, so are vertices
     within 1e-6 of its size. `print(mesh)` shows whether it is closed. A size above 1 km raises a warning.
     Raises ShapeError for a file that is missing, too large (1 GiB), of another format, or without valid faces.
+
+    >>> load_mesh("part.stl", scale=0.001)
+    Traceback (most recent call last):
+        ...
+    collision_monitor.errors.ShapeError: part.stl: expected a mesh file, got no file there
     """
     file = Path(path)
     try:

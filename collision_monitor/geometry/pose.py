@@ -25,11 +25,18 @@ def vector(value: ArrayLike, name: str, length: int = 3) -> Array:
     except (TypeError, ValueError):
         raise PoseError(f"{name}: expected {length} numbers, got {value!r}") from None
     if result.shape != (length,):
-        raise PoseError(f"{name}: expected {length} numbers, got an array of shape {result.shape}")
+        raise PoseError(f"{name}: expected {length} numbers, got an array of shape {result.shape}"
+                        + _advice(result.shape))  # fmt: skip
     if not (np.abs(result) <= LARGEST_INPUT).all():
         raise PoseError(f"{name}: expected finite numbers up to {LARGEST_INPUT:g}, got {result.tolist()}")
     result.setflags(write=False)
     return result
+
+
+def _advice(shape: tuple[int, ...]) -> str:
+    matrix = "; of a matrix write Pose.from_matrix(matrix)"
+    angles = "; of angles write Pose.from_euler(roll, pitch, yaw)"
+    return {(4, 4): matrix, (3, 3): matrix, (3,): angles}.get(shape, "")
 
 
 def unit_quaternion(value: ArrayLike) -> Array:
@@ -38,7 +45,8 @@ def unit_quaternion(value: ArrayLike) -> Array:
     norm = float(np.linalg.norm(q))
     if abs(norm - 1.0) > UNIT_QUATERNION:
         raise PoseError(
-            f"quaternion: expected unit length within {UNIT_QUATERNION:g}, got {q.tolist()} of length {norm:g}"
+            f"quaternion: expected x, y, z, w of unit length within {UNIT_QUATERNION:g}, "
+            f"got {q.tolist()} of length {norm:g}"
         )
     q = q / norm
     q.setflags(write=False)
@@ -88,6 +96,13 @@ class Pose:
 
     position: Any = (0.0, 0.0, 0.0)
     quaternion: Any = (0.0, 0.0, 0.0, 1.0)
+
+    def __new__(cls, *args: Any, **kwargs: Any) -> Self:
+        """Refuse three numbers in place of a position."""
+        if len(args) > 2:
+            raise PoseError(f"Pose: expected a position and a quaternion, got {len(args)} arguments; "
+                            "write Pose((x, y, z))")  # fmt: skip
+        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "position", vector(self.position, "position"))
@@ -191,7 +206,8 @@ class Motion:
 
     def __post_init__(self) -> None:
         if not isinstance(self.pose, Pose):
-            raise PoseError(f"Motion: expected a Pose first, got {type(self.pose).__name__}")
+            got = type(self.pose).__name__
+            raise PoseError(f"Motion: expected a Pose first, got {got}; write Motion(Pose((x, y, z)), linear)")
         object.__setattr__(self, "linear", vector(self.linear, "linear velocity"))
         object.__setattr__(self, "angular", vector(self.angular, "angular velocity"))
         object.__setattr__(self, "acceleration", vector(self.acceleration, "acceleration"))

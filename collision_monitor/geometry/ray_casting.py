@@ -1,8 +1,7 @@
-"""Where rays first meet a solid shape, in the shape's frame: clipped intervals of planes, quadratics, triangles.
+"""Where rays first meet a solid shape, in the shape's frame: clipped intervals of planes, quadratics, edges, triangles.
 
 A ray is p + t d, with a unit vector d and t in m. A ray that starts inside meets the solid at t = 0, without a normal.
-(Slides "Line intersection", "Ray test", "Edge intersection face test"; Kay and Kajiya, 1986, for the clipping; Möller
-and Trumbore, 1997, for the triangles)
+(Slides "Line intersection", "Ray test", "Edge intersection face test"; Kay and Kajiya, 1986, for the clipping)
 """
 
 from __future__ import annotations
@@ -13,9 +12,9 @@ import numpy as np
 
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import convex_hull
+from collision_monitor.geometry.containment import inside
 from collision_monitor.geometry.coordinates import Array, Booleans
-from collision_monitor.geometry.point_in_polygon import Location, locate
-from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
+from collision_monitor.geometry.ray_crossings import edge_hits, face_hits
 from collision_monitor.geometry.shapes import (
     Box,
     Capsule,
@@ -23,6 +22,7 @@ from collision_monitor.geometry.shapes import (
     Cone,
     ConvexHull,
     Cylinder,
+    Ellipsoid,
     HalfSpace,
     Mesh,
     Polygon,
@@ -31,15 +31,15 @@ from collision_monitor.geometry.shapes import (
 )
 
 AT_ONCE: Final = 1 << 20
-"""Pairs of a ray and a triangle that are tested in one batch, which limits the temporary arrays to 200 MB."""
+"""Pairs of a ray and an edge or a face in one batch, which limits the temporary arrays to 200 MB."""
 
 
 class Interval(NamedTuple):
-    """Part of each ray in a convex solid: t from enter (n,) to leave (n,); empty if enter > leave."""
+    """Part of each ray in a convex solid: t from enter (...) to leave (...); empty if enter > leave."""
 
     enter: Array
     leave: Array
-    normal: Array  # (n, 3) outward unit normal where it enters
+    normal: Array  # (..., 3) outward unit normal where it enters
 
 
 def first_hits(shape: Shape, p: Array, d: Array) -> tuple[Array, Array]:
@@ -49,8 +49,6 @@ def first_hits(shape: Shape, p: Array, d: Array) -> tuple[Array, Array]:
     """
     if isinstance(shape, Mesh):
         return _mesh_hits(shape, p, d)
-    if isinstance(shape, Polygon) and shape.radius > 0.0:
-        raise UnsupportedError("Polygon with a radius: rays are not offered for it")
     if isinstance(shape, Polygon):
         return _polygon_hits(shape, p, d)
     parts = _solids(shape, p, d)
@@ -65,7 +63,7 @@ def first_hits(shape: Shape, p: Array, d: Array) -> tuple[Array, Array]:
 
 
 def _solids(shape: Shape, p: Array, d: Array) -> list[Interval]:
-    """Intervals of convex solids whose union is the shape."""
+    """Intervals of convex solids that make up the shape."""
     match shape:
         case Sphere():
             return [_ball(p, d, shape.radius)]
@@ -79,6 +77,8 @@ def _solids(shape: Shape, p: Array, d: Array) -> list[Interval]:
             length = np.linalg.norm(normal, axis=1)
             normal = normal[length > 0.0] / length[length > 0.0, None]
             return [_planes(normal, np.einsum("ni,ni->n", normal, a[length > 0.0]), p, d)]
+        case Ellipsoid():
+            return [_ellipsoid(p, d, np.array(shape.radii))]
         case HalfSpace():
             return [_planes(shape.normal[None], np.array([shape.offset]), p, d)]
         case Cylinder():
@@ -103,11 +103,28 @@ def _check_in_plane(d: Array) -> None:
 
 def _ball(p: Array, d: Array, radius: float) -> Interval:
     middle = -_dot(p, d)
-    across = p + middle[:, None] * d  # the ray's point nearest to the centre: its square does not cancel
+    across = p + middle[..., None] * d  # the ray's point nearest to the centre: its square does not cancel
     rest = radius * radius - _dot(across, across)
     half = np.sqrt(np.maximum(rest, 0.0))
     enter = np.where(rest >= 0.0, middle - half, np.inf)
-    return Interval(enter, np.where(rest >= 0.0, middle + half, -np.inf), (across - half[:, None] * d) / radius)
+    return Interval(enter, np.where(rest >= 0.0, middle + half, -np.inf), (across - half[..., None] * d) / radius)
+
+
+def _ellipsoid(p: Array, d: Array, radii: Array) -> Interval:
+    """In coordinates in which it is a ball, and from the ray's point nearest to its centre, which keeps digits."""
+    near = -_dot(p, d)
+    least = radii.min()
+    w, u = (p + near[:, None] * d) * (least / radii), d * (least / radii)
+    square = _dot(u, u)
+    middle = -_dot(w, u) / square
+    across = w + middle[:, None] * u
+    rest = least * least - _dot(across, across)
+    half = np.sqrt(np.maximum(rest, 0.0) / square)
+    normal = (across - half[:, None] * u) * (least / radii)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    enter = np.where(rest >= 0.0, near + middle - half, np.inf)
+    leave = np.where(rest >= 0.0, near + middle + half, -np.inf)
+    return Interval(enter, leave, normal / np.where(length > 0.0, length, 1.0))
 
 
 def _planes(normal: Array, offset: Array, p: Array, d: Array) -> Interval:
@@ -178,51 +195,51 @@ def _cone(shape: Cone, p: Array, d: Array) -> Interval:
 
 
 def _polygon_hits(shape: Polygon, p: Array, d: Array) -> tuple[Array, Array]:
+    """Nearest edge on the way. With a radius: edges moved by it to both sides, and discs about the corners."""
     _check_in_plane(d)
     start = np.asarray(shape.points)
-    edge = np.roll(start, -1, axis=0) - start
-    inside = np.asarray(locate(p[:, :2], start)) != Location.OUTSIDE
-    offset = start - p[:, None, :2]
-    turn = d[:, None, 0] * edge[:, 1] - d[:, None, 1] * edge[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = (offset[..., 0] * edge[:, 1] - offset[..., 1] * edge[:, 0]) / turn
-        s = (offset[..., 0] * d[:, None, 1] - offset[..., 1] * d[:, None, 0]) / turn
-    met = (turn != 0.0) & (t >= 0.0) & (s >= 0.0) & (s <= 1.0)
-    t = np.where(met, t, np.inf)
-    which = t.argmin(axis=1)
-    normal = np.stack([edge[which, 1], -edge[which, 0], np.zeros(len(p))], axis=1)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    normal *= -np.sign(_dot(normal, d))[:, None]
-    best = np.where(inside, 0.0, t.min(axis=1))
-    return best, np.where((np.isfinite(best) & ~inside)[:, None], normal, 0.0)
+    end = np.roll(start, -1, axis=0)
+    across = (end - start)[:, ::-1] * [1.0, -1.0]
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    across /= np.where(length > 0.0, length, 1.0)
+    corners = np.pad(start, ((0, 0), (0, 1)))
+    if shape.radius > 0.0:
+        aside = shape.radius * across
+        start, end = np.concatenate([start + aside, start - aside]), np.concatenate([end + aside, end - aside])
+        across = np.concatenate([across, across])
+    best, normal = np.full(len(p), np.inf), np.zeros_like(p)
+    step = max(AT_ONCE // len(start), 1)
+    for first in range(0, len(p), step):
+        o, way = p[first : first + step, None], d[first : first + step, None]
+        t = edge_hits(o[..., :2], way[..., :2], start, end)
+        n = np.pad(-np.sign(_dot(way[..., :2], across))[..., None] * across, ((0, 0), (0, 0), (0, 1)))
+        if shape.radius > 0.0:
+            disc = _ball(o * [1.0, 1.0, 0.0] - corners, way, shape.radius)
+            t = np.concatenate([t, np.where(disc.enter >= 0.0, disc.enter, np.inf)], axis=1)
+            n = np.concatenate([n, disc.normal], axis=1)
+        rows, which = np.arange(len(t)), t.argmin(axis=1)
+        best[first : first + step], normal[first : first + step] = t[rows, which], n[rows, which]
+    return _from_outside(inside(shape, p, "closed form"), best, normal)
 
 
 def _mesh_hits(shape: Mesh, p: Array, d: Array) -> tuple[Array, Array]:
     """Nearest face on the way; a closed mesh is solid, an open one a surface."""
-    a, b, c = (shape.vertices[corner] for corner in shape.faces.T)
-    u, v = b - a, c - a
-    best, which = np.full(len(p), np.inf), np.zeros(len(p), np.int64)
-    inside: Booleans = np.zeros(len(p), bool)
-    if is_closed(shape.faces):
-        inside = np.asarray(locate_in_polyhedron(p, shape.vertices, shape.faces)) != Location.OUTSIDE
-    step = max(AT_ONCE // len(a), 1)
-    for first in range(0, len(p), step):
-        rows = slice(first, first + step)
-        h = np.cross(d[rows, None], v)
-        determinant = _dot(u, h)
-        offset = p[rows, None] - a
-        q = np.cross(offset, u)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            beta, gamma = _dot(offset, h) / determinant, _dot(d[rows, None], q) / determinant
-            t = _dot(v, q) / determinant
-        met = (determinant != 0.0) & (beta >= 0.0) & (gamma >= 0.0) & (beta + gamma <= 1.0) & (t >= 0.0)
-        t = np.where(met, t, np.inf)
-        which[rows], best[rows] = t.argmin(axis=1), t.min(axis=1)
-    normal = np.cross(u[which], v[which])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    normal *= -np.sign(_dot(normal, d))[:, None]
-    best = np.where(inside, 0.0, best)
-    return best, np.where((np.isfinite(best) & ~inside)[:, None], normal, 0.0)
+    surface = shape.surface
+    best, normal = np.full(len(p), np.inf), np.zeros_like(p)
+    if len(surface.faces):
+        triangles = surface.vertices[surface.faces]
+        step = max(AT_ONCE // len(triangles), 1)
+        for first in range(0, len(p), step):
+            rows = slice(first, first + step)
+            best[rows], normal[rows] = face_hits(p[rows], d[rows], triangles)
+    within = inside(shape, p, "closed form") if surface.closed else np.zeros(len(p), bool)
+    return _from_outside(within, best, normal)
+
+
+def _from_outside(within: Booleans, best: Array, normal: Array) -> tuple[Array, Array]:
+    """Hits of rays, where those from within start at 0 without a normal."""
+    outside = np.isfinite(best) & ~within
+    return np.where(within, 0.0, best), np.where(outside[:, None], normal, 0.0)
 
 
 def _dot(a: Array, b: Array) -> Array:

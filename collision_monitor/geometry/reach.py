@@ -19,6 +19,7 @@ from collision_monitor.geometry.shapes import (
     Ellipsoid,
     HalfSpace,
     Mesh,
+    Points,
     Polygon,
     Shape,
     Sphere,
@@ -57,6 +58,8 @@ def _reach(shape: Shape, d: Array) -> Array:
             return np.asarray((d @ shape.points.T).max(axis=-1))
         case Mesh():
             return np.asarray((d @ shape.vertices[np.unique(shape.faces)].T).max(axis=-1))
+        case Points():
+            return np.asarray((d @ shape.points.T).max(axis=-1) + shape.radius)
         case HalfSpace():
             return np.where(d @ shape.normal >= 1.0 - HULL_DROP, shape.offset, np.inf)
         case Circle():

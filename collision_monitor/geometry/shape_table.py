@@ -35,6 +35,7 @@ CIRCLE: Final = int(ShapeType.CIRCLE)
 POLYGON: Final = int(ShapeType.POLYGON)
 ELLIPSOID: Final = int(ShapeType.ELLIPSOID)
 MESH: Final = int(ShapeType.MESH)
+POINTS: Final = int(ShapeType.POINTS)
 
 TREE: Final = 3
 """Column of `size` with the first block of the shape's tree plus 1, or 0; a half-space has its offset there."""
@@ -55,8 +56,8 @@ class ShapeTable(NamedTuple):
 
     size holds, by kind: sphere r | box half extents x, y, z | capsule r, half core length | cylinder r, half height |
     cone r, half height | half-space normal x, y, z, offset | hull nothing | circle r | polygon number of corners |
-    ellipsoid half axes x, y, z. The radius of a polygon is part of its margin.
-    The last number of any other kind is its tree (TREE); a mesh always has one, and nothing else.
+    ellipsoid half axes x, y, z. The radius of a polygon, and of a cloud's points, is part of its margin.
+    The last number of any other kind is its tree (TREE); a mesh and a cloud always have one, and nothing else.
     Hull vertices come in blocks padded to a multiple of LANES with the last vertex, so that the support scan has no
     tail.
     """
@@ -200,8 +201,8 @@ class ShapeTableBuilder:
     ) -> int:
         """Add a shape at a pose in its object's frame, enlarged by `margin` (m); return its slot.
 
-        corners: the `hull_vertices` of a ConvexHull, if they are known already. tree: of a mesh, which is needed
-        (`meshes.shape_trees`).
+        corners: the `hull_vertices` of a ConvexHull, if they are known already. tree: of a mesh or a cloud, which is
+        needed (`meshes.shape_trees`).
         Raises UnsupportedError for a kind without kernels, ShapeError for an invalid margin.
         """
         if not (np.isfinite(margin) and margin >= 0.0):
@@ -242,6 +243,9 @@ class ShapeTableBuilder:
                 margin += shape.radius
             case shapes.Mesh() if tree is not None:
                 kind, size, radius = MESH, (), float(tree[REACH])
+            case shapes.Points() if tree is not None:
+                kind, size, radius = POINTS, (), float(tree[REACH])
+                margin += shape.radius
             case _:
                 raise UnsupportedError(f"{type(shape).__name__} has no narrow phase; supported are {SUPPORTED_SHAPES}")
         slot = self._new_slot()

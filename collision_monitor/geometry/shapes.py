@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import Any
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,9 @@ from collision_monitor.geometry.surface import Surface
 from collision_monitor.tolerances import LARGEST_INPUT
 
 Array = NDArray[np.float64]
+
+MOST_CLOUD_POINTS: Final = 500_000
+"""Points of one cloud. Larger: its tree takes longer than the 100 ms for which one message may hold the answers."""
 
 
 def _positive(value: float, what: str) -> float:
@@ -77,11 +80,17 @@ class Box(Shape):
 
     size: Any
 
+    def __new__(cls, *args: Any, **kwargs: Any) -> Self:
+        """Refuse three numbers in place of one size."""
+        if len(args) > 1:
+            raise ShapeError(f"Box: expected one size, got {len(args)} arguments; write Box((x, y, z))")
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
         try:
             size = tuple(float(s) for s in self.size)
         except (TypeError, ValueError):
-            raise ShapeError(f"Box size: expected 3 full extents in metres, got {self.size!r}") from None
+            raise ShapeError(f"Box size: expected 3 full extents in m, as Box((1, 1, 1)), got {self.size!r}") from None
         if len(size) != 3 or not all(0.0 <= s <= LARGEST_INPUT for s in size) or max(size) == 0.0:
             raise ShapeError(f"Box size: expected 3 extents from 0 to {LARGEST_INPUT:g}, not all zero, got {size}")
         object.__setattr__(self, "size", size)
@@ -142,7 +151,11 @@ class Cone(Shape):
 
 @dataclass(frozen=True)
 class Ellipsoid(Shape):
-    """Ellipsoid; radii: half axes along x, y, z in m."""
+    """Ellipsoid; radii: half axes along x, y, z in m.
+
+    >>> Ellipsoid((0.3, 0.2, 0.1))
+    Ellipsoid(radii=(0.3, 0.2, 0.1))
+    """
 
     radii: Any
 
@@ -209,12 +222,40 @@ class Mesh(Shape):
 
     @cached_property
     def surface(self) -> Surface:
-        """Welded faces, and whether they close and are oriented. Computed on first access, 2 s for 10^6 faces."""
+        """Welded faces, and whether they close and are oriented. Computed on first access."""
         return Surface(self.vertices, self.faces)
 
     def __repr__(self) -> str:
         welded = f", {self.surface.welded} of them welded" if self.surface.welded else ""
         return f"Mesh({len(self.vertices)} vertices{welded}, {len(self.faces)} faces: {self.surface})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Points(Shape):
+    """Cloud of points (n, 3) in m, each a ball of `radius` in m, as one object: a scan, a depth image, a map.
+
+    The radius may be 0. At most MOST_CLOUD_POINTS points. A cloud encloses nothing.
+
+    >>> Points([(0, 0, 0), (1, 0, 0)], 0.05)
+    Points(2 points, radius=0.05)
+    """
+
+    points: Any
+    radius: float = 0.0
+
+    def __post_init__(self) -> None:
+        points = _points(self.points, "Points", 3, 1)
+        if len(points) > MOST_CLOUD_POINTS:
+            raise ShapeError(
+                f"Points: expected at most {MOST_CLOUD_POINTS} points, got {len(points)}; "
+                "keep one for each cube of a grid, or only those within reach"
+            )
+        radius = self.radius if self.radius == 0.0 else _positive(self.radius, "Points radius")
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "radius", float(radius))
+
+    def __repr__(self) -> str:
+        return f"Points({len(self.points)} points, radius={self.radius!r})"
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,13 +44,13 @@ class Surface:
         start, end = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
         low, high = np.minimum(start, end), np.maximum(start, end)
         n = len(self.vertices)
-        key = low * n + high
-        order = np.argsort(key, kind="stable")
-        begin = np.flatnonzero(np.diff(key[order], prepend=-1))
-        count = np.diff(begin, append=len(order))
-        way = np.add.reduceat(np.where(start < end, 1, -1)[order], begin) if len(begin) else count
-        edge = key[order[begin]]
-        return np.column_stack([edge // n, edge % n]), count, way == 0
+        key = np.sort(2 * (low * n + high) + (start < end))  # sorting numbers is much faster than sorting rows
+        edge, forward = key >> 1, key & 1
+        begin = np.flatnonzero(np.diff(edge, prepend=-1))
+        count = np.diff(begin, append=len(edge))
+        passes = np.add.reduceat(forward, begin) if len(begin) else count
+        edge = edge[begin]
+        return np.column_stack([edge // n, edge % n]), count, 2 * passes == count
 
     @cached_property
     def open_edges(self) -> Indices:
@@ -75,7 +75,7 @@ class Surface:
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
-        start, end = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
+        start, end = self.faces[:, :2].ravel(), self.faces[:, 1:].ravel()
         ones = np.ones(len(start), np.int8)
         graph = coo_array((ones, (start, end)), shape=(len(self.vertices),) * 2)
         return np.asarray(connected_components(graph, directed=False)[1][self.faces[:, 0]], np.int64)
@@ -126,14 +126,31 @@ class Surface:
 
 def first_equal(points: Array) -> Indices:
     """Index (n,) of the first point equal to each of the points (n, 3)."""
-    order = np.lexsort(points.T)
+    first = np.arange(len(points))
+    some = _with_equal_key(_mixed((points + 0.0).view(np.uint64)))  # + 0.0: -0 equals 0
+    order = some[np.lexsort(points[some].T)]
     ordered = points[order]
-    new = np.ones(len(points), bool)
+    new = np.ones(len(order), bool)
     new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
     # lexsort is stable, so the first of equal points has the smallest index
-    first = np.empty(len(points), np.int64)
-    first[order] = order[np.maximum.accumulate(np.where(new, np.arange(len(points)), 0))]
+    first[order] = order[np.maximum.accumulate(np.where(new, np.arange(len(order)), 0))]
     return first
+
+
+def _mixed(rows: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """One number (n,) for each row (n, 3): equal for equal rows, and hardly ever for others."""
+    a, b, c = rows.T
+    mixed = (a * np.uint64(0x9E3779B97F4A7C15)) ^ (a >> np.uint64(29))
+    mixed = (mixed + b) * np.uint64(0xBF58476D1CE4E5B9) ^ (mixed >> np.uint64(31))
+    mixed = (mixed + c) * np.uint64(0x94D049BB133111EB)
+    return np.asarray(mixed ^ (mixed >> np.uint64(32)))
+
+
+def _with_equal_key(keys: NDArray[np.uint64]) -> Indices:
+    """Indices, ascending, of the keys that occur more than once. Sorting numbers is much faster than sorting rows."""
+    ordered = np.sort(keys)
+    repeated = ordered[1:][ordered[1:] == ordered[:-1]]
+    return np.flatnonzero(np.isin(keys, repeated)) if len(repeated) else np.zeros(0, np.int64)
 
 
 def _without_collapsed(faces: Indices) -> Indices:
@@ -145,7 +162,8 @@ def _without_collapsed(faces: Indices) -> Indices:
 def _distinct(faces: Indices) -> Indices:
     """Faces without repetitions in any order of the vertices; the first is kept."""
     ordered = np.sort(faces, axis=1)
-    order = np.lexsort(ordered.T)
-    new = np.ones(len(faces), bool)
-    new[1:] = (ordered[order[1:]] != ordered[order[:-1]]).any(axis=1)
-    return faces[np.sort(order[new])]
+    some = _with_equal_key(_mixed(ordered.astype(np.uint64)))
+    order = some[np.lexsort(ordered[some].T)]
+    repeats = np.zeros(len(faces), bool)
+    repeats[order[1:]] = (ordered[order[1:]] == ordered[order[:-1]]).all(axis=1)
+    return faces[~repeats]

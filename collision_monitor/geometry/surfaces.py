@@ -16,6 +16,7 @@ from collision_monitor.geometry.shapes import (
     Ellipsoid,
     HalfSpace,
     Mesh,
+    Points,
     Polygon,
     Shape,
     Sphere,
@@ -25,8 +26,8 @@ Triangles = NDArray[np.float64]
 """(n, 3, 3): triangle, corner, coordinate in m."""
 
 MOST_POINTS = 5000
-"""Points of a hull that is drawn, which takes up to 50 ms. A larger one, or one too flat for Qhull, appears as its box.
-"""
+"""Points of a hull or a cloud that is drawn, which takes up to 50 ms. A larger hull, or one too flat for Qhull, appears
+as its box; of a larger cloud, some points appear."""
 SIDES = 16
 """Number of sides of a round shape."""
 HALF_SPACE_EXTENT = 20.0
@@ -59,6 +60,8 @@ def surface_triangles(shape: Shape) -> Triangles:
         case Mesh():
             corners: Triangles = np.asarray(shape.vertices)[np.asarray(shape.faces)]
             return corners
+        case Points():
+            return _tetrahedra(np.asarray(shape.points), shape.radius)
         case ConvexHull():
             return _hull(np.asarray(shape.points))
         case Polygon():
@@ -95,6 +98,15 @@ def _hull(points: NDArray[np.float64]) -> Triangles:
         return _box(Box((1.0, 1.0, 1.0)).corners * (high - low) + 0.5 * (low + high))
     corners: Triangles = points[hull.simplices]
     return corners
+
+
+def _tetrahedra(points: NDArray[np.float64], radius: float) -> Triangles:
+    """Return a tetrahedron at each point; at every k-th one if there are more than MOST_POINTS."""
+    some = points[:: -(-len(points) // MOST_POINTS)]
+    size = radius or 1e-3 * float(np.abs(points).max())
+    corner = size * np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)]) / np.sqrt(3.0)
+    faces = corner[[(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)]]
+    return np.asarray((some[:, None, None] + faces).reshape(-1, 3, 3))
 
 
 def _outline(points: NDArray[np.float64]) -> Triangles:

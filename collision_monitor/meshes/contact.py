@@ -55,15 +55,15 @@ def tree_contact(
     if distance == 0.0:
         count, _ = touching(blocks_a, root_a, blocks_b, root_b, X, MOST_PAIRS, work)
         if count > 0:
-            depth, n, on_a = deepest(blocks_a, blocks_b, X, work, count)
+            depth, n, on_a = deepest(blocks_a, blocks_b, X, work, count, answer)
         else:  # round-off says so of the distance alone
             depth, n, on_a = 0.0, FACE_TO_FACE, (answer[ON_A], answer[ON_A + 1], answer[ON_A + 2])
         write(out, -depth, rotate(pose.R_A, n), rotate(pose.R_A, on_a), round_off)
         return TOUCHING
-    known = APART
-    inside = is_in(blocks_a, root_a, blocks_b, root_b, X, work)
+    known, clear = APART, max(min(distance, limit), 0.0)
+    inside = is_in(blocks_a, root_a, blocks_b, root_b, X, clear, work)
     if inside != INSIDE:
-        inside = max(inside, is_in(blocks_b, root_b, blocks_a, root_a, inverse(X), work))
+        inside = max(inside, is_in(blocks_b, root_b, blocks_a, root_a, inverse(X), clear, work))
     if inside == INSIDE:
         known = ENCLOSED
     elif inside == UNKNOWN:
@@ -98,4 +98,6 @@ def trees_overlap(tree_a, R_a, p_a, tree_b, R_b, p_b, work):
     X = relative(R_a, R_b, p)
     if touching(tree_a, 0, tree_b, 0, X, 1, work)[0] > 0:
         return True
-    return is_in(tree_a, 0, tree_b, 0, X, work) != OUTSIDE or is_in(tree_b, 0, tree_a, 0, inverse(X), work) != OUTSIDE
+    if is_in(tree_a, 0, tree_b, 0, X, 0.0, work) != OUTSIDE:
+        return True
+    return is_in(tree_b, 0, tree_a, 0, inverse(X), 0.0, work) != OUTSIDE

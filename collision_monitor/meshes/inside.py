@@ -7,13 +7,17 @@ from typing import Any, Final
 from collision_monitor._jit import device, inlined
 from collision_monitor.meshes.boxes import box_bounds, half_of
 from collision_monitor.meshes.layout import CENTER, CHILD, CLOSED, FIRST_PART, MOST_PARTS, PARTS, WIDTH
-from collision_monitor.meshes.nearest import BOUNDS, triangle_at
+from collision_monitor.meshes.nearest import BOUNDS, PAIRS, triangle_at
 from collision_monitor.meshes.placing import Placing, place_point, turned_back
 from collision_monitor.meshes.touching import repeats
 from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus
 from collision_monitor.tolerances import EPSILON
 
 OUTSIDE, UNKNOWN, INSIDE = 0, 1, 2
+
+MOST_LOCATED: Final = 10_000
+"""Most points of the other surface to locate, 10 to 30 ms. Many disjoint parts near a surface, such as a cloud around a
+robot, need more only if they are near to each other and to the surface."""
 
 UNDECIDED: Final = 1 << 62
 """Not a winding number."""
@@ -41,27 +45,72 @@ def locate(blocks: Any, root: int, x: Vector, work: Any) -> int:
 
 
 @device
-def is_in(blocks: Any, root: int, other: Any, other_root: int, X: Placing, work: Any) -> int:
+def is_in(blocks: Any, root: int, other: Any, other_root: int, X: Placing, clear: float, work: Any) -> int:
     """INSIDE if a part of the other tree, placed by X, is in the solid that a tree bounds and no surfaces meet.
 
-    UNKNOWN if round-off, or the number of parts, leaves it open.
+    clear (m): distance of the two surfaces, or less. UNKNOWN if round-off, or the number of parts, leaves it open.
     """
     if blocks[root, CLOSED, 1] == 0.0:
         return OUTSIDE
     parts = int(other[other_root, PARTS, 1])
+    if parts > MOST_PARTS:
+        return _is_some_in(blocks, root, other, other_root, X, clear, work)
     first = other_root + int(other[other_root, FIRST_PART, 1])
     known = OUTSIDE
-    for k in range(min(parts, MOST_PARTS)):
+    for k in range(parts):
         block, member = first + k // WIDTH, k % WIDTH
         x = place_point(X, (other[block, 0, member], other[block, 1, member], other[block, 2, member]))
         known = max(known, locate(blocks, root, x, work))
         if known == INSIDE:
             return INSIDE
-    if parts > MOST_PARTS:
-        box_bounds(blocks, root, 0, other, other_root, X, (0.0, 0.0, 0.0), work, BOUNDS)
-        if work[BOUNDS] <= 0.0:
-            return UNKNOWN
     return known
+
+
+@device
+def _is_some_in(blocks: Any, root: int, other: Any, other_root: int, X: Placing, clear: float, work: Any) -> int:
+    """`is_in` by a corner of each triangle of the other tree that is near the solid.
+
+    Points nearer to each other than to the surface are on the same side, so one of them answers for a small box.
+    """
+    work[PAIRS] = WIDTH * other_root
+    waiting, located, known = 1, 0, OUTSIDE
+    while waiting > 0:  # terminates: each box is opened once
+        waiting -= 1
+        place = int(work[PAIRS + waiting])
+        child = other[place // WIDTH, CHILD, place % WIDTH]
+        block = other_root + int(abs(child))
+        if child > 0.0:
+            box_bounds(blocks, root, 0, other, block, X, (0.0, 0.0, 0.0), work, BOUNDS)
+        for k in range(WIDTH):
+            if child > 0.0:
+                if other[block, CHILD, k] == 0.0 or work[BOUNDS + k] > 0.0:
+                    continue
+                e = half_of(other, block, k)
+                if 4.0 * dot(e, e) >= clear * clear:
+                    work[PAIRS + waiting] = WIDTH * block + k
+                    waiting += 1
+                    continue
+                x = _first_point(other, other_root, block, k)
+            elif repeats(other, block, k):
+                continue
+            else:
+                x = triangle_at(other, block, k).a
+            if located == MOST_LOCATED:
+                return UNKNOWN
+            located += 1
+            known = max(known, locate(blocks, root, place_point(X, x), work))
+            if known == INSIDE:
+                return INSIDE
+    return known
+
+
+@device
+def _first_point(blocks: Any, root: int, block: int, k: int) -> Vector:
+    """A corner of a triangle in a box."""
+    child = blocks[block, CHILD, k]
+    while child > 0.0:  # terminates: one level down
+        child = blocks[root + int(child), CHILD, 0]
+    return triangle_at(blocks, root - int(child), 0).a
 
 
 @inlined

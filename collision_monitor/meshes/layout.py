@@ -41,5 +41,7 @@ FIRST_PART: Final = 3
 """The first of these blocks, relative to block 0."""
 MOST_PARTS: Final = 64
 """Most parts with a point in the tree. More: a soup of a million triangles would take a million rays."""
+COUNT: Final = 6
+"""Number of points of a cloud; 0 for triangles."""
 KEY: Final = 4
-"""Digest of the tree, 16 bytes in this row and the next; equal trees have equal digests."""
+"""Digest of the tree, 16 bytes in this row and the next; equal trees of triangles have equal digests."""

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.convex_pieces import is_concave_mesh
-from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Mesh, Shape, Sphere, Triangle
+from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Mesh, Points, Shape, Sphere, Triangle
+from collision_monitor.meshes.cloud_tree import cloud_tree
 from collision_monitor.meshes.tree import tree_of
 
 Array = NDArray[np.float64]
@@ -22,8 +23,8 @@ _KEPT: Final = "_tree"
 def shape_tree(shape: Shape) -> Array | None:
     """Tree of a shape's surface; None for a shape that triangles with a radius cannot represent exactly.
 
-    A sphere is a point with a radius, a capsule an edge with a radius; a box and a hull are closed surfaces, unless
-    they are too flat.
+    A sphere is a point with a radius, a capsule an edge with one; a cloud is its points, without their radius; a box
+    and a hull are closed surfaces, unless they are too flat.
     """
     kept = shape.__dict__.get(_KEPT)
     if kept is None:
@@ -36,13 +37,22 @@ def shape_tree(shape: Shape) -> Array | None:
 def trees_of_pair(a: Shape, b: Shape) -> tuple[Array, Array] | None:
     """Trees of two shapes; None unless one of them is a concave mesh and the other has a tree.
 
-    Also None if it is not certain what is inside of a mesh.
+    Also None for a cloud, and if it is not certain what is inside of a mesh.
     """
+    if isinstance(a, Points) or isinstance(b, Points):
+        return None
     tree_a, tree_b = shape_tree(a), shape_tree(b)
     (_, concave_a, certain_a), (_, concave_b, certain_b) = a.__dict__[_KEPT], b.__dict__[_KEPT]
     if tree_a is None or tree_b is None or not (concave_a or concave_b) or not (certain_a and certain_b):
         return None
     return tree_a, tree_b
+
+
+def _plate(box: Box) -> Array:
+    """Triangles (12, 3, 3) of the faces of a box without thickness."""
+    k = box.corners
+    quads = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]
+    return np.array([k[[q[0], q[i], q[i + 1]]] for q in quads for i in (1, 2)])
 
 
 def made_tree(shape: Shape) -> Array | None:
@@ -54,6 +64,8 @@ def made_tree(shape: Shape) -> Array | None:
             first = np.unique(surface.part, return_index=True)[1] if len(surface.faces) else [0]
             closed = surface.closed and surface.certain
             return tree_of(shape.vertices[shape.faces], closed=closed, parts=shape.vertices[faces[first, 0]])
+        case Points():
+            return cloud_tree(shape.points)
         case Sphere():
             return tree_of(np.zeros((1, 3, 3)), shape.radius)
         case Capsule():
@@ -63,7 +75,7 @@ def made_tree(shape: Shape) -> Array | None:
             try:
                 hull = convex_hull(shape.corners if isinstance(shape, Box) else shape.points)
             except ShapeError:  # too flat for faces
-                return None
+                return tree_of(_plate(shape)) if isinstance(shape, Box) else None
             return tree_of(hull.vertices[hull.faces], closed=True)
         case Triangle():
             return tree_of(shape.points[None])

@@ -1,7 +1,8 @@
-"""A tree against a cylinder, a cone or a half-space, which triangles cannot represent: contact, and a time without one.
+"""A tree against a convex solid: contact, and a time without one.
 
-Boxes and triangles are dropped by their bounding spheres; the triangles that remain are tested by GJK and EPA, or by
-their deepest corner for a half-space. Other convex shapes have trees of their own.
+For a cloud with any solid, and for a mesh with a cylinder, a cone, an ellipsoid or a half-space, which triangles cannot
+represent. Boxes and triangles are dropped by their bounding spheres; the triangles that remain are tested by GJK and
+EPA, by their deepest corner for a half-space, and points in closed form where there is one.
 """
 
 from __future__ import annotations
@@ -11,20 +12,44 @@ from typing import Any, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor._jit.vectors import LANES
-from collision_monitor.geometry.shape_table import CONVEX_HULL, ELLIPSOID, HALF_SPACE
+from collision_monitor.geometry.shape_table import CONE, CONVEX_HULL, HALF_SPACE, SPHERE
 from collision_monitor.meshes.approach import Approach, time_until
 from collision_monitor.meshes.boxes import half_of
-from collision_monitor.meshes.layout import CENTER, CHILD, RADIUS, WIDTH
+from collision_monitor.meshes.contact import reach_in
+from collision_monitor.meshes.feature import triangle_feature
+from collision_monitor.meshes.layout import CENTER, CHILD, FACE, RADIUS, WIDTH
 from collision_monitor.meshes.nearest import NEAR_A, triangle_at
 from collision_monitor.meshes.placing import Placing, inverse, place_point, relative, turn_back
+from collision_monitor.meshes.point_solid import point_distance
 from collision_monitor.meshes.touching import repeats
 from collision_monitor.meshes.triangle_pair import Triangle
-from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, write
+from collision_monitor.narrow_phase.contact_row import (
+    BOUND,
+    CONTACT_SIZE,
+    DISTANCE,
+    FEATURE_TYPE_A,
+    NORMAL,
+    POINT_A,
+    POINT_B,
+    VERTEX,
+    write,
+)
 from collision_monitor.narrow_phase.convex_convex import cores_contact
-from collision_monitor.narrow_phase.core import Core, CorePair, core_length, core_of
+from collision_monitor.narrow_phase.core import Core, CorePair, core_length, core_of, rounding
 from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.narrow_phase.sphere_cone import sphere_cone_contact
 from collision_monitor.narrow_phase.support_value import core_support
-from collision_monitor.narrow_phase.vector import Vector, along, cross, dot, minus, opposite, rotate, rotate_back
+from collision_monitor.narrow_phase.vector import (
+    Vector,
+    along,
+    cross,
+    dot,
+    minus,
+    opposite,
+    rotate,
+    rotate_back,
+    sum_of_sizes,
+)
 from collision_monitor.tolerances import SAT_ROUND_OFF
 
 
@@ -34,29 +59,6 @@ class SolidMemory(NamedTuple):
     triangle: Any  # (3, LANES): its corners, the last one repeated
     gjk: Any  # (WORK_SIZE,)
     tree: Any  # (MEMORY,), see `nearest`
-
-
-@inlined
-def _outside(table: Any, b: int, x: Vector) -> tuple[float, Vector]:
-    """Lower bound on the signed distance (m) of a point in its frame from a solid without margin; its direction."""
-    if table.kind[b] == HALF_SPACE:
-        n = table.size[b, 0], table.size[b, 1], table.size[b, 2]
-        return dot(n, x) - table.size[b, 3], n
-    if table.kind[b] == ELLIPSOID:
-        length = sqrt(dot(x, x))
-        out = (x[0] / length, x[1] / length, x[2] / length) if length > 0.0 else (1.0, 0.0, 0.0)
-        return length - max(table.size[b, 0], max(table.size[b, 1], table.size[b, 2])), out
-    r, h = table.size[b, 0], table.size[b, 1]
-    rim = sqrt(x[0] * x[0] + x[1] * x[1])
-    side, end = rim - r, abs(x[2]) - h  # of the cylinder around it
-    up = 1.0 if x[2] > 0.0 else -1.0
-    out = (x[0] / rim, x[1] / rim, 0.0) if rim > 0.0 else (1.0, 0.0, 0.0)
-    if side > 0.0 and end > 0.0:
-        length = sqrt(side * side + end * end)
-        return length, (out[0] * side / length, out[1] * side / length, up * end / length)
-    if side > end:
-        return side, out
-    return end, (0.0, 0.0, up)
 
 
 @inlined
@@ -70,6 +72,42 @@ def _middle(T: Triangle) -> tuple[Vector, float]:
     )
     a, b, d = minus(T.a, c), minus(T.b, c), minus(T.c, c)
     return c, sqrt(max(dot(a, a), max(dot(b, b), dot(d, d)))) * (1.0 + 1e-14)
+
+
+@inlined
+def _is_point(T: Triangle) -> bool:
+    return (
+        T.a[0] == T.b[0] and T.a[1] == T.b[1] and T.a[2] == T.b[2]
+        and T.a[0] == T.c[0] and T.a[1] == T.c[1] and T.a[2] == T.c[2]
+    )  # fmt: skip
+
+
+@device
+def _point_contact(
+    table: Any, b: int, pose: PairPose, x: Vector, radius: float, limit: float, out: Any, memory: SolidMemory
+) -> bool:
+    """As `_triangle_contact`, for a point of A: in closed form where there is one, otherwise by GJK and EPA."""
+    y = place_point(inverse(relative(pose.R_A, pose.R_B, pose.p)), x)
+    distance, d, is_exact = point_distance(table, b, y)
+    x = rotate(pose.R_A, x)
+    if is_exact:
+        n = rotate(pose.R_B, d)
+        distance -= radius + table.margin[b]
+        scale = sum_of_sizes(pose.p) + sum_of_sizes(x) + radius + table.size[b, 0] + table.size[b, 1] + table.size[b, 2]
+        write(out, distance, opposite(n), along(x, -radius, n), SAT_ROUND_OFF * scale)
+        return distance <= limit
+    p = minus(pose.p, x)
+    if table.kind[b] == CONE:
+        sphere_cone_contact(radius, table.size[b, 0], table.size[b, 1], table.margin[b], pose.R_B, p, out)
+    else:
+        cores = CorePair(Core(SPHERE, (0.0, 0.0, 0.0), 0, 0), core_of(table, b), table.vertices)
+        radii, at = (radius, rounding(table, b)), PairPose(pose.R_A, pose.R_B, p)
+        if not cores_contact(cores, radii, core_length(table, b), at, limit, out, memory.gjk):
+            return False
+    for c in range(3):
+        out[POINT_A + c] += x[c]
+        out[POINT_B + c] += x[c]
+    return out[DISTANCE] <= limit
 
 
 @device
@@ -86,12 +124,14 @@ def _triangle_contact(
         distance = dot(n, minus(witness, pose.p)) - table.size[b, 3] - table.margin[b]
         write(out, distance, opposite(n), witness, SAT_ROUND_OFF * (scale + abs(table.size[b, 3])))
         return distance <= limit
+    if _is_point(T):
+        return _point_contact(table, b, pose, T.a, radius, limit, out, memory)
     for k in range(LANES):
         x = T.a if k == 0 else (T.b if k == 1 else T.c)
         memory.triangle[0, k], memory.triangle[1, k], memory.triangle[2, k] = x
     flat = Core(CONVEX_HULL, (0.0, 0.0, 0.0), 0, LANES)
     size = core_length(table, b) + sqrt(max(dot(T.a, T.a), max(dot(T.b, T.b), dot(T.c, T.c))))
-    radii = radius, table.margin[b]
+    radii = radius, rounding(table, b)
     found = cores_contact(CorePair(flat, core_of(table, b), memory.triangle), radii, size, pose, limit, out, memory.gjk)
     return found and out[DISTANCE] <= limit
 
@@ -120,7 +160,7 @@ def solid_contact(
                     continue
                 e = half_of(blocks, block, k)
                 c = blocks[block, CENTER, k], blocks[block, CENTER + 1, k], blocks[block, CENTER + 2, k]
-                bound, _ = _outside(table, b, place_point(Y, c))
+                bound, _, _ = point_distance(table, b, place_point(Y, c))
                 bound -= sqrt(dot(e, e)) + margin + table.margin[b]
                 if bound <= best:
                     work[2 * waiting], work[2 * waiting + 1] = bound, WIDTH * block + k
@@ -131,13 +171,19 @@ def solid_contact(
             T = triangle_at(blocks, block, k)
             radius = blocks[block, RADIUS, k] + margin
             c, size = _middle(T)
-            bound, _ = _outside(table, b, place_point(Y, c))
+            bound, _, _ = point_distance(table, b, place_point(Y, c))
             if bound - size - radius - table.margin[b] > best:
                 continue
             if _triangle_contact(table, b, pose, T, radius, best, row, memory) and (not found or row[DISTANCE] < best):
                 best, found = row[DISTANCE], True
                 for i in range(CONTACT_SIZE):
                     out[i] = row[i]
+                n = rotate_back(pose.R_A, (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2]))
+                if _is_point(T):
+                    out[FEATURE_TYPE_A], out[FEATURE_TYPE_A + 1] = VERTEX, blocks[block, FACE, k]
+                else:
+                    reach = reach_in(blocks, root)
+                    out[FEATURE_TYPE_A], out[FEATURE_TYPE_A + 1] = triangle_feature(blocks, block, k, n, reach)
     return found
 
 
@@ -190,7 +236,7 @@ def advance_to_solid(
                     continue
                 c, size = _middle(triangle_at(blocks, block, k))
                 radius = blocks[block, RADIUS, k]
-            bound, n = _outside(table, b, place_point(Y, c))
+            bound, n, _ = point_distance(table, b, place_point(Y, c))
             n = opposite(minus(place_point(X, n), (X.x, X.y, X.z)))
             time = _solid_time(table, b, X, n, bound - size - radius - move.start, c, size, move)
             if not time < best:

@@ -8,7 +8,7 @@ from typing import Any, Final
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.meshes.boxes import box_bounds, triangle_bounds
 from collision_monitor.meshes.layout import CHILD, FACE, RADIUS, WIDTH
-from collision_monitor.meshes.nearest import BOUNDS, NEAR_A, NEAR_B, PAIRS, opens_b, triangle_at
+from collision_monitor.meshes.nearest import BOUNDS, NEAR_A, NEAR_B, PAIRS, PLACE_A, PLACE_B, opens_b, triangle_at
 from collision_monitor.meshes.placing import inverse, place_triangle, relative
 from collision_monitor.meshes.triangle_pair import Triangle, closest_points, crossing_point
 from collision_monitor.narrow_phase.vector import Vector, along, cross, dot, minus
@@ -137,8 +137,13 @@ def triangle_depth(S: Triangle, T: Triangle) -> tuple[float, Vector]:
 
 
 @device
-def deepest(blocks_a: Any, blocks_b: Any, X: Any, work: Any, count: int) -> tuple[float, Vector, Vector]:
-    """Depth (m) of the deepest of the first pairs of `touching`, its direction, and a point on A."""
+def deepest(
+    blocks_a: Any, blocks_b: Any, X: Any, work: Any, count: int, answer: Any
+) -> tuple[float, Vector, Vector]:
+    """Depth (m) of the deepest of the first pairs of `touching`, its direction, and a point on A.
+
+    Its places are written to the answer (see `nearest`).
+    """
     best, direction, point = -1.0, (0.0, 0.0, 1.0), NOWHERE
     for k in range(count):
         a, b = int(work[PAIRS + 2 * k]), int(work[PAIRS + 2 * k + 1])
@@ -159,6 +164,7 @@ def deepest(blocks_a: Any, blocks_b: Any, X: Any, work: Any, count: int) -> tupl
             x, depth = found.on_a, radius - length
         if depth > best:
             best, direction = depth, n
+            answer[PLACE_A], answer[PLACE_B] = a, b
             point = along(x, blocks_a[a // WIDTH, RADIUS, a % WIDTH], n)
     return best, direction, point
 

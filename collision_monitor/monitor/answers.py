@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from collision_monitor import records
 from collision_monitor._jit import kernel
+from collision_monitor.meshes.nearest import MEMORY
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.active_pairs import ActivePairs
 from collision_monitor.monitor.contact_details import complete_contacts
@@ -57,7 +58,8 @@ class Answers(Stage):
         """Contacts (records.CONTACT) of the active pairs, sorted by ids, with the END of contacts of removed pairs."""
         roster, multibody = step.roster, step.roster.multibody
         contacts = np.empty(len(active.pairs), records.CONTACT)
-        complete_contacts(multibody, active.pairs, active.results, step.now, np.empty((1, 4)), np.empty((3, 3, 3)))
+        scratch = np.empty((1, 4)), np.empty((3, 3, 3))
+        complete_contacts(multibody, active.pairs, active.results, step.now, scratch, np.empty(MEMORY))
         n = write_contacts(active.pairs, active.results, roster.bodies, roster.parts.index, step.now, contacts)
         contacts = contacts[:n]
         if step.profile.contact_points > 1:

@@ -16,8 +16,11 @@ from collision_monitor.geometry.shape_table import (
     CYLINDER,
     HALF_SPACE,
     MESH,
+    POINTS,
     POLYGON,
+    TREE,
 )
+from collision_monitor.meshes.extent import farthest
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,
     DISTANCE,
@@ -36,6 +39,7 @@ from collision_monitor.narrow_phase.support_value import core_support
 from collision_monitor.narrow_phase.vector import Vector, dot, opposite, rotate_back
 from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUCHING, relative_now
+from collision_monitor.prediction.mesh_pair import has_mesh
 from collision_monitor.prediction.motion import rotation_now
 from collision_monitor.tolerances import FEATURE_TIE
 
@@ -124,11 +128,11 @@ def feature_along(table: Any, s: int, n: Vector) -> tuple[float, float]:
         return _of_vertices(table, s, n)
     if kind == HALF_SPACE:
         return FACE, 0.0
-    return (UNKNOWN if kind == MESH else SURFACE), 0.0
+    return SURFACE, 0.0
 
 
 @device
-def _reach_of_body(multibody: Any, i: int, n: Vector, R_body: Any, R_shape: Any) -> float:
+def _reach_of_body(multibody: Any, i: int, n: Vector, R_body: Any, R_shape: Any, work: Any) -> float:
     """How far all shapes of a body reach from its origin along n (m), in world axes."""
     table, parts, bodies = multibody
     reach = -inf
@@ -136,8 +140,11 @@ def _reach_of_body(multibody: Any, i: int, n: Vector, R_body: Any, R_shape: Any)
     while s >= 0:
         o = place_shape(table, parts, s, R_body, R_shape)
         d = rotate_back(R_shape, n)
-        own = table.radius[s]
-        if table.kind[s] != MESH and table.kind[s] != HALF_SPACE:
+        if table.kind[s] == MESH or table.kind[s] == POINTS:
+            own = farthest(table.blocks, int(table.size[s, TREE]) - 1, d, work) + table.margin[s]
+        elif table.kind[s] == HALF_SPACE:
+            own = table.radius[s]
+        else:
             own = core_support(table, s, d[0], d[1], d[2]) + rounding(table, s)
         reach = max(reach, dot(n, o) + own)
         s = parts.next[s]
@@ -145,15 +152,17 @@ def _reach_of_body(multibody: Any, i: int, n: Vector, R_body: Any, R_shape: Any)
 
 
 @kernel
-def complete_contacts(multibody: Any, pairs: Any, results: Any, now: float, quaternion: Any, R: Any) -> None:
+def complete_contacts(multibody: Any, pairs: Any, results: Any, now: float, scratch: Any, work: Any) -> None:
     """Name the features that are UNKNOWN in the results (n, RESULT) of the pairs that touch, and widen their bounds.
 
     Features are named where the contact is settled and the object is tested exactly.
 
-    The depth of compounds is that of their deepest two shapes. A translation along the normal that parts all of their
-    shapes may be longer, by what is added to the bound. quaternion (1, 4), R (3, 3, 3): scratch memory.
+    The depth of compounds and meshes is that of their deepest two pieces. A translation along the normal that parts all
+    of them may be longer, by what is added to the bound. Scratch memory: a quaternion (1, 4) with rotations (3, 3, 3),
+    and work (MEMORY,).
     """
     table, parts, bodies = multibody
+    quaternion, R = scratch
     for k in range(pairs.size):
         if pairs[k].touching == 0:
             continue
@@ -171,9 +180,10 @@ def complete_contacts(multibody: Any, pairs: Any, results: Any, now: float, quat
                     table, s, rotate_back(R[2], n if side == 0 else opposite(n))
                 )
         several = parts.next[bodies.first_shape[i]] >= 0 or parts.next[bodies.first_shape[j]] >= 0
+        several = several or has_mesh(table, bodies.first_shape[i], bodies.first_shape[j])
         if several and row[DISTANCE] <= 0.0:
             if table.kind[int(row[SHAPE_I])] == HALF_SPACE or table.kind[int(row[SHAPE_J])] == HALF_SPACE:
                 continue  # the only way out is along its normal
-            reach = _reach_of_body(multibody, i, n, R[0], R[2])
-            reach += _reach_of_body(multibody, j, opposite(n), R[1], R[2])
+            reach = _reach_of_body(multibody, i, n, R[0], R[2], work)
+            reach += _reach_of_body(multibody, j, opposite(n), R[1], R[2], work)
             row[BOUND] += max(reach - dot(n, relative_now(bodies, i, j, now).p) + row[DISTANCE], 0.0)

@@ -196,7 +196,7 @@ def _states(ids: NDArray[Any], poses: Any, twists: Any) -> States:
     n = len(ids)
     if pose.shape != (n, 7) or twist.shape != (n, 6):
         raise InputError(
-            "expected ids (N,), poses (N, 7) and twists (N, 6), "
+            "expected ids (N,), poses (N, 7), x y z qx qy qz qw, and twists (N, 6), linear, angular; "
             f"got shapes {ids.shape}, {pose.shape} and {twist.shape}"
         )
     if ids.min() < 0 or ids.max() >= 2**32:

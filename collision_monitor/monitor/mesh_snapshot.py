@@ -1,4 +1,4 @@
-"""The meshes of a snapshot: their triangles, from which `restore` builds the trees again, equal to the bit."""
+"""The meshes and clouds of a snapshot, from which `restore` builds their trees again, equal to the bit."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.shape_table import MESH, TREE, ShapeTable, ShapeTableBuilder
+from collision_monitor.geometry.shape_table import MESH, POINTS, TREE, ShapeTable, ShapeTableBuilder
+from collision_monitor.geometry.shapes import MOST_CLOUD_POINTS
+from collision_monitor.meshes.cloud_tree import cloud_points, cloud_tree
 from collision_monitor.meshes.slot_trees import plant_trees
 from collision_monitor.meshes.surface import Surface, surface_of
 from collision_monitor.monitor.snapshot import Snapshot, check_range
@@ -20,7 +22,25 @@ def mesh_arrays(table: ShapeTable) -> dict[str, NDArray[Any]]:
 
     meshes.of: the mesh of each slot with one. By mesh: numbers of triangles and of parts, and whether it is closed.
     meshes.corners (m, 3, 3) and meshes.points (k, 3): those of all meshes, one after another.
+    clouds.of: the cloud of each slot with one. clouds.count: the number of points of each cloud. clouds.points (n, 3).
     """
+    return {**_triangles(table), **_points(table)}
+
+
+def _points(table: ShapeTable) -> dict[str, NDArray[Any]]:
+    slots = np.flatnonzero(table.kind == POINTS)
+    if not len(slots):
+        return {}
+    roots, of = np.unique(table.size[slots, TREE].astype(np.int64) - 1, return_inverse=True)
+    found = [cloud_points(table.blocks, int(root)) for root in roots]
+    return {
+        "clouds.of": of.astype(np.int32),
+        "clouds.count": np.array([len(each) for each in found], np.int32),
+        "clouds.points": np.concatenate(found),
+    }
+
+
+def _triangles(table: ShapeTable) -> dict[str, NDArray[Any]]:
     slots = np.flatnonzero(table.kind == MESH)
     if not len(slots):
         return {}
@@ -37,10 +57,32 @@ def mesh_arrays(table: ShapeTable) -> dict[str, NDArray[Any]]:
 
 
 def plant_meshes(builder: ShapeTableBuilder, snapshot: Snapshot) -> None:
-    """Give the meshes of a restored table their trees, and the other shapes those that their pairs need.
+    """Give the meshes and clouds of a restored table their trees, and the other shapes those that their pairs need.
 
     Raises InputError if the arrays do not describe them.
     """
+    _plant_triangles(builder, snapshot)
+    _plant_points(builder, snapshot)
+    plant_trees(builder)
+
+
+def _plant_points(builder: ShapeTableBuilder, snapshot: Snapshot) -> None:
+    slots = np.flatnonzero(builder.table.kind == POINTS)
+    if not len(slots):
+        return
+    of = snapshot.array("clouds.of", np.zeros(0, np.int32), len(slots))
+    counts = snapshot.array("clouds.count", np.zeros(0, np.int32))
+    check_range("clouds.of", of, 0, len(counts))
+    check_range("clouds.count", counts, 1, MOST_CLOUD_POINTS + 1)
+    points = snapshot.array("clouds.points", np.zeros((0, 3)), int(counts.sum()))
+    if not (np.abs(points) <= LARGEST_INPUT).all():
+        raise InputError(f"snapshot, clouds: expected finite coordinates up to {LARGEST_INPUT:g}, got others")
+    trees = [cloud_tree(each) for each in np.split(points, np.cumsum(counts)[:-1])]
+    for slot, cloud in zip(slots.tolist(), of.tolist(), strict=True):
+        builder.plant(slot, trees[cloud])
+
+
+def _plant_triangles(builder: ShapeTableBuilder, snapshot: Snapshot) -> None:
     slots = np.flatnonzero(builder.table.kind == MESH)
     if not len(slots):
         return
@@ -62,4 +104,3 @@ def plant_meshes(builder: ShapeTableBuilder, snapshot: Snapshot) -> None:
     ]
     for slot, mesh in zip(slots.tolist(), of.tolist(), strict=True):
         builder.plant(slot, trees[mesh])
-    plant_trees(builder)

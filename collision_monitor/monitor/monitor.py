@@ -65,7 +65,7 @@ class Monitor:
     def __init__(self, profile: str | Profile = "balanced", *, timed: bool = True, warns: bool = True) -> None:
         """Make a monitor without objects. warns: whether the first refusal of each kind is a RefusalWarning too."""
         self._unwarned = set(Refusal) if warns else set()
-        self._profile = Profile.named(profile) if isinstance(profile, str) else profile
+        self._profile = profile if isinstance(profile, Profile) else Profile.named(profile)
         self._settings = KernelSettings.of(self._profile)
         self._roster = Roster()
         self._timeline = Timeline()
@@ -227,6 +227,16 @@ class Monitor:
         return self._timeline.restarts
 
     @property
+    def roster(self) -> Roster:
+        """The objects and their last states, for reading."""
+        return self._roster
+
+    @property
+    def now(self) -> float:
+        """The latest time (s after the first stamp); the states in `roster` have such times."""
+        return self._timeline.now
+
+    @property
     def stale_ids(self) -> list[int]:
         """Ids of the objects that are stale at the latest time, ascending."""
         if self._answers.last is None or not self._timeline.has_begun:
@@ -264,7 +274,8 @@ class Monitor:
         first of each kind is a RefusalWarning. Raises InputError for arrays of another shape.
         """
         if not isinstance(stamp_ns, int | np.integer) or isinstance(stamp_ns, bool):
-            raise InputError(f"stamp_ns: expected an integer number of nanoseconds, got {stamp_ns!r}")
+            got = f"got {stamp_ns!r}; of seconds t write round(1e9 * t)"
+            raise InputError(f"stamp_ns: expected an integer number of nanoseconds, {got}")
         states, covariances = self._intake.states(ids, poses, twists, covariance)
         self._intake.of_step = {}
         with self.clock:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel, kernel
-from collision_monitor.geometry.shape_table import MESH, take
+from collision_monitor.geometry.shape_table import take
 from collision_monitor.monitor.active_pairs import Active
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.dispatch import contact_batch
@@ -21,6 +21,7 @@ from collision_monitor.narrow_phase.manifold import CORNERS, manifold_batch, red
 from collision_monitor.narrow_phase.work_memory import work_array
 from collision_monitor.prediction.bodies import Multibody, next_pair, place_shape
 from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUCHING, closing_now, relative_now
+from collision_monitor.prediction.mesh_pair import has_mesh
 from collision_monitor.prediction.motion import position_now, rotation_now
 from collision_monitor.records import MOST_POINTS
 from collision_monitor.tolerances import FEATURE_TIE
@@ -68,7 +69,7 @@ def _shape_pairs(multibody, active, now, scratch, found):
             ob = place_shape(table, parts, b, R[1], R[3])
             x, y, z = px + ob[0], py + ob[1], pz + ob[2]
             apart = sqrt((x - oa[0]) ** 2 + (y - oa[1]) ** 2 + (z - oa[2]) ** 2)
-            has_faces = table.kind[a] != MESH and table.kind[b] != MESH  # a mesh has one contact point
+            has_faces = not has_mesh(table, a, b)  # which has one contact point
             if has_faces and apart - table.radius[a] - table.radius[b] <= near:
                 if n < found.size:
                     found[n].of, found[n].tie = k, FEATURE_TIE * size

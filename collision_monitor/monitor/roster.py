@@ -13,7 +13,7 @@ from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.shape_table import POLYGON, SHARED, TREE, ShapeTable, ShapeTableBuilder
-from collision_monitor.geometry.shapes import HalfSpace, Mesh, array_bytes
+from collision_monitor.geometry.shapes import HalfSpace, Mesh, Points, array_bytes
 from collision_monitor.meshes.shape_trees import shape_tree
 from collision_monitor.meshes.slot_trees import plant_trees
 from collision_monitor.monitor.mesh_snapshot import mesh_arrays, plant_meshes
@@ -43,15 +43,16 @@ the table has up to twice the room that it needs."""
 
 
 TREE_BYTES: Final = 300
-"""Memory of a triangle in the tree of its mesh: 150 to 220 bytes, and the array of all trees may have half as much room
+"""Memory of a triangle or a point in its tree: 150 to 220 bytes, and the array of all trees may have half as much room
 again."""
 
 
 def memory(d: ObjectDescription) -> int:
     """Return the memory that a described object needs (bytes), rounded up."""
     shapes = sum(SHAPE_BYTES + COPIES * array_bytes(shape) for shape, _ in d.shapes)
-    trees = TREE_BYTES * sum(len(shape.faces) for shape, _ in d.shapes if isinstance(shape, Mesh))
-    return OBJECT_BYTES + shapes + trees + ALLOWED_BYTES * len(d.allowed)
+    leaves = sum(len(shape.faces) for shape, _ in d.shapes if isinstance(shape, Mesh))
+    leaves += sum(len(shape.points) for shape, _ in d.shapes if isinstance(shape, Points))
+    return OBJECT_BYTES + shapes + TREE_BYTES * leaves + ALLOWED_BYTES * len(d.allowed)
 
 
 class Roster(Stage):
@@ -187,7 +188,7 @@ class Roster(Stage):
         slots: list[int] = []
         try:
             for (shape, offset), chosen in zip(modelled.pieces, corners, strict=True):
-                tree = shape_tree(shape) if isinstance(shape, Mesh) else None
+                tree = shape_tree(shape) if isinstance(shape, Mesh | Points) else None
                 placed = flat_pose(offset) if planar else offset
                 slots.append(self._shapes.append(shape, placed, d.padding, chosen, tree))
             plant_trees(self._shapes)

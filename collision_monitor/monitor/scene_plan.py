@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.hashed_grid import GRID_LEVELS, LEVEL_OFFSET, HashedGrid
-from collision_monitor.geometry.shape_table import MESH
+from collision_monitor.geometry.shape_table import MESH, POINTS
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.narrow_phase.dispatch import KIND_NAMES, TEST_METHODS, pair_test
 
-_NAMES: Final = {**KIND_NAMES, MESH: "mesh"}
-_METHODS: Final = {**TEST_METHODS, "meshes": "trees of triangles"}
+_NAMES: Final = {**KIND_NAMES, MESH: "mesh", POINTS: "points"}
+_METHODS: Final = {**TEST_METHODS, "meshes": "trees of triangles or points"}
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,8 @@ def scene_plan(roster: Roster, grid: HashedGrid, *, uncertain: bool, outside: in
         static=int(np.count_nonzero(static)),
         turning=int(np.count_nonzero(bodies.spin_radius[moving_bodies] > 0.0)),
         tests={
-            (_NAMES[a], _NAMES[b]): "meshes" if MESH in (a, b) else pair_test(a, b) for a, b in sorted(set(pairs))
+            (_NAMES[a], _NAMES[b]): "meshes" if {a, b} & {MESH, POINTS} else pair_test(a, b)
+            for a, b in sorted(set(pairs))
         },
         cells={2.0 ** (k - LEVEL_OFFSET): int(grid.level_count[k]) for k in range(GRID_LEVELS) if grid.level_count[k]},
         groups=len(filters),

@@ -62,7 +62,7 @@ def _edge(best: float, axis: int, sign: float, number: int, dot: float, radius: 
     return best, axis, sign
 
 
-@device
+@inlined
 def sat(a: Vector, b: Vector, pose: PairPose, limit: float) -> Any:
     """Largest gap of the 15 axes (m), its axis and sign; a and b are half extents (3,) in m.
 
@@ -158,7 +158,7 @@ def sat(a: Vector, b: Vector, pose: PairPose, limit: float) -> Any:
     return best, axis, sign
 
 
-@device
+@inlined
 def axis_direction(axis: int, sign: float, pose: PairPose) -> Vector:
     """Unit vector of a SAT axis in world axes, times the sign."""
     RA, RB = pose.R_A, pose.R_B
@@ -175,7 +175,7 @@ def axis_direction(axis: int, sign: float, pose: PairPose) -> Vector:
     return x * scale, y * scale, z * scale
 
 
-@device
+@inlined
 def box_box_separation(a: Vector, b: Vector, margin: float, pose: PairPose, out: Any) -> float:
     """Largest SAT gap minus the margins and the round-off (m), with its unit direction in out[0:3]."""
     gap, axis, sign = sat(a, b, pose, inf)
@@ -183,7 +183,7 @@ def box_box_separation(a: Vector, b: Vector, margin: float, pose: PairPose, out:
     return gap - margin - SAT_ROUND_OFF * (abs(gap) + a[0] + a[1] + a[2] + b[0] + b[1] + b[2])
 
 
-@device
+@inlined
 def _find(feature: BoxFeature, n: Vector, tie: float) -> int:
     """Fill the row of the feature that is extreme along n; return its number of free axes: 0 vertex, 1 edge, 2 face."""
     row, R = feature.row, feature.R
@@ -231,7 +231,7 @@ def _clip(work: Any, source: int, target: int, count: int, column: int, limit: f
     return count
 
 
-@device
+@inlined
 def _common_point(face: BoxFeature, other: BoxFeature, d: Vector, work: Any) -> Vector:
     """Middle of the common part of a face and another feature, as an offset (m) from the face's centre in its plane.
 
@@ -289,7 +289,7 @@ def _common_point(face: BoxFeature, other: BoxFeature, d: Vector, work: Any) -> 
     return along(scaled(side_i, ci), cj, side_j)
 
 
-@device
+@inlined
 def _describe(row: Any, free: int, out: Any, at: int) -> None:
     """Write feature type and index: faces +x -x +y -y +z -z; vertices by their sides as bits; edges 4 axis + sides."""
     if free == 0:
@@ -309,7 +309,7 @@ def _describe(row: Any, free: int, out: Any, at: int) -> None:
                 out[at + 1] = 2.0 * k + (0.0 if row[3 + k] > 0.0 else 1.0)
 
 
-@device
+@inlined
 def touching_features(a: Any, b: Any, pose: PairPose, distance: float, n: Vector, out: Any, work: Any) -> None:
     """Write the contact of two boxes (half extents a, b) with the given signed distance (m) and normal n.
 

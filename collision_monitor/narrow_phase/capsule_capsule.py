@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import copysign, sqrt
 from typing import Any
 
-from collision_monitor._jit import device
+from collision_monitor._jit import inlined
 from collision_monitor.narrow_phase.contact_row import FEATURE_TYPE_A, FEATURE_TYPE_B, SURFACE, write
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.segment import segment_segment
@@ -13,7 +13,7 @@ from collision_monitor.narrow_phase.vector import across, column, cross, directi
 from collision_monitor.tolerances import GJK_TOUCHING, SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2
 
 
-@device
+@inlined
 def capsule_capsule_contact(ra: float, la: float, rb: float, lb: float, pose: PairPose, out: Any) -> None:
     """Write the contact; ra, rb: radii with margins, la, lb: half core lengths (m), 0 for a sphere.
 

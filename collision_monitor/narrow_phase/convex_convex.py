@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import inlined
 from collision_monitor.geometry.shape_table import CONE, CYLINDER, ELLIPSOID
 from collision_monitor.narrow_phase.contact_row import write
 from collision_monitor.narrow_phase.core import CorePair, core_length, core_pair, core_radius, rounding
@@ -23,7 +23,7 @@ from collision_monitor.narrow_phase.work_memory import MAX_VERTICES, P_AB, R_AB,
 from collision_monitor.tolerances import EPA_CURVED, EPA_CURVED_POINTS, EPA_POLYTOPE, GJK_TOUCHING, SAT_ROUND_OFF
 
 
-@device
+@inlined
 def _place(pose: PairPose, work: Any) -> None:
     """Write the pose of B in A's frame to the scratch memory."""
     RA, RB = pose.R_A, pose.R_B
@@ -40,7 +40,7 @@ def _is_curved(kind: int) -> bool:
     return kind == CYLINDER or kind == CONE or kind == ELLIPSOID
 
 
-@device
+@inlined
 def convex_separation(table: Any, a: int, b: int, pose: PairPose, limit: float, out: Any, work: Any) -> float:
     """Certified lower bound of the distance (m), <= 0 if they overlap or touch; its direction is in out[0:3].
 
@@ -56,14 +56,14 @@ def convex_separation(table: Any, a: int, b: int, pose: PairPose, limit: float, 
     return max(lower, 0.0) - radii - slack
 
 
-@device
+@inlined
 def convex_contact(table: Any, a: int, b: int, pose: PairPose, limit: float, out: Any, work: Any) -> bool:
     """Write the contact; False, with out undefined, as soon as the distance is certified to exceed `limit` (m)."""
     size = core_length(table, a) + core_length(table, b)
     return cores_contact(core_pair(table, a, b), (rounding(table, a), rounding(table, b)), size, pose, limit, out, work)
 
 
-@device
+@inlined
 def cores_contact(
     cores: CorePair, radii: tuple[float, float], size: float, pose: PairPose, limit: float, out: Any, work: Any
 ) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import copysign, sqrt
 from typing import Any
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import inlined
 from collision_monitor.geometry.shape_table import CYLINDER, SPHERE
 from collision_monitor.narrow_phase.contact_row import FEATURE_TYPE_A, SURFACE, write
 from collision_monitor.narrow_phase.core import rounding
@@ -27,7 +27,7 @@ def is_parallel(table: Any, a: int, pose: PairPose) -> bool:
     return dot(c, c) <= SEGMENT_PARALLEL_SIN2
 
 
-@device
+@inlined
 def parallel_cylinders_contact(table: Any, a: int, b: int, R: Any, p: Vector, out: Any) -> None:
     """Write the contact of shape a and cylinder b, with rotation R (3, 3), for which `is_parallel` holds.
 

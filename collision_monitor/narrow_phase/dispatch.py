@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, inlined, kernel, merged
+from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.geometry.shape_table import (
     BOX,
     CAPSULE,
@@ -152,7 +152,7 @@ def _is_swapped(table: Any, a: int, b: int) -> bool:
     return ka == HALF_SPACE or (ka > kb and kb != HALF_SPACE)
 
 
-@merged
+@inlined
 def separation(table: Any, a: int, b: int, pose: PairPose, out: Any, work: Any) -> float:
     """Certified lower bound (m) of the distance of shapes a and b, with its unit direction from A to B in out[0:3].
 
@@ -171,7 +171,7 @@ def separation(table: Any, a: int, b: int, pose: PairPose, out: Any, work: Any) 
     return gap
 
 
-@merged
+@inlined
 def _separation(table: Any, a: int, b: int, pose: PairPose, out: Any, work: Any) -> float:
     test = _TEST_OF[table.kind[a], table.kind[b]]
     if test == BOX_BOX:
@@ -194,7 +194,7 @@ def _separation(table: Any, a: int, b: int, pose: PairPose, out: Any, work: Any)
     return convex_separation(table, a, b, pose, inf, out, work)
 
 
-@merged
+@inlined
 def contact_within(table: Any, a: int, b: int, pose: PairPose, limit: float, out: Any, work: Any) -> bool:
     """Whether the signed distance is at most `limit` (m); only then `out` holds the contact (see contact_row.py).
 
@@ -227,13 +227,13 @@ def _mirror(out: Any, p: Vector) -> None:
         out[FEATURE_TYPE_B + i] = feature
 
 
-@merged
+@inlined
 def pair_contact(table: Any, a: Any, b: Any, pose: PairPose, out: Any, work: Any) -> None:
     """Write the contact of shapes a and b to `out` (see contact_row.py)."""
     contact_within(table, a, b, pose, inf, out, work)
 
 
-@merged
+@inlined
 def _contact(table: Any, a: int, b: int, pose: PairPose, limit: float, out: Any, work: Any) -> bool:
     test = _TEST_OF[table.kind[a], table.kind[b]]
     if test == BOX_BOX:
@@ -248,7 +248,7 @@ def _contact(table: Any, a: int, b: int, pose: PairPose, limit: float, out: Any,
     return True
 
 
-@merged
+@inlined
 def _closed_form(test: int, table: Any, a: int, b: int, pose: PairPose, out: Any) -> bool:
     """Write the contact to out if the test is a closed form that the callers do not handle; return whether it is."""
     if test == HALF_SPACE_ANY:

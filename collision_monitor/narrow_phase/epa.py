@@ -37,7 +37,7 @@ def _from_first(work: Any, k: int) -> Vector:
     return minus(simplex_point(work, k), simplex_point(work, 0))
 
 
-@device
+@inlined
 def _normal(work: Any, i: int, j: int, k: int) -> tuple[Vector, float]:
     """Cross product of the edges ij and ik, and the product of their squared lengths."""
     a = simplex_point(work, i)
@@ -45,7 +45,7 @@ def _normal(work: Any, i: int, j: int, k: int) -> tuple[Vector, float]:
     return cross(u, v), dot(u, u) * dot(v, v)
 
 
-@device
+@inlined
 def _set_face(work: Any, f: int, i: int, j: int, k: int) -> None:
     """Face f through the points i, j, k, counter-clockwise from outside; a sliver gets distance inf and no normal."""
     n, product = _normal(work, i, j, k)
@@ -99,7 +99,7 @@ def _off(work: Any, count: int, n: Vector) -> float:
     return sqrt(dot(d, d))
 
 
-@device
+@inlined
 def _push_edge(work: Any, count: int, i: float, j: float) -> int:
     """Add a directed edge to the horizon, or cancel it against its reverse: the edge is then inside the hole."""
     for e in range(count):
@@ -140,6 +140,20 @@ def _grow(cores: CorePair, work: Any, flat: float, count: int) -> tuple[int, flo
         work[WEIGHTS + count] = 0.0
         count += 1
     return count, inf, (0.0, 0.0, 0.0)
+
+
+@inlined
+def _least_along_axes(cores: CorePair, work: Any) -> tuple[float, Vector]:
+    """Upper bound of the depth (m) and its direction: the least support along the six directions of A's axes."""
+    least = inf
+    direction = (1.0, 0.0, 0.0)
+    for step in range(6):
+        d = _probe(work, 1, step)
+        h = dot(d, support_difference(cores, work, d, SPARE))
+        if h < least:
+            least = h
+            direction = d
+    return least, direction
 
 
 @device
@@ -276,5 +290,8 @@ def epa(
     if count < 4:
         return upper, min(upper, -flat), opposite(outward), _weighted_point_on_a(work, count)
     upper, lower, outward, plane, faces = _expand(cores, work, size, tolerance, most)
+    if not upper < inf:  # every face of the first tetrahedron is a sliver
+        upper, outward = _least_along_axes(cores, work)
+        lower = min(upper, -flat)
     reach = plane + max(upper - plane, 64.0 * EPSILON * size)
     return upper, lower, opposite(outward), _witness(work, faces, scaled(outward, upper), reach)

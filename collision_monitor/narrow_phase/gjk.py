@@ -44,7 +44,7 @@ def weighted(weights: Vector, a: Vector, b: Vector, c: Vector) -> Vector:
     )
 
 
-@device
+@inlined
 def _segment(a: Vector, b: Vector) -> float:
     """Weight of b in the point of segment ab that is closest to the origin."""
     e = minus(b, a)
@@ -57,7 +57,7 @@ def _segment(a: Vector, b: Vector) -> float:
     return toward / length2
 
 
-@device
+@inlined
 def _triangle(a: Vector, b: Vector, c: Vector) -> tuple[Vector, bool]:
     """Weights of a, b and the newest point c in the point closest to the origin; whether it is inside the face."""
     u, v = minus(b, a), minus(c, a)
@@ -107,7 +107,7 @@ def _face_vector(a: Vector, b: Vector, c: Vector, weights: Vector) -> Vector:
     return scaled(n, dot(n, a) / n2)
 
 
-@device
+@inlined
 def _keep(work: Any, count: int) -> int:
     """Adopt the new weights and drop the simplex points of weight 0; returns the number of points left."""
     kept = 0
@@ -121,7 +121,7 @@ def _keep(work: Any, count: int) -> int:
     return kept
 
 
-@device
+@inlined
 def _closest(work: Any, count: int, size: float) -> tuple[bool, Vector]:
     """Whether the simplex contains the origin, and its point closest to the origin; writes the weights of that point.
 
@@ -169,7 +169,7 @@ def _closest(work: Any, count: int, size: float) -> tuple[bool, Vector]:
     return best == inf, nearest
 
 
-@device
+@inlined
 def gjk(cores: CorePair, work: Any, size: float, limit: float) -> tuple[int, float, Vector]:
     """Distance between two cores, with the pose of B in A's frame in the scratch memory.
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
-from collision_monitor._jit import device
+from collision_monitor._jit import inlined
 from collision_monitor.narrow_phase.contact_row import FEATURE_TYPE_A, SURFACE, write
 from collision_monitor.narrow_phase.vector import Vector, across, column, dot, scaled
 from collision_monitor.tolerances import SAT_ROUND_OFF
 
 
-@device
+@inlined
 def sphere_cone_contact(radius: float, r: float, h: float, margin: float, R: Any, p: Vector, out: Any) -> None:
     """Write the contact of a sphere (`radius` includes its margin) and a cone of base radius r and half height h (m).
 

@@ -11,7 +11,7 @@ from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
-from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, Polygon, Shape
+from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, Points, Polygon, Shape
 from collision_monitor.objects.models import Modelled
 from collision_monitor.records import Model
 from collision_monitor.tolerances import ROUNDED_UP
@@ -53,12 +53,14 @@ def _has_corners(shape: Shape) -> bool:
 
 
 def _own_points(shape: Shape) -> Array:
-    """Some points (n, 3) of a shape in its frame: all corners of a polytope, the centre of a round shape."""
+    """Some points (n, 3) of a shape in its frame: all corners of a polytope, a cloud, the centre of a round shape."""
     match shape:
         case ConvexHull():
             return np.asarray(shape.points)
         case Mesh():
             return np.asarray(shape.vertices[np.unique(shape.faces)])
+        case Points():
+            return np.asarray(shape.points)
         case Polygon():
             return np.pad(shape.points, ((0, 0), (0, 1)))
     return np.zeros((1, 3))

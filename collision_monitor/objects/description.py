@@ -26,7 +26,8 @@ Longer names are refused, because cutting them could make two of them equal."""
 
 def _uint32(value: Any, what: str) -> int:
     if isinstance(value, bool) or not hasattr(value, "__index__") or not 0 <= value.__index__() <= _UINT32_MAX:
-        raise InputError(f"{what}: expected an integer from 0 to {_UINT32_MAX}, got {value!r}")
+        name = "; a text goes into name=" if isinstance(value, str) else ""
+        raise InputError(f"{what}: expected an integer from 0 to {_UINT32_MAX}, got {value!r}{name}")
     return int(value)
 
 

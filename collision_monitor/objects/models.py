@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -17,13 +16,10 @@ from collision_monitor.geometry.bounding_spheres import minimal_sphere
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
 from collision_monitor.geometry.convex_pieces import convex_pieces, is_concave_mesh
 from collision_monitor.geometry.coordinates import coordinates
-from collision_monitor.geometry.inside import locate_in_surface
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
 from collision_monitor.geometry.planar import is_planar
-from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
-from collision_monitor.geometry.shape_table import ShapeTableBuilder, take
 from collision_monitor.geometry.shapes import (
     Box,
     Capsule,
@@ -33,21 +29,17 @@ from collision_monitor.geometry.shapes import (
     Ellipsoid,
     HalfSpace,
     Mesh,
+    Points,
     Shape,
     Sphere,
     Triangle,
 )
-from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.objects.convex_decomposition import convex_decomposition
+from collision_monitor.objects.excess import PosedShapes, corners, excess_of
 from collision_monitor.records import Model
 from collision_monitor.tolerances import ROUNDED_UP
 
 Array = NDArray[np.float64]
-PosedShapes = list[tuple[Shape, Pose]]
-
-EXCESS_CELLS: Final = 24
-"""Cells along each axis for the search for the excess around a concave object; its accuracy is their half diagonal.
-Larger: the time grows as the cube. Smaller: the stated excess is up to 2/EXCESS_CELLS of the size too large."""
 
 MOST_DIRECTIONS: Final = 200
 """Most directions of a user's k-DOP; its polytope has up to four corners for each."""
@@ -85,7 +77,7 @@ def parse_model(model: Model | str | int) -> Model:
 
 def shape_class(shapes: Sequence[tuple[Shape, Pose]]) -> str | None:
     """Class of an object: primitive, hull, mesh or compound, each with a setting; None if there is no coarser model."""
-    if any(is_planar(shape) or isinstance(shape, HalfSpace) for shape, _ in shapes):
+    if any(is_planar(shape) or isinstance(shape, HalfSpace | Points) for shape, _ in shapes):
         return None
     if len(shapes) > 1:
         return "compound"
@@ -112,20 +104,20 @@ def containing_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | 
     if chosen in (Model.AUTO, Model.EXACT):
         return Modelled(pieces, index, Model.EXACT, 0.0, convex)
     for shape, _ in shapes:
-        if is_planar(shape) or isinstance(shape, HalfSpace):
+        if is_planar(shape) or isinstance(shape, HalfSpace | Points):
             raise UnsupportedError(
                 f"{type(shape).__name__}: model {chosen.name.lower()} is not offered; supported are auto, exact"
             )
     if chosen is Model.CONVEX_DECOMPOSITION:
         return _decomposed(shapes, convex)
     piece, pose = _enclose(pieces, chosen)
-    return Modelled([(piece, pose)], [0], chosen, _excess(shapes, pieces, piece, pose), convex)
+    return Modelled([(piece, pose)], [0], chosen, excess_of(shapes, pieces, piece, pose), convex)
 
 
 def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | int) -> Modelled:
     """Compute the model that a monitor uses, as `containing_model`; but an exact concave mesh stays one piece.
 
-    A mesh of which the inside is not certain (`Surface.certain`) has no exact model: its convex hull replaces it.
+    A mesh with an uncertain inside (`Surface.certain`) has no exact model. Its convex hull replaces it.
     """
     chosen = parse_model(model)
     if chosen not in (Model.AUTO, Model.EXACT):
@@ -147,11 +139,11 @@ def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | i
 
 
 def exact_model(shapes: Sequence[tuple[Shape, Pose]]) -> Modelled:
-    """Convex pieces and concave meshes that are exactly the object."""
+    """Convex pieces, concave meshes and clouds that are exactly the object."""
     pieces: PosedShapes = []
     index = []
     for k, (shape, pose) in enumerate(shapes):
-        if is_concave_mesh(shape):
+        if is_concave_mesh(shape) or isinstance(shape, Points):
             pieces.append((shape, pose))
             index.append(k)
             continue
@@ -159,7 +151,7 @@ def exact_model(shapes: Sequence[tuple[Shape, Pose]]) -> Modelled:
         for part, offset in convex_pieces(shape):
             pieces.append((part, pose @ offset if placed else offset))
             index.append(k)
-    convex = len(pieces) == 1 and not isinstance(pieces[0][0], Mesh)
+    convex = len(pieces) == 1 and not isinstance(pieces[0][0], Mesh | Points)
     return Modelled(pieces, index, Model.EXACT, 0.0, convex)
 
 
@@ -187,7 +179,7 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
         case Model.SPHERE:
             if single and isinstance(shape, Sphere | Box | Capsule | Cylinder | Ellipsoid):
                 return Sphere(float(reach([(shape, Pose())], _widest(shape))) * (1 + ROUNDED_UP)), pose
-            ball = minimal_sphere(_corners(pieces))
+            ball = minimal_sphere(corners(pieces))
             return Sphere(float(ball.radius) * (1 + ROUNDED_UP)), Pose(ball.center)
         case Model.AABB:
             low, high = -reach(pieces, -np.eye(3)), reach(pieces, np.eye(3))
@@ -198,7 +190,7 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
                 return _box(high - low), pose @ Pose((low + high) / 2)
             from scipy.spatial.transform import Rotation
 
-            box = obb_minimum_volume(_corners(pieces))
+            box = obb_minimum_volume(corners(pieces))
             axes = np.array(box.rotation)
             axes[:, 2] *= np.sign(np.linalg.det(axes))
             turned = Rotation.from_matrix(axes).as_quat()
@@ -208,7 +200,7 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
                 if single:
                     return shape, pose
                 raise UnsupportedError("model convex_hull: the hull of several shapes with round ones is not offered")
-            return ConvexHull(_corners(pieces)), Pose()
+            return ConvexHull(corners(pieces)), Pose()
     return _kdop(pieces, np.array(KDOP_DIRECTIONS[KDOPS[model]], float), model.name.lower())
 
 
@@ -231,19 +223,6 @@ def _box(size: Array) -> Box:
     return Box(size + ROUNDED_UP * float(size.max()))
 
 
-def _corners(pieces: PosedShapes) -> Array:
-    """Points with a hull that contains the pieces: vertices of polytopes, corners of boxes around round shapes."""
-    corners = []
-    for shape, pose in pieces:
-        if isinstance(shape, ConvexHull | Triangle):
-            points = shape.points
-        else:
-            low, high = -reach([(shape, Pose())], -np.eye(3)), reach([(shape, Pose())], np.eye(3))
-            points = np.array(list(product(*zip(low, high, strict=True))))
-        corners.append(points @ pose.rotation.T + pose.position)
-    return np.concatenate(corners)
-
-
 def containing_kdop(shapes: Sequence[tuple[Shape, Pose]], directions: ArrayLike) -> Modelled:
     """Compute the k-DOP of an object of these shapes with the user's directions (k/2, 3) of any length but zero.
 
@@ -260,11 +239,11 @@ def containing_kdop(shapes: Sequence[tuple[Shape, Pose]], directions: ArrayLike)
     if np.linalg.matrix_rank(normals, tol=1e-6) < 3:
         raise InputError("k-DOP directions: expected three or more that are not in one plane, got a slab without end")
     for shape, _ in shapes:
-        if is_planar(shape) or isinstance(shape, HalfSpace):
+        if is_planar(shape) or isinstance(shape, HalfSpace | Points):
             raise UnsupportedError(f"{type(shape).__name__}: a k-DOP is not offered; supported are auto, exact")
     pieces = [(piece, pose @ offset) for shape, pose in shapes for piece, offset in convex_pieces(shape)]
     solid, pose = _kdop(pieces, normals, "of these directions")
-    excess = _excess(shapes, pieces, solid, pose)
+    excess = excess_of(shapes, pieces, solid, pose)
     return Modelled([(solid, pose)], [0], Model.CONVEX_HULL, excess, len(pieces) == 1)
 
 
@@ -279,7 +258,7 @@ def _kdop(pieces: PosedShapes, directions: Array, name: str) -> tuple[Shape, Pos
     if (np.abs(directions[:3]) == np.eye(3)).all():
         centre = (far[:3] - far[k : k + 3]) / 2  # middle of the slabs along x, y and z
     else:
-        centre = _corners(pieces).mean(axis=0)
+        centre = corners(pieces).mean(axis=0)
     distance = far - normals @ centre
     size = float(distance.max())
     if not size > 0.0:
@@ -288,63 +267,3 @@ def _kdop(pieces: PosedShapes, directions: Array, name: str) -> tuple[Shape, Pos
     distance = np.maximum(distance, 1e-9 * size) + 1e-9 * size
     points = HalfspaceIntersection(np.column_stack([normals, -distance / size]), np.zeros(3)).intersections * size
     return ConvexHull(points), Pose(centre)
-
-
-def _excess(shapes: Sequence[tuple[Shape, Pose]], pieces: PosedShapes, model: Shape, pose: Pose) -> float:
-    """Largest distance (m) by which the model exceeds the object, rounded up."""
-    if len(pieces) == 1 and model is pieces[0][0]:
-        return 0.0
-    if len(pieces) > 1:
-        return _excess_around_concave(shapes, pieces, model, pose)
-    # the distance to a convex object is greatest at a corner of the model
-    if isinstance(model, Sphere):
-        return max(float(_distances(pose.position[None], pieces)[0]) + model.radius, 0.0)
-    return max(float(_distances(_corners([(model, pose)]), pieces).max()), 0.0)
-
-
-def _excess_around_concave(
-    shapes: Sequence[tuple[Shape, Pose]], pieces: PosedShapes, model: Shape, pose: Pose
-) -> float:
-    """Excess by sampling cells: the distance changes by at most half a cell's diagonal within a cell."""
-    low, high = -reach([(model, pose)], -np.eye(3)), reach([(model, pose)], np.eye(3))
-    cell = (high - low) / EXCESS_CELLS
-    slack = float(np.linalg.norm(cell)) / 2
-    centres = np.stack(np.meshgrid(*[np.arange(EXCESS_CELLS) + 0.5] * 3, indexing="ij"), -1).reshape(-1, 3) * cell + low
-    if not isinstance(model, Box):
-        centres = centres[_distances(centres, [(model, pose)]) <= slack]
-    inside = np.zeros(len(centres), bool)
-    for shape, offset in shapes:
-        if isinstance(shape, Mesh):
-            own = (centres - offset.position) @ offset.rotation
-            location = locate_in_surface(own, shape.surface)
-            inside |= (location == Location.INSIDE) | (location == Location.BOUNDARY)
-    centres = centres[~inside]
-    if not len(centres):
-        return slack
-    if all(isinstance(s, Triangle) for s, _ in pieces):
-        from scipy.spatial import cKDTree
-
-        # the distance to the nearest vertex bounds that to the nearest face and is much faster to compute
-        return float(cKDTree(_corners(pieces)).query(centres)[0].max()) + slack
-    return float(_distances(centres, pieces).max()) + slack
-
-
-def _distances(points: Array, pieces: PosedShapes) -> Array:
-    """Signed distances (n,) in m of points (n, 3) from the nearest piece, rounded up."""
-    builder = ShapeTableBuilder(slots=1 + len(pieces))
-    size = float(max(np.abs(reach(pieces, np.concatenate([np.eye(3), -np.eye(3)])))))
-    probe = Sphere(max(1e-9 * size, 1e-300))
-    builder.append(probe)
-    for shape, _ in pieces:
-        builder.append(shape)
-    best = np.full(len(points), np.inf)
-    count = len(points)
-    pairs = np.stack([np.zeros(count), np.arange(1, count + 1)], axis=1).astype(np.int32)
-    rotation = np.tile(np.eye(3), (1 + count, 1, 1))
-    for k, (_, pose) in enumerate(pieces, start=1):
-        # the piece is in slot 0, and the probe at each point around it
-        table = take(builder.table, np.r_[k, np.zeros(count, int)])
-        rotation[0] = pose.rotation
-        rows = contact_batch(table, np.concatenate([np.zeros((1, 3)), points - pose.position]), rotation, pairs)
-        best = np.minimum(best, rows[:, 0] + rows[:, 10] + probe.radius)
-    return best

@@ -16,7 +16,7 @@ from collision_monitor.geometry.convex_pieces import is_convex_mesh
 from collision_monitor.geometry.orientation import exact_limit
 from collision_monitor.geometry.polygons import is_convex
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import ConvexHull, Mesh, Polygon, Shape
+from collision_monitor.geometry.shapes import ConvexHull, HalfSpace, Mesh, Points, Polygon, Shape
 from collision_monitor.records import Model
 
 MESSAGE_MS: Final = 80.0
@@ -36,7 +36,8 @@ _SIMPLE: Final = 0.05  # a shape with dimensions
 _HULL: Final = (0.3, 3e-3, 5e-6)  # a hull: in all, for each point, for each two points
 _HEIGHT: Final = 2e-5  # a vertex above the plane of a face, in the test for convexity
 _CONCAVE: Final = (30.0, 0.12)  # the excess around a concave object: in all, for each face
-_TREE: Final = (0.1, 3e-3)  # the tree of an exact concave mesh: in all, for each face
+_TREE: Final = (0.1, 5e-3)  # the surface and the tree of an exact concave mesh: in all, for each face
+_POINT: Final = 1.5e-4  # a point of a cloud, in its tree
 _EXACT: Final = 0.02  # a determinant in integers
 _PIECE: Final = 10.0  # the excess around several pieces: for each piece
 _TRIANGLE: Final = 3.0  # the excess around a concave mesh beside other shapes: for each face
@@ -52,7 +53,7 @@ _MODELS: Final = {
 
 def is_quick(shapes: Sequence[tuple[Shape, Pose]]) -> bool:
     """Whether an object is one shape with dimensions. All of its models take less than SMALL_MS."""
-    return len(shapes) == 1 and not isinstance(shapes[0][0], ConvexHull | Mesh | Polygon)
+    return len(shapes) == 1 and not isinstance(shapes[0][0], ConvexHull | Mesh | Points | Polygon)
 
 
 class Budget:
@@ -67,6 +68,8 @@ class Budget:
         The time to find out is taken off in any case.
         """
         coarse = model not in (Model.AUTO, Model.EXACT)
+        if coarse and any(isinstance(shape, HalfSpace) for shape, _ in shapes):
+            return True  # it is refused at once, with the same text as in a replay
         cost = _PIECE * len(shapes) if coarse and len(shapes) > 1 else 0.0
         mixed = coarse and not all(isinstance(shape, Mesh) for shape, _ in shapes)
         for shape, _ in shapes:
@@ -103,14 +106,18 @@ class Budget:
                     return inf
                 if looking > 0.1 * SMALL_MS:
                     self.left -= looking
+                if model in (Model.AUTO, Model.EXACT) and not is_convex_mesh(shape):
+                    if shape.surface.certain:
+                        return _TREE[0] + _TREE[1] * m
+                    fixed, each = _MODELS[Model.CONVEX_HULL]  # see `monitored_model`
                 own = _of_hull(n) + (fixed if n > 8 else 0.1 * fixed) + each * n
                 if is_convex_mesh(shape):
                     return own
-                if model in (Model.AUTO, Model.EXACT):
-                    return _TREE[0] + _TREE[1] * m
                 if model is Model.CONVEX_DECOMPOSITION:
                     return inf
                 return own + _CONCAVE[0] + (_TRIANGLE if mixed else _CONCAVE[1]) * m
+            case Points():
+                return _POINT * len(shape.points) if model in (Model.AUTO, Model.EXACT) else inf
             case Polygon():
                 n = len(shape.points)
                 try:

@@ -68,6 +68,10 @@ class Catalogue:
         """Return the names of these objects. Those that the last step knew have one until the next step has ended."""
         return list(map(self._names.__getitem__, ids.tolist()))
 
+    def name(self, object_id: int) -> str:
+        """Return the name of an object, as `names` does."""
+        return self._names[object_id]
+
     def end_step(self) -> None:
         """Forget the names of the removed objects, because the step has ended their contacts."""
         self._new.clear()

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._version import VERSION
+from collision_monitor.alerts.alerts import Alerts
+from collision_monitor.alerts.rules import Rules
 from collision_monitor.codec import (
     Change,
     MonitorStatus,
@@ -21,14 +23,15 @@ from collision_monitor.codec import (
     Removal,
     decode_descriptions,
     decode_states,
+    encode_alert,
+    encode_alerts,
     encode_contacts,
     encode_descriptions,
     encode_predictions,
     encode_status,
 )
 from collision_monitor.codec.states import COVARIANCE_SIZE
-from collision_monitor.errors import InputError, MessageError, ProfileError, Refusal, TooCostlyError, reason_of
-from collision_monitor.geometry.shapes import HalfSpace
+from collision_monitor.errors import InputError, MessageError, Refusal, TooCostlyError, reason_of
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.snapshot import Snapshot
@@ -40,7 +43,7 @@ from collision_monitor.pipeline.catalogue import Catalogue
 from collision_monitor.pipeline.preparation import STAYS, Job, Preparation
 from collision_monitor.pipeline.provenance import provenance
 from collision_monitor.pipeline.sequence import LostMessages
-from collision_monitor.pipeline.settings_event import LIMIT, SettingsChange, decode_settings, encode_settings
+from collision_monitor.pipeline.settings_event import LIMIT, RULES, SettingsChange, decode_settings, encode_settings
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
 
@@ -51,6 +54,9 @@ Budgets = tuple[Budget, Budget]
 _PIPELINE: Final = "pipeline"
 """Key of the pipeline's entry in `Snapshot.facts`."""
 
+_ALERTS: Final = "alerts"
+"""Key of the entry of the alerts in `Snapshot.facts`; without rules there is none."""
+
 _AS_THEY_WERE: Final[Mapping[str, Any]] = MappingProxyType({})
 
 
@@ -59,7 +65,7 @@ class Outputs:
     """Answers of one step: complete CDR messages, and the result that they hold.
 
     limit: None, or the settings (ParameterEvent) with which a replay stops where the clock stopped this step. They have
-    to be recorded before the states.
+    to be recorded before the states. alerts: a CollisionAlert for each alert that the step has changed.
     """
 
     contacts: bytes
@@ -67,6 +73,7 @@ class Outputs:
     result: StepResult
     digest: int
     limit: bytes | None = None
+    alerts: tuple[bytes, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +89,8 @@ class Pipeline:
 
     catalogue: the monitored objects with their last descriptions. timed: whether a profile's budget applies; in a
     replay the recorded settings determine how far each step comes. kept: settings that no recorded change alters.
-    preparation: makes the models that take long; None: they are made at once, however long it takes.
+    preparation: makes the models that take long; None: they are made at once, however long it takes. rules: of
+    the alerts; None: there are no alerts.
     """
 
     def __init__(
@@ -93,6 +101,7 @@ class Pipeline:
         timed: bool = True,
         kept: Collection[str] = (),
         preparation: Preparation | None = None,
+        rules: Rules | None = None,
     ) -> None:
         self.monitor = Monitor(profile, timed=timed, warns=False)
         self.catalogue = Catalogue()
@@ -100,6 +109,7 @@ class Pipeline:
         self._preparation = preparation
         self._without_model = 0, ""  # number of refusals then, and the last text about an object without its own model
         self._lost = LostMessages()
+        self._alerts = Alerts(rules)
         self._kept = frozenset(kept)
         self._limit = self.monitor.profile.pairs_per_step  # the value that a replay has
 
@@ -139,8 +149,10 @@ class Pipeline:
         horizon = self.monitor.profile.horizon
         contacts = encode_contacts(*header, result.contact_rows, *self._mentioned(result.contact_rows))
         predictions = encode_predictions(*header, horizon, result.predictions, *self._mentioned(result.predictions))
+        alerts = self._alerts.step(self.monitor, result, self.frame_id, self.catalogue.name)
         self.catalogue.end_step()
-        return Outputs(contacts, predictions, result, self.monitor.digest, self._limit_of(result))
+        limit, digest = self._limit_of(result), self.monitor.digest
+        return Outputs(contacts, predictions, result, digest, limit, tuple(map(encode_alert, alerts)))
 
     def _mentioned(self, answers: Records) -> tuple[NDArray[np.uint32], list[str]]:
         """Return the ids in `answers`, ascending, and their names."""
@@ -182,6 +194,7 @@ class Pipeline:
             self.monitor.refuse(Refusal.SHAPE, text)
         changes = self.catalogue.changes(message)
         implied = len(changes) - len(message.objects)
+        self._alerts.forget_classes()
         budgets, made, coarse = (Budget(), Budget(BOXES_MS)), [], []
         for k, change in enumerate(changes):
             taken = self._apply(change, message.stamp_ns, budgets, ready)
@@ -223,9 +236,6 @@ class Pipeline:
             return change
         own, boxes = budgets
         model = self.monitor.model_of(change)
-        if model not in (Model.AUTO, Model.EXACT) and any(isinstance(shape, HalfSpace) for shape, _ in change.shapes):
-            self.monitor.describe(change)  # refuses it, with the same text as in a replay
-            return change
         if model is not Model.AABB:
             if ready is None and self._preparation is not None:
                 if own.fits(change.shapes, model) and self._described_within(own, change):
@@ -292,9 +302,11 @@ class Pipeline:
         """
         try:
             changes = {name: value for name, value in decode_settings(data).items() if name not in self._kept}
+            if (text := changes.pop(RULES, None)) is not None:
+                self._alerts.use(Rules.parse(str(text)))
             self.monitor.profile = self.monitor.profile.replace(**changes)
             self._limit = changes.get(LIMIT, self._limit)
-        except (MessageError, ProfileError) as error:
+        except (MessageError, InputError) as error:
             self.monitor.refuse(Refusal.MALFORMED, str(error))
 
     def change_settings(self, profile: Profile, stamp_ns: int, node: str = "") -> SettingsChange:
@@ -310,6 +322,29 @@ class Pipeline:
         if shapes is not None:
             shapes = self.take_shapes(shapes).data
         return SettingsChange(encode_settings(stamp_ns, node, changes), shapes)
+
+    # -- alerts
+
+    @property
+    def rules(self) -> Rules:
+        """The rules of the alerts that are in force."""
+        return self._alerts.rules
+
+    def change_rules(self, rules: Rules, stamp_ns: int, node: str = "") -> bytes:
+        """Use these rules from the next step on. Return the ParameterEvent that a session needs."""
+        self._alerts.use(rules)
+        return encode_settings(stamp_ns, node, {RULES: rules.text})
+
+    def raised_alerts(self) -> bytes:
+        """Return a CollisionAlertArray of all alerts that are raised."""
+        last = self.monitor.last
+        stamp_ns, step = (last.stamp_ns, last.step) if last is not None else (0, 0)
+        return encode_alerts(self._alerts.raised(stamp_ns, self.frame_id, step))
+
+    @property
+    def empty_classes(self) -> list[str]:
+        """The classes of the rules that no object belongs to, as of the last step."""
+        return self._alerts.empty_classes
 
     # -- status and metadata
 
@@ -344,11 +379,12 @@ class Pipeline:
 
     def metadata(self, node: str = "") -> dict[str, str]:
         """Return what a replay and its comparison need: profile, frame, versions, determinism key."""
-        return {**provenance(), "profile": self.settings(), "frame_id": self.frame_id, "node": node}
+        return {**provenance(), **self.settings(), "frame_id": self.frame_id, "node": node}
 
-    def settings(self) -> str:
-        """Return the profile in force as JSON, as a session's metadata holds it."""
-        return json.dumps(self.monitor.profile.to_dict(), sort_keys=True)
+    def settings(self) -> dict[str, str]:
+        """Return what a session's metadata holds of the settings in force: the profile as JSON; the rules, if any."""
+        profile = json.dumps(self.monitor.profile.to_dict(), sort_keys=True)
+        return {"profile": profile, **({RULES: self.rules.text} if self._alerts.are_used else {})}
 
     # -- snapshots
 
@@ -360,6 +396,8 @@ class Pipeline:
             **self.catalogue.facts(),
             "profile": {**self.monitor.profile.to_dict(), LIMIT: self._limit},
         }
+        if self._alerts.are_used:
+            snapshot.facts[_ALERTS] = self._alerts.save(snapshot)
         return snapshot
 
     @classmethod
@@ -376,6 +414,8 @@ class Pipeline:
             pipeline.monitor = Monitor.restored(profile, snapshot, warns=False)
             pipeline._lost = LostMessages(facts["messages_lost"], facts["sequence"])
             pipeline.catalogue = Catalogue.restored(facts)
+            if _ALERTS in snapshot.facts:
+                pipeline._alerts = Alerts.restored(snapshot, snapshot.facts[_ALERTS])
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"snapshot: expected the state of a monitor of this version, got: {error!r}") from None
         return pipeline

@@ -23,7 +23,7 @@ from typing import Any, Final
 import numpy as np
 
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import ConvexHull, Mesh, Polygon, Shape
+from collision_monitor.geometry.shapes import ConvexHull, Mesh, Points, Polygon, Shape
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled
 from collision_monitor.pipeline.model_message import decode_model
@@ -193,8 +193,10 @@ def _arrays(shape: Shape) -> tuple[Any, ...]:
     match shape:
         case Mesh():
             return shape.vertices, shape.faces
-        case ConvexHull() | Polygon():
+        case ConvexHull():
             return (shape.points,)
+        case Points() | Polygon():
+            return shape.points, np.array([shape.radius])
     return (np.frombuffer(repr(shape).encode(), np.uint8),)
 
 

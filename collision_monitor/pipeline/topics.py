@@ -17,6 +17,9 @@ STATUS_PERIOD: Final = 50_000_000
 SOURCES: Final = "~/sources"
 """Topic of a DiagnosticArray about the other programs' topics that the node reads, about once a second."""
 
+RULES: Final = "~/rules"
+"""Topic of a String with the rules of the alerts (YAML), from a latched publisher."""
+
 LATCHED: Final = "transient_local"
 """The durability that delivers earlier messages to a late subscriber."""
 
@@ -45,6 +48,12 @@ class Topic(Enum):
     PREDICTIONS = "predictions", "collision_monitor_msgs/msg/PredictedCollisionArray", Quality(10)
     """Contacts and predictions are reliable: a subscriber that keeps up loses none."""
 
+    ALERTS = "alerts", "collision_monitor_msgs/msg/CollisionAlert", Quality(1000)
+    """One message for each change. Reliable; the depth covers a step in which many alerts change at once."""
+
+    RAISED_ALERTS = "raised_alerts", "collision_monitor_msgs/msg/CollisionAlertArray", Quality(1, durability=LATCHED)
+    """All that are raised, for a subscriber that starts late. Not recorded, because the changes are."""
+
     STATUS = "status", "collision_monitor_msgs/msg/MonitorStatus", Quality(1, durability=LATCHED)
     """A new subscriber gets the last status at once."""
 
@@ -71,5 +80,7 @@ class Topic(Enum):
         return f"/{node}/{self.path}"
 
 
-RECORDED: Final = (Topic.SHAPES, Topic.STATES, Topic.SETTINGS, Topic.CONTACTS, Topic.PREDICTIONS, Topic.STATUS)
+RECORDED: Final = (
+    *(Topic.SHAPES, Topic.STATES, Topic.SETTINGS, Topic.CONTACTS, Topic.PREDICTIONS, Topic.STATUS, Topic.ALERTS),
+)
 """The topics that the node records, in the order of a session's channels."""

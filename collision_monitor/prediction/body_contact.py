@@ -10,7 +10,7 @@ from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DIST
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.bodies import next_pair, place_shape
 from collision_monitor.prediction.body_impact import CLOSING, closing_speed
-from collision_monitor.prediction.mesh_pair import shapes_within, unknown_depth
+from collision_monitor.prediction.mesh_pair import shapes_within
 from collision_monitor.prediction.motion import (
     age_of,
     position_now,
@@ -114,7 +114,6 @@ def body_contact(multibody, i, j, time, query, scratch, result):
         limit = min(wanted, best)
         if shapes_within(table, a, b, pose, limit, out, scratch) and out[DISTANCE] < best:
             best = out[DISTANCE]
-            out[BOUND] += unknown_depth(table, a, b, pose.p, best)
             for c in range(3):
                 out[POINT_A + c] += oa[c]
                 out[POINT_B + c] += oa[c]

@@ -19,7 +19,7 @@ from collision_monitor.geometry.planar import is_planar
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
-from collision_monitor.geometry.shapes import Capsule, HalfSpace, Mesh, Shape, Sphere
+from collision_monitor.geometry.shapes import Capsule, HalfSpace, Mesh, Points, Shape, Sphere
 from collision_monitor.meshes.contact import APART, ENCLOSED, OPEN, contact_of_trees, reach_of
 from collision_monitor.meshes.extent import extents
 from collision_monitor.meshes.nearest import MEMORY, answer_row
@@ -34,7 +34,8 @@ from collision_monitor.narrow_phase.contact_row import (
     as_contacts,
 )
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
-from collision_monitor.objects.models import containing_kdop, containing_model, parse_model
+from collision_monitor.objects.models import containing_kdop, containing_model, exact_model, parse_model
+from collision_monitor.query.cloud_pair import cloud_contact
 from collision_monitor.query.convex_pairs import convex_contact
 from collision_monitor.query.fillings import fillings
 from collision_monitor.query.nearest_pieces import NearestPieces
@@ -166,14 +167,26 @@ class _Posed:
 
     @cached_property
     def is_uncertain(self) -> bool:
-        """Whether it has a mesh of which the inside is not certain."""
+        """Whether it has a mesh with an uncertain inside (`Surface.certain`)."""
         meshes = [shape for shape, _ in self.shapes if isinstance(shape, Mesh)] if self.model is Model.EXACT else []
         return not all(mesh.surface.certain for mesh in meshes)
 
     @cached_property
     def is_concave(self) -> bool:
         """Whether it has several pieces."""
-        return any(is_concave_mesh(shape) for shape, _ in self.outline) or len(self.pieces) > 1
+        several = len(self.outline) > 1 or isinstance(self.outline[0][0], Points)
+        return several or any(is_concave_mesh(shape) for shape, _ in self.outline) or len(self.pieces) > 1
+
+    @property
+    def inner(self) -> Array:
+        """Points (n, 3) of its pieces, at least one of each connected part, in its frame (m)."""
+        clouds = [
+            shape.points @ pose.rotation.T + pose.position for shape, pose in self.shapes if isinstance(shape, Points)
+        ]
+        others = [pair for pair in self.shapes if not isinstance(pair[0], Points)]
+        if not clouds:
+            return self.pieces.inner
+        return np.concatenate(clouds + ([exact_piece_table(others).inner] if others else []))
 
 
 def contact(
@@ -206,15 +219,14 @@ def contact(
         kinds = sorted({type(shape).__name__ for shape, _ in (*a.shapes, *b.shapes)})
         raise UnsupportedError(
             "Circle and Polygon meet each other only; supported are pairs of Circle, Polygon, or of "
-            f"Sphere, Box, Capsule, Cylinder, Cone, Ellipsoid, ConvexHull, Mesh, HalfSpace; got {', '.join(kinds)}"
+            "Sphere, Box, Capsule, Cylinder, Cone, Ellipsoid, ConvexHull, Mesh, Points, HalfSpace; "
+            f"got {', '.join(kinds)}"
         )
     if planes == {True}:
         _check_in_plane(a)
         _check_in_plane(b)
     offset = b.pose.position - a.pose.position
-    deepest = _by_trees(a, b)
-    if deepest is None:
-        deepest = _by_pieces(a, b, offset)
+    deepest = _by_clouds(a, b, offset) or _by_trees(a, b) or _by_pieces(a, b, offset)
     row, enclosed = deepest.row, deepest.enclosed
     least = np.inf
     if row[DISTANCE] > 0.0 and (a.is_uncertain or b.is_uncertain):
@@ -263,11 +275,11 @@ def _nearest(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -
     """Search for the nearest pieces of exact shapes, relative to A's origin."""
     a, b = _posed(shape_a, pose_a, Model.EXACT, "A"), _posed(shape_b, pose_b, Model.EXACT, "B")
     offset = b.pose.position - a.pose.position
-    return NearestPieces(a.pieces, (a.rotation, np.zeros(3)), b.pieces, (b.rotation, offset))
+    return _nearest_pieces(a, b, offset)
 
 
 def _meshes_apart(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -> Contact | None:
-    """The contact of two single shapes, one of which is a concave mesh, if they are apart; else None."""
+    """The contact of a concave mesh and another single shape if they are apart; else None."""
     if not (type(shape_a) is Mesh or type(shape_b) is Mesh):
         return None
     if not (isinstance(shape_a, Shape) and isinstance(shape_b, Shape)):
@@ -296,16 +308,21 @@ def _meshes_apart(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Po
 class _Deepest(NamedTuple):
     """The nearest or deepest contact of two objects, about A's origin in world axes.
 
-    pieces: finds the pieces that touch in one plane. enclosed: no surfaces meet, but one object is inside the other.
+    pieces: finds the pieces that touch in one plane; None: the contact is one point. enclosed: no surfaces meet, but
+    one object is inside the other.
     """
 
     row: Array
-    pieces: Callable[[], NearestPieces]
+    pieces: Callable[[], NearestPieces] | None
     enclosed: bool
 
 
+def _nearest_pieces(a: _Posed, b: _Posed, offset: Array) -> NearestPieces:
+    return NearestPieces(a.pieces, (a.rotation, np.zeros(3)), b.pieces, (b.rotation, offset))
+
+
 def _by_pieces(a: _Posed, b: _Posed, offset: Array) -> _Deepest:
-    found = NearestPieces(a.pieces, (a.rotation, np.zeros(3)), b.pieces, (b.rotation, offset))
+    found = _nearest_pieces(a, b, offset)
     row = found.best.copy()
     row[POINT_A : POINT_A + 3] += found.position[found.pair[0]]
     enclosed = bool(row[DISTANCE] > 0.0 and Location.INSIDE in (_where(a, b, offset), _where(b, a, -offset)))
@@ -320,8 +337,27 @@ def _turn_inward(row: Array) -> None:
     row[NORMAL : NORMAL + 3] *= -1.0
 
 
+def _by_clouds(a: _Posed, b: _Posed, offset: Array) -> _Deepest | None:
+    """The contact of objects one of which has a cloud, shape by shape; None for others."""
+    if not any(isinstance(shape, Points) for shape, _ in (*a.outline, *b.outline)):
+        return None
+    best: _Deepest | None = None
+    for pair_a in exact_model(a.outline).pieces:
+        for pair_b in exact_model(b.outline).pieces:
+            own, other = _Posed([pair_a], a.pose, [pair_a]), _Posed([pair_b], b.pose, [pair_b])
+            if isinstance(pair_a[0], Points) or isinstance(pair_b[0], Points):
+                X, (R, p) = _place(own), _place(other)
+                row = cloud_contact(pair_a[0], X, pair_b[0], (R, p + offset))
+                row[POINT_A : POINT_A + 3] += X[1]
+            else:
+                row = (_by_trees(own, other) or _by_pieces(own, other, offset)).row
+            if best is None or row[DISTANCE] < best.row[DISTANCE]:
+                best = _Deepest(row, None, False)
+    return best
+
+
 def _by_trees(a: _Posed, b: _Posed) -> _Deepest | None:
-    """The contact through the trees of two single shapes, one of which is a concave mesh; None for others.
+    """The contact of a concave mesh and another single shape through their trees; None for other pairs.
 
     The pieces also know how deep a triangle is inside a convex solid, so an overlap with one is left to them.
     """
@@ -341,7 +377,7 @@ def _by_trees(a: _Posed, b: _Posed) -> _Deepest | None:
         row[BOUND] += reach_of(trees[0]) + reach_of(trees[1]) + float(np.linalg.norm(p_b - p_a))
     row[POINT_A : POINT_A + 3] += p_a
     offset = b.pose.position - a.pose.position
-    return _Deepest(row, lambda: _by_pieces(a, b, offset).pieces(), known == ENCLOSED)
+    return _Deepest(row, lambda: _nearest_pieces(a, b, offset), known == ENCLOSED)
 
 
 def _place(side: _Posed) -> tuple[Array, Array]:
@@ -355,7 +391,7 @@ def _place(side: _Posed) -> tuple[Array, Array]:
 def _posed(shape: Compound, pose: Pose, model: Model | str | ArrayLike, name: str) -> _Posed:
     shapes = shape_pairs(shape, f"shape {name}")
     if not isinstance(pose, Pose):
-        raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
+        raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
     if isinstance(model, str | int):
         if parse_model(model) in (Model.AUTO, Model.EXACT):
             return _Posed(shapes, pose, shapes)
@@ -375,7 +411,7 @@ def _where(inner: _Posed, outer: _Posed, offset: Array) -> int:
     found: int = Location.OUTSIDE
     if outer.model is not Model.EXACT or not outer.is_concave:
         return found
-    points = inner.pieces.inner @ inner.rotation.T - offset
+    points = inner.inner @ inner.rotation.T - offset
     for shape, pose in outer.shapes:
         if not isinstance(shape, Mesh):
             continue
@@ -397,7 +433,8 @@ def _distance_of_fillings(a: _Posed, b: _Posed) -> float:
         own = _Posed([filling], a.pose, [filling])
         for shapes in ([shape] for shape in (*b.outline, *(fillings(b.shapes) if b.model is Model.EXACT else ()))):
             other = _Posed(shapes, b.pose, shapes)
-            deepest = _by_trees(own, other) or _by_pieces(own, other, b.pose.position - a.pose.position)
+            offset = b.pose.position - a.pose.position
+            deepest = _by_clouds(own, other, offset) or _by_trees(own, other) or _by_pieces(own, other, offset)
             least = min(least, float(deepest.row[DISTANCE] - deepest.row[BOUND]))
     return least
 
@@ -421,7 +458,8 @@ def _parting_translation(a: _Posed, b: _Posed, offset: Array, normal: Array) -> 
 def _reach(side: _Posed, directions: Array) -> Array:
     """How far an object reaches in directions (n, 3) in its own frame (m)."""
     shape, pose = side.outline[0]
-    tree = shape_tree(shape) if len(side.outline) == 1 and isinstance(shape, Mesh) else None
+    tree = shape_tree(shape) if len(side.outline) == 1 and isinstance(shape, Mesh | Points) else None
     if tree is None:
         return reach(side.outline, directions)
-    return extents(tree, directions @ pose.rotation) + directions @ pose.position
+    radius = shape.radius if isinstance(shape, Points) else 0.0
+    return extents(tree, directions @ pose.rotation) + directions @ pose.position + radius

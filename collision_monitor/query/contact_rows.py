@@ -9,19 +9,18 @@ from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, 
 from collision_monitor.narrow_phase.dispatch import pair_contact
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.motion import quaternion_to_matrix
-from collision_monitor.query.packed import fits, load_pair, rotations, work
+from collision_monitor.query.packed import fits, load_pair
 
 
 @device
 def write_contact(a, at_a, x_a, i, b, at_b, x_b, j, memory, row):
     """Write the contact of the pair at a[at_a], with pose x_a[i], and b[at_b], with pose x_b[j]."""
-    table = load_pair(memory, a, at_a, b, at_b)
-    R = rotations(memory)
+    table, R, work = load_pair(memory, a, at_a, b, at_b)
     quaternion_to_matrix(x_a[:, 3:7], i, R[0])
     quaternion_to_matrix(x_b[:, 3:7], j, R[1])
     p = (x_b[j, 0] - x_a[i, 0], x_b[j, 1] - x_a[i, 1], x_b[j, 2] - x_a[i, 2])
     first, second = np.int32(0), np.int32(1)  # the type of a slot in the other kernels, which thus share the pair test
-    pair_contact(table, first, second, PairPose(R[0], R[1], p), row, work(memory))
+    pair_contact(table, first, second, PairPose(R[0], R[1], p), row, work)
     for c in range(3):
         row[POINT_A + c] += x_a[i, c]
         row[POINT_B + c] = row[POINT_A + c] + row[DISTANCE] * row[NORMAL + c]

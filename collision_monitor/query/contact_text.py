@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from collision_monitor.geometry.contact_features import FeatureType
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape
+from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Points, Shape
 from collision_monitor.query.features import feature_of
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def _feature(shape: Compound, pose: Pose, point: Array, normal: Array) -> str:
     if not isinstance(shape, Shape):
         return "compound"
     kind = type(shape).__name__.lower()
-    if not isinstance(shape, Box | ConvexHull | Mesh):
+    if not isinstance(shape, Box | ConvexHull | Mesh | Points):
         return f"{kind} surface"
     found = feature_of(shape, pose, point, normal)
     number = found.face if found.type is FeatureType.FACE else "-".join(map(str, found.vertices))

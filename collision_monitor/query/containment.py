@@ -18,13 +18,18 @@ def contains(shape: Compound, pose: Pose, points: ArrayLike, test: str = "closed
     """Whether points (..., 3) in m, in the world frame, are in a shape or a compound at a pose, or on its boundary.
 
     test: "closed form" for every shape with an inside; "ray" for polygons and polyhedra, by the parity of a ray;
-    "sides" for convex ones, by the sides of their edges or faces. The last two are exact for the points in the shape's
-    frame. Points of two coordinates are in the x-y plane. (Slides "Point in polygon - ray test", "Point in convex
-    polygon", "A vertex is inside a convex polyhedron if …") Raises ShapeError, PoseError, InputError; UnsupportedError
-    for a shape that the test does not take.
+    "sides" for convex ones, by the sides of their edges or faces. Answers for polygons without a radius, hulls and
+    meshes are exact for the points in the shape's frame, others for points moved by some 1e-15 of its size. In a mesh,
+    "closed form" takes the union of its solids, also where they overlap, and counts a point as contained if faces
+    that are not oriented leave it open. Points of two coordinates are in the x-y plane. (Slides "Point in polygon -
+    ray test", "Point in convex polygon", "A vertex is inside a convex polyhedron if …") Raises ShapeError, PoseError,
+    InputError; UnsupportedError for a shape that the test does not take, and a mesh that is not closed.
+
+    >>> contains(cm.Sphere(0.5), cm.Pose(), [(0, 0, 0.4), (0, 0, 0.6)])
+    array([ True, False])
     """
     if not isinstance(pose, Pose):
-        raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}")
+        raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
     if test not in TESTS:
         raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")
     given = coordinates(points, "points")

@@ -26,6 +26,7 @@ from collision_monitor.geometry.shapes import (
     Ellipsoid,
     HalfSpace,
     Mesh,
+    Points,
     Polygon,
     Shape,
 )
@@ -47,7 +48,8 @@ def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Sh
     of `convex_hull`. A box numbers its corners by their sides (bit 0: +x, 1: +y, 2: +z) and its faces in the order
     +x -x +y -y +z -z. A cylinder has faces and rims 0 (+z) and 1 (-z), a cone vertex 0, rim 0 and face 0, and both a
     curved surface. A polygon has the corners of its points, a capsule corner 0 (-z) and 1 (+z) and the edge between
-    them. A half-space is face 0. Raises UnsupportedError for Sphere, Ellipsoid and Circle, which are one surface.
+    them. A cloud has its points as vertices. A half-space is face 0. Raises UnsupportedError for Sphere, Ellipsoid and
+    Circle, which are one surface.
 
     >>> import collision_monitor as cm
     >>> box, pose, above = cm.Box((1, 1, 1)), cm.Pose(), cm.Pose((0, 0, 1.5))
@@ -91,10 +93,13 @@ def feature_of(shape: Shape, pose: Pose, point: Array, normal: Array, tie: float
         case Polygon():
             core = at[:2] - shape.radius * towards[:2]
             return feature_of_outline(core, towards[:2], shape.points)
+        case Points():
+            nearest = int(((shape.points - (at - shape.radius * towards)) ** 2).sum(axis=1).argmin())
+            return Feature(FeatureType.VERTEX, (nearest,), -1)
         case HalfSpace():
             return Feature(FeatureType.FACE, (), 0)
     kind = type(shape).__name__
     raise UnsupportedError(
         f"{kind} has no vertices, edges and faces; supported are Box, ConvexHull, Mesh, Cylinder, Cone, Capsule, "
-        "Polygon, HalfSpace"
+        "Polygon, Points, HalfSpace"
     )

@@ -8,22 +8,27 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.errors import PoseError, UnsupportedError
+from collision_monitor.errors import PoseError, TooCostlyError, UnsupportedError
 from collision_monitor.geometry.bounded_cache import bounded_cache
 from collision_monitor.geometry.compound import shape_pairs
 from collision_monitor.geometry.forest import Forest
 from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shape_table import ShapeTableBuilder
-from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape
+from collision_monitor.geometry.shapes import HalfSpace, Mesh, Points, Shape, Sphere, Triangle
 from collision_monitor.meshes.shape_trees import shape_tree
-from collision_monitor.objects.models import PosedShapes, containing_model, exact_model
+from collision_monitor.objects.excess import PosedShapes
+from collision_monitor.objects.models import containing_model, exact_model
 from collision_monitor.prediction.bodies import Bodies, Multibody, make_bodies, make_parts
 from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.body_layout import lay_out_body
 from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.prediction.pair_impacts import predict_pairs
+from collision_monitor.query.cloud_pair import points_near
 from collision_monitor.query.contact import Compound
+
+MOST_NEAR: Final = 500
+"""Most points of a cloud that touch the other object and are followed one by one, 1 ms each."""
 
 REMEMBERED: Final = 256 << 20
 """Bytes of the trees of pairs that are remembered. Less: each query of two meshes copies them, 1 ms for
@@ -55,7 +60,7 @@ def make_moving_shape(shape: Compound, motion: Motion, name: str) -> MovingShape
     """
     shapes = shape_pairs(shape, f"shape {name}")
     if not isinstance(motion, Motion):
-        raise PoseError(f"motion {name}: expected a Motion, got {type(motion).__name__}")
+        raise PoseError(f"motion {name}: expected a Motion, got {type(motion).__name__}; write Motion(pose)")
     if any(isinstance(s, HalfSpace) for s, _ in shapes) and motion.angular.any():
         raise UnsupportedError(f"shape {name}: a HalfSpace has no end and cannot turn")
     if is_planar(shapes[0][0]):
@@ -66,10 +71,35 @@ def make_moving_shape(shape: Compound, motion: Motion, name: str) -> MovingShape
     return MovingShape(shapes, modelled.pieces, modelled.shapes, motion)
 
 
-def in_convex_pieces(moving: MovingShape) -> MovingShape:
-    """The same object with the triangles of a concave mesh as pieces of their own."""
-    modelled = containing_model(moving.shapes, "exact")
-    return moving._replace(pieces=modelled.pieces, shape_of=modelled.shapes)
+def in_convex_pieces(moving: MovingShape, other: MovingShape, near: float) -> MovingShape:
+    """The same object with the triangles of a concave mesh, and the points of a cloud near the other, as own pieces.
+
+    near (m): at most this far from the other's shapes now.
+    """
+    pieces: PosedShapes = []
+    shape_of = []
+    for k, (shape, pose) in enumerate(moving.shapes):
+        if isinstance(shape, Points):
+            own = [(part, pose @ at) for part, at in _near_points(shape, moving.motion.pose @ pose, other, near)]
+        else:
+            own = containing_model([(shape, pose)], "exact").pieces
+        pieces += own
+        shape_of += [k] * len(own)
+    return moving._replace(pieces=pieces, shape_of=shape_of)
+
+
+def _near_points(cloud: Points, pose: Pose, other: MovingShape, near: float) -> PosedShapes:
+    """Each point near the other object as a ball, and the cloud of the remaining ones."""
+    is_near = np.zeros(len(cloud.points), np.bool_)
+    for shape, at in other.pieces:
+        is_near |= points_near(cloud.points, cloud.radius, pose, shape, other.motion.pose @ at, near)
+    if np.count_nonzero(is_near) > MOST_NEAR:
+        raise TooCostlyError(f"expected at most {MOST_NEAR} points that touch, got {np.count_nonzero(is_near)}")
+    balls: PosedShapes = [
+        (Sphere(cloud.radius) if cloud.radius else Triangle(np.zeros((3, 3))), Pose(point))
+        for point in cloud.points[is_near]
+    ]
+    return balls if is_near.all() else [*balls, (Points(cloud.points[~is_near], cloud.radius), Pose())]
 
 
 def _bytes(forest: Forest, pieces: tuple[Shape, ...]) -> int:
@@ -93,7 +123,7 @@ def lay_out_pair(a: MovingShape, b: MovingShape, horizon: float, apart: bool = F
     """
     count = len(a.pieces) + len(b.pieces)
     pieces = tuple(piece for moving in (a, b) for piece, _ in moving.pieces)
-    forest = _forest(pieces) if any(isinstance(piece, Mesh) for piece in pieces) else None
+    forest = _forest(pieces) if any(isinstance(piece, Mesh | Points) for piece in pieces) else None
     builder = ShapeTableBuilder(slots=count, forest=forest)
     slots = [
         [builder.append(piece, pose, tree=shape_tree(piece) if forest else None) for piece, pose in moving.pieces]

@@ -71,7 +71,7 @@ def _named(
 ) -> tuple[tuple[Compound, Pose, str], tuple[Compound, Pose, str]]:
     for pose, name in ((pose_a, "A"), (pose_b, "B")):
         if not isinstance(pose, Pose):
-            raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}")
+            raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
     return (shape_a, pose_a, "A"), (shape_b, pose_b, "B")
 
 
@@ -86,6 +86,8 @@ def _polygons(shape: Compound, pose: Pose, test: str, name: str) -> list[Array]:
         if not isinstance(each, Polygon):
             kinds = "Polygon" if test == "edges" else "Polygon with Polygon, and Box, ConvexHull with each other"
             raise UnsupportedError(f"test {test}: {type(each).__name__} is not offered; supported are {kinds}")
+        if each.radius > 0.0:
+            raise UnsupportedError(f"test {test}: Polygon with a radius is not offered; use the test 'contact'")
         at = flat_pose(pose @ offset)
         found.append(each.points @ at.rotation[:2, :2].T + at.position[:2])
     return found

@@ -99,7 +99,10 @@ def fits(memory, a, at_a, b, at_b):
 
 @inlined
 def load_pair(memory, a, at_a, b, at_b):
-    """Copy the packed shapes that begin at a[at_a] and b[at_b] into the memory; return their ShapeTable."""
+    """Copy the packed shapes that begin at a[at_a] and b[at_b] into the memory.
+
+    Return their ShapeTable, rotations (2, 3, 3) for the caller to write, and scratch memory of the pair tests.
+    """
     count_a, count_b = int(a[at_a + _COUNT]), int(b[at_b + _COUNT])
     count = count_a + count_b
     end = _TABLE_VERTICES + 3 * count
@@ -127,16 +130,4 @@ def load_pair(memory, a, at_a, b, at_b):
             for c in range(3):
                 table.vertices[c, before + k] = packed[at + _VERTICES + c * own + k]
             table.vertex_index[before + k] = np.int32(packed[at + _VERTICES + 3 * own + k])
-    return table
-
-
-@inlined
-def rotations(memory):
-    """Rotations (2, 3, 3) of the pair, for the kernels to write."""
-    return memory[_ROTATION:_WORK].reshape((2, 3, 3))
-
-
-@inlined
-def work(memory):
-    """Scratch memory of the pair tests."""
-    return memory[_WORK:_TABLE_VERTICES]
+    return table, memory[_ROTATION:_WORK].reshape((2, 3, 3)), memory[_WORK:_TABLE_VERTICES]

@@ -61,7 +61,7 @@ def pair_impact_rows(a, at_a, states_a, b, at_b, states_b, query, own, memory, r
             rows[k, 2] = TOO_SMALL
             continue
         write_contact(a, start_a, states_a, i, b, start_b, states_b, j, memory, contact)
-        table = load_pair(memory, a, start_a, b, start_b)
+        table, _, _ = load_pair(memory, a, start_a, b, start_b)
         round_off = GJK_TOUCHING * (table.radius[0] + table.radius[1])
         if contact[DISTANCE] < separation - round_off:
             rows[k, 0] = rows[k, 1] = 0.0

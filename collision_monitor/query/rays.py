@@ -20,6 +20,10 @@ class RayHits(NamedTuple):
     """distance (...) in m, infinite for no hit; point (..., 3) and outward unit normal (..., 3) in the world frame.
 
     Without a hit the point is NaN. The normal is zero without a hit, and for a ray that starts inside, at distance 0.
+
+    >>> hits = cast_ray(cm.Sphere(0.5), cm.Pose(), [(0, 0, 2), (0, 1, 2)], (0, 0, -1))
+    >>> hits.hit, hits.distance
+    (array([ True, False]), array([1.5, inf]))
     """
 
     distance: Array
@@ -39,12 +43,16 @@ def cast_ray(
 
     origin (..., 3) m and direction (..., 3) of any length, in the world frame; length (...): of the rays in m. A
     segment from p to q has the direction q - p and the length |q - p|. A closed mesh is solid, an open one a surface.
-    For plane shapes, directions lie in the plane. Errors are some 1e-15 of the distance of the shape from the origin
-    of the ray; a ray that grazes may count either way. (Slides "Ray test", "Line intersection")
+    For plane shapes, directions lie in the plane. The answer is right for a ray that is moved by some 1e-15 of the
+    size of the shape and of its distance from the origin of the ray. So a ray that grazes may count either way, but no
+    ray passes between two faces or edges. (Slides "Ray test", "Line intersection")
     Raises ShapeError, PoseError, InputError.
+
+    >>> cast_ray(cm.Box((1, 1, 1)), cm.Pose(), origin=(0, 0, 2), direction=(0, 0, -1)).point
+    array([0. , 0. , 0.5])
     """
     if not isinstance(pose, Pose):
-        raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}")
+        raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
     p, d = coordinates(origin, "origin", 3), coordinates(direction, "direction", 3)
     limit = np.asarray(length, dtype=np.float64)
     if not (limit >= 0.0).all():

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from collision_monitor.errors import UnsupportedError
+from collision_monitor.errors import TooCostlyError, UnsupportedError
 from collision_monitor.geometry.pose import Motion
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Sphere
 from collision_monitor.prediction.impact_record import HIT
@@ -141,7 +141,11 @@ def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain:
     lower = float(events[0]["lower"])
     upper = float(events[0]["upper"]) if events[0]["status"] == HIT else math.inf
     if lower <= 0.0:
-        lower, upper = follow(in_convex_pieces(a), in_convex_pieces(b), query, round_off)
+        near = query.separation + 2.0 * query.tolerance + 2.0 * round_off
+        try:
+            lower, upper = follow(in_convex_pieces(a, b, near), in_convex_pieces(b, a, near), query, round_off)
+        except TooCostlyError:
+            lower, upper = 0.0, math.inf
         if lower == math.inf:
             return _CLEAR
     certain = upper <= query.horizon

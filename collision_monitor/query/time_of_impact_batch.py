@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from collision_monitor.errors import InputError, PoseError
 from collision_monitor.geometry.planar import is_planar
 from collision_monitor.geometry.pose import Motion, Pose
-from collision_monitor.geometry.shapes import HalfSpace, Mesh
+from collision_monitor.geometry.shapes import HalfSpace, Mesh, Points
 from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.query.contact import Compound
@@ -97,7 +97,7 @@ def time_of_impact_batch(
 def _is_special(a: MovingShape, b: MovingShape, state_a: Array, state_b: Array) -> bool:
     """Whether the kernel alone is not enough: plane shapes, meshes that may contain the other, rotating half-spaces."""
     for body, state in ((a, state_a), (b, state_b)):
-        if any(isinstance(piece, Mesh) for piece, _ in body.pieces):
+        if any(isinstance(piece, Mesh | Points) for piece, _ in body.pieces):
             return True
         for shape, _ in body.shapes:
             if is_planar(shape):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collision_monitor.report.alert_bars import alert_caption
 from collision_monitor.report.assessment import counted
 from collision_monitor.report.facts import ReportFacts
 from collision_monitor.report.figures import CURVES, NEAR, PAIRS, drawn_collisions, largest_error
@@ -13,6 +14,7 @@ def captions(history: History, facts: ReportFacts) -> dict[str, str]:
     """Return the caption of each figure, by the names that `figures` uses."""
     return {
         "timeline": _timeline(facts),
+        "alerts": alert_caption(history),
         "predicted": _predicted(facts),
         "distances": _distances(),
         "events": _events(facts),

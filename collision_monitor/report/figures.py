@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from collision_monitor.report.alert_bars import alert_figure
 from collision_monitor.report.facts import ReportFacts
 from collision_monitor.report.from_above import from_above
 from collision_monitor.report.rendering import CONTACT, INK, PALETTE, POSSIBLE, STYLE, WARNING, Size, shortened
@@ -39,6 +40,7 @@ def figures(history: History, facts: ReportFacts, size: Size) -> dict[str, Figur
     """Draw the figures that have content. Return them by name, in their order on the page."""
     draw: dict[str, Callable[[History, ReportFacts, Size], Figure | None]] = {
         "timeline": _timeline,
+        "alerts": lambda history, _, size: alert_figure(history, size),
         "predicted": _predicted,
         "distances": _distances,
         "events": from_above,

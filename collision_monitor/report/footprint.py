@@ -9,7 +9,7 @@ import numpy as np
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.qhull import qhull
 from collision_monitor.geometry.reach import reach
-from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, Polygon, Shape, Triangle
+from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, Points, Polygon, Shape, Triangle
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session.history.history import Floats
 
@@ -45,6 +45,8 @@ def _outline(shape: Shape, pose: Pose) -> Floats | None:
             return _hull(shape.points, pose)
         case Mesh():
             return _hull(shape.vertices, pose)
+        case Points():
+            return _hull(shape.points, pose)
     return _round(shape, pose)
 
 

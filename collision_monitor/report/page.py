@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from collision_monitor._version import VERSION
 from collision_monitor.errors import SessionError
+from collision_monitor.report.alert_bars import alert_caption, alert_table
 from collision_monitor.report.assessment import assess, counted
 from collision_monitor.report.captions import captions
 from collision_monitor.report.facts import ReportFacts, gather
@@ -25,6 +26,7 @@ SWITCHES: Final = 10
 
 PICTURES: Final = {
     "timeline": "Timeline",
+    "alerts": "Alerts",
     "predicted": "Predicted against actual",
     "distances": "The riskiest pairs",
     "events": "From above",
@@ -116,7 +118,9 @@ def page(history: History, facts: ReportFacts, pictures: dict[str, str]) -> str:
     """Return the whole page. pictures: HTML of the figures, by the names that `figures` uses."""
     said = captions(history, facts)
     drawn = [_section(title, said[name], pictures.get(name)) for name, title in PICTURES.items()]
-    sections = [_verdict(history, facts), drawn[0], _collisions(history, facts), *drawn[1:], _provenance(history)]
+    alerts = drawn[1] + alert_table(history) if drawn[1] else _without_alerts(history)
+    above = [_verdict(history, facts), drawn[0], alerts, _collisions(history, facts)]
+    sections = [*above, *drawn[2:], _provenance(history)]
     title = escape(history.name)
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{title}</title>\n'
@@ -129,6 +133,10 @@ def page(history: History, facts: ReportFacts, pictures: dict[str, str]) -> str:
 
 def _section(title: str, caption: str, picture: str | None) -> str:
     return f"<h2>{title}</h2>\n<p>{caption}</p>\n<figure>{picture}</figure>" if picture else ""
+
+
+def _without_alerts(history: History) -> str:
+    return f"<h2>Alerts</h2>\n<p>{alert_caption(history)}</p>" if history.rules.rules else ""
 
 
 def _verdict(history: History, facts: ReportFacts) -> str:
@@ -211,6 +219,8 @@ def _provenance(history: History) -> str:
     if len(changes) > SWITCHES:
         changes[SWITCHES:] = [f"{len(changes) - SWITCHES} more left out"]
     facts = {key: value for key, value in sorted(history.metadata.items()) if key != "profile"}
+    if history.rules.rules:
+        facts["rules"] = ", ".join(each.name for each in history.rules.rules)
     facts["profile"] = f"{history.profile.name}: {_settings_text(settings)}"
     if changes:
         facts["settings changed"] = "; ".join(changes)
@@ -226,5 +236,6 @@ def _provenance(history: History) -> str:
 
 
 def _settings_text(settings: dict[str, Any]) -> str:
+    settings = {**settings, "rules": "changed"} if "rules" in settings else settings
     texts = {key: f"{value:g}" if isinstance(value, float) else str(value) for key, value in settings.items()}
     return ", ".join(f"{key} {text}" for key, text in texts.items())

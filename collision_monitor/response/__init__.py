@@ -14,6 +14,9 @@ Vectors are (..., 3) or (..., 2) in m, m/s and rad/s, masses in kg; normals need
 dimensions broadcast. A mass may be infinite (an immovable body). Every function raises InputError for a restitution
 outside 0 to 1, a mass that is not positive, a negative friction, a zero normal and values that are not finite.
 docs/response.md compares the methods.
+
+>>> reflect((1, 0, -2), normal=(0, 0, 1), restitution=0.5)
+array([1., 0., 1.])
 """
 
 from collision_monitor.response.bonded import move_as_one

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
-from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import CollisionMonitorError, InputError
+from collision_monitor.geometry.mesh_file import load_mesh
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
 from collision_monitor.robots.mesh_location import FileLocator
 from collision_monitor.robots.urdf import Link
 from collision_monitor.robots.xml_tree import Element
-
-LARGEST_MESH: Final = 256 << 20
-"""Bytes of a mesh file. Collision meshes have 10 kB to 10 MB."""
-
-_UNIT: Final = re.compile(rb"""<unit\b[^>]*\bmeter\s*=\s*["']([^"']*)""")
-"""Length of COLLADA's unit in m, which trimesh does not apply."""
 
 
 def link_shapes(link: Link, files: FileLocator) -> tuple[list[tuple[Shape, Pose]], list[str]]:
@@ -52,29 +45,14 @@ def _shape(geometry: Element, files: FileLocator) -> Shape:
 
 
 def _mesh(path: Path, scale: NDArray[np.float64]) -> Mesh:
-    """Return the mesh of a file, in m. If the scale mirrors it, its faces are turned to point outwards again."""
+    """Return the welded mesh of a file, in m. If the scale mirrors it, its faces are turned to point outwards again.
+
+    The unit of a COLLADA file counts and its up axis does not, as in RViz.
+    """
     if not scale.all():
         raise InputError(f"{path.name}: expected a scale without zeros, got {scale.tolist()}")
-    vertices, faces = _read_mesh(path)
-    return Mesh(vertices * scale, faces if scale.prod() > 0.0 else faces[:, ::-1])
-
-
-def _read_mesh(path: Path) -> tuple[NDArray[np.float64], NDArray[Any]]:
-    """Return vertices (n, 3) and faces (m, 3). COLLADA's unit counts and its up axis does not, as in RViz."""
-    try:
-        import trimesh
-    except ImportError:
-        raise InputError(f"{path.name}: reading meshes needs trimesh: pip install trimesh") from None
-    if path.stat().st_size > LARGEST_MESH:
-        raise InputError(f"{path}: expected a mesh of at most {LARGEST_MESH >> 20} MiB, got more")
-    try:
-        mesh = trimesh.load_mesh(path)
-        vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces)
-        if path.suffix.lower() == ".dae" and (unit := _UNIT.search(path.read_bytes())):
-            vertices = vertices * float(unit[1])
-    except Exception as error:  # trimesh and its readers raise many kinds of errors
-        reason = str(error) or type(error).__name__
-        raise InputError(f"{path}: expected a mesh, cannot be read: {reason:.200}") from None
-    if not len(faces):
-        raise InputError(f"{path}: expected a mesh with faces, got none")
-    return vertices, faces
+    factor = float(np.abs(scale).max())
+    mesh = load_mesh(path, factor)
+    used, faces = np.unique(mesh.surface.faces, return_inverse=True)
+    faces = faces.reshape(-1, 3)
+    return Mesh(mesh.vertices[used] * (scale / factor), faces if scale.prod() > 0.0 else faces[:, ::-1])

@@ -10,11 +10,11 @@ import math
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from enum import IntEnum
 from typing import Final
 
 from collision_monitor.codec import MonitorStatus
 from collision_monitor.errors import Refusal
+from collision_monitor.ros.line_report import Level, LineReport
 from collision_monitor.session import Recording
 
 HISTORY: Final = 10
@@ -23,15 +23,6 @@ HISTORY: Final = 10
 UNMONITORED: Final = (Refusal.UNKNOWN_ID, Refusal.SHAPE)
 """Refusals that mean an object which no answer covers and no other report mentions. An object whose states are refused
 for another reason is unseen or becomes stale."""
-
-
-class Level(IntEnum):
-    """The levels of DiagnosticStatus."""
-
-    OK = 0
-    WARN = 1
-    ERROR = 2
-    STALE = 3
 
 
 @dataclass(frozen=True)
@@ -50,7 +41,7 @@ class Facts:
 
     topic: of the states. silence: s since newer states arrived, by the steady clock; None: none arrived yet.
     stale, unseen: the names of such objects. deferred, unresolved: most pairs in one step since the last report.
-    other_nodes: nodes of the same name.
+    other_nodes: nodes of the same name. sources: the lines of the sources file; None: there is no file.
     """
 
     status: MonitorStatus
@@ -62,13 +53,15 @@ class Facts:
     deferred: int
     unresolved: int
     other_nodes: int
+    sources: tuple[LineReport, ...] | None = None
 
 
 @dataclass
 class History:
-    """The statuses at the last reports of one configuration."""
+    """The statuses, and the refusals of each source, at the last reports of one configuration."""
 
     _statuses: deque[MonitorStatus] = field(default_factory=lambda: deque(maxlen=HISTORY))
+    _refused: deque[dict[str, int]] = field(default_factory=lambda: deque(maxlen=HISTORY))
 
     def increase(self, status: MonitorStatus, counters: Iterable[str]) -> dict[str, int]:
         """Return by how much counters of the status grew since the oldest report; the ones that did not are left out.
@@ -79,9 +72,15 @@ class History:
         grown = {name: getattr(status, name) - getattr(first, name) for name in counters}
         return {name: count for name, count in grown.items() if count}
 
-    def add(self, status: MonitorStatus) -> None:
-        """Remember the status of this report."""
-        self._statuses.append(status)
+    def refused(self, line: LineReport) -> int:
+        """Return the number of messages of a source that were refused since the oldest report."""
+        first = self._refused[0] if len(self._refused) == HISTORY else {}
+        return line.refused - first.get(line.name, 0)
+
+    def add(self, facts: Facts) -> None:
+        """Remember the counters of this report."""
+        self._statuses.append(facts.status)
+        self._refused.append({line.name: line.refused for line in facts.sources or ()})
 
 
 class _Findings:
@@ -112,7 +111,9 @@ def reports(state: str, failure: str, facts: Facts | None, history: History) -> 
         _steps(facts),
         _recording(facts.status, history),
     ]
-    history.add(facts.status)
+    if facts.sources is not None:
+        found.append(_sources(facts.sources, history))
+    history.add(facts)
     return found
 
 
@@ -193,6 +194,20 @@ def _recording(status: MonitorStatus, history: History) -> Report:
     names = ("recording_path", "recorded_messages", "recorded_bytes", "recording_dropped")
     values = {name: getattr(status, name) for name in names}
     return findings.report("recording", f"recording to {status.recording_path}" if is_on else "not recording", values)
+
+
+def _sources(lines: tuple[LineReport, ...], history: History) -> Report:
+    findings = _Findings()
+    for line in lines:
+        if line.level == Level.ERROR:
+            findings.add(Level.ERROR, f"unusable: {line.text}")
+        elif count := history.refused(line):
+            findings.add(Level.WARN, f"refused lately: {count} of {line.name} (last: {line.last_refusal})")
+        elif line.level == Level.WARN and not line.refused:
+            findings.add(Level.WARN, line.text)
+    refused = sum({line.name: line.refused for line in lines}.values())  # a robot has several lines
+    values: dict[str, object] = {"messages": sum(line.messages for line in lines), "refused": refused}
+    return findings.report("sources", f"{len(lines)} topics", values)
 
 
 def _texts(values: dict[str, object]) -> dict[str, str]:

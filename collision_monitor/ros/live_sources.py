@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
@@ -16,6 +16,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.pipeline.topics import SOURCES
+from collision_monitor.ros.line_report import Level, LineReport
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage
 from collision_monitor.sources.tf_objects import TRANSFORMS
@@ -29,20 +30,6 @@ REPORT_PERIOD: Final = 1.0
 _TF: Final = ("/tf", "/tf_static")
 _DEPTH: Final = {"/tf": 100, "/tf_static": 100}
 """Depth of the queue; 10 for the other topics."""
-
-
-class LineReport(NamedTuple):
-    """What a line of the file does. level: of DiagnosticStatus, with a text. The counts are those since the start."""
-
-    name: str
-    topic: str
-    type: str
-    messages: int
-    states: int
-    refused: int
-    last_refusal: str
-    level: bytes
-    text: str
 
 
 class LiveSources:
@@ -158,15 +145,16 @@ class LiveSources:
         states = sum(count for other, count in scene.states.items() if other == name or other.startswith(parts))
         problem = self._problems.get(name) or self._problems.get(topic)
         if problem:
-            level, text = DiagnosticStatus.ERROR, problem
+            level, text = Level.ERROR, problem
         elif topic not in self._found:
-            level, text = DiagnosticStatus.WARN, f"{topic} has no publisher"
+            level, text = Level.WARN if topic not in _TF else Level.OK, f"{topic} has no publisher"
         elif not messages and topic not in _TF:
-            level, text = DiagnosticStatus.WARN, f"no message on {topic} yet"
+            level, text = Level.WARN, f"no message on {topic} yet"
         else:
-            level, text = (DiagnosticStatus.WARN, refusal) if refused else (DiagnosticStatus.OK, "ok")
+            level, text = (Level.WARN, refusal) if refused else (Level.OK, "ok")
         kind = self._found.get(topic, "")
-        return LineReport(name, topic, kind, messages, states, refused, refusal, level, text)
+        dropped = scene.points_dropped.get(name, 0)
+        return LineReport(name, topic, kind, messages, states, refused, refusal, dropped, level, text)
 
     def _report(self) -> None:
         """Publish the state of each line of the file."""
@@ -178,7 +166,9 @@ class LiveSources:
             topic = f" {line.topic}" if line.name in self._feed.owners.values() else ""  # a robot has several
             name = f"{self._node.get_name()}: {line.name}{topic}"
             array.status.append(
-                DiagnosticStatus(level=line.level, name=name, message=line.text, hardware_id="none", values=pairs)
+                DiagnosticStatus(
+                    level=bytes([line.level]), name=name, message=line.text, hardware_id="none", values=pairs
+                )
             )
         self._out.publish(array)
 

@@ -12,12 +12,14 @@ from rclpy.node import Node
 
 from collision_monitor import warm_up
 from collision_monitor._jit.compilation import on_first_compilation
+from collision_monitor.alerts.rules import Rules
 from collision_monitor.errors import CollisionMonitorError
 from collision_monitor.pipeline.topics import NODE
 from collision_monitor.ros import health
 from collision_monitor.ros.bond import ManagerBond
 from collision_monitor.ros.diagnostics import Diagnostics
 from collision_monitor.ros.entities import Entities
+from collision_monitor.ros.live_rules import LiveRules
 from collision_monitor.ros.live_settings import LiveSettings
 from collision_monitor.ros.managed import Managed
 from collision_monitor.ros.monitoring import Monitoring
@@ -41,6 +43,8 @@ class MonitorNode(Managed, Node):
             raise
         self._profile = self.settings.profile
         self._live_settings = LiveSettings(self, self._profile, self._on_settings)
+        self._rules = self.settings.rules
+        self._live_rules = LiveRules(self, self._on_rules)
         self._warm_up(stop)
         self._monitoring: Monitoring | None = None
         self._resources = ExitStack()  # of the configuration
@@ -63,8 +67,9 @@ class MonitorNode(Managed, Node):
         """Begin to monitor and to record."""
         self._configurations += 1
         self._resources.callback(Entities(self).destroy_new)
+        self._live_rules.subscribe()
         record = numbered(self.settings.record, self._configurations)
-        self._monitoring = Monitoring(self, self._resources, self.settings, self._profile, record)
+        self._monitoring = Monitoring(self, self._resources, self.settings, self._profile, self._rules, record)
 
     def activate(self) -> None:
         """Begin to publish the answers."""
@@ -92,6 +97,11 @@ class MonitorNode(Managed, Node):
         self._profile = profile
         if self._monitoring is not None:
             self._monitoring.change_settings(profile)
+
+    def _on_rules(self, rules: Rules) -> None:
+        self._rules = rules
+        if self._monitoring is not None:
+            self._monitoring.change_rules(rules)
 
     def _health(self) -> list[health.Report]:
         """Return what the diagnostics report."""

@@ -16,6 +16,7 @@ from rclpy.clock_type import ClockType
 from rclpy.lifecycle import LifecycleNode
 
 from collision_monitor import codec
+from collision_monitor.alerts.rules import Rules
 from collision_monitor.pipeline.pipeline import Outputs, Pipeline, TakenShapes
 from collision_monitor.pipeline.preparation import Preparation
 from collision_monitor.pipeline.topics import STATUS_PERIOD, Topic
@@ -47,21 +48,27 @@ LOG_PERIOD: Final = 5_000_000_000
 
 
 class Monitoring:
-    """Subscribes to shapes and states, publishes contacts, predictions, status and markers.
+    """Subscribes to shapes and states, publishes contacts, predictions, alerts, status and markers.
 
     node: a managed node, which destroys what is made here. resources: gets what has to end with the configuration, also
-    when it fails halfway. profile: the settings in force. record: as the parameter; empty: no recording.
+    when it fails halfway. profile, rules: those in force. record: as the parameter; empty: no recording.
     """
 
     def __init__(
-        self, node: LifecycleNode, resources: ExitStack, settings: MonitorParameters, profile: Profile, record: str
+        self,
+        node: LifecycleNode,
+        resources: ExitStack,
+        settings: MonitorParameters,
+        profile: Profile,
+        rules: Rules,
+        record: str,
     ) -> None:
         self._node, self._logger = node, node.get_logger()
         self._name = node.get_fully_qualified_name()
         self._name_conflict = NameConflict(node)
         self._preparation = Preparation()
         resources.callback(self._preparation.close)
-        self._pipeline = Pipeline(profile, frame_id=settings.frame_id, preparation=self._preparation)
+        self._pipeline = Pipeline(profile, settings.frame_id, preparation=self._preparation, rules=rules)
         self._times = StepTimes(profile.max_time_step)
         self._peaks = StepPeaks()
         self._markers = MarkerView(self._pipeline.catalogue, settings.frame_id)
@@ -69,10 +76,13 @@ class Monitoring:
         self._last_step: int | None = None  # when the monitor's time last changed
         self._last_stamp: int | None = None
         self._was_silent = False
+        self._empty_classes: list[str] = []  # at the last look
         self._is_event_wanted = settings.splitting.on_event
 
         self._contacts_out = answer_publisher(node, Topic.CONTACTS)
         self._predictions_out = answer_publisher(node, Topic.PREDICTIONS)
+        self._alerts_out = answer_publisher(node, Topic.ALERTS)
+        self._raised_out = answer_publisher(node, Topic.RAISED_ALERTS)
         self._status_out = answer_publisher(node, Topic.STATUS)
         self._markers_out = answer_publisher(node, Topic.MARKERS)
         self._recording = NodeRecording(node, record, lambda: self._pipeline.metadata(self._name), settings.splitting)
@@ -93,6 +103,7 @@ class Monitoring:
             f"listening on {states.topic_name} and {shapes.topic_name}, "
             f"profile {profile.name}, frame {settings.frame_id}, {self._recording}"
         )
+        self._check_rules()
 
     # -- activation
 
@@ -153,7 +164,14 @@ class Monitoring:
             if outputs is not None:
                 self._predictions_out.publish(outputs.predictions)  # first: a warning is worth more if it is early
                 self._contacts_out.publish(outputs.contacts)
+                self._publish_alerts(outputs.alerts)
             return outputs
+
+    def _publish_alerts(self, alerts: tuple[bytes, ...]) -> None:
+        for each in alerts:
+            self._alerts_out.publish(each)
+        if alerts:
+            self._raised_out.publish(self._pipeline.raised_alerts())
 
     def _record_step(self, states: bytes, outputs: Outputs, received: int) -> None:
         """Record a step in the order that a replay needs: how far the step came, the inputs, the answers."""
@@ -164,6 +182,8 @@ class Monitoring:
         self._recording.write(Topic.STATES, states, received, stamp)
         self._recording.write(Topic.CONTACTS, outputs.contacts, received, stamp, event=begins)
         self._recording.write(Topic.PREDICTIONS, outputs.predictions, received, stamp)
+        for each in outputs.alerts:
+            self._recording.write(Topic.ALERTS, each, received, stamp)
 
     def _publish_markers_if_due(self, states: bytes, outputs: Outputs, now: int) -> None:
         if now - self._last_markers < MARKER_PERIOD or not self.is_active:
@@ -205,6 +225,30 @@ class Monitoring:
             self._record_shapes(change.shapes, now)
         self._times.longest_latency = profile.max_time_step
         self._logger.info(f"settings changed, profile {profile.name}")
+        self._check_rules()
+
+    def change_rules(self, rules: Rules) -> None:
+        """Change the rules of the alerts from the next step on."""
+        now = self._now()
+        event = self._pipeline.change_rules(rules, now, self._name)
+        self._recording.write(Topic.SETTINGS, event, now, now, settings=self._pipeline.settings())
+        self._logger.info(f"rules of the alerts changed: {', '.join(each.name for each in rules.rules) or 'none'}")
+        self._check_rules()
+
+    def _check_rules(self) -> None:
+        """Warn if a rule asks for more than the predictions tell."""
+        horizon, longest = self._pipeline.monitor.profile.horizon, self._pipeline.rules.longest_time
+        if longest > horizon:
+            self._logger.warning(
+                f"a rule has a threshold of {longest:g} s, and collisions are predicted only {horizon:g} s ahead: "
+                "raise the parameter horizon"
+            )
+
+    def _warn_of_empty_classes(self) -> None:
+        empty = self._pipeline.empty_classes
+        if empty and empty != self._empty_classes:
+            self._logger.warning(f"rules: no object belongs to the class {', '.join(empty)}")
+        self._empty_classes = empty
 
     def _record_shapes(self, data: bytes, received: int) -> None:
         """Record an ObjectDescriptionArray that the pipeline has processed, with all objects described since then."""
@@ -227,8 +271,11 @@ class Monitoring:
             self._refusals.report_stale(self._states_in, now)
         self._refusals.catch_up(now)
         self._publish_status_if_due(now)
+        if self._pipeline.rules.text:
+            self._raised_out.publish(self._pipeline.raised_alerts())
         if now - self._last_log >= LOG_PERIOD and not silent and self._last_step is not None:
             self._last_log = now
+            self._warn_of_empty_classes()
             line = status_line(codec.decode_status(self._publish_status()))
             self._logger.info(line if self.is_active else f"inactive, nothing is published: {line}")
 
@@ -273,6 +320,7 @@ class Monitoring:
             deferred=deferred,
             unresolved=unresolved,
             other_nodes=self._name_conflict.others,
+            sources=None if self._sources is None else tuple(self._sources.lines()),
         )
 
     def _now(self) -> int:

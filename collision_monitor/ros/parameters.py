@@ -15,8 +15,9 @@ from typing import Any, TypeVar
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
+from collision_monitor.alerts.rules import Rules
 from collision_monitor.errors import InputError, ProfileError, SessionError
-from collision_monitor.pipeline.settings_event import PROFILE
+from collision_monitor.pipeline.settings_event import PROFILE, RULES
 from collision_monitor.ros.diagnostics import DiagnosticsParameters
 from collision_monitor.session import ONE_FILE, Splitting
 from collision_monitor.settings.profile import Profile
@@ -94,12 +95,14 @@ class MonitorParameters:
     autostart: bool = True
     diagnostics: DiagnosticsParameters = field(default_factory=DiagnosticsParameters)
     sources: Mapping | None = None
+    rules: Rules = field(default_factory=Rules)
 
 
 def read_monitor_parameters(node: Node) -> MonitorParameters:
     """Read, check and declare the parameters. Raises InputError; ProfileError for a setting out of range."""
     settings = Profile.fields()
-    reader = ParameterReader(node, [PROFILE, *(s.name for s in settings), "frame_id", "sources", *_RECORD, *_RUNNING])
+    others = ("frame_id", "sources", RULES, *_RECORD, *_RUNNING)
+    reader = ParameterReader(node, [PROFILE, *(s.name for s in settings), *others])
     name = reader.value(PROFILE, "balanced")
     profile = Profile.named(name)
     given = {s.name: plain(reader.given(s.name), s) for s in settings if reader.given(s.name) is not None}
@@ -114,6 +117,7 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
     text = "Frame of all poses; messages in another frame are refused. A sources file sets it."
     frame_id = reader.read("frame_id", DEFAULT_FRAME, text)
     sources = _read_sources(reader, frame_id)
+    rules = _read_rules(reader)
     record = reader.read(
         "record", "", "Path of the session to write: a .mcap file or a folder. Without one, nothing is recorded."
     )
@@ -132,6 +136,7 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
         executor,
         splitting,
         sources=sources,
+        rules=rules,
         autostart=autostart,
         diagnostics=_read_diagnostics(reader),
     )
@@ -161,6 +166,15 @@ def _read_sources(reader: ParameterReader, frame_id: str) -> Mapping | None:
     if frame_id not in (DEFAULT_FRAME, mapping.frame):
         raise InputError(f"parameter frame_id: expected that of {path}, {mapping.frame!r}, got {frame_id!r}")
     return mapping
+
+
+def _read_rules(reader: ParameterReader) -> Rules:
+    """Read the rules of the alerts. Raises InputError with the file and the line."""
+    value = reader.value(RULES, "")
+    rules = Rules.given(value)
+    text = "Path of a YAML file with the rules of the alerts, or the YAML itself. Without rules, there are no alerts."
+    reader.declare(RULES, value, ParameterDescriptor(description=text))
+    return rules
 
 
 def _read_splitting(reader: ParameterReader) -> Splitting:

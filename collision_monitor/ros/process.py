@@ -38,12 +38,14 @@ ordinary end, half for finishing a recording without the thread that is stuck.""
 class StopRequest:
     """Set by SIGINT or SIGTERM. Further signals during the shutdown change nothing.
 
-    A thread ends the process STOP_S after the first signal if it has not ended by then, for example within native code.
-    on_stuck: called by another thread at FINISH_S, to bring to safety what must not be lost.
+    A thread ends the process with `code` if it still runs `within` seconds after the first signal, for example within
+    native code. on_stuck: called by another thread at FINISH_S, to bring to safety what must not be lost.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, within: float = STOP_S, code: int = 0) -> None:
         self.received = False
+        self._within = within
+        self._code = code
         self.on_stuck: Callable[[], None] | None = None
         self._ends = False
 
@@ -66,10 +68,11 @@ class StopRequest:
         time.sleep(FINISH_S)
         finishing = threading.Thread(target=self.on_stuck or (lambda: None), name="finish", daemon=True)
         finishing.start()
-        finishing.join(began + STOP_S - time.monotonic())
-        time.sleep(max(0.0, began + STOP_S - time.monotonic()))
+        end = began + self._within
+        finishing.join(end - time.monotonic())
+        time.sleep(max(0.0, end - time.monotonic()))
         os.write(2, b"collision-monitor: ended within its work, which took too long after the signal\n")
-        os._exit(0)
+        os._exit(self._code)
 
     def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
         self.received = True

@@ -13,7 +13,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from collision_monitor.errors import CollisionMonitorError
-from collision_monitor.ros.live_sources import LineReport, LiveSources, quality_of_all
+from collision_monitor.ros.line_report import LineReport
+from collision_monitor.ros.live_sources import LiveSources, quality_of_all
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Mapping
 from collision_monitor.sources.frames import frame_name

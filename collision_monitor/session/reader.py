@@ -15,8 +15,10 @@ from typing import Final, NamedTuple
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
+from collision_monitor.alerts.rules import Rules
 from collision_monitor.codec import ObjectDescriptionArray, ObjectStateArray, decode_descriptions, decode_states
 from collision_monitor.errors import InputError, MessageError, ProfileError, SessionError
+from collision_monitor.pipeline.settings_event import RULES
 from collision_monitor.session.mcap.layout import (
     LIBRARY,
     LOG_TIME,
@@ -84,8 +86,8 @@ class SessionSpan:
 class Session:
     """A recorded session: a file, or the folder of all files of one recording.
 
-    metadata, profile, frame_id: those of the recorded monitor. foreign: another program recorded the monitor's topics;
-    then there is no metadata, the profile is `balanced`, and the messages are numbered in the order of reading.
+    metadata, profile, rules, frame_id: those of the recorded monitor. foreign: another program recorded the monitor's
+    topics; then there is no metadata, the profile is `balanced`, and the messages are numbered in the order of reading.
     damage: one sentence for each missing or broken part; complete when all messages have been read.
     position, size: bytes read, and bytes in total.
     Raises SessionError, with what was found, if the path holds no session.
@@ -99,6 +101,7 @@ class Session:
         self.foreign = self._files[0].foreign
         self.metadata = self._files[0].metadata
         self.profile = Profile.named("balanced") if self.foreign else self._profile()
+        self.rules = self._rules()
         self.frame_id = self.metadata.get("frame_id", "")
 
     @property
@@ -146,6 +149,12 @@ class Session:
                     snapshots.append(SnapshotLocation(number, at, int(found[1]), *TIMES.unpack_from(data)[:1]))
         begin, end = min(times, default=0), max(times, default=0)
         return SessionSpan(begin, end, tuple(snapshots))
+
+    def _rules(self) -> Rules:
+        try:
+            return Rules.parse(self.metadata.get(RULES, ""))
+        except InputError as error:
+            raise SessionError(f"{self.path}: the rules in the session's metadata cannot be used: {error}") from None
 
     def _profile(self) -> Profile:
         try:

@@ -47,9 +47,9 @@ def profile_changes(name: str) -> dict[str, Any]:
 
     It does not check the values of a file.
     """
-    if name in NAMED_PROFILES:
+    if isinstance(name, str) and name in NAMED_PROFILES:
         return {"name": name, **NAMED_PROFILES[name]}
-    if Path(name).suffix in (".yaml", ".yml"):
+    if isinstance(name, str) and Path(name).suffix in (".yaml", ".yml"):
         return _read(Path(name))
     raise ProfileError(f"profile: expected one of {_names()}, or a .yaml file, got {name!r}")
 

@@ -40,6 +40,11 @@ def read_yaml(path: Path, *, aliases: bool = False, nodes: int = NODES) -> Any:
 
     Raises InputError with the file and the line.
     """
+    return parse_yaml(read_text(path), str(path), aliases=aliases, nodes=nodes)
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a YAML file, of LARGEST bytes at most. Raises InputError."""
     try:
         with path.open("rb") as file:
             data = file.read(LARGEST + 1)
@@ -50,11 +55,10 @@ def read_yaml(path: Path, *, aliases: bool = False, nodes: int = NODES) -> Any:
     if len(data) > LARGEST:
         raise InputError(f"{path}: expected YAML of at most {LARGEST} bytes, got more")
     try:
-        text = data.decode("utf-8-sig")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise InputError(f"{path}, line {line}: expected YAML in UTF-8, got bytes that are not") from None
-    return parse_yaml(text, str(path), aliases=aliases, nodes=nodes)
 
 
 def parse_yaml(text: str, name: str, *, aliases: bool = False, nodes: int = NODES) -> Any:
@@ -71,6 +75,27 @@ def parse_yaml(text: str, name: str, *, aliases: bool = False, nodes: int = NODE
         raise InputError(f"{where}: expected YAML, got: {' '.join(str(reason).split())[:_SHOWN]}") from None
     except Exception as error:  # the library raises many kinds of errors for tags that do not fit their values
         raise InputError(f"{name}: expected YAML, got a value that does not fit its tag: {error!r:.{_SHOWN}}") from None
+
+
+def key_lines(path: Path) -> dict[str, int]:
+    """Return the line of each key in the first three levels of a file that `read_yaml` accepted.
+
+    Keys of the first two levels are by their names, and those of the third by `second, third`.
+    """
+    with path.open(encoding="utf-8-sig") as file:
+        root = yaml.compose(file, SafeLoader)
+    found: dict[str, int] = {}
+    for key, value in _pairs(root):
+        found[key.value] = key.start_mark.line + 1
+        for name, entry in _pairs(value):
+            found[name.value] = name.start_mark.line + 1
+            for inner, _ in _pairs(entry):
+                found[f"{name.value}, {inner.value}"] = inner.start_mark.line + 1
+    return found
+
+
+def _pairs(node: Any) -> list[tuple[Any, Any]]:
+    return node.value if isinstance(node, yaml.MappingNode) else []
 
 
 def _refused(expected: str, found: str, mark: Any) -> yaml.MarkedYAMLError:

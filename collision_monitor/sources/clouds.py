@@ -13,35 +13,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import CollisionMonitorError, InputError
-from collision_monitor.geometry import shapes
 from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import MOST_CLOUD_POINTS, Points
+from collision_monitor.query.points_within import points_within
 from collision_monitor.sources.frames import frame_name
 from collision_monitor.sources.mapping import Mapping
 from collision_monitor.sources.object_entry import ObjectEntry
 from collision_monitor.sources.scene import Scene
+from collision_monitor.sources.yaml_table import known
 
 SCAN: Final = "sensor_msgs/msg/LaserScan"
 CLOUD: Final = "sensor_msgs/msg/PointCloud2"
 
 Floats = NDArray[np.float64]
 
-MOST_POINTS: Final = 1_000_000
-"""Points of a message."""
+MOST_POINTS: Final = 4 * MOST_CLOUD_POINTS
+"""Points of a message, before those without a place are dropped and the others are thinned."""
 
-_POINTS: Final[Any] = getattr(shapes, "Points", None)
 _FORMATS: Final = {7: "f4", 8: "f8"}
 """NumPy's names of PointField's float types."""
 
 
 class CloudSource:
-    """The scan of one entry: points of the entry's `radius`, thinned to one for each cube of its `voxel`."""
+    """The scan of one entry: points of the entry's `radius`, thinned to one for each cube of its `voxel`.
+
+    Points on the objects that `without` names are left out: those of the robot that carries the sensor.
+    """
 
     def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
-        entry.allow_only(("radius", "voxel", "min_range", "max_range"), message_type)
+        entry.allow_only(("radius", "voxel", "min_range", "max_range", "without", "clearance"), message_type)
         if entry.shapes:
             raise InputError(f"{entry.name}, shape: {message_type} brings its own points; `radius` is theirs")
-        if _POINTS is None:
-            raise InputError(f"{entry.name}: {message_type} needs the shape Points, which this version does not have")
+        for each in entry.without:
+            known(each, [*(other.name for other in mapping.sources), *mapping.robots], f"{entry.name}, without")
         self.topics = {entry.topic: (message_type,)}
         self._entry = entry
 
@@ -55,10 +59,11 @@ class CloudSource:
         if frame is None:
             return
         try:
-            points = cloud_points(content) if hasattr(content, "point_step") else scan_points(content)
+            points, lost = cloud_points(content) if hasattr(content, "point_step") else scan_points(content)
         except InputError as error:
             scene.refuse(entry.name, str(error))
             return
+        scene.points_dropped[entry.name] += lost
         squared = (points**2).sum(1)
         points = points[(squared >= entry.min_range**2) & (squared <= entry.max_range**2)]
         points, radius = thinned(points, entry.voxel, entry.radius)
@@ -66,26 +71,48 @@ class CloudSource:
             scene.remove(entry.object_id)
             return
         try:
-            at = Pose(frame.position, frame.quaternion)
-            scene.describe(entry.describe(shapes=((_POINTS(points, radius), Pose()),), at=at))
+            cloud, at = Points(points, radius), Pose(frame.position, frame.quaternion)
+            kept = ~self._on_robot(cloud, at, stamp_ns, scene)
+            if not kept.any():
+                scene.remove(entry.object_id)
+                return
+            if not kept.all():
+                cloud = Points(points[kept], radius)
+            scene.describe(entry.describe(shapes=((cloud, Pose()),), at=at))
         except CollisionMonitorError as error:
             scene.refuse(entry.name, str(error))
+
+    def _on_robot(self, cloud: Points, at: Pose, stamp_ns: int, scene: Scene) -> NDArray[np.bool_]:
+        """Which points (N,) are on an object that is left out. Raises InputError if it is not known where one is."""
+        on = np.zeros(len(cloud.points), np.bool_)
+        for name in self._entry.without:
+            objects = scene.placed(name, stamp_ns)
+            if not objects:
+                raise InputError(f"without: the pose of {name} is not known at the stamp of this scan")
+            for description, pose in objects:
+                limit = self._entry.clearance + description.padding
+                on |= points_within(cloud, at, description.shapes, pose, limit)
+        return on
 
     def settle(self, now_ns: int, scene: Scene) -> None:
         """See Source."""
 
 
-def scan_points(scan: Any) -> Floats:
-    """Return the points (N, 3) in m of a LaserScan in its frame, without beams that met nothing."""
+def scan_points(scan: Any) -> tuple[Floats, int]:
+    """Return the points (N, 3) in m of a LaserScan in its frame, and the number of NaN; beams may meet nothing."""
     ranges = np.asarray(scan.ranges, np.float64)
     angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges))
     met = (ranges >= scan.range_min) & (ranges <= scan.range_max) & np.isfinite(angles)
     distance, angle = ranges[met], angles[met]
-    return np.column_stack([distance * np.cos(angle), distance * np.sin(angle), np.zeros(len(distance))])
+    points = np.column_stack([distance * np.cos(angle), distance * np.sin(angle), np.zeros(len(distance))])
+    return points, int(np.count_nonzero(np.isnan(ranges)))
 
 
-def cloud_points(cloud: Any) -> Floats:
-    """Return the finite points (N, 3) in m of a PointCloud2 in its frame. Raises InputError if it has no x, y and z."""
+def cloud_points(cloud: Any) -> tuple[Floats, int]:
+    """Return the finite points (N, 3) in m of a PointCloud2 in its frame, and the number of the others.
+
+    Raises InputError if it has no x, y and z.
+    """
     fields = {each.name: each for each in cloud.fields}
     missing = [name for name in "xyz" if name not in fields or fields[name].datatype not in _FORMATS]
     if missing:
@@ -119,7 +146,8 @@ def cloud_points(cloud: Any) -> Floats:
     with np.errstate(invalid="ignore"):  # a signalling NaN
         for k, name in enumerate("xyz"):
             points[:, k] = raw[name]
-    return points[np.isfinite(points).all(1)]
+    finite = np.isfinite(points).all(1)
+    return (points, 0) if finite.all() else (points[finite], int(count - np.count_nonzero(finite)))
 
 
 def thinned(points: Floats, voxel: float, radius: float) -> tuple[Floats, float]:

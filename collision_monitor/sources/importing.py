@@ -9,6 +9,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Final
 
+from collision_monitor.alerts.rules import Rules
 from collision_monitor.codec import decode_states
 from collision_monitor.errors import CollisionMonitorError, InputError, MessageError, Refusal, SessionError
 from collision_monitor.pipeline.pipeline import Pipeline
@@ -54,14 +55,15 @@ def import_bag(
     mapping: Mapping | None = None,
     *,
     profile: Profile | str = "balanced",
+    rules: Rules | None = None,
     node: str | None = None,
     overwrite: bool = False,
     progress: Callable[[Imported], None] | None = None,
 ) -> Imported:
     """Write the session `target` from the bag `source`.
 
-    Without a mapping the bag must hold a monitor's inputs; node: the monitor to use, if there are several.
-    Raises SessionError or InputError; then there is no target.
+    Without a mapping the bag must hold a monitor's inputs; node: the monitor to use, if there are several. rules: for
+    the alerts. Raises SessionError or InputError; then there is no target.
     """
     result = Imported()
     if target.exists() and source.exists() and target.samefile(source):
@@ -72,7 +74,7 @@ def import_bag(
         else:
             feed = _feed_of(bag, mapping)
             frame_id, inputs = mapping.frame, _mapped_inputs(bag, feed)
-        pipeline = Pipeline(profile, frame_id=frame_id, timed=False)
+        pipeline = Pipeline(profile, frame_id=frame_id, timed=False, rules=rules)
         _write(inputs, target, pipeline, result, overwrite, progress)
     if mapping is not None:
         result.states, result.skipped = dict(feed.scene.states), dict(feed.scene.refused)
@@ -91,7 +93,8 @@ def _write(
     first = next(inputs, None)  # read first, so that an unusable bag leaves no file
     if first is None:
         raise SessionError("expected messages of the mapped topics in the bag, got none")
-    types = {topic.of(): topic.message for topic in RECORDED if topic is not Topic.SETTINGS}
+    left_out = {Topic.SETTINGS} if pipeline.rules.text else {Topic.SETTINGS, Topic.ALERTS}
+    types = {topic.of(): topic.message for topic in RECORDED if topic not in left_out}
     recorder = Recorder(target, types, pipeline.metadata(node=f"/{NODE}"), overwrite=overwrite, patient=True)
     try:
         _feed(first, inputs, pipeline, recorder, result, progress)
@@ -138,6 +141,8 @@ def _feed(
             result.steps = outputs.result.step
             record(Topic.CONTACTS, outputs.contacts, outputs.result.stamp_ns)
             record(Topic.PREDICTIONS, outputs.predictions, outputs.result.stamp_ns)
+            for alert in outputs.alerts:
+                record(Topic.ALERTS, alert, outputs.result.stamp_ns)
             if now - last_status >= STATUS_PERIOD:
                 last_status = now
                 record(Topic.STATUS, pipeline.status(), now)

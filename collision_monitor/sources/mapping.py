@@ -20,10 +20,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-import yaml
-
 from collision_monitor.errors import CollisionMonitorError, InputError
-from collision_monitor.settings.yaml_file import read_yaml
+from collision_monitor.settings.yaml_file import key_lines, read_yaml
 from collision_monitor.sources.object_entry import ObjectEntry, read_entries
 from collision_monitor.sources.yaml_table import number, table, text
 
@@ -55,6 +53,12 @@ class Mapping:
     path: str = ""
 
     @property
+    def robots(self) -> list[str]:
+        """The names of the robots."""
+        section = self.sections.get("robots", {})
+        return list(section) if isinstance(section, dict) else []
+
+    @property
     def topics(self) -> dict[str, list[ObjectEntry]]:
         """The entries of each topic."""
         found: dict[str, list[ObjectEntry]] = {}
@@ -71,7 +75,7 @@ class Mapping:
 def load_mapping(path: Path) -> Mapping:
     """Read a sources file. Raises InputError, with the line, the object and the key, if it cannot be used."""
     content = read_yaml(path)
-    lines = _lines(path)
+    lines = key_lines(path)
     try:
         return make_mapping(content, str(path), lines)
     except CollisionMonitorError as error:
@@ -104,24 +108,6 @@ def make_mapping(content: Any, path: str = "", lines: dict[str, int] | None = No
         lines=lines or {},
         path=path,
     )
-
-
-def _lines(path: Path) -> dict[str, int]:
-    """Return the line of each key of a file that `read_yaml` accepted: `frame`, and below a section `cart, shape`."""
-    with path.open(encoding="utf-8-sig") as file:
-        root = yaml.compose(file, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-    found: dict[str, int] = {}
-    for key, value in _pairs(root):
-        found[key.value] = key.start_mark.line + 1
-        for name, entry in _pairs(value):
-            found[name.value] = name.start_mark.line + 1
-            for inner, _ in _pairs(entry):
-                found[f"{name.value}, {inner.value}"] = inner.start_mark.line + 1
-    return found
-
-
-def _pairs(node: Any) -> list[tuple[Any, Any]]:
-    return node.value if isinstance(node, yaml.MappingNode) else []
 
 
 def _located(message: str, path: str, lines: dict[str, int]) -> str:

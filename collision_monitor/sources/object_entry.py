@@ -27,10 +27,11 @@ NUMBERS: Final = {
     "voxel": ("m", 0.0),
     "min_range": ("m", 0.0),
     "max_range": ("m", 1e9),
+    "clearance": ("m", 0.0),
 }
 """Keys with a number, their units and defaults."""
 
-KEYS: Final = (*PLACE, *BODY, "covariance", *NUMBERS)
+KEYS: Final = (*PLACE, *BODY, "covariance", "without", *NUMBERS)
 
 
 @dataclass(frozen=True)
@@ -40,8 +41,8 @@ class ObjectEntry:
     type: of the topic's messages, empty if the topic decides. marker: namespace and id of its marker; id None: all
     markers of the namespace. shapes: empty if the messages hold them. each: the shape of each object of a
     group, in place of those in the messages. pose: of a static object, in `frame` (empty: the
-    monitor's). covariance: whether covariances in the messages are used. given: the keys that the file holds.
-    The numbers are those of NUMBERS.
+    monitor's). covariance: whether covariances in the messages are used. without: names of the objects
+    whose points a scan leaves out. given: the keys that the file holds. The numbers are those of NUMBERS.
     """
 
     name: str
@@ -71,6 +72,8 @@ class ObjectEntry:
     voxel: float = 0.0
     min_range: float = 0.0
     max_range: float = 1e9
+    clearance: float = 0.0
+    without: tuple[str, ...] = ()
     given: tuple[str, ...] = ()
 
     def describe(
@@ -152,9 +155,10 @@ def _entry(name: str, content: dict[str, Any], object_id: int) -> ObjectEntry:
         raise InputError(f"{name}, topic: expected the topic that tells where it is, or `static: true`, got none")
     elif stands_at is not None:
         raise InputError(f"{name}, pose: expected one of static objects only; `at` places a shape in its object")
-    allowed = content.get("allowed", [])
-    if not isinstance(allowed, list):
-        raise InputError(f"{name}, allowed: expected a list of names, got {allowed!r}")
+    allowed, without = content.get("allowed", []), content.get("without", [])
+    for key, names in (("allowed", allowed), ("without", without)):
+        if not isinstance(names, list):
+            raise InputError(f"{name}, {key}: expected a list of names, got {names!r}")
     values: dict[str, Any] = {
         key: number(content.get(key, default), f"{name}, {key}", unit) for key, (unit, default) in NUMBERS.items()
     }
@@ -173,6 +177,7 @@ def _entry(name: str, content: dict[str, Any], object_id: int) -> ObjectEntry:
         group=content.get("group", 1),
         mask=content.get("mask", 0),
         allowed=tuple(map(str, allowed)),
+        without=tuple(map(str, without)),
         covariance=truth(content.get("covariance", True), f"{name}, covariance"),
         given=tuple(content),
         **values,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.codec import Change, Removal
+from collision_monitor.geometry.pose import Pose
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.sources.frames import FrameMotion, FrameTree, MissingFrame
 from collision_monitor.sources.waiting_states import WaitingStates
@@ -27,7 +28,7 @@ class Scene:
 
     frame: the monitor's. frames: the tree of tf frames. waiting: the states since the last step. states: number of
     states of each object, by name. refused: what was left out, by its reason. refused_by_name, last_refusal: the same
-    by the key in the sources file.
+    by the key in the sources file. points_dropped: by name, points of scans without a place (NaN).
     """
 
     def __init__(self, frame: str, max_age: float, *, first_free_id: int = 1, by_header: bool = True) -> None:
@@ -39,7 +40,8 @@ class Scene:
         self.refused_by_name: Counter[str] = Counter()
         self.last_refusal: dict[str, str] = {}
         self._news: dict[str, tuple[int, str]] = {}
-        self._names: dict[int, str] = {}
+        self.points_dropped: Counter[str] = Counter()
+        self._described: dict[int, ObjectDescription] = {}
         self._changes: list[Change] = []
         self._next_id = first_free_id
         self._by_header = by_header
@@ -53,12 +55,12 @@ class Scene:
 
     def describe(self, description: ObjectDescription) -> None:
         """Add or replace an object."""
-        self._names[description.object_id] = description.name
+        self._described[description.object_id] = description
         self._changes.append(description)
 
     def remove(self, object_id: int) -> None:
         """Remove an object. An unknown one is ignored."""
-        if self._names.pop(object_id, None) is not None:
+        if self._described.pop(object_id, None) is not None:
             self.waiting.forget(object_id)
             self._changes.append(Removal(object_id))
 
@@ -68,7 +70,7 @@ class Scene:
         covariance (N, 12): as in ObjectStateArray, or None. Where StateFlag.TWIST_UNKNOWN is set, the twist is
         estimated over the last `window` (s) of poses; 0: from the last two.
         """
-        self.states.update(self._names.get(object_id, "?") for object_id in states["id"].tolist())
+        self.states.update(self._name(object_id) for object_id in states["id"].tolist())
         self.waiting.put(states, stamp_ns, covariance, window)
 
     def locate(self, name: str, frame: str, stamp_ns: int) -> FrameMotion | None:
@@ -81,6 +83,20 @@ class Scene:
             self.refuse(name, str(found))
             return None
         return found
+
+    def placed(self, name: str, stamp_ns: int) -> list[tuple[ObjectDescription, Pose]]:
+        """Return the objects of a name, or the links of a robot, with their poses at a stamp; none if one lacks it."""
+        found = []
+        for it in self._described.values():
+            if it.name == name or it.name.startswith(f"{name}/"):
+                pose = it.pose or self.waiting.pose(it.object_id, stamp_ns)
+                if pose is None:
+                    return []
+                found.append((it, pose))
+        return found
+
+    def _name(self, object_id: int, otherwise: str = "?") -> str:
+        return self._described[object_id].name if object_id in self._described else otherwise
 
     def stamp_of(self, header: Any, otherwise: int) -> int:
         """Return the stamp of a std_msgs/Header (ns); `otherwise` if it is zero, or if the file selects receipt."""
@@ -98,7 +114,7 @@ class Scene:
 
     def refuse_old(self, object_id: int) -> None:
         """Count a state that was too old for the step that would have taken it."""
-        self.refuse(self._names.get(object_id, str(object_id)), "its message is older than max_age at its step")
+        self.refuse(self._name(object_id, str(object_id)), "its message is older than max_age at its step")
 
     # -- what the feed calls
 

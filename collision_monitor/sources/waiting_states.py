@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from collision_monitor import records
 from collision_monitor.codec.states import COVARIANCE_SIZE
-from collision_monitor.geometry.pose import from_rotation_vector, multiply
+from collision_monitor.errors import PoseError
+from collision_monitor.geometry.pose import Pose, from_rotation_vector, multiply
 from collision_monitor.records import StateFlag
 from collision_monitor.sources.twist_estimate import TwistEstimator
 
@@ -59,6 +60,17 @@ class WaitingStates:
         self._stamps[slots] = stamp_ns
         self._covariances[slots] = np.nan if covariance is None else covariance
         self._waits[slots] = True
+
+    def pose(self, object_id: int, stamp_ns: int) -> Pose | None:
+        """Return the pose of an object at a stamp, from its last state; None if that is missing or too old."""
+        slot = self._slots.get(object_id)
+        if slot is None or abs(stamp_ns - int(self._stamps[slot])) > self._max_age / NANOSECOND:
+            return None
+        (state,) = self._step(stamp_ns, np.array([slot]), estimated=True).states
+        try:
+            return Pose(state["position"], state["quaternion"])
+        except PoseError:  # it is refused when it reaches the monitor
+            return None
 
     def forget(self, object_id: int) -> None:
         """Forget an object."""

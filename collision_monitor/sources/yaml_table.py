@@ -17,7 +17,7 @@ from collision_monitor.geometry.shapes import Shape
 from collision_monitor.records import ShapeType
 
 BY_VERTICES = ("convex_hull", "polygon")
-SHAPES = tuple(kind.name.lower() for kind in ShapeType if kind is not ShapeType.MESH)
+SHAPES = tuple(kind.name.lower() for kind in ShapeType if kind not in (ShapeType.MESH, ShapeType.POINTS))
 
 
 def table(value: Any, what: str, keys: Collection[str]) -> dict[str, Any]:

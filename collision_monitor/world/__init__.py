@@ -1,4 +1,9 @@
-"""Simulated worlds for demos, tests and benchmarks: scenes, collision response, and event-driven hard spheres."""
+"""Simulated worlds for demos, tests and benchmarks: scenes, collision response, and event-driven hard spheres.
+
+>>> scene = make_scene("fleet", objects=4)
+>>> len(scene.step(0.1))  # states of the objects after 0.1 s
+4
+"""
 
 from typing import TYPE_CHECKING, Any
 

@@ -1,4 +1,4 @@
-"""Pendulums: rows of balls on rods, Newton's cradles, of which some balls are pulled aside."""
+"""Pendulums: rows of balls on rods (Newton's cradles). Some balls of each row are pulled aside."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ANGLES: Final = (0.3, 0.8)
 MASS: Final = 1.0
 """Mass of a ball (kg); the rods have none."""
 STEP: Final = 1e-3
-"""Longest step (s) of the swing, whose energy oscillates by about (2 pi STEP / period)² / 8 of itself."""
+"""Longest step (s) of the swing. Its energy oscillates by about (2 pi STEP / period)² / 8 of itself."""
 SHORTEST: Final = 1e-5
 """Shortest step (s), with which a ball stops at the next one."""
 TOUCH: Final = 1e-6

@@ -81,7 +81,7 @@ _SCENES = {
     "billiards": _responding("billiards", "Billiards", "a cue ball hits a triangle of balls on a table with cushions"),
     "slope": _responding("slope", "Slope", "boxes and balls of different friction slide and roll down a slope"),
     "pile": _responding("pile", "Pile", "boxes and balls fall into a bin and come to rest on each other"),
-    "pendulums": _responding("pendulums", "Pendulums", "rows of balls on rods, of which some are pulled aside"),
+    "pendulums": _responding("pendulums", "Pendulums", "rows of balls on rods, some of them pulled aside"),
     "trajectory": _RegisteredScene(
         lambda objects, seed, rate, path: Trajectory(objects, rate, path),
         "plays recorded tracks of people and carts from CSV files (needs a path)",

@@ -277,12 +277,12 @@ STAGES = (
     Stage("package", "installing collision-monitor", _package_inputs, _install_package),
     Stage("messages", "building collision_monitor_msgs", _messages_inputs, _build_messages, alongside=True),
     Stage("monitor", "compiling the monitor", _kernel_inputs, _compile_monitor, alongside=True),
-    Stage("functions", "compiling the functions beside it", _kernel_inputs, _compile_functions, for_demo=False),
+    Stage("functions", "compiling other functions", _kernel_inputs, _compile_functions, alongside=True, for_demo=False),
     Stage("tools", "installing tools for the tests", _tools_inputs, _install_tools, for_demo=False),
 )
 
 MODULES = ("scipy", "numba", "trimesh", "collada", "mcap", "rich", "matplotlib", "yaml", "rosbags", "colcon_core")
-TOOL_MODULES = ("fcl", "pytest", "hypothesis", "mypy")
+TOOL_MODULES = ("fcl", "pytest", "hypothesis", "mypy", "viser")
 
 _HEALTH = """
 import importlib.util, sys

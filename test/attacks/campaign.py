@@ -38,9 +38,6 @@ STEP: Final = 10_000_000
 
 SLOWEST: Final = 0.1
 """s for one input of up to LARGEST bytes. The time of the processor counts too, as others share the cores."""
-SLOWEST_SHAPES: Final = 0.25
-"""The same for descriptions, whose models are made within an estimate of 0.1 s: other processes on the same cores
-lengthen it, also in time of the processor. `test/pipeline/test_preparation.py` measures the largest ones alone."""
 STUCK: Final = 20.0
 """s of wall time that no input may take, whatever the load: it waits for something that does not come."""
 LARGEST: Final = 1 << 20
@@ -218,8 +215,7 @@ class Campaign:
         if len(slowest) > 64:
             slowest.sort(reverse=True)
             del slowest[5:]
-        limit = SLOWEST_SHAPES if message.topic is Topic.SHAPES else SLOWEST
-        if size <= LARGEST and (min(wall, cpu) > limit or wall > STUCK):
+        if size <= LARGEST and (min(wall, cpu) > SLOWEST or wall > STUCK):
             self.problems.append(f"{size} bytes took {wall:.3f} s, {cpu:.3f} s of the processor")
 
     def _check_answers(self, outputs: Outputs | None) -> None:

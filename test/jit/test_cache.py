@@ -28,7 +28,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def _forget() -> None:
-    for cached in (cache.folder, cache._file_digest, imports.direct_imports):
+    for cached in (cache.folder, cache._file_digest, imports.direct_imports, imports.source_file):
         cached.cache_clear()
 
 

@@ -148,3 +148,16 @@ def test_meshes_that_are_no_manifold_are_their_solids(shift):
     sheet = Mesh(mesh.vertices, mesh.faces[1:])
     assert not cm.contact(sheet, cm.Pose(), Sphere(0.1), cm.Pose()).overlaps
     assert cm.contact(mesh, cm.Pose(), Sphere(0.1), cm.Pose()).overlaps
+
+
+@pytest.mark.parametrize("length", [1e4, 1e8, 1.5e10, 1e12])
+def test_a_needle_of_any_length_has_a_direction(length):
+    """A ball on the axis of a long ellipsoid leaves it sideways, over its smallest half axis."""
+    needle, ball, rng = cm.Ellipsoid((0.8, length, 1.03)), Sphere(0.5), np.random.default_rng(7)
+    for _ in range(20):
+        q = rng.normal(size=4)
+        X = cm.Pose(rng.normal(size=3), q / np.linalg.norm(q))
+        for c in (cm.contact(needle, X, ball, X), cm.contact(ball, X, needle, X)):
+            assert abs(np.linalg.norm(c.normal) - 1.0) < 1e-12
+            assert np.isfinite([c.signed_distance, c.error_bound, *c.point_a, *c.point_b]).all()
+            assert abs(c.signed_distance + 1.3) <= c.error_bound

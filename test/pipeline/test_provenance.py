@@ -28,6 +28,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def _forget() -> None:
     imports.direct_imports.cache_clear()
+    imports.source_file.cache_clear()
     provenance.provenance.cache_clear()
 
 

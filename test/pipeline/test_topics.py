@@ -25,8 +25,8 @@ def test_a_topic_has_the_names_that_its_users_need() -> None:
     )
 
 
-def test_a_picture_is_all_that_is_not_recorded() -> None:
-    assert set(Topic) - set(RECORDED) == {Topic.MARKERS}
+def test_all_is_recorded_but_a_picture_and_what_other_messages_tell() -> None:
+    assert set(Topic) - set(RECORDED) == {Topic.MARKERS, Topic.RAISED_ALERTS}
 
 
 @pytest.mark.parametrize("name", [f'"{NODE}"', f'"/{NODE}', "~/objects", '"objects/s', '"~/'])

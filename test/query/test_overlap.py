@@ -75,5 +75,9 @@ def test_edges_are_for_polygons() -> None:
     assert cm.overlap(square, cm.Pose(), square, cm.Pose((1, 1, 0)), "edges")
     with pytest.raises(cm.UnsupportedError, match="test edges: Box"):
         cm.overlap(square, cm.Pose(), cm.Box((1, 1, 1)), cm.Pose(), "edges")
+    rounded = cm.Polygon(square.points, radius=0.3)
+    for test in ("edges", "sat"):
+        with pytest.raises(cm.UnsupportedError, match=f"test {test}: Polygon with a radius"):
+            cm.overlap(square, cm.Pose(), rounded, cm.Pose((1.2, 0, 0)), test)
     with pytest.raises(cm.UnsupportedError, match="test sat: Circle"):
         cm.overlap(square, cm.Pose(), cm.Circle(1), cm.Pose(), "sat")

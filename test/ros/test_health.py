@@ -9,6 +9,7 @@ import pytest
 
 from collision_monitor.codec import MonitorStatus
 from collision_monitor.ros.health import HISTORY, Facts, History, Level, Report, reports
+from collision_monitor.ros.line_report import LineReport
 from collision_monitor.session import Recording
 
 GOOD = {"step": 9, "objects": 3, "latency": 0.002, "rate": 50.0, "step_duration_p99": 0.001}
@@ -92,6 +93,32 @@ def test_static_objects_alone_need_no_states() -> None:
 def test_a_counter_that_grows_no_more_is_reported_for_ten_reports() -> None:
     history = History()
     levels = [by_task(reports("active", "", facts({"refused_frame": 1}), history))["inputs"].level for _ in range(13)]
+    assert levels == [Level.WARN] * HISTORY + [Level.OK] * (13 - HISTORY)
+
+
+def source(refused: int, level: Level = Level.OK, text: str = "ok") -> LineReport:
+    return LineReport("cart", "/odom", "nav_msgs/msg/Odometry", 9, 9, refused, "why" if refused else "", 0, level, text)
+
+
+@pytest.mark.parametrize(
+    ("line", "level", "text"),
+    [
+        (source(0), Level.OK, "1 topics"),
+        (source(3, Level.WARN, "why"), Level.WARN, "refused lately: 3 of cart (last: why)"),
+        (source(0, Level.WARN, "/odom has no publisher"), Level.WARN, "/odom has no publisher"),
+        (source(3, Level.ERROR, "cart: not installed"), Level.ERROR, "unusable: cart: not installed"),
+    ],
+)
+def test_sources_are_reported_with_a_file(line: LineReport, level: Level, text: str) -> None:
+    found = by_task(reports("active", "", facts(sources=(line,)), History()))
+    assert (found["sources"].level, found["sources"].text) == (level, text)
+    assert found["sources"].values == {"messages": "9", "refused": str(line.refused)}
+    assert {report.level for task, report in found.items() if task != "sources"} == {Level.OK}
+
+
+def test_a_source_that_refuses_no_more_is_reported_for_ten_reports() -> None:
+    history, given = History(), facts(sources=(source(1, Level.WARN, "why"),))
+    levels = [by_task(reports("active", "", given, history))["sources"].level for _ in range(13)]
     assert levels == [Level.WARN] * HISTORY + [Level.OK] * (13 - HISTORY)
 
 

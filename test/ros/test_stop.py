@@ -97,3 +97,15 @@ def test_a_heavy_mesh_holds_up_neither_the_answers_nor_the_end(start, team, tmp_
     assert not worker.exists()
     report = replay(Session(tmp_path / "run.mcap"))
     assert report.verdict is Verdict.IDENTICAL and report.steps == len(seen)
+
+
+def test_a_process_that_does_not_end_in_time_ends_with_its_code():
+    """An interrupted demo that waits too long for its processes reports that it was interrupted."""
+    program = """
+import os, signal, time
+from collision_monitor.ros.process import StopRequest
+StopRequest(within=1.0, code=130).install()
+os.kill(os.getpid(), signal.SIGINT)
+time.sleep(60.0)
+"""
+    assert subprocess.run([sys.executable, "-c", program], timeout=30, capture_output=True).returncode == 130

@@ -386,23 +386,50 @@ def test_markers_expire_by_their_lifetime_and_by_forget_after() -> None:
 
 def test_points_of_scans() -> None:
     _, scan = laser_scan("laser", START, [1, np.inf, np.nan, 20, 0.01, 2], start=0.0, step=math.pi / 2)
-    np.testing.assert_allclose(scan_points(scan), [[1, 0, 0], [0, 2, 0]], atol=1e-6)
+    found, lost = scan_points(scan)
+    np.testing.assert_allclose(found, [[1, 0, 0], [0, 2, 0]], atol=1e-6)
+    assert lost == 1
     rng = np.random.default_rng(3)
     points = rng.normal(size=(500, 3)).astype(np.float32).astype(np.float64)
     points[7] = np.nan
     _, cloud = point_cloud("lidar", START, points, gap=20)
-    np.testing.assert_array_equal(cloud_points(cloud), np.delete(points, 7, 0))
+    found, lost = cloud_points(cloud)
+    np.testing.assert_array_equal(found, np.delete(points, 7, 0))
+    assert lost == 1
     cloud.is_bigendian = True
-    assert not np.array_equal(cloud_points(cloud), np.delete(points, 7, 0))
+    assert not np.array_equal(cloud_points(cloud)[0], np.delete(points, 7, 0))
     cloud.is_bigendian, cloud.width = False, 501
     with pytest.raises(InputError, match="data: expected 1 rows of"):
         cloud_points(cloud)
     cloud.width = 1 << 31
-    with pytest.raises(InputError, match="expected at most 1000000 points"):
+    with pytest.raises(InputError, match="expected at most 2000000 points"):
         cloud_points(cloud)
     cloud.width, cloud.fields = 500, cloud.fields[:2]
     with pytest.raises(InputError, match=r"fields: expected x, y and z of FLOAT32 \(7\)"):
         cloud_points(cloud)
+
+
+def test_a_scan_is_one_object_without_the_points_on_the_robot_that_carries_the_sensor() -> None:
+    robot = {"topic": "/odom", "shape": {"box": [1, 1, 1]}}
+    scan = {"topic": "/scan", "without": ["robot"], "clearance": 0.1, "radius": 0.02}
+    fed = Fed({"robot": robot, "scan": scan})
+    ahead = [(0.55, 0, 0), (2, 0, 0), (np.nan, 0, 0), (0.7, 0, 0)]  # the first one is on the robot, with the clearance
+    fed.give("/scan", at(0), point_cloud("map", at(0), np.add(ahead, (3, 0, 0))))
+    assert any("the pose of robot is not known" in text for text in fed.refused)
+    fed.give("/odom", at(1), odometry("map", at(1), (3 - 0.05, 0, 0), (0, 0, 0, 1), (1, 0, 0), (0, 0, 0)))
+    fed.give("/scan", at(2), point_cloud("map", at(2), np.add(ahead, (3, 0, 0))))  # 0.05 s and 0.05 m later
+    (cloud, _), = fed.changes[-1].shapes  # type: ignore[union-attr]
+    np.testing.assert_allclose(cloud.points[:, 0], [5, 3.7], atol=1e-6)
+    assert cloud.radius == 0.02 and fed.feed.scene.points_dropped["scan"] == 2
+    fed.give("/scan", at(3), point_cloud("map", at(3), [(3.1, 0, 0)]))
+    assert fed.names[-1].startswith("-")  # nothing is left
+    fed = Fed({"robot": robot, "scan": {**scan, "without": ["robto"]}})
+    (problem,) = fed.feed.bind("/scan", laser_scan("map", START, [1])[0]).values()
+    assert "scan, without: 'robto' is unknown: did you mean 'robot'" in problem
+    fed = Fed({"scan": {"topic": "/scan"}})
+    fed.give("/scan", at(0), laser_scan("map", at(0), [1, np.inf, np.nan, 2]))
+    (cloud, _), = fed.changes[-1].shapes  # type: ignore[union-attr]
+    assert len(cloud.points) == 2 and fed.feed.scene.points_dropped["scan"] == 1
 
 
 @given(st.integers(0, 1000), st.floats(0.01, 2.0))

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 from xml.etree import ElementTree
 
+from collision_monitor.alerts.rules import Rules
 from collision_monitor.session.history.expectations import ExpectationResult, evaluate, parse_expectations
 from collision_monitor.session.history.read_history import read_history
 from collision_monitor.session.many import ALL_CORES, Engine, for_each
@@ -36,13 +37,16 @@ class Checked:
         return not self.error and all(each.holds for each in self.outcomes)
 
 
-def check_session(path: Path, expectations: Any, with_profile: str | None = None) -> Checked:
+def check_session(
+    path: Path, expectations: Any, with_profile: str | None = None, rules: Rules | None = None
+) -> Checked:
     """Check one session against the content from `read_expectations`. Raises SessionError, ProfileError.
 
     with_profile: check the answers of this program with that profile, or AS_RECORDED, instead of the recorded answers.
+    rules: replace those of the session.
     """
     begin = time.perf_counter()
-    history = read_history(Session(path), with_profile)
+    history = read_history(Session(path), with_profile, rules=rules)
     outcomes = evaluate(parse_expectations(expectations), history, lambda: replay_verdict(path))
     return Checked(str(path), outcomes, seconds=time.perf_counter() - begin)
 
@@ -63,10 +67,11 @@ def check_sessions(
     expectations: Any,
     *,
     with_profile: str | None = None,
+    rules: Rules | None = None,
     engine: Engine = ALL_CORES,
 ) -> Iterator[Checked]:
     """Yield the outcomes of each session, in order. Raises the errors of `for_each`."""
-    each = partial(check_session, expectations=expectations, with_profile=with_profile)
+    each = partial(check_session, expectations=expectations, with_profile=with_profile, rules=rules)
     for path, checked in zip(paths, for_each(each, paths, _unread, engine), strict=True):
         yield replace(checked, session=str(path))  # the path as the caller gave it
 

@@ -13,7 +13,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from collision_monitor.alerts.thresholds import LEVELS
 from collision_monitor.errors import CollisionMonitorError, InputError
+from collision_monitor.session.history.alert_conditions import alert_within, no_alert
 from collision_monitor.session.history.conditions import (
     Condition,
     PairSelector,
@@ -88,6 +90,8 @@ _OPTIONS: Final[dict[str, tuple[str, ...]]] = {
     "no_contact": (),
     "no_prediction": ("under",),
     "warned": ("before",),
+    "alert": ("level", "rule", "between"),
+    "no_alert": ("level", "rule"),
     "step_time_p99": (),
     "replay": (),
     "complete": (),
@@ -117,6 +121,13 @@ def _parse(number: int, item: Any) -> Expectation:
             )
         case "warned":
             return Expectation(text, warned_before(_names(item[kind], what), _number(item.get("before"), what)))
+        case "alert" | "no_alert":
+            names, rule, level = _names(item[kind], what), item.get("rule", ""), _level(item, what)
+            if not isinstance(rule, str):
+                raise InputError(f"{what}: rule: expected the name of a rule, got {rule!r}")
+            if kind == "no_alert":
+                return Expectation(text, no_alert(names, rule, level))
+            return Expectation(text, alert_within(names, rule, level, *_window(item.get("between"), what)))
         case "step_time_p99":
             return Expectation(text, step_time_within(_number(item[kind], what)))
         case "replay":
@@ -126,6 +137,13 @@ def _parse(number: int, item: Any) -> Expectation:
     if item[kind] is not True:
         raise InputError(f"{what}: complete: expected true, got {item[kind]!r}")
     return Expectation(text, complete)
+
+
+def _level(item: Mapping[str, Any], what: str) -> int:
+    name = item.get("level", LEVELS[0])
+    if name not in LEVELS:
+        raise InputError(f"{what}: level: expected one of {', '.join(LEVELS)}, got {name!r}")
+    return LEVELS.index(name) + 1
 
 
 def _shown(value: Any) -> str:

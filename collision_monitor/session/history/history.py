@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor import records
-from collision_monitor.codec import MonitorStatus
+from collision_monitor.alerts.rules import Rules
+from collision_monitor.codec import CollisionAlert, MonitorStatus
 from collision_monitor.errors import InputError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.settings.profile import Profile
@@ -59,7 +60,8 @@ class History:
     back (restarts: how often). contacts, predictions: of all steps, records.CONTACT (only the first of several points)
     and records.PREDICTION, with the step (index) of each row. states: of all messages, records.STATE, with the time
     (s). objects: by id, as described last; names: all names that occurred, with their ids. profile: at the start;
-    settings: the changed ones, with the time (s) of the first step that used them. durations: step times (s), as far as
+    settings: the changed ones, with the time (s) of the first step that used them. alerts: the changes of alerts, with
+    their times (s); rules: those at the start, or those that replace them. durations: step times (s), as far as
     they were reported or measured. status: the last one, or the replay's. problems: why some of it may be unknown.
     """
 
@@ -80,6 +82,8 @@ class History:
     objects: dict[int, ObjectDescription] = field(default_factory=dict)
     names: dict[str, set[int]] = field(default_factory=dict)
     settings: list[tuple[float, dict[str, Any]]] = field(default_factory=list)
+    alerts: list[tuple[float, CollisionAlert]] = field(default_factory=list)
+    rules: Rules = field(default_factory=Rules)
     status: MonitorStatus | None = None
     problems: list[str] = field(default_factory=list)
     collisions: list[CollisionEvent] = field(default_factory=list)

@@ -10,9 +10,12 @@ from typing import Any, Final
 import numpy as np
 
 from collision_monitor import records
+from collision_monitor.alerts.rules import Rules
 from collision_monitor.codec import (
+    CollisionAlert,
     MonitorStatus,
     Removal,
+    decode_alert,
     decode_contacts,
     decode_descriptions,
     decode_parameter_event,
@@ -23,7 +26,7 @@ from collision_monitor.codec import (
 from collision_monitor.errors import MessageError, SessionError
 from collision_monitor.monitor.timeline import NANOSECOND
 from collision_monitor.pipeline.pipeline import Outputs, Pipeline
-from collision_monitor.pipeline.settings_event import LIMIT
+from collision_monitor.pipeline.settings_event import LIMIT, RULES
 from collision_monitor.session.history.collisions import find_collisions
 from collision_monitor.session.history.growing_rows import GrowingRows
 from collision_monitor.session.history.history import History, Records
@@ -37,14 +40,18 @@ AS_RECORDED: Final = ""
 
 
 def read_history(
-    session: Session, replay_with: Profile | str | None = None, progress: Callable[[], None] = lambda: None
+    session: Session,
+    replay_with: Profile | str | None = None,
+    progress: Callable[[], None] = lambda: None,
+    rules: Rules | None = None,
 ) -> History:
     """Read a whole session. With `replay_with`, replace the recorded answers by those of this program.
 
     replay_with: a profile or its name, for all steps; AS_RECORDED: the recorded profile with its recorded changes.
-    progress: called after every message. Raises SessionError for a session without inputs, ProfileError.
+    progress: called after every message. rules: replace those of the session, whose inputs are replayed for them.
+    Raises SessionError for a session without inputs, ProfileError.
     """
-    gathered = _Gathered(session, replay_with)
+    gathered = _Gathered(session, AS_RECORDED if replay_with is None and rules is not None else replay_with, rules)
     for message in session.messages():
         gathered.take(message)
         progress()
@@ -54,14 +61,19 @@ def read_history(
 class _Gathered:
     """Collects the content of a session, message by message."""
 
-    def __init__(self, session: Session, replay_with: Profile | str | None) -> None:
+    def __init__(self, session: Session, replay_with: Profile | str | None, rules: Rules | None) -> None:
         self._changes = replay_with is None or replay_with == AS_RECORDED
         profile = session.profile if self._changes else replay_with
         assert profile is not None
         profile = Profile.named(profile) if isinstance(profile, str) else profile
         self._session = session
         self._history = History(session.path.name, profile, session.metadata, replay_with is not None)
-        self._pipeline = None if replay_with is None else Pipeline(profile, frame_id=session.frame_id, timed=False)
+        self._history.rules = session.rules if rules is None else rules
+        self._pipeline = None
+        if replay_with is not None:
+            kept = () if rules is None else (RULES,)
+            used = self._history.rules
+            self._pipeline = Pipeline(profile, frame_id=session.frame_id, timed=False, kept=kept, rules=used)
         self._settings: list[tuple[int, dict[str, Any]]] = []  # changed before the step of this index
         self._count = 0
         self._steps: list[int] = []  # stamps in ns
@@ -71,6 +83,7 @@ class _Gathered:
         self._states = GrowingRows(records.STATE)
         self._next_step: list[int] = []  # index of the step after each message of states
         self._durations: list[float] = []
+        self._alerts: list[tuple[int, CollisionAlert]] = []  # index of the step
 
     def take(self, message: Recorded) -> None:
         missing = (message.sequence - self._count) & SEQUENCE_MASK
@@ -118,6 +131,8 @@ class _Gathered:
                 predictions = decode_predictions(message.data)
                 step = self._step(predictions.stamp_ns, predictions.step)
                 self._predictions.append(step, predictions.predictions)
+            case "CollisionAlert" if answers:
+                self._take_alert(decode_alert(message.data))
             case "MonitorStatus":
                 status = self._history.status = decode_status(message.data)
                 if answers and np.isfinite(status.step_duration):
@@ -128,6 +143,11 @@ class _Gathered:
         step = self._step(result.stamp_ns, result.step)
         self._take_contacts(step, result.contact_rows)
         self._predictions.append(step, result.predictions)
+        for alert in map(decode_alert, outputs.alerts):
+            self._take_alert(alert)
+
+    def _take_alert(self, alert: CollisionAlert) -> None:
+        self._alerts.append((self._step(alert.stamp_ns, alert.step), alert))
 
     def _take_contacts(self, step: int, rows: Records) -> None:
         self._contacts.append(step, rows.compress(rows["point_index"] == 0))
@@ -157,6 +177,7 @@ class _Gathered:
         h.states, stamps_of = self._states.joined()
         h.state_time = np.asarray((stamps_of - h.begin_ns) * NANOSECOND, np.float64)
         h.durations = np.array(self._durations)
+        h.alerts = [(float(h.times[step]), alert) for step, alert in self._alerts]
         h.settings = [(float(h.times[k]), changed) for k, changed in self._settings if k < len(stamps)]
         if self._pipeline is not None:
             h.status = self._status_of_replay(self._pipeline)

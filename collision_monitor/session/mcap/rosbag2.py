@@ -15,7 +15,9 @@ _METADATA_VERSION: Final = 9
 """Version of rosbag2's metadata that Jazzy writes."""
 
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
-_TOPICS: Final = (Topic.STATES, Topic.SHAPES, Topic.CONTACTS, Topic.PREDICTIONS, Topic.STATUS, Topic.SETTINGS)
+_TOPICS: Final = (
+    *(Topic.STATES, Topic.SHAPES, Topic.CONTACTS, Topic.PREDICTIONS, Topic.STATUS, Topic.SETTINGS, Topic.ALERTS),
+)
 _QOS: Final = {topic.message: topic.quality for topic in _TOPICS}
 RECORDED_TYPES: Final = tuple(_QOS)
 """The message types that a session holds."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from operator import itemgetter
 from typing import Final, NamedTuple
 
@@ -16,8 +16,9 @@ _OVERHEAD: Final = 128
 class QueueEntry(NamedTuple):
     """A message, or a snapshot, in the recorder's queue. Times in ns.
 
-    event: a collision begins in it. objects: all objects described after it, if it changes them. settings: the profile
-    (JSON) after it, if it changes it. snapshot: the monitor's state before message `sequence`, in place of a message.
+    event: a collision begins in it. objects: all objects described after it, if it changes them. settings: the
+    metadata of the settings after it, if it changes them. snapshot: the monitor's state before message `sequence`, in
+    place of a message.
     """
 
     topic: str
@@ -28,7 +29,7 @@ class QueueEntry(NamedTuple):
     event: bool = False
     objects: Sequence[ObjectDescription] | None = None
     snapshot: Snapshot | None = None
-    settings: str | None = None
+    settings: Mapping[str, str] | None = None
 
     @property
     def cost(self) -> int:

@@ -113,13 +113,13 @@ class Recorder:
         *,
         event: bool = False,
         objects: Sequence[ObjectDescription] | None = None,
-        settings: str | None = None,
+        settings: Mapping[str, str] | None = None,
     ) -> None:
         """Put one message on the queue. Messages are recorded in the order of these calls. Times in ns.
 
         event: a collision begins in it. objects: if the message changes the objects, all that are described afterwards;
-        each further file begins with them. settings: if the message changes settings, the profile afterwards, from
-        `Pipeline.settings`.
+        each further file begins with them. settings: if the message changes settings, those in force afterwards,
+        from `Pipeline.settings`.
 
         A log time before the last one is raised to it. A message that finds the queue full is dropped and counted. Its
         sequence number stays unused, so that a replay notices. Raises KeyError for a topic that is not in `types`.

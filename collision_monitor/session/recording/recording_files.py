@@ -163,7 +163,7 @@ class RecordingFiles:
         if entry.objects is not None:
             self._objects = entry.objects
         if entry.settings is not None:
-            self._metadata["profile"] = entry.settings
+            self._metadata.update(entry.settings)
 
     def _write_snapshot(self, file: SessionFile, entry: QueueEntry, snapshot: Snapshot) -> None:
         data = snapshot.encode()

@@ -8,7 +8,13 @@ from collision_monitor.codec import decode_states
 from collision_monitor.errors import MessageError
 from collision_monitor.pipeline.pipeline import Outputs
 from collision_monitor.session.reader import Recorded
-from collision_monitor.session.replaying.difference import Difference, compare_answers, compare_status, compare_within
+from collision_monitor.session.replaying.difference import (
+    Difference,
+    compare_alerts,
+    compare_answers,
+    compare_status,
+    compare_within,
+)
 from collision_monitor.session.replaying.replay_report import ReplayReport
 
 
@@ -18,7 +24,7 @@ class Comparison:
     def __init__(self, report: ReplayReport) -> None:
         self.sequence = 0
         self._report = report
-        self._expected: dict[str, bytes] = {}  # by message type
+        self._expected: dict[str, list[bytes]] = {}  # by message type, in order
         self._states = b""  # the inputs of the last step
         self._last_differing_step = -1
 
@@ -26,13 +32,16 @@ class Comparison:
         """Store the answers to these states; None if the pipeline refused them."""
         self._states = states
         if outputs is not None:
-            self._expected = {"ContactArray": outputs.contacts, "PredictedCollisionArray": outputs.predictions}
+            self._expected = {"ContactArray": [outputs.contacts], "PredictedCollisionArray": [outputs.predictions]}
+            if outputs.alerts and self._report.tolerance is None:
+                self._expected["CollisionAlert"] = list(outputs.alerts)
 
     def expect_nothing_more(self) -> None:
         """Report each answer of the last step that was not in the session."""
-        for kind, data in self._expected.items():
-            nothing = f"a {kind} of {len(data)} bytes"
-            self._note(Difference(self._report.steps, kind, "the message", "presence", "nothing", nothing))
+        for kind, messages in self._expected.items():
+            for data in messages:
+                nothing = f"a {kind} of {len(data)} bytes"
+                self._note(Difference(self._report.steps, kind, "the message", "presence", "nothing", nothing))
         self._expected = {}
 
     def drop(self) -> None:
@@ -40,13 +49,17 @@ class Comparison:
         self._expected = {}
 
     def compare(self, message: Recorded) -> None:
-        """Compare a recorded ContactArray or PredictedCollisionArray."""
+        """Compare a recorded ContactArray, PredictedCollisionArray or CollisionAlert."""
         self._report.compared += 1
         step, tolerance = self._report.steps, self._report.tolerance
-        replayed = self._expected.pop(message.type, None)
+        expected = self._expected.get(message.type)
+        replayed = expected.pop(0) if expected else None
         if replayed is None:
             recorded = f"a {message.type} of {len(message.data)} bytes"
             self._note(Difference(step, message.topic, "the message", "presence", recorded, "nothing"))
+            return
+        if message.type == "CollisionAlert":
+            self._note(compare_alerts(message.topic, step, message.data, replayed))
             return
         difference = compare_answers(message.type, message.topic, step, message.data, replayed)
         if difference is not None and tolerance is not None:

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.codec import MonitorStatus, decode_contacts, decode_predictions, decode_status
+from collision_monitor.codec import MonitorStatus, decode_alert, decode_contacts, decode_predictions, decode_status
 from collision_monitor.codec.status import LIVE_FIELDS
 from collision_monitor.errors import MessageError
 from collision_monitor.pipeline.preparation import STAYS
@@ -121,6 +121,24 @@ def compare_status(topic: str, step: int, recorded: bytes, replayed: bytes) -> D
             step, topic, "the status", "objects_stale", repr(theirs.objects_stale), repr(ours.objects_stale)
         )
     return None
+
+
+def compare_alerts(topic: str, step: int, recorded: bytes, replayed: bytes) -> Difference | None:
+    """Return the first difference of two CollisionAlert; None if all bytes are equal."""
+    if recorded == replayed:
+        return None
+    ours = decode_alert(replayed)
+    try:
+        theirs = decode_alert(recorded)
+    except MessageError as error:
+        return Difference(step, topic, "the message", "bytes", str(error), "an alert")
+    pair = ours.id_a, ours.id_b
+    element = f"alert {ours.rule!r} of {ours.name_a} and {ours.name_b}"
+    for field in dataclasses.fields(ours):
+        a, b = getattr(theirs, field.name), getattr(ours, field.name)
+        if repr(a) != repr(b):
+            return Difference(step, topic, element, field.name, repr(a), repr(b), pair)
+    return Difference(step, topic, element, "padding", f"{len(recorded)} bytes", f"{len(replayed)} bytes", pair)
 
 
 def _row_difference(rows: str, topic: str, step: int, theirs: Any, ours: Any) -> Difference | None:

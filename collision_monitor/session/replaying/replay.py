@@ -28,7 +28,8 @@ def replay(
 ) -> ReplayReport:
     """Replay a session. threads: replaces the recorded number. progress: called after every message.
 
-    tolerance (m, s): compare the answers of another version by their distances and times, and no status messages.
+    tolerance (m, s): compare the answers of another version by their distances and times, and no status messages and no
+    alerts.
     start (s after the first message): begin with the last snapshot before it.
 
     Raises SessionError if the session holds no inputs or cannot be read, InputError if `start` lies outside of it.
@@ -91,7 +92,8 @@ class _Replay:
     def __init__(self, session: Session, settings: Mapping[str, Any], tolerance: float | None) -> None:
         self._session = session
         self._settings = settings
-        self._pipeline = Pipeline(session.profile.replace(**settings), session.frame_id, timed=False, kept=settings)
+        profile = session.profile.replace(**settings)
+        self._pipeline = Pipeline(profile, session.frame_id, timed=False, kept=settings, rules=session.rules)
         self.report = ReplayReport(digest=self._pipeline.monitor.digest, tolerance=tolerance)
         self.comparison = Comparison(self.report)
         self._mode = _Mode.EXACT
@@ -201,6 +203,8 @@ class _Replay:
                     self.report.steps, self.report.digest = outputs.result.step, outputs.digest
                 self.comparison.expect(message.data, outputs)
             case "ContactArray" | "PredictedCollisionArray" if compare:
+                self.comparison.compare(message)
+            case "CollisionAlert" if compare and self.report.tolerance is None:
                 self.comparison.compare(message)
             case "MonitorStatus" if compare and self.report.tolerance is None:
                 self.comparison.compare_status(message, self._pipeline.status())

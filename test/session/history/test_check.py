@@ -141,7 +141,7 @@ def test_what_nobody_can_know_does_not_hold(tmp_path: Path) -> None:
 
 
 def test_the_example_of_the_help_is_one() -> None:
-    assert len(parse_expectations(yaml.safe_load(EXAMPLE))) == 7
+    assert len(parse_expectations(yaml.safe_load(EXAMPLE))) == 9
 
 
 @pytest.mark.parametrize(

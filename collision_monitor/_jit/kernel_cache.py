@@ -1,0 +1,122 @@
+"""Cache of one function: a file for each combination of argument types and processor, in the folder of its module.
+
+numba's own cache first imports everything that a compilation needs (SciPy's linear algebra, 0.3 s), compiles its
+reference counting, and checks the time of the source file. Here the folder's name stands for the source (`cache.py`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import os
+import pickle
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding as llvm
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
+from numba.core.runtime import _nrt_python
+from numba.core.serialize import dumps
+
+from collision_monitor._jit.cache import folder
+from collision_monitor._jit.libraries import DeviceLibrary, LoadedKernel
+
+
+class KernelCache(NullCache):  # type: ignore[misc]
+    """Loads and saves the overloads of a function; what cannot be read is compiled again."""
+
+    def __init__(self, function: Callable[..., Any], *, is_device: bool) -> None:
+        self._folder = Path(folder(function.__module__))
+        self._name = f"{function.__qualname__.replace('<locals>.', '')}-{function.__code__.co_firstlineno}"
+        self._is_device = is_device
+
+    @property
+    def cache_path(self) -> str:
+        """The folder of the module's kernels."""
+        return str(self._folder)
+
+    def _file(self, signature: Any, target: Any) -> Path:
+        types = getattr(signature, "args", signature)
+        key = repr((tuple(types), target.codegen().magic_tuple()))
+        digest = hashlib.blake2b(key.encode(), digest_size=8).hexdigest()
+        return self._folder / f"{self._name}-{digest}.{'device' if self._is_device else 'kernel'}"
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the compiled function, or None if it has to be compiled."""
+        with contextlib.suppress(OSError, EOFError, ValueError, pickle.UnpicklingError):
+            data = self._file(sig, target_context).read_bytes()
+            digest, data = data[:16], data[16:]
+            if hashlib.blake2b(data, digest_size=16).digest() == digest:  # not cut off by a full disk
+                return _rebuild(target_context, pickle.loads(data))
+        target_context.refresh()
+        return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Save a compiled function; a disk without space costs only the next compilation."""
+        if data.library.has_dynamic_globals or data.lifted:
+            return
+        file = self._file(sig, data.target_context)
+        data.fndesc.typemap = data.fndesc.calltypes = None  # the types of all variables
+        content = dumps((_code(data.library), data.fndesc, data.environment, data.signature, data.reload_init))
+        with contextlib.suppress(OSError):
+            file.parent.mkdir(parents=True, exist_ok=True)
+            handle, temporary = tempfile.mkstemp(dir=file.parent, prefix=file.name)
+            try:
+                with os.fdopen(handle, "wb") as stream:
+                    stream.write(hashlib.blake2b(content, digest_size=16).digest() + content)
+                os.replace(temporary, file)
+            except OSError:
+                os.unlink(temporary)
+
+
+def _code(library: Any) -> tuple[Any, ...]:
+    """The arguments of DeviceLibrary.loaded or of LoadedKernel."""
+    if isinstance(library, DeviceLibrary):
+        return library.serialize_using_object_code()
+    name, _, (code, intermediate) = library.serialize_using_object_code()
+    module = library._get_module_for_linking()
+    symbols = [each.name for each in (*module.functions, *module.global_variables) if not each.is_declaration]
+    return name, code, intermediate, symbols
+
+
+@functools.cache
+def _add_symbols() -> None:
+    """Let LLVM find numba's functions for memory, which machine code calls by name."""
+    for name, address in _nrt_python.c_helpers.items():
+        llvm.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+
+
+def _rebuild(target: Any, content: tuple[Any, ...]) -> Any:
+    """Make the compile result of a function again, with its own environment only.
+
+    The environments of the functions inside belong to modules of numba that a compiled kernel does not need.
+    """
+    code, fndesc, environment, signature, reload_init = content
+    for start in reload_init:  # the threads of a parallel kernel
+        start()
+    if len(code) == 2:
+        library: Any = DeviceLibrary.loaded(target.codegen(), *code)
+    else:
+        _add_symbols()
+        library = LoadedKernel(target.codegen(), *code)
+    return CompileResult(
+        target_context=target,
+        typing_context=target.typing_context,
+        library=library,
+        environment=environment,
+        entry_point=target.get_executable(library, fndesc, environment),
+        fndesc=fndesc,
+        type_annotation="",
+        signature=signature,
+        objectmode=False,
+        lifted=(),
+        typing_error=None,
+        call_helper=None,
+        metadata=None,
+        reload_init=reload_init,
+        referenced_envs=(),
+    )

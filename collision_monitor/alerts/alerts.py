@@ -1,0 +1,167 @@
+"""The alerts of a monitor: after each step, one message for each alert that rises, changes or clears."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.alerts.answered import answered
+from collision_monitor.alerts.debounce import ENTRY, Conditions, Delays, Entries, advance, lasting, restart
+from collision_monitor.alerts.evaluation import evaluate
+from collision_monitor.alerts.measures import Measures, Slots
+from collision_monitor.alerts.messages import Change, Head, NameOf, message
+from collision_monitor.alerts.rules import Rule, Rules
+from collision_monitor.alerts.scene import Scene
+from collision_monitor.alerts.selection import Classes
+from collision_monitor.codec.alerts import AlertCause, CollisionAlert, CollisionAlertArray
+from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.monitor.result import StepResult
+from collision_monitor.monitor.snapshot import Facts, Snapshot
+from collision_monitor.prediction.impact_record import ids_of_keys
+
+_ARRAY: Final = "alerts"
+"""Begin of the keys in a snapshot; the number of the rule follows."""
+
+
+class Alerts:
+    """Evaluates rules, and remembers which alerts are raised. All depends on the steps and their stamps alone.
+
+    rules: those in force. are_used: whether there ever were any. number: count of the messages so far.
+    """
+
+    def __init__(self, rules: Rules | None = None) -> None:
+        self.rules = rules or Rules()
+        self.are_used = bool(self.rules.text)
+        self.number = 0
+        self._classes = Classes(self.rules)
+        self._is_outdated = True  # objects were described or removed since the classes were updated
+        self._entries: dict[str, Entries] = {rule.name: _none() for rule in self.rules.rules}
+        self._gone: dict[str, Entries] = {}  # of rules that were taken out, until the next step
+        self._last: list[int] | None = None  # stamp (ns) of the last step, and number of restarts of the timeline
+        self._raised: dict[tuple[str, int, int], CollisionAlert] = {}
+
+    def use(self, rules: Rules) -> None:
+        """Use these rules from the next step on. The alerts of a rule whose name stays go on; the others end."""
+        before, self.rules, self.are_used = {**self._gone, **self._entries}, rules, True
+        self._entries = {rule.name: before.pop(rule.name, _none()) for rule in rules.rules}
+        self._gone = before
+        self._classes, self._is_outdated = Classes(rules), True
+
+    def forget_classes(self) -> None:
+        """Look again which objects belong to which classes, because objects were described or removed."""
+        self._is_outdated = True
+
+    @property
+    def empty_classes(self) -> list[str]:
+        """The classes of the rules that no object belongs to, as of the last step."""
+        return self._classes.without_members()
+
+    def raised(self, stamp_ns: int, frame_id: str, step: int) -> CollisionAlertArray:
+        """Return all alerts that are raised. After a restart from a snapshot, those that have changed since then."""
+        alerts = sorted(self._raised.values(), key=lambda each: (-each.level, each.rule, each.id_a, each.id_b))
+        highest = alerts[0].level if alerts else 0
+        return CollisionAlertArray(stamp_ns, frame_id, step, self.number, highest, tuple(alerts))
+
+    # ------------------------------------------------------------------ steps
+
+    def step(self, monitor: Monitor, result: StepResult, frame_id: str, name_of: NameOf) -> list[CollisionAlert]:
+        """Return the alerts that a step changes, by rule and pair. Without rules this costs nothing."""
+        if not (self.rules.rules or self._gone):
+            return []
+        scene = Scene(monitor.roster, monitor.profile, monitor.now)
+        if self._is_outdated:
+            self._classes.update(monitor.roster)
+            self._is_outdated = False
+        self._follow_time(result.stamp_ns, monitor.restarts)
+        head = Head(result.stamp_ns, frame_id, result.step, name_of)
+        made = [
+            each for name, entries in self._gone.items() for each in self._messages(head, name, None, _ended(entries))
+        ]
+        self._gone = {}
+        answers = answered(scene, result)
+        for rule in self.rules.rules:
+            found, changes = self._advance(rule, scene, answers, result.stamp_ns)
+            made += self._messages(head, rule.name, (rule, found), changes)
+        return made
+
+    def _follow_time(self, now: int, restarts: int) -> None:
+        if self._last is not None and (now < self._last[0] or restarts != self._last[1]):
+            for entries in self._entries.values():
+                restart(entries, now)
+        self._last = [now, restarts]
+
+    def _advance(self, rule: Rule, scene: Scene, answers: Measures, now: int) -> tuple[Measures, list[Change]]:
+        """Advance one rule. Return its measures and its changes, by pair."""
+        entries = self._entries[rule.name]
+        i, j = (scene.roster.find_slots(ids.astype(np.uint32)) for ids in ids_of_keys(entries["key"]))
+        is_removed = (i < 0) | (j < 0)
+        removed, entries = entries.compress(is_removed), entries.compress(~is_removed)
+        is_unknown = _is_stale(scene, i[~is_removed]) | _is_stale(scene, j[~is_removed])
+        raised = entries["key"][entries["level"] > 0]
+        found, level = evaluate(self.rules, rule, self._classes, scene, answers, raised)
+        uncertain = np.union1d(entries["key"][is_unknown], found.keys[found.uncertain])
+        conditions = Conditions(found.keys, level, uncertain)
+        after, before = advance(entries, conditions, now, Delays(rule.raise_after, rule.clear_after))
+        self._entries[rule.name] = lasting(after)
+        changes = _ended(removed)
+        for k in np.flatnonzero(after["level"] != before).tolist():
+            key, new, since = int(after["key"][k]), int(after["level"][k]), int(after["since"][k])
+            cause = AlertCause.UNRESOLVED if np.isin(after["key"][k], uncertain) else AlertCause.CONDITIONS
+            classes = self._classes.of_pair(rule.between, scene.roster, key)
+            changes.append(Change(key, new, int(before[k]), since, cause, classes))
+        return found, sorted(changes)
+
+    def _messages(
+        self, head: Head, rule: str, of: tuple[Rule, Measures] | None, changes: list[Change]
+    ) -> list[CollisionAlert]:
+        made = []
+        for change in changes:
+            self.number += 1
+            each = message(head, self.number, rule, change, of)
+            pair = rule, each.id_a, each.id_b
+            self._raised.pop(pair, None)
+            if change.level:
+                self._raised[pair] = each
+            made.append(each)
+        return made
+
+    # ------------------------------------------------------------------ snapshots
+
+    def save(self, snapshot: Snapshot) -> Facts:
+        """Copy what later alerts depend on into the snapshot's arrays and into the facts that are returned."""
+        kept = {**self._gone, **self._entries}
+        for k, entries in enumerate(kept.values()):
+            snapshot.arrays[f"{_ARRAY}.{k}"] = entries.copy()
+        return {
+            "rules": self.rules.text,
+            "names": list(kept),
+            "number": self.number,
+            "last": self._last,
+        }
+
+    @classmethod
+    def restored(cls, snapshot: Snapshot, facts: Any) -> Alerts:
+        """Restore what `save` wrote. Raises InputError, KeyError, TypeError or ValueError for other content."""
+        alerts = cls(Rules.parse(str(facts["rules"])))
+        alerts.are_used = True
+        alerts.number, alerts._last = int(facts["number"]), facts["last"]
+        for k, name in enumerate(facts["names"]):
+            entries = snapshot.array(f"{_ARRAY}.{k}", _none())
+            (alerts._entries if name in alerts._entries else alerts._gone)[name] = entries
+        return alerts
+
+
+def _none() -> Entries:
+    return np.zeros(0, ENTRY)
+
+
+def _ended(entries: Entries) -> list[Change]:
+    """Return the end of each raised alert among the entries."""
+    raised = entries.compress(entries["level"] > 0)
+    return [Change(int(e["key"]), 0, int(e["level"]), int(e["since"]), AlertCause.REMOVED) for e in raised]
+
+
+def _is_stale(scene: Scene, slots: Slots) -> NDArray[np.bool_]:
+    return np.asarray(scene.stale[slots])

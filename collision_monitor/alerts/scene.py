@@ -1,0 +1,45 @@
+"""The bodies of the monitor after a step, as the measures read them: one array for each quantity, by slot."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.alerts.measures import Array, Slots
+from collision_monitor.monitor.filters import bodies_in, is_bounded
+from collision_monitor.monitor.roster import Roster
+from collision_monitor.settings.profile import Profile
+
+
+class Scene:
+    """The bodies at `now` (s after the monitor's origin), in the world frame; N slots.
+
+    present (N,): the body is described and has a state, and lies in the region of interest. position, velocity, angular
+    (N, 3): extrapolated from the last states. radius (N,): of the sphere about the origin that holds the body (m); may
+    be infinite. turning (N,): bound on the speed of its points about the origin (m/s); speed (N,): on any.
+    doubt (N,): how far it may have left its path since its last state (m). stale (N,): the last state is too old, or
+    there is none.
+    """
+
+    def __init__(self, roster: Roster, profile: Profile, now: float) -> None:
+        b, top = roster.bodies, roster.top
+        self.roster, self.profile, self.now = roster, profile, now
+        age = np.where(b.static[:top], 0.0, now - b.time[:top])
+        turning = np.sqrt((b.angular[:top] ** 2).sum(axis=1))
+        self.radius: Array = b.motion["radius"][:top]
+        self.velocity: Array = b.linear[:top] + b.acceleration[:top] * age[:, None]
+        self.position: Array = b.position[:top] + 0.5 * (b.linear[:top] + self.velocity) * age[:, None]
+        self.angular: Array = b.angular[:top]
+        self.doubt: Array = 0.5 * profile.stale_acceleration * age**2
+        reach = np.where(turning > 0.0, b.spin_radius[:top], 0.0)
+        self.turning: Array = turning * reach
+        self.speed: Array = np.sqrt((self.velocity**2).sum(axis=1)) + self.turning
+        self.stale: NDArray[np.bool_] = (age > profile.stale_after) | ~(b.seen[:top] | b.static[:top])
+        self.present: NDArray[np.bool_] = b.used[:top] & (b.seen[:top] | b.static[:top])
+        if is_bounded(profile.region_min, profile.region_max):
+            low, high = profile.region_min, profile.region_max
+            self.present &= bodies_in(b, top, now, low, high, profile.stale_acceleration)
+
+    def velocity_at(self, slots: Slots, points: Array) -> Array:
+        """Velocity (m/s) of points (n, 3) of these bodies."""
+        return np.asarray(self.velocity[slots] + np.cross(self.angular[slots], points - self.position[slots]))

@@ -1,0 +1,158 @@
+"""Largest distance by which a model exceeds the object that it contains.
+
+Around a concave object it is found by sampling: the distance from the object changes by at most half a cell's diagonal
+within a cell. It changes as slowly between the cells of a block, so that most blocks are left out after one distance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.geometry.inside import locate_in_surface
+from collision_monitor.geometry.point_in_polygon import Location
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.reach import reach
+from collision_monitor.geometry.shape_table import ShapeTableBuilder, take
+from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape, Sphere, Triangle
+from collision_monitor.narrow_phase.dispatch import contact_batch
+
+Array = NDArray[np.float64]
+PosedShapes = list[tuple[Shape, Pose]]
+
+BLOCK: Final = 4
+"""Cells of a block along each axis."""
+
+BLOCKS: Final = 6
+"""Blocks along each axis. The stated excess is up to 2 / (BLOCK * BLOCKS) of the size too large.
+The time grows at least with the square of BLOCKS."""
+
+AT_ONCE: Final = 16
+"""Blocks that are searched first. The next search takes twice as many, and so on."""
+
+FARTHEST_FIRST: Final = 64
+"""Cells that are first tested for the inside of a mesh, which takes longest. The next test takes 8 times as many."""
+
+
+def excess_of(shapes: Sequence[tuple[Shape, Pose]], pieces: PosedShapes, model: Shape, pose: Pose) -> float:
+    """Largest distance (m) by which the model exceeds the object, rounded up. pieces: the object's convex pieces."""
+    if len(pieces) == 1 and model is pieces[0][0]:
+        return 0.0
+    if len(pieces) > 1:
+        return _excess_around_concave(shapes, pieces, model, pose)
+    # the distance to a convex object is greatest at a corner of the model
+    if isinstance(model, Sphere):
+        return max(float(_distances(pose.position[None], pieces)[0]) + model.radius, 0.0)
+    return max(float(_distances(corners([(model, pose)]), pieces).max()), 0.0)
+
+
+def corners(pieces: PosedShapes) -> Array:
+    """Points with a hull that contains the pieces: vertices of polytopes, corners of boxes around round shapes."""
+    found = []
+    for shape, pose in pieces:
+        if isinstance(shape, ConvexHull | Triangle):
+            points = shape.points
+        else:
+            low, high = -reach([(shape, Pose())], -np.eye(3)), reach([(shape, Pose())], np.eye(3))
+            points = np.array(list(product(*zip(low, high, strict=True))))
+        found.append(points @ pose.rotation.T + pose.position)
+    return np.concatenate(found)
+
+
+def _excess_around_concave(
+    shapes: Sequence[tuple[Shape, Pose]], pieces: PosedShapes, model: Shape, pose: Pose
+) -> float:
+    """Excess at the farthest cell of a grid around the model that is in the model and not inside of the object."""
+    low, high = -reach([(model, pose)], -np.eye(3)), reach([(model, pose)], np.eye(3))
+    cell = (high - low) / (BLOCK * BLOCKS)
+    diagonal = float(np.linalg.norm(cell))
+    slack = diagonal / 2
+    distance = _DistanceTo(pieces)
+    block = _grid(BLOCKS)
+    bound = distance((block + 0.5) * (BLOCK * cell) + low) + diagonal * (BLOCK - 1) / 2
+    order = np.argsort(-bound)
+    farthest = -np.inf
+    begin = 0
+    while begin < len(order) and bound[order[begin]] > farthest:
+        some = order[begin : 2 * begin + AT_ONCE]
+        begin += len(some)
+        some = some[bound[some] > farthest]
+        index = (block[some, None] * BLOCK + _grid(BLOCK)).reshape(-1, 3)
+        centres = (index + 0.5) * cell + low
+        if not isinstance(model, Box):
+            centres = centres[_distances(centres, [(model, pose)]) <= slack]
+        farthest = max(farthest, _farthest_outside(centres, distance(centres), shapes, farthest))
+    return slack + (farthest if farthest > -np.inf else 0.0)
+
+
+def _grid(count: int) -> NDArray[np.intp]:
+    """Indices (count^3, 3) of the cells of a cube."""
+    return np.stack(np.meshgrid(*[np.arange(count)] * 3, indexing="ij"), -1).reshape(-1, 3)
+
+
+def _farthest_outside(points: Array, distance: Array, shapes: Sequence[tuple[Shape, Pose]], beyond: float) -> float:
+    """Largest distance (n,) of a point (n, 3) that is above `beyond` (m) and not inside of a mesh; -inf if none is."""
+    order = np.argsort(-distance)
+    order = order[distance[order] > beyond]
+    begin = 0
+    while begin < len(order):
+        some = order[begin : 8 * begin + FARTHEST_FIRST]
+        outside = ~_inside_of_meshes(points[some], shapes)
+        if outside.any():
+            return float(distance[some[np.argmax(outside)]])
+        begin += len(some)
+    return -np.inf
+
+
+def _inside_of_meshes(points: Array, shapes: Sequence[tuple[Shape, Pose]]) -> NDArray[np.bool_]:
+    """Whether each of the points (n, 3) is certainly inside of a mesh, or on it."""
+    inside = np.zeros(len(points), bool)
+    for shape, offset in shapes:
+        if isinstance(shape, Mesh):
+            own = (points - offset.position) @ offset.rotation
+            location = locate_in_surface(own, shape.surface)
+            inside |= (location == Location.INSIDE) | (location == Location.BOUNDARY)
+    return inside
+
+
+class _DistanceTo:
+    """Distance (n,) in m of points (n, 3) from the nearest piece, rounded up."""
+
+    def __init__(self, pieces: PosedShapes) -> None:
+        self._pieces = pieces
+        self._tree = None
+        if all(isinstance(shape, Triangle) for shape, _ in pieces):
+            from scipy.spatial import cKDTree
+
+            # the distance to the nearest vertex bounds that to the nearest face and is much faster to compute
+            self._tree = cKDTree(corners(pieces))
+
+    def __call__(self, points: Array) -> Array:
+        if self._tree is not None:
+            return np.asarray(self._tree.query(points)[0])
+        return _distances(points, self._pieces)
+
+
+def _distances(points: Array, pieces: PosedShapes) -> Array:
+    """Signed distances (n,) in m of points (n, 3) from the nearest piece, rounded up."""
+    builder = ShapeTableBuilder(slots=1 + len(pieces))
+    size = float(max(np.abs(reach(pieces, np.concatenate([np.eye(3), -np.eye(3)])))))
+    probe = Sphere(max(1e-9 * size, 1e-300))
+    builder.append(probe)
+    for shape, _ in pieces:
+        builder.append(shape)
+    best = np.full(len(points), np.inf)
+    count = len(points)
+    pairs = np.stack([np.zeros(count), np.arange(1, count + 1)], axis=1).astype(np.int32)
+    rotation = np.tile(np.eye(3), (1 + count, 1, 1))
+    for k, (_, pose) in enumerate(pieces, start=1):
+        # the piece is in slot 0, and the probe at each point around it
+        table = take(builder.table, np.r_[k, np.zeros(count, int)])
+        rotation[0] = pose.rotation
+        rows = contact_batch(table, np.concatenate([np.zeros((1, 3)), points - pose.position]), rotation, pairs)
+        best = np.minimum(best, rows[:, 0] + rows[:, 10] + probe.radius)
+    return best

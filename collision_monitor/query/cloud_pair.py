@@ -1,0 +1,72 @@
+"""The contact of a cloud with another shape, and its points that are near one, by the kernel of the monitor."""
+
+from __future__ import annotations
+
+import threading
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.geometry.bounded_cache import bounded_cache
+from collision_monitor.geometry.forest import Forest
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shape_table import ShapeTable, ShapeTableBuilder
+from collision_monitor.geometry.shapes import Mesh, Points, Shape
+from collision_monitor.meshes.shape_trees import shape_tree
+from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE
+from collision_monitor.prediction.body_impact import make_scratch
+from collision_monitor.prediction.mesh_contact import mark_near_points, mesh_contact
+
+Array = NDArray[np.float64]
+
+REMEMBERED: Final = 64 << 20
+"""Bytes of the tables of pairs that are remembered. Less: each query copies the tree, 1 ms for 20,000 points."""
+
+
+class _Memory(threading.local):
+    def __init__(self) -> None:
+        self.scratch = make_scratch()
+
+
+_MEMORY: Final = _Memory()
+
+
+def cloud_contact(a: Shape, X_A: tuple[Array, Array], b: Shape, X_B: tuple[Array, Array]) -> Array:
+    """Contact row of two shapes, one of which is a cloud, about A's origin in world axes; a mesh counts as its surface.
+
+    X_A, X_B: rotation (3, 3) and position (3,) of each (m).
+    """
+    row = np.empty(CONTACT_SIZE)
+    mesh_contact(_table(a, b), np.stack([X_A[0], X_B[0]]), X_B[1] - X_A[1], np.inf, row, _MEMORY.scratch)
+    return row
+
+
+def points_near(points: Array, radius: float, pose: Pose, shape: Shape, at: Pose, limit: float) -> NDArray[np.bool_]:
+    """Which balls (n,) about points (n, 3), at a pose, are within a limit (m) of a shape at another pose."""
+    near = np.zeros(len(points), np.bool_)
+    R = np.stack([np.eye(3), pose.rotation.T @ at.rotation])
+    p = pose.rotation.T @ (at.position - pose.position)
+    row = np.empty(CONTACT_SIZE)
+    mark_near_points(_table(_at_origin(radius), shape), points, R, p, limit, near, row, _MEMORY.scratch)
+    return near
+
+
+@lru_cache(8)
+def _at_origin(radius: float) -> Points:
+    """A cloud of one point."""
+    return Points(np.zeros((1, 3)), radius)
+
+
+def _bytes(table: ShapeTable, a: Shape, b: Shape) -> int:
+    return int(table.blocks.nbytes)
+
+
+@bounded_cache(REMEMBERED, _bytes)
+def _table(a: Shape, b: Shape) -> ShapeTable:
+    trees = [shape_tree(shape) if isinstance(shape, Mesh | Points) else None for shape in (a, b)]
+    builder = ShapeTableBuilder(slots=2, forest=Forest(sum(len(tree) for tree in trees if tree is not None)))
+    for shape, tree in zip((a, b), trees, strict=True):
+        builder.append(shape, tree=tree)
+    return builder.table

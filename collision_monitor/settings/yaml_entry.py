@@ -1,0 +1,112 @@
+"""One value of a YAML file with its place, so that an error names the file, the line and the key."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+import yaml
+
+from collision_monitor.errors import InputError
+from collision_monitor.settings.yaml_file import parse_yaml
+
+Path = tuple[str | int, ...]
+"""Keys and indices that lead to a value."""
+
+
+@dataclass(frozen=True, eq=False)
+class YamlEntry:
+    """A value, and the keys and indices that lead to it. Every method raises InputError if the value does not fit."""
+
+    value: Any
+    file: str
+    lines: Mapping[Path, int]
+    path: Path = ()
+
+    @classmethod
+    def of_text(cls, text: str, file: str) -> Self:
+        """Parse YAML. file: its name, for errors."""
+        value = parse_yaml(text, file)
+        return cls(value, file, _lines(text))
+
+    @property
+    def where(self) -> str:
+        """File, line and keys, such as `rules.yaml, line 7, rules, 0, warning`."""
+        line = self.lines.get(self.path)
+        return ", ".join([self.file, *([f"line {line}"] if line else []), *map(str, self.path)])
+
+    def error(self, expected: str, found: str | None = None) -> InputError:
+        """Return the error for this value, to be raised."""
+        return InputError(f"{self.where}: expected {expected}, got {f'{self.value!r:.80}' if found is None else found}")
+
+    def unknown(self, name: str, names: Collection[str], what: str) -> InputError:
+        """Return the error for an unknown name, with the nearest known one."""
+        near = difflib.get_close_matches(name, names, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names) or 'none'}"
+        return InputError(f"{self.where}: the {what} {name!r:.80} is unknown: {hint}")
+
+    def table(self, keys: Collection[str] | None = None) -> dict[str, Self]:
+        """Return the entries of a table with these keys only; None: any texts."""
+        if not isinstance(self.value, dict):
+            raise self.error("a table" + (f" with {', '.join(keys)}" if keys else ""))
+        found = {}
+        for key, value in self.value.items():
+            entry = type(self)(value, self.file, self.lines, (*self.path, key))
+            if not isinstance(key, str) or not key:
+                raise entry.error("a text as key", f"{key!r:.80}")
+            if keys is not None and key not in keys:
+                raise entry.unknown(key, keys, "key")
+            found[key] = entry
+        return found
+
+    def items(self, least: int = 0, most: int = 1000) -> list[Self]:
+        """Return the entries of a list."""
+        if not isinstance(self.value, list) or not least <= len(self.value) <= most:
+            size = f"{least}" if least == most else f"{least} to {most}"
+            raise self.error(f"a list of {size}")
+        return [type(self)(each, self.file, self.lines, (*self.path, k)) for k, each in enumerate(self.value)]
+
+    def text(self) -> str:
+        """Return a text that is not empty."""
+        if not isinstance(self.value, str) or not self.value:
+            raise self.error("a text")
+        return self.value
+
+    def truth(self) -> bool:
+        """Return true or false."""
+        if not isinstance(self.value, bool):
+            raise self.error("true or false")
+        return self.value
+
+    def number(self, unit: str, least: float = 0.0, most: float = 1e9) -> float:
+        """Return a number in a range."""
+        value = self.value
+        is_number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        if not (is_number and least <= value <= most):
+            raise self.error(f"a number of {unit} from {least:g} to {most:g}")
+        return float(value)
+
+    def numbers(self, count: int, unit: str) -> tuple[float, ...]:
+        """Return a list of `count` numbers."""
+        return tuple(each.number(unit, -1e9) for each in self.items(count, count))
+
+
+def _lines(text: str) -> dict[Path, int]:
+    """Return the line of each key and of each element of a list. The text is one that `parse_yaml` accepted."""
+    found: dict[Path, int] = {}
+    waiting: list[tuple[Path, Any]] = [((), yaml.compose(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader)))]
+    while waiting:
+        path, node = waiting.pop()
+        if isinstance(node, yaml.MappingNode):
+            for key, value in node.value:
+                if isinstance(key, yaml.ScalarNode):
+                    found[*path, key.value] = key.start_mark.line + 1
+                    waiting.append(((*path, key.value), value))
+        elif isinstance(node, yaml.SequenceNode):
+            for k, value in enumerate(node.value):
+                found[*path, k] = value.start_mark.line + 1
+                waiting.append(((*path, k), value))
+    return found

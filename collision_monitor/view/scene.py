@@ -1,0 +1,227 @@
+"""The scene of a monitor, message by message: its objects, their last states and the last answers."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor import records
+from collision_monitor.codec import (
+    ContactArray,
+    MonitorStatus,
+    ObjectDescriptionArray,
+    ObjectStateArray,
+    PredictedCollisionArray,
+    Removal,
+    decode_contacts,
+    decode_descriptions,
+    decode_predictions,
+    decode_states,
+    decode_status,
+)
+from collision_monitor.codec.states import COVARIANCE_SIZE
+from collision_monitor.geometry.pose import multiply
+from collision_monitor.monitor.timeline import NANOSECOND
+from collision_monitor.pipeline.catalogue import Catalogue
+from collision_monitor.prediction.spread import worst_stddevs
+from collision_monitor.records import StateFlag
+from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
+from collision_monitor.view.bodies import Bodies, described_pieces
+from collision_monitor.view.forms import Piece
+from collision_monitor.view.moment import Moment
+
+States = NDArray[np.void]
+
+_NEVER: Final = np.iinfo(np.int64).min
+
+
+class Scene:
+    """The newest content of a monitor's topics, live or from a session.
+
+    frame_id: states and descriptions in another frame are ignored, as the monitor refuses them; empty: not known yet,
+    the answers tell it.
+    """
+
+    def __init__(self, frame_id: str = "") -> None:
+        self.frame_id = frame_id
+        self.status: MonitorStatus | None = None
+        self._catalogue = Catalogue()
+        self._is_shared = False
+        self._pieces: dict[int, list[Piece]] = {}
+        self._bodies = Bodies()
+        self._removed: set[int] = set()
+        self._is_changed = False
+        self._state = np.zeros(0, records.STATE)
+        self._stamp = np.zeros(0, np.int64)
+        self._newest = 0
+        self._contacts: ContactArray | None = None
+        self._predictions: PredictedCollisionArray | None = None
+
+    def take(self, kind: str, data: bytes) -> None:
+        """Take a message. kind: its type, such as `ContactArray`; others are ignored. Raises MessageError."""
+        match kind:
+            case "ObjectDescriptionArray":
+                self._describe(decode_descriptions(data))
+            case "ObjectStateArray":
+                self._move(decode_states(data))
+            case "ContactArray":
+                contacts = decode_contacts(data)
+                if self._contacts is not None and contacts.stamp_ns < self._contacts.stamp_ns:
+                    self._set_back(contacts.stamp_ns)
+                self._contacts, self.frame_id = contacts, contacts.frame_id
+            case "PredictedCollisionArray":
+                self._predictions = decode_predictions(data)
+                self.frame_id = self._predictions.frame_id
+            case "MonitorStatus":
+                self.status = decode_status(data)
+
+    def copy(self) -> Scene:
+        """Return a scene that takes further messages without changing this one."""
+        self._is_shared = True
+        other = copy.copy(self)
+        other._state, other._stamp = self._state.copy(), self._stamp.copy()
+        other._removed = set(self._removed)
+        return other
+
+    def moment(self) -> Moment:
+        """Return the moment after the last messages."""
+        self._adopt()
+        bodies, contacts, predictions = self._bodies, self._contacts, self._predictions
+        answers = [each for each in (contacts, predictions) if each is not None]
+        last: Any = max(answers, key=lambda each: each.step, default=None)
+        stamp = self._newest if last is None else last.stamp_ns
+        body = np.flatnonzero(self._stamp != _NEVER)
+        state = self._state[body]
+        age = np.where(bodies.static[body], 0.0, (stamp - self._stamp[body]) * NANOSECOND)
+        names = {
+            object_id: name for each in answers for object_id, name in zip(each.ids.tolist(), each.names, strict=False)
+        }
+        moment = Moment(
+            bodies,
+            body,
+            state,
+            age,
+            names=names,
+            stamp_ns=stamp,
+            step=0 if last is None else last.step,
+            is_known=contacts is not None and predictions is not None,
+        )
+        if contacts is not None:
+            moment = replace(moment, contacts=contacts.contacts)
+        if predictions is not None:
+            moment = replace(moment, predictions=predictions.predictions, horizon=predictions.horizon)
+        return moment
+
+    # -- objects
+
+    def _describe(self, message: ObjectDescriptionArray) -> None:
+        if not self._is_ours(message.frame_id):
+            return
+        if self._is_shared:
+            self._catalogue, self._is_shared = _copied(self._catalogue), False
+            self._pieces = dict(self._pieces)
+        for change in self._catalogue.changes(message):
+            self._catalogue.apply(change)
+            if isinstance(change, Removal):
+                self._removed.add(change.object_id)
+                self._pieces.pop(change.object_id, None)
+            else:
+                self._pieces[change.object_id] = described_pieces(change)
+        self._is_changed = True
+
+    def _adopt(self) -> None:
+        """Take over the described objects. Those that were known and not removed keep their states."""
+        if not self._is_changed:
+            return
+        before, state, stamp = self._bodies, self._state, self._stamp
+        self._bodies = bodies = Bodies(tuple(self._catalogue.descriptions.values()), self._pieces)
+        self._state, self._stamp = np.zeros(len(bodies.ids), records.STATE), np.full(len(bodies.ids), _NEVER)
+        kept = ~np.isin(before.ids, list(self._removed)) & np.isin(before.ids, bodies.ids) & ~before.static
+        at = np.searchsorted(bodies.ids, before.ids[kept])
+        self._state[at], self._stamp[at] = state[kept], stamp[kept]
+        for k in np.flatnonzero(bodies.static):
+            pose = bodies.descriptions[k].pose
+            assert pose is not None
+            self._state[k] = np.zeros((), records.STATE)
+            self._state["position"][k], self._state["quaternion"][k] = pose.position, pose.quaternion
+            self._stamp[k] = 0
+        self._removed = set()
+        self._is_changed = False
+
+    def _is_ours(self, frame_id: str) -> bool:
+        return not frame_id or not self.frame_id or frame_id == self.frame_id
+
+    # -- states
+
+    def _move(self, message: ObjectStateArray) -> None:
+        """Take over the states that the monitor does not refuse."""
+        if not self._is_ours(message.frame_id):
+            return
+        self._adopt()
+        self._newest = max(self._newest, message.stamp_ns)
+        ids, states = self._bodies.ids, message.states.copy()
+        if not len(ids):
+            return
+        at = np.minimum(np.searchsorted(ids, states["id"]), len(ids) - 1)
+        taken = (ids[at] == states["id"]) & ~self._bodies.static[at] & (self._stamp[at] < message.stamp_ns)
+        taken &= _are_usable(states)
+        if len(message.covariance) == COVARIANCE_SIZE * len(states):
+            _write_worst_stddevs(states, message.covariance.reshape(-1, COVARIANCE_SIZE))
+        at, states = at[taken], states.compress(taken)
+        before = self._stamp[at]
+        elapsed = np.where(before == _NEVER, np.inf, (message.stamp_ns - np.maximum(before, 0)) * NANOSECOND)
+        _estimate_twists(states, self._state[at], elapsed)
+        self._state[at], self._stamp[at] = states, message.stamp_ns
+
+    def _set_back(self, stamp_ns: int) -> None:
+        """Follow the monitor, which has accepted an earlier clock: states from that time on are new."""
+        moving = ~self._bodies.static & (self._stamp != _NEVER)
+        self._stamp[moving] = np.minimum(self._stamp[moving], stamp_ns)
+        self._newest = stamp_ns
+
+
+def _copied(catalogue: Catalogue) -> Catalogue:
+    other = Catalogue.restored(catalogue.facts())
+    other.descriptions = dict(catalogue.descriptions)
+    return other
+
+
+def _are_usable(states: States) -> NDArray[np.bool_]:
+    """Return which states (n,) the monitor takes for their numbers, as `monitor.intake.take_states`."""
+    known = (states["flags"] & StateFlag.TWIST_UNKNOWN) == 0
+    usable: NDArray[np.bool_] = (np.abs(states["position"]) <= LARGEST_INPUT).all(axis=1)
+    usable &= np.abs(np.linalg.norm(states["quaternion"], axis=1) - 1.0) <= UNIT_QUATERNION
+    for field in ("linear", "angular"):
+        usable &= ~known | (np.abs(states[field]) <= LARGEST_INPUT).all(axis=1)
+    return usable
+
+
+def _write_worst_stddevs(states: States, covariance: NDArray[np.float64]) -> None:
+    """Write the standard deviations along the worst axes of covariances (n, 12), where one is declared."""
+    declared = np.isfinite(covariance).all(axis=1) & (covariance != 0.0).any(axis=1)
+    stddevs = np.maximum(worst_stddevs(covariance[declared])[1], 0.0)
+    states["position_stddev"][declared], states["velocity_stddev"][declared] = stddevs.T
+
+
+def _estimate_twists(states: States, before: States, elapsed: NDArray[np.float64]) -> None:
+    """Write unknown twists from two poses, as the monitor estimates them; 0 without an earlier pose.
+
+    before (n,): the states `elapsed` (n,) s earlier; infinite if there is none.
+    """
+    unknown = (states["flags"] & StateFlag.TWIST_UNKNOWN) != 0
+    if not unknown.any():
+        return
+    jumped = (states["flags"][unknown] & StateFlag.DISCONTINUITY) != 0
+    elapsed = np.where(jumped, np.inf, elapsed[unknown])[:, None]
+    moved = np.where(np.isinf(elapsed), 0.0, states["position"][unknown] - before["position"][unknown])
+    turn = multiply(states["quaternion"][unknown], before["quaternion"][unknown] * (-1.0, -1.0, -1.0, 1.0))
+    turn *= np.where(turn[:, 3:] < 0.0, -1.0, 1.0)
+    sine = np.linalg.norm(turn[:, :3], axis=1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, turn[:, 3:])
+    states["linear"][unknown] = moved / elapsed
+    axis = turn[:, :3] / np.where(sine > 0.0, sine, 1.0)
+    states["angular"][unknown] = axis * angle / elapsed
