@@ -2,7 +2,8 @@
 
 `uncertainty.py` follows each sample as exactly as the stated motion. Here the samples meet planes that bound the
 obstacle (obstacle_planes.py), which costs a few products for each plane and sample. The planes come from exact
-separations at a few samples. Pairs with a mesh, or with errors of orientation, are left to `uncertainty.py`.
+separations at a few samples. Pairs with a mesh, with errors of
+orientation, or that turn fast, are left to `uncertainty.py`.
 docs/uncertainty.md describes the method.
 """
 
@@ -43,18 +44,21 @@ from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE, body_has_
 BENDING: Final = 0.05
 """Largest deviation of a gap from a straight line in a segment, in standard deviations of the gap."""
 
-FACETS: Final = 0.02
+MOST_BENDS: Final = 4.0
+"""Pairs that turn faster, so that the horizon has more parts than this, are left to the exact method."""
+
+FACETS: Final = 0.015
 """Distance between the planes and the obstacle, in standard deviations of the gap, up to which no plane is added."""
 
 VERIFIED_IN_PILOT: Final = 8
-VERIFIED: Final = 24
+VERIFIED: Final = 64
 """Samples of the pilot lattice, and of all, that must need no new plane of a segment."""
 
 FURTHEST: Final = 4.5
 """Standard deviations beyond which errors are neglected; 7 of a million are larger."""
 
 LEFT: Final = -1.0
-"""Probability of a pair that this method does not answer: with errors of orientation, or with a mesh."""
+"""Probability of a pair that this method does not answer: errors of orientation, fast rotation, or a mesh."""
 
 NO_ERROR: Final = (0.0, 0.0, 0.0)
 
@@ -201,6 +205,17 @@ def _gap_covariance(multibody, spread, i, j, ages, t, sampling, work):
         add_covariance(spread, j, ages[1], t, sampling.stale_acceleration, sampling.planar, work)
 
 
+@inlined
+def _bends(A, B, length, bend, sigma):
+    """Number of parts of a time of this length (s) in which the gaps are straight enough, less 1.
+
+    bend: bound on the acceleration of the surfaces (m/s^2). A normal that turns while the bodies pass each other bends
+    the gap too.
+    """
+    speed = sqrt((B.vx - A.vx) ** 2 + (B.vy - A.vy) ** 2 + (B.vz - A.vz) ** 2)
+    return length * sqrt((bend + speed * (_rate(A) + _rate(B))) / (8.0 * BENDING * max(sigma, 1e-300)))
+
+
 @device
 def _enter_pair(table, parts, pair, window, bend, sigma, sampling, lattice, memory, work):
     """Lower memory.times to the samples' impacts of a pair of shapes (ShapePair) in the window.
@@ -211,15 +226,14 @@ def _enter_pair(table, parts, pair, window, bend, sigma, sampling, lattice, memo
     obstacle, off, times, weights = memory.obstacle, memory.off, memory.times, lattice.weights
     margin, size, pilot = sampling.query.margin, weights.size, lattice.pilot
     if table.kind[a] == SPHERE and table.kind[b] == SPHERE and bend == 0.0:
-        p, v = (B.x - A.x, B.y - A.y, B.z - A.z), (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
+        R = work.scratch.rotation
+        oa, ob = place_shape(table, parts, a, A.rotation, R[0]), place_shape(table, parts, b, B.rotation, R[1])
+        p = (B.x - A.x + ob[0] - oa[0], B.y - A.y + ob[1] - oa[1], B.z - A.z + ob[2] - oa[2])
+        v = (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
         reach = table.radius[a] + table.radius[b] + margin
         enter_sphere(p, v, reach, window.end, off, times)
         return
-    length = window.end - window.begin
-    # a normal that turns while the bodies pass each other bends the gap too
-    speed = sqrt((B.vx - A.vx) ** 2 + (B.vy - A.vy) ** 2 + (B.vz - A.vz) ** 2)
-    bend += speed * (_rate(A) + _rate(B))
-    segments = min(MOST_SEGMENTS, 1 + int(length * sqrt(bend / (8.0 * BENDING * max(sigma, 1e-300)))))
+    segments = 1 + int(min(_bends(A, B, window.end - window.begin, bend, sigma), MOST_SEGMENTS - 1.0))
     set_nodes(table, parts, pair, window, segments, work.scratch, obstacle)
     tolerance, turn = max(FACETS * sigma, sampling.query.tolerance), (_rate(A) > 0.0, _rate(B) > 0.0)
     settings = CutSettings(margin, tolerance, pilot, VERIFIED_IN_PILOT, turn)
@@ -270,7 +284,8 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         bend = _bend(A, r_i) + _bend(B, r_j) + 2.0 * half_acceleration(A, B)
         t = _approach(A, B, horizon) if A.radius + B.radius < inf else 0.0
         turn_i, turn_j = orientation_spread(spread, i, r_i, ages[0], t), orientation_spread(spread, j, r_j, ages[1], t)
-        turning = (r_i * turn_i[0] + r_j * turn_j[0], r_i * turn_i[1] + r_j * turn_j[1])
+        far_i, far_j = r_i if r_i < inf else 0.0, r_j if r_j < inf else 0.0  # a half-space does not turn
+        turning = (far_i * turn_i[0] + far_j * turn_j[0], far_i * turn_i[1] + far_j * turn_j[1])
         if not sampling.stated:
             _set_axes(work.frame)
             reach = A.radius + B.radius + query.margin + sampling.sigmas * tube.start
@@ -294,6 +309,10 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         _gap_covariance(multibody, spread, i, j, ages, t, sampling, work)
         take_root(work.joint)
         _clear_upper(work.joint)
+        balls = r_i == 0.0 and r_j == 0.0
+        if not balls and _bends(A, B, horizon, bend, work.joint[0, 0]) > MOST_BENDS:
+            answers[k, PROBABILITY] = LEFT
+            continue
         set_errors(work.joint, work.frame, t, lattice.points, off)
         times[:] = inf
         wide = Tube(FURTHEST * tube.start, FURTHEST * tube.growth)
