@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from math import inf, nan
 from statistics import NormalDist
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,8 @@ from collision_monitor.prediction.bodies import enlarge
 from collision_monitor.prediction.error_samples import Workspace, make_workspace
 from collision_monitor.prediction.impact_distribution import PROBABILITY
 from collision_monitor.prediction.impact_record import holds, ids_of_keys, pair_keys, write_pair
-from collision_monitor.prediction.normal_samples import normal_samples
+from collision_monitor.prediction.likely_impacts import LEFT, PlaneMemory, likely_impacts, make_plane_memory
+from collision_monitor.prediction.normal_samples import normal_samples, sample_columns
 from collision_monitor.prediction.pair_impacts import cover_of
 from collision_monitor.prediction.spread import Spread, is_uncertain, make_spread, take_spread
 from collision_monitor.prediction.uncertainty import Sampling, impact_probabilities
@@ -53,6 +54,18 @@ ENTRY = np.dtype(
 
 Records = NDArray[np.void]
 Pairs = NDArray[np.int32]
+
+
+class Workspaces(NamedTuple):
+    """Scratch memory of one thread."""
+
+    exact: Workspace
+    planes: PlaneMemory
+
+
+def make_workspaces(samples: int) -> Workspaces:
+    """Make the scratch memory of one thread."""
+    return Workspaces(make_workspace(), make_plane_memory(samples))
 
 
 @kernel
@@ -104,7 +117,7 @@ class UncertainPredictions(Stage):
         self.spread = make_spread(capacity)
         self.entries: Records = np.empty(0, ENTRY)
         """The pairs (ENTRY), sorted by key."""
-        self._workspaces = [make_workspace()]  # one for each thread
+        self._workspaces = [make_workspaces(Profile().uncertainty_samples)]  # one for each thread
 
     # ------------------------------------------------------------------ the bodies
 
@@ -185,7 +198,8 @@ class UncertainPredictions(Stage):
             return
         ends = [np.ascontiguousarray(predictions[name]) for name in INTERVAL]
         intervals, query, horizon = Intervals(slots, *ends), step.settings.impact, step.profile.horizon
-        widen_intervals(step.roster.multibody, self.spread, intervals, step.now, horizon, query, self._workspaces[0])
+        work = self._workspaces[0].exact
+        widen_intervals(step.roster.multibody, self.spread, intervals, step.now, horizon, query, work)
         for name, column in zip(INTERVAL, ends, strict=True):
             predictions[name] = column
 
@@ -205,15 +219,24 @@ class UncertainPredictions(Stage):
             *normal_samples(p.uncertainty_samples),
         )
 
-        def part(slots: Pairs, work: Workspace) -> NDArray[np.float64]:
+        lattice, multibody = sample_columns(p.uncertainty_samples), step.roster.multibody
+
+        def part(slots: Pairs, work: Workspaces) -> NDArray[np.float64]:
             answers = np.empty((len(slots), len(ANSWERS)))
-            impact_probabilities(step.roster.multibody, self.spread, slots, step.now, sampling, work, answers)
+            likely_impacts(multibody, self.spread, slots, step.now, sampling, lattice, work.planes, work.exact, answers)
+            left = np.flatnonzero(answers[:, PROBABILITY] == LEFT)
+            if len(left):
+                others = np.empty((len(left), len(ANSWERS)))
+                impact_probabilities(multibody, self.spread, slots[left], step.now, sampling, work.exact, others)
+                answers[left] = others
             return answers
 
+        if len(self._workspaces[0].planes.times) != p.uncertainty_samples:
+            self._workspaces = [make_workspaces(p.uncertainty_samples)]
         if pool is None or len(slots) < FEWEST_SAMPLED_PAIRS_FOR_THREADS:
             return part(slots, self._workspaces[0])
         while len(self._workspaces) < p.threads:
-            self._workspaces.append(make_workspace())
+            self._workspaces.append(make_workspaces(p.uncertainty_samples))
         workspaces = self._workspaces[: p.threads]
         return np.concatenate(list(pool.map(part, np.array_split(slots, len(workspaces)), workspaces)))
 

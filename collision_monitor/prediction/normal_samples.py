@@ -75,3 +75,24 @@ def normal_samples(count: int) -> NormalSamples:
     weights /= weights.sum()
     points.flags.writeable = weights.flags.writeable = False
     return NormalSamples(points, weights)
+
+
+class SampleColumns(NamedTuple):
+    """The same samples by coordinate, those of the coarser lattice first; any few in succession are spread out."""
+
+    points: NDArray[np.float64]  # (DIMENSIONS, n)
+    weights: NDArray[np.float64]  # (n,)
+    pilot: int
+    """Number of samples of the coarser lattice."""
+
+
+@lru_cache(maxsize=8)
+def sample_columns(count: int) -> SampleColumns:
+    """Make the samples of `normal_samples`, for loops over many samples."""
+    points, weights = normal_samples(count)
+    stride = max(1, count // PILOT)
+    place = np.arange(count)
+    order = np.lexsort((place // stride * _GOLDEN_RATIO % 1.0, place % stride))
+    columns = SampleColumns(np.ascontiguousarray(points[order].T), weights[order], -(-count // stride))
+    columns.points.flags.writeable = columns.weights.flags.writeable = False
+    return columns

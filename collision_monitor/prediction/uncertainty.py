@@ -15,6 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import allocating_kernel, device, inlined
+from collision_monitor.geometry.shape_table import MESH
 from collision_monitor.narrow_phase.contact_row import NORMAL
 from collision_monitor.prediction.bodies import next_pair
 from collision_monitor.prediction.body_impact import (
@@ -56,7 +57,7 @@ coarse lattice of samples. The test is repeated after each further one."""
 
 
 @device
-def _first_contact(multibody, i, j, window, tube, query, work):
+def first_contact(multibody, i, j, window, tube, query, work):
     """First time in the window at which bodies i and j are within query.margin and the tube; infinite: never.
 
     They move as in work.motion. Time 0 of the motions and of the tube is now.
@@ -113,6 +114,16 @@ def _is_straight(parts, bodies, i, j, A, B):
     round = bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0
     turns = turns or half_acceleration(A, B) > 0.0
     return not turns and not round and parts.next[a] < 0 and parts.next[b] < 0
+
+
+@inlined
+def body_has_mesh(table, parts, shape):
+    """Whether one of a body's shapes, from its first on, is a mesh."""
+    found = False
+    while shape >= 0:
+        found |= table.kind[shape] == MESH
+        shape = parts.next[shape]
+    return found
 
 
 @device
@@ -191,10 +202,10 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
         roughly, whole = ImpactQuery(query.margin, coarse, query.iterations), Window(0.0, horizon)
         if not stated:
             wide = Tube(sampling.sigmas * tube.start, sampling.sigmas * tube.growth)
-            if _first_contact(multibody, i, j, whole, wide, roughly, work) == inf:
+            if first_contact(multibody, i, j, whole, wide, roughly, work) == inf:
                 continue
         wide = Tube(sampling.safe_sigmas * tube.start, sampling.safe_sigmas * tube.growth)
-        safe = _first_contact(multibody, i, j, whole, wide, roughly, work)
+        safe = first_contact(multibody, i, j, whole, wide, roughly, work)
         t = _lay_along(multibody, i, j, tube, sampling, work)
         work.joint[:] = 0.0
         if not bodies.static[i]:
@@ -211,7 +222,10 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
         coarse = max(query.tolerance, SAMPLE_TOLERANCE * work.joint[0, 0])
         roughly = ImpactQuery(query.margin, coarse, query.iterations)
         begin = safe if safe < inf else 0.0
-        bias = 0.0 if r_i == 0.0 and r_j == 0.0 else -0.75 * coarse
+        # a search for the overlap of half a tolerance; the surface of a mesh has no gap below 0
+        exact = body_has_mesh(table, parts, bodies.first_shape[i]) or body_has_mesh(table, parts, bodies.first_shape[j])
+        exact = exact or (r_i == 0.0 and r_j == 0.0)
+        bias = 0.0 if exact else -0.75 * coarse
         p, v = (B.x, B.y, B.z), (B.vx, B.vy, B.vz)
         w_i, w_j = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
         straight = (
@@ -240,7 +254,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                         times[n] = inf
                         continue
                 window = Window(max(begin, parted), horizon)
-                times[n] = _first_contact(multibody, i, j, window, Tube(bias, 0.0), roughly, work)
+                times[n] = first_contact(multibody, i, j, window, Tube(bias, 0.0), roughly, work)
                 if straight:
                     pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
                     remember(table, parts, pair, times[n] == inf, n, work.scratch, work.axes)

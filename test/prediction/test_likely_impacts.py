@@ -1,0 +1,161 @@
+"""Probabilities by cutting planes, against the slow method that follows each sample exactly (uncertainty.py)."""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+import pytest
+
+import collision_monitor as cm
+from collision_monitor.monitor import uncertain_predictions
+from collision_monitor.monitor.uncertain_predictions import sigmas_for
+from collision_monitor.prediction.error_samples import make_workspace
+from collision_monitor.prediction.likely_impacts import LEFT, likely_impacts, make_plane_memory
+from collision_monitor.prediction.normal_samples import normal_samples, sample_columns
+from collision_monitor.prediction.time_order import sort_times
+from collision_monitor.prediction.uncertainty import Sampling, impact_probabilities
+from collision_monitor.records import STATE
+from collision_monitor.settings.profile import Profile
+
+SAMPLES = 1024
+SHAPES = {
+    "ball": cm.Sphere(0.4),
+    "box": cm.Box((0.9, 0.5, 0.7)),
+    "capsule": cm.Capsule(0.2, 0.8),
+    "cylinder": cm.Cylinder(0.3, 0.8),
+    "cone": cm.Cone(0.4, 0.9),
+    "ellipsoid": cm.Ellipsoid((0.5, 0.3, 0.4)),
+    "hull": cm.ConvexHull(np.random.default_rng(1).normal(0, 0.3, (12, 3))),
+    "ball aside": [(cm.Sphere(0.3), cm.Pose((0.4, 0.2, 0)))],
+    "two boxes": [(cm.Box((0.8, 0.5, 0.3)), cm.Pose()), (cm.Box((0.1, 0.4, 0.9)), cm.Pose((0.3, 0, 0.4)))],
+}
+
+
+CORNERS = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
+DENTED = cm.Mesh(
+    [*CORNERS, (0.2, 0.0, 0.0)],  # a cube with the face at x = 0.5 pressed in
+    [
+        (0, 1, 3), (0, 3, 2), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3),
+        (4, 6, 8), (6, 7, 8), (7, 5, 8), (5, 4, 8),
+    ],
+)  # fmt: skip
+
+
+def both_methods(monitor: cm.Monitor, stated: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Answers (1, 4) for the pair of slots 0 and 1: exact samples, and planes."""
+    p = Profile()
+    roster, spread = monitor._roster, monitor._uncertain.spread
+    sampling = Sampling(
+        monitor._settings.impact, p.horizon, p.stale_acceleration, stated, sigmas_for(p.min_probability),
+        sigmas_for(p.min_probability * (1.0 - p.confidence)), p.min_probability, p.confidence, roster.planar,
+        *normal_samples(SAMPLES),
+    )  # fmt: skip
+    pairs, work, answers = np.array([[0, 1]], np.int32), make_workspace(), np.empty((2, 1, 4))
+    impact_probabilities(roster.multibody, spread, pairs, 0.0, sampling, work, answers[0])
+    lattice, memory = sample_columns(SAMPLES), make_plane_memory(SAMPLES)
+    likely_impacts(roster.multibody, spread, pairs, 0.0, sampling, lattice, memory, work, answers[1])
+    return answers[0], answers[1]
+
+
+def random_pair(rng: np.random.Generator, first: str, second: str, turning: float) -> tuple[cm.Monitor, bool]:
+    """A monitor of two shapes that come near each other, after its first step, and whether they are stated to meet."""
+    monitor = cm.Monitor()
+    for k, name in enumerate((first, second)):
+        monitor.add(k, SHAPES[name])
+    rows = np.zeros(2, STATE)
+    rows["id"] = 0, 1
+    velocity = rng.normal(0, 1, 3)
+    across = np.cross(velocity, rng.normal(0, 1, 3))
+    away = rng.uniform(0.7, 1.6)
+    rows["position"][1] = -velocity * away + across / np.linalg.norm(across) * rng.uniform(0.0, 1.2)
+    rows["linear"][1] = velocity
+    rows["angular"] = turning * rng.normal(0, 1, (2, 3))
+    q = rng.normal(0, 1, (2, 4))
+    rows["quaternion"] = q / np.linalg.norm(q, axis=1, keepdims=True)
+    rows["position_stddev"], rows["velocity_stddev"] = rng.uniform(0.02, 0.2, 2)
+    told = monitor.step(0, rows)
+    stated = bool((told.predictions["status"] != 2).any())
+    return monitor, stated
+
+
+@pytest.mark.parametrize("turning", [0.0, 0.1], ids=["straight", "turning"])
+def test_planes_agree_with_exact_samples(turning: float) -> None:
+    rng = np.random.default_rng(3)
+    errors, earliest, compared = [], [], 0
+    names = list(SHAPES)
+    for _ in range(60):
+        first, second = rng.choice(names, 2)
+        monitor, stated = random_pair(rng, str(first), str(second), turning)
+        if monitor.last is not None and len(monitor.last.contacts):
+            continue
+        exact, planes = (np.nan_to_num(answer[0], posinf=inf) for answer in both_methods(monitor, stated))
+        if max(exact[3], planes[3]) < 0.01:
+            continue
+        if planes[3] == LEFT:
+            continue
+        compared += 1
+        errors.append(planes[3] - exact[3])
+        if min(exact[3], planes[3]) > 0.05:
+            earliest.append(planes[0] - exact[0])
+    assert compared > (8 if turning else 25)  # pairs that turn fast are left out
+    assert np.sqrt(np.mean(np.square(errors))) < 0.01
+    assert np.abs(errors).max() < 0.03
+    assert abs(np.median(earliest)) < 0.01
+
+
+def test_errors_of_orientation_and_meshes_are_left_to_the_exact_method() -> None:
+    for change in ("orientation_stddev", "mesh"):
+        monitor = cm.Monitor()
+        monitor.add(0, DENTED if change == "mesh" else cm.Box((1, 1, 1)))
+        monitor.add(1, cm.Box((1, 1, 1)))
+        rows = np.zeros(2, STATE)
+        rows["id"], rows["quaternion"][:, 3] = (0, 1), 1.0
+        rows["position"][1], rows["linear"][1] = (3, 0.2, 0.1), (-1.5, 0, 0)
+        rows["position_stddev"] = 0.05
+        if change != "mesh":
+            rows[change] = 0.05
+        told = monitor.step(0, rows).predictions
+        exact, planes = both_methods(monitor, True)
+        assert planes[0, 3] == LEFT
+        assert told["probability"][0] == exact[0, 3] > 0.9
+
+
+def test_the_order_of_times_is_that_of_a_stable_sort() -> None:
+    rng = np.random.default_rng(0)
+    for times in (
+        rng.normal(1, 0.1, 500).clip(0),
+        np.where(rng.random(300) < 0.5, inf, rng.random(300)),
+        np.zeros(20),
+        np.full(20, inf),
+        np.repeat([3.0, 1e-300, 2.0], 7),
+    ):
+        order, bucket, ends = np.zeros(len(times), int), np.zeros(len(times), int), np.zeros(len(times) + 1, int)
+        finite = sort_times(times, order, bucket, ends)
+        assert finite == np.isfinite(times).sum()
+        np.testing.assert_array_equal(order, np.argsort(times, kind="stable"))
+
+
+def test_the_columns_are_the_same_samples() -> None:
+    for count in (16, 100, 1024):
+        points, weights = normal_samples(count)
+        columns = sample_columns(count)
+        order = np.lexsort(columns.points)
+        np.testing.assert_array_equal(columns.points.T[order], points[np.lexsort(points.T)])
+        assert columns.weights.sum() == pytest.approx(1.0)
+        assert weights.sum() == pytest.approx(1.0)
+
+
+def test_another_number_of_samples_is_possible() -> None:
+    """The scratch memory follows the profile while the monitor runs."""
+    answers = []
+    rng = np.random.default_rng(4)
+    monitor, _ = random_pair(rng, "box", "capsule", 0.0)
+    for count in (1024, 64, 4096, 1024):
+        monitor.profile = monitor.profile.replace(uncertainty_samples=count)
+        rows = np.zeros(0, STATE)
+        told = monitor.step(0, rows).predictions
+        answers.append(float(told["probability"][0]) if len(told) else 0.0)
+    assert uncertain_predictions.ANSWERS[3] == "probability"
+    assert answers[0] == answers[3]
+    assert np.ptp(answers) < 0.05
