@@ -197,7 +197,8 @@ def test_what_is_imported_is_declared() -> None:
     """Each top-level import of the package is the standard library, a ROS package of package.xml or a requirement."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     modules = {"python-fcl": "fcl", "PyYAML": "yaml"}
-    requirements = project["dependencies"] + project["optional-dependencies"]["ray"]
+    extras = project["optional-dependencies"]
+    requirements = project["dependencies"] + extras["ray"] + extras["view"]
     names = {re.split(r"[<>=\[; ]", requirement)[0] for requirement in requirements}
     declared = {modules.get(name, name.replace("-", "_")) for name in names}
     declared |= {element.text for element in ET.parse(ROOT / "package.xml").iter("depend") if element.text}

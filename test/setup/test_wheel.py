@@ -48,7 +48,7 @@ def test_the_wheel_works_without_ros(tmp_path: Path) -> None:
     with zipfile.ZipFile(wheel) as content:
         names = content.namelist()
         content.extractall(target)
-    for needed in ("py.typed", "session/mcap/definitions.txt", "ros/shared_memory.xml", "_jit/device_library.py"):
+    for needed in ("py.typed", "session/mcap/definitions.txt", "ros/shared_memory.xml", "_jit/libraries.py"):
         assert f"collision_monitor/{needed}" in names
     # without compilation: kernels in another place would be compiled anew, for a minute
     environment = {**os.environ, "PYTHONPATH": str(target), "NUMBA_DISABLE_JIT": "1"}
