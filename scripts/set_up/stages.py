@@ -182,7 +182,7 @@ def _build_messages(ros: machine.RosInstall | None, log: IO[str]) -> None:
 # package -------------------------------------------------------------------------------------------------------------
 
 
-EXECUTABLES = ("monitor", "world", "replay", "collision-monitor")
+EXECUTABLES = ("monitor", "guard", "world", "replay", "collision-monitor")
 
 
 def ros_files() -> dict[Path, Path]:
