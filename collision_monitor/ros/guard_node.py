@@ -206,12 +206,12 @@ class GuardNode(Node):
     def _report(self, found: Verdict) -> None:
         """Log and publish what the guard does, when that changes."""
         action = NOTHING if found.factor == 1.0 else STOP if found.factor == 0.0 else SLOWDOWN
-        key = found.rule if action else ""
-        if self._nav2_out is not None and (action, key) != self._said:
-            self._nav2_out.publish(self._nav2(action_type=action, polygon_name=key))
+        key = found.rule or found.reason.partition(" for ")[0]  # an age that grows is no news
         if (action, key) == self._said:
             return
         self._said = action, key
+        if self._nav2_out is not None:
+            self._nav2_out.publish(self._nav2(action_type=action, polygon_name=found.rule))
         text = {NOTHING: "passes", SLOWDOWN: "slows down", STOP: "stops"}[action]
         text += f": {found.reason}" if found.reason else ""
         self._state_out.publish(String(data=text))
