@@ -20,6 +20,9 @@ SOURCES: Final = "~/sources"
 RULES: Final = "~/rules"
 """Topic of a String with the rules of the alerts (YAML), from a latched publisher."""
 
+GUARD_STATE: Final = "~/state"
+"""Topic of a String on which the guard, a node of its own, explains what it does with the commands."""
+
 LATCHED: Final = "transient_local"
 """The durability that delivers earlier messages to a late subscriber."""
 

@@ -20,7 +20,7 @@ from std_msgs.msg import String
 
 from collision_monitor import codec
 from collision_monitor.errors import CollisionMonitorError, InputError, MessageError
-from collision_monitor.pipeline.topics import NODE, Topic
+from collision_monitor.pipeline.topics import GUARD_STATE, NODE, Topic
 from collision_monitor.ros.endpoints import subscription
 from collision_monitor.ros.parameters import ParameterReader
 from collision_monitor.ros.speed_limit import PASSES, Braking, RobotPose, Twist2, Verdict, verdict
@@ -63,7 +63,7 @@ class GuardNode(Node):
         self._out = self.create_publisher(kind, "cmd_vel_out", 1)
         self.create_subscription(kind, "cmd_vel_in", self._on_command, 1)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._state_out = self.create_publisher(String, "~/state", latched)
+        self._state_out = self.create_publisher(String, GUARD_STATE, latched)
         self._nav2 = _nav2_state()
         self._nav2_out = self._nav2 and self.create_publisher(self._nav2, "collision_monitor_state", 1)
         for topic, callback in (
