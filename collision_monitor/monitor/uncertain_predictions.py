@@ -52,6 +52,10 @@ ENTRY = np.dtype(
     ]
 )
 
+FINEST_WITH_PLANES: Final = 1e-5
+"""Smallest `impact_tolerance` (m) with which probabilities come from cutting planes. Below it, as in the profile
+`exact`, each sample is followed to its impact."""
+
 Records = NDArray[np.void]
 Pairs = NDArray[np.int32]
 
@@ -223,6 +227,9 @@ class UncertainPredictions(Stage):
 
         def part(slots: Pairs, work: Workspaces) -> NDArray[np.float64]:
             answers = np.empty((len(slots), len(ANSWERS)))
+            if p.impact_tolerance < FINEST_WITH_PLANES:
+                impact_probabilities(multibody, self.spread, slots, step.now, sampling, work.exact, answers)
+                return answers
             likely_impacts(multibody, self.spread, slots, step.now, sampling, lattice, work.planes, work.exact, answers)
             left = np.flatnonzero(answers[:, PROBABILITY] == LEFT)
             if len(left):

@@ -2,9 +2,8 @@
 
 `uncertainty.py` follows each sample as exactly as the stated motion. Here the samples meet planes that bound the
 obstacle (obstacle_planes.py), which costs a few products for each plane and sample. The planes come from exact
-separations at a few samples. Pairs with a mesh, with errors of
-orientation, or that turn fast, are left to `uncertainty.py`.
-docs/uncertainty.md describes the method.
+separations at a few samples. Pairs with a mesh, with errors of orientation, or that turn fast, are left to
+`uncertainty.py`. docs/uncertainty.md describes the method.
 """
 
 from __future__ import annotations
