@@ -16,6 +16,7 @@ NODE = {
     "ObjectDescriptionArray": endpoints.quality_of(Topic.SHAPES),
     "ContactArray": endpoints.quality_of(Topic.CONTACTS),
     "PredictedCollisionArray": endpoints.quality_of(Topic.PREDICTIONS),
+    "CollisionAlert": endpoints.quality_of(Topic.ALERTS),
     "MonitorStatus": endpoints.quality_of(Topic.STATUS),
     "ParameterEvent": qos_profile_parameter_events,
 }
