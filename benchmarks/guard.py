@@ -125,7 +125,6 @@ class Nodes:
         self._processes = [self._start(folder, environment, "monitor", rules)]
         for k in range(ROBOTS):
             arguments = ["-r", f"__node:=guard_{k}", "-p", f"robot:=robot_{k}", "-p", f"deceleration:={DECELERATION}"]
-            arguments += ["-p", "reaction_time:=0.3", "-p", "clearance:=0.2"]
             for way in ("in", "out"):
                 arguments += ["-r", f"cmd_vel_{way}:=/robot_{k}/cmd_vel_{way}"]
             self._processes.append(self._start(folder, environment, "guard", arguments))

@@ -21,8 +21,8 @@ class Braking:
     """
 
     deceleration: float = 1.0
-    reaction: float = 0.2
-    clearance: float = 0.1
+    reaction: float = 0.3
+    clearance: float = 0.2
     caution: float = 1.0
     warning: float = 0.5
     critical: float = 0.0
