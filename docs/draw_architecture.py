@@ -32,12 +32,14 @@ GROUND = ("_jit", "errors", "tolerances", "records", "_version")
 FLOORS: tuple[tuple[tuple[str, str], ...], ...] = (
     (("cli", "the command line, one file per command"),),
     (
-        ("ros", "the node, the world that plays scenes, RViz markers"),
+        ("ros", "the node, the guard, the world that plays scenes"),
         ("report", "the HTML page of a session"),
+        ("view", "a page in the browser, live or of a session"),
         ("accuracy", "tradeoff, tune, extremes, timing"),
     ),
     (("sources", "bags of other programs"), ("session", "record, read, replay, compare, check")),
     (("pipeline", "message bytes in, monitor, message bytes out"), ("warm_up", "compile all kernels ahead")),
+    (("alerts", "rules about pairs, evaluated after each step"),),
     (
         ("monitor", "the stages of a step"),
         ("query", "two shapes without a monitor"),
@@ -50,6 +52,7 @@ FLOORS: tuple[tuple[tuple[str, str], ...], ...] = (
         ("objects", "description of an object, its models"),
         ("robots", "URDF, SRDF, forward kinematics"),
     ),
+    (("meshes", "trees over triangles and points: distance, overlap, impact"),),
     (
         ("broad_phase", "grids, trees, sweep and prune"),
         ("narrow_phase", "one file per pair test, dispatch"),
@@ -99,7 +102,7 @@ def draw_floors() -> None:
     """Draw images/architecture.svg."""
     imports = folder_imports()
     gap, space, left, right = 18, 10, 14, WIDTH - 14
-    heights = {1: 62, 2: 62, 3: 88, 5: 100}  # px, by the number of boxes side by side
+    heights = {1: 62, 2: 76, 3: 88, 4: 118, 5: 122}  # px, by the number of boxes side by side
     figure, axes = sheet(sum(heights[len(floor)] + gap for floor in FLOORS) + 98)
     y = 14.0
     for floor in FLOORS:
