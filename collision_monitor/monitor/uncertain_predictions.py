@@ -28,7 +28,7 @@ from collision_monitor.prediction.likely_impacts import LEFT, PlaneMemory, likel
 from collision_monitor.prediction.normal_samples import normal_samples, sample_columns
 from collision_monitor.prediction.pair_impacts import cover_of
 from collision_monitor.prediction.spread import Spread, is_uncertain, make_spread, take_spread
-from collision_monitor.prediction.uncertainty import Sampling, impact_probabilities
+from collision_monitor.prediction.uncertainty import Sampling, find_meshes, impact_probabilities
 from collision_monitor.records import PREDICTION, Method, PredictionStatus
 from collision_monitor.settings.profile import Profile
 
@@ -55,6 +55,10 @@ ENTRY = np.dtype(
 FINEST_WITH_PLANES: Final = 1e-5
 """Smallest `impact_tolerance` (m) with which probabilities come from cutting planes. Below it, as in the profile
 `exact`, each sample is followed to its impact."""
+
+FEWEST_SAMPLES: Final = 16
+"""Fewest samples of a pair with a mesh or a cloud. It has an eighth of `uncertainty_samples`, because each sample takes
+as long as a hundred of convex shapes."""
 
 Records = NDArray[np.void]
 Pairs = NDArray[np.int32]
@@ -222,20 +226,26 @@ class UncertainPredictions(Stage):
             step.roster.planar,
             *normal_samples(p.uncertainty_samples),
         )
-
+        fewer = sampling._replace(**normal_samples(max(p.uncertainty_samples // 8, FEWEST_SAMPLES))._asdict())
         lattice, multibody = sample_columns(p.uncertainty_samples), step.roster.multibody
 
         def part(slots: Pairs, work: Workspaces) -> NDArray[np.float64]:
-            answers = np.empty((len(slots), len(ANSWERS)))
-            if p.impact_tolerance < FINEST_WITH_PLANES:
-                impact_probabilities(multibody, self.spread, slots, step.now, sampling, work.exact, answers)
-                return answers
-            likely_impacts(multibody, self.spread, slots, step.now, sampling, lattice, work.planes, work.exact, answers)
-            left = np.flatnonzero(answers[:, PROBABILITY] == LEFT)
-            if len(left):
-                others = np.empty((len(left), len(ANSWERS)))
-                impact_probabilities(multibody, self.spread, slots[left], step.now, sampling, work.exact, others)
-                answers[left] = others
+            answers = np.full((len(slots), len(ANSWERS)), LEFT)
+            meshes = np.empty(len(slots), bool)
+            find_meshes(multibody, slots, meshes)
+
+            def follow(some: NDArray[np.bool_], samples: Sampling) -> None:
+                """Follow each sample of some of the pairs exactly."""
+                if some.any():
+                    found = np.empty((np.count_nonzero(some), len(ANSWERS)))
+                    impact_probabilities(multibody, self.spread, slots[some], step.now, samples, work.exact, found)
+                    answers[some] = found
+
+            if p.impact_tolerance >= FINEST_WITH_PLANES:
+                exact, planes = work
+                likely_impacts(multibody, self.spread, slots, step.now, sampling, lattice, planes, exact, answers)
+            follow(meshes, fewer)
+            follow((answers[:, PROBABILITY] == LEFT) & ~meshes, sampling)
             return answers
 
         if len(self._workspaces[0].planes.times) != p.uncertainty_samples:

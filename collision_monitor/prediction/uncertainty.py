@@ -14,8 +14,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from collision_monitor._jit import allocating_kernel, device, inlined
-from collision_monitor.geometry.shape_table import MESH
+from collision_monitor._jit import allocating_kernel, device, inlined, kernel
+from collision_monitor.geometry.shape_table import MESH, POINTS
 from collision_monitor.narrow_phase.contact_row import NORMAL
 from collision_monitor.prediction.bodies import next_pair
 from collision_monitor.prediction.body_impact import (
@@ -118,12 +118,21 @@ def _is_straight(parts, bodies, i, j, A, B):
 
 @inlined
 def body_has_mesh(table, parts, shape):
-    """Whether one of a body's shapes, from its first on, is a mesh."""
+    """Whether one of a body's shapes, from its first on, is a mesh or a cloud."""
     found = False
     while shape >= 0:
-        found |= table.kind[shape] == MESH
+        found |= table.kind[shape] == MESH or table.kind[shape] == POINTS
         shape = parts.next[shape]
     return found
+
+
+@kernel
+def find_meshes(multibody, pairs, found):
+    """Write to found (P,) whether a body of each pair (P, 2) has a mesh or a cloud."""
+    table, parts, bodies = multibody
+    for k in range(len(pairs)):
+        a, b = bodies.first_shape[pairs[k, 0]], bodies.first_shape[pairs[k, 1]]
+        found[k] = body_has_mesh(table, parts, a) or body_has_mesh(table, parts, b)
 
 
 @device
