@@ -115,11 +115,12 @@ class Attacker:
     def ask(self, step: int, place: int) -> list[str]:
         """Ask for the known scene until there is an answer. Return what is wrong with it."""
         self.publish(Topic.SHAPES, known_scene.descriptions(0, snapshot=True))
-        end = time.monotonic() + ANSWER
+        end, later = time.monotonic() + ANSWER, START
         while time.monotonic() < end:
             stamp = self.now + STEP
             if not 0 <= stamp // 1_000_000_000 < 2**31:
-                stamp = START
+                later += STEP  # a later message has to confirm that the clock goes back
+                stamp = later
             self.publish(Topic.STATES, known_scene.states(step, place, stamp))
             again = time.monotonic() + AGAIN
             while time.monotonic() < again:
