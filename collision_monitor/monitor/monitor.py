@@ -412,7 +412,7 @@ class Monitor:
             for stage in monitor.stages:
                 stage.restore(snapshot, snapshot.facts[FACTS])
             monitor._make_room()
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             if isinstance(error, InputError):
                 raise
             raise InputError(f"snapshot: expected the state of a monitor of this version, got: {error!r}") from None

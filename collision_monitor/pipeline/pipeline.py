@@ -421,7 +421,7 @@ class Pipeline:
             pipeline.catalogue = Catalogue.restored(facts)
             if _ALERTS in snapshot.facts:
                 pipeline._alerts = Alerts.restored(snapshot, snapshot.facts[_ALERTS])
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise InputError(f"snapshot: expected the state of a monitor of this version, got: {error!r}") from None
         return pipeline
 

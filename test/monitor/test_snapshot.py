@@ -165,6 +165,8 @@ def broken(change: str, snapshot: Snapshot) -> Snapshot:
             del facts["monitor"]["digest"]
         case "facts of another kind":
             facts["monitor"]["last"] = [1, 2, {"strange": 3}]
+        case "an object of infinite size":
+            facts["monitor"]["memory"] = dict.fromkeys(facts["monitor"]["memory"], float("inf"))
         case "no facts of the pipeline":
             del facts["pipeline"]
     return Snapshot(arrays, facts)
@@ -175,7 +177,8 @@ def broken(change: str, snapshot: Snapshot) -> Snapshot:
     [
         "an array is missing", "an array is of another type", "an array is shorter", "vertices that are not there",
         "an event of a body that is not there", "shapes in a circle", "a slot that is free and used",
-        "facts are missing", "facts of another kind", "no facts of the pipeline",
+        "facts are missing", "facts of another kind", "an object of infinite size",
+        "no facts of the pipeline",
     ],
 )  # fmt: skip
 def test_a_snapshot_that_does_not_fit_is_refused(change: str) -> None:
