@@ -157,7 +157,7 @@ def main() -> int:
     parser.add_argument("--files", type=int, default=1000, metavar="N", help="number of files (default: 1000)")
     parser.add_argument("--seed", type=int, default=0, help="seed of the first file; each file has the next one")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
-    parser.add_argument("--keep", type=Path, default=Path("fuzz_sessions"), help="folder for files with problems")
+    parser.add_argument("--keep", type=Path, default=Path("build/fuzz"), help="folder for files with problems")
     parser.add_argument("--only", type=int, metavar="SEED", help="read the file of this seed, and keep it")
     args = parser.parse_args()
     if args.only is not None:
