@@ -16,8 +16,8 @@ from collision_monitor.geometry.shapes import ConvexHull, Mesh, Points, Polygon,
 from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.tolerances import HULL_DROP
 
-REMEMBERED_PIECES: Final = 64 << 20
-"""Bytes of pieces that are remembered: those of meshes of 45,000 faces in all. More: memory that hostile meshes can
+REMEMBERED_PIECES: Final = 16 << 20
+"""Bytes of pieces that are remembered: those of meshes of 11,000 faces in all. More: memory that hostile meshes can
 fill. Less: describing an object cuts its mesh several times."""
 
 PIECE_BYTES: Final = 1300
