@@ -18,7 +18,7 @@ from collision_monitor.alerts.thresholds import APPROACH
 from collision_monitor.alerts.traffic import post_encroachment_time, required_deceleration, time_headway
 from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.monitor.candidates import keep_checked
-from collision_monitor.prediction.impact_record import pair_keys
+from collision_monitor.prediction.impact_record import ids_of_keys, pair_keys
 
 REST_SPEED: Final = 0.05
 """m/s: two bodies none of whose points is faster rest. Trackers report about this for people who stand."""
@@ -67,7 +67,7 @@ def _with_near(
     ids = scene.roster.bodies.id
     keys = pair_keys(np.minimum(ids[i], ids[j]), np.maximum(ids[i], ids[j]))
     keys = np.unique(np.concatenate([found.keys, keys, raised]))
-    i, j = (scene.roster.find_slots((keys >> np.uint64(shift)).astype(np.uint32)) for shift in (32, 0))
+    i, j = (scene.roster.find_slots(ids.astype(np.uint32)) for ids in ids_of_keys(keys))
     both = Measures(keys, i, j)
     both = both.take(select(rules, rule, classes, scene, both) | np.isin(keys, found.keys))
     both.fill(found)

@@ -21,7 +21,7 @@ from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.motion import relative_position, rotation_at
 
 MOST_SEGMENTS: Final = 16
-"""Largest number of parts of the time, in each of which the gaps are linear in time."""
+"""Largest number of parts of the time. In each part, the gaps are linear in time."""
 
 MOST_PLANES: Final = 64
 """Largest number of planes in a segment. Each costs 1 to 2 ns per sample."""

@@ -34,7 +34,9 @@ _MEMORY: Final = _Memory()
 
 
 def cloud_contact(a: Shape, X_A: tuple[Array, Array], b: Shape, X_B: tuple[Array, Array]) -> Array:
-    """Contact row of two shapes, one of which is a cloud, about A's origin in world axes; a mesh counts as its surface.
+    """Contact row of a cloud and another shape, in either order, about A's origin in world axes.
+
+    A mesh counts as its surface.
 
     X_A, X_B: rotation (3, 3) and position (3,) of each (m).
     """

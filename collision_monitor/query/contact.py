@@ -338,7 +338,7 @@ def _turn_inward(row: Array) -> None:
 
 
 def _by_clouds(a: _Posed, b: _Posed, offset: Array) -> _Deepest | None:
-    """The contact of objects one of which has a cloud, shape by shape; None for others."""
+    """The contact of two objects, shape by shape, if either has a cloud; None for others."""
     if not any(isinstance(shape, Points) for shape, _ in (*a.outline, *b.outline)):
         return None
     best: _Deepest | None = None

@@ -6,7 +6,6 @@ The frame, the recording and the executor are read-only.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +19,7 @@ from collision_monitor.errors import InputError, ProfileError, SessionError
 from collision_monitor.pipeline.settings_event import PROFILE, RULES
 from collision_monitor.ros.diagnostics import DiagnosticsParameters
 from collision_monitor.session import ONE_FILE, Splitting
+from collision_monitor.settings.names import nearest_name
 from collision_monitor.settings.profile import Profile
 from collision_monitor.settings.setting import Setting
 from collision_monitor.sources.mapping import Mapping, load_mapping
@@ -43,9 +43,7 @@ class ParameterReader:
         for name in self._given:
             if name in names or name.startswith(_BY_RCLPY):
                 continue
-            near = difflib.get_close_matches(name, names, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names)}"
-            raise InputError(f"parameter {name!r} is unknown: {hint}")
+            raise InputError(f"parameter {name!r} is unknown: {nearest_name(name, names)}")
 
     def value(self, name: str, default: T) -> T:
         """Return the given value, or the default. The type of the default is the expected type. Raises InputError."""

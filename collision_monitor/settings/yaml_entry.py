@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
-import yaml
-
 from collision_monitor.errors import InputError
-from collision_monitor.settings.yaml_file import parse_yaml
-
-Path = tuple[str | int, ...]
-"""Keys and indices that lead to a value."""
+from collision_monitor.settings.names import nearest_name
+from collision_monitor.settings.yaml_file import Keys, parse_yaml, value_lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,14 +18,14 @@ class YamlEntry:
 
     value: Any
     file: str
-    lines: Mapping[Path, int]
-    path: Path = ()
+    lines: Mapping[Keys, int]
+    path: Keys = ()
 
     @classmethod
     def of_text(cls, text: str, file: str) -> Self:
         """Parse YAML. file: its name, for errors."""
         value = parse_yaml(text, file)
-        return cls(value, file, _lines(text))
+        return cls(value, file, value_lines(text))
 
     @property
     def where(self) -> str:
@@ -44,9 +39,7 @@ class YamlEntry:
 
     def unknown(self, name: str, names: Collection[str], what: str) -> InputError:
         """Return the error for an unknown name, with the nearest known one."""
-        near = difflib.get_close_matches(name, names, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names) or 'none'}"
-        return InputError(f"{self.where}: the {what} {name!r:.80} is unknown: {hint}")
+        return InputError(f"{self.where}: the {what} {name!r:.80} is unknown: {nearest_name(name, names)}")
 
     def table(self, keys: Collection[str] | None = None) -> dict[str, Self]:
         """Return the entries of a table with these keys only; None: any texts."""
@@ -92,21 +85,3 @@ class YamlEntry:
     def numbers(self, count: int, unit: str) -> tuple[float, ...]:
         """Return a list of `count` numbers."""
         return tuple(each.number(unit, -1e9) for each in self.items(count, count))
-
-
-def _lines(text: str) -> dict[Path, int]:
-    """Return the line of each key and of each element of a list. The text is one that `parse_yaml` accepted."""
-    found: dict[Path, int] = {}
-    waiting: list[tuple[Path, Any]] = [((), yaml.compose(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader)))]
-    while waiting:
-        path, node = waiting.pop()
-        if isinstance(node, yaml.MappingNode):
-            for key, value in node.value:
-                if isinstance(key, yaml.ScalarNode):
-                    found[*path, key.value] = key.start_mark.line + 1
-                    waiting.append(((*path, key.value), value))
-        elif isinstance(node, yaml.SequenceNode):
-            for k, value in enumerate(node.value):
-                found[*path, k] = value.start_mark.line + 1
-                waiting.append(((*path, k), value))
-    return found

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 else:
     SafeLoader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml reads 20 times as fast
 
+Keys = tuple[str | int, ...]
+"""Keys and indices that lead to a value."""
+
 LARGEST: Final = 1 << 20
 """Bytes of a file. A mapping with 1,000 objects has 0.1 MB."""
 
@@ -77,25 +80,36 @@ def parse_yaml(text: str, name: str, *, aliases: bool = False, nodes: int = NODE
         raise InputError(f"{name}: expected YAML, got a value that does not fit its tag: {error!r:.{_SHOWN}}") from None
 
 
-def key_lines(path: Path) -> dict[str, int]:
-    """Return the line of each key in the first three levels of a file that `read_yaml` accepted.
-
-    Keys of the first two levels are by their names, and those of the third by `second, third`.
-    """
-    with path.open(encoding="utf-8-sig") as file:
-        root = yaml.compose(file, SafeLoader)
-    found: dict[str, int] = {}
-    for key, value in _pairs(root):
-        found[key.value] = key.start_mark.line + 1
-        for name, entry in _pairs(value):
-            found[name.value] = name.start_mark.line + 1
-            for inner, _ in _pairs(entry):
-                found[f"{name.value}, {inner.value}"] = inner.start_mark.line + 1
+def value_lines(text: str) -> dict[Keys, int]:
+    """Return the line of each key and of each element of a list, in a text that `parse_yaml` accepted."""
+    found: dict[Keys, int] = {}
+    waiting: list[tuple[Keys, Any]] = [((), yaml.compose(text, SafeLoader))]
+    while waiting:
+        path, node = waiting.pop()
+        if isinstance(node, yaml.MappingNode):
+            for key, value in node.value:
+                if isinstance(key, yaml.ScalarNode):
+                    found[*path, key.value] = key.start_mark.line + 1
+                    waiting.append(((*path, key.value), value))
+        elif isinstance(node, yaml.SequenceNode):
+            for k, value in enumerate(node.value):
+                found[*path, k] = value.start_mark.line + 1
+                waiting.append(((*path, k), value))
     return found
 
 
-def _pairs(node: Any) -> list[tuple[Any, Any]]:
-    return node.value if isinstance(node, yaml.MappingNode) else []
+def key_lines(path: Path) -> dict[str, int]:
+    """Return the line of each key in the first three levels of a file that `read_yaml` accepted.
+
+    Keys of the first two levels are by their names, and those of the third by `second, third`. Of equal names, the last
+    counts.
+    """
+    found: dict[str, int] = {}
+    for keys, line in sorted(value_lines(read_text(path)).items(), key=lambda each: each[1]):
+        names = [key for key in keys if isinstance(key, str)]
+        if len(names) == len(keys) <= 3:
+            found[", ".join(names[-2:]) if len(names) == 3 else names[-1]] = line
+    return found
 
 
 def _refused(expected: str, found: str, mark: Any) -> yaml.MarkedYAMLError:

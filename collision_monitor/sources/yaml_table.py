@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Collection
 from typing import Any
@@ -15,6 +14,7 @@ from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.records import ShapeType
+from collision_monitor.settings.names import nearest_name
 
 BY_VERTICES = ("convex_hull", "polygon")
 SHAPES = tuple(kind.name.lower() for kind in ShapeType if kind not in (ShapeType.MESH, ShapeType.POINTS))
@@ -32,9 +32,7 @@ def table(value: Any, what: str, keys: Collection[str]) -> dict[str, Any]:
 def known(key: str, keys: Collection[str], what: str) -> None:
     """Check that a key is one of these."""
     if key not in keys:
-        near = difflib.get_close_matches(key, keys, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(keys)}"
-        raise InputError(f"{what}: {key!r} is unknown: {hint}")
+        raise InputError(f"{what}: {key!r} is unknown: {nearest_name(key, keys)}")
 
 
 def text(value: Any, what: str) -> str:
