@@ -40,8 +40,14 @@ BENDING: Final = 0.05
 FACETS: Final = 0.015
 """Distance between the planes and the obstacle, in standard deviations of the gap, up to which no plane is added."""
 
+TURNED: Final = 2.0
+"""Standard deviations of the errors of angular velocity for which gaps are that straight."""
+
+MOST_PARTS: Final = 4
+"""Pairs that are not sure to meet, and turn so fast that the time has more parts, are left to the exact method."""
+
 VERIFIED_IN_PILOT: Final = 8
-VERIFIED: Final = 24
+VERIFIED: Final = 48
 """Samples of the pilot lattice, and of all, that must need no new plane of a segment."""
 
 SURE_SAMPLES: Final = 256
@@ -79,15 +85,15 @@ def _gap_covariance(multibody, spread, i, j, ages, t, sampling, work):
 
 
 @inlined
-def _part_length(A, B, bend, sigma):
+def _part_length(A, B, errors):
     """Length (s) of a part of the time in which the gaps are straight enough.
 
-    bend: bound on the acceleration of the surfaces (m/s^2). A normal that turns while the bodies pass each other bends
-    the gap too.
+    A normal that turns while the bodies pass each other bends the gap like an acceleration of the surfaces.
     """
     speed = sqrt((B.vx - A.vx) ** 2 + (B.vy - A.vy) ** 2 + (B.vz - A.vz) ** 2)
-    bend += speed * (_rate(A) + _rate(B))
-    return sqrt(8.0 * BENDING * max(sigma, 1e-300) / bend) if bend > 0.0 else inf
+    rate = _rate(A) + _rate(B) + TURNED * (errors.turning[0][1] + errors.turning[1][1])
+    bend = errors.bend + speed * rate
+    return sqrt(8.0 * BENDING * max(errors.sigma, 1e-300) / bend) if bend > 0.0 else inf
 
 
 class PairErrors(NamedTuple):
@@ -121,7 +127,7 @@ def _lay_planes(table, parts, pair, errors, until, sampling, lattice, memory, wo
     end = min(end, until)
     if not begin < end:
         return 0, settings, True
-    length = _part_length(A, B, errors.bend, sigma)
+    length = _part_length(A, B, errors)
     if length < end - begin:
         roughly = ImpactQuery(margin, max(sampling.query.tolerance, SAMPLE_TOLERANCE * sigma), sampling.query.iterations)
         there = Tube(wide.start + wide.growth * begin, wide.growth)
@@ -306,7 +312,7 @@ def _enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
         latest = max(latest, times[n])
         seen += weights[n] if times[n] < inf else 0.0
         part += weights[n]
-    if not reaches:
+    if not reaches or (latest == inf and laid[0] > MOST_PARTS):
         return -1
     if seen < part * PILOT_PART * sampling.min_probability and not sampling.stated:
         return 0
