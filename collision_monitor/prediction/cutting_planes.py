@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.prediction.obstacle_planes import AT_REST, MOST_PLANES, PLANE_SIZE, separation_at, set_plane
-from collision_monitor.prediction.sample_gaps import enter_planes, set_samples
+from collision_monitor.prediction.sample_gaps import enter_planes, gaps_at_end, set_samples
 
 
 class CutSettings(NamedTuple):
@@ -21,7 +21,7 @@ class CutSettings(NamedTuple):
     tolerance: float  # m: gap up to which a sample has entered
     pilot: int  # number of samples that decide how a normal turns
     follows: Any  # (bool, bool): whether normals may turn with the bodies
-    turning: Any  # (bool, bool): whether the bodies have errors of orientation
+    turning: Any  # (int, int): how errors of orientation turn the bodies, see sample_gaps
 
 
 @inlined
@@ -136,10 +136,34 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, points,
 
 
 @device
+def carry_planes(table, pair, k, settings, memory):
+    """Start segment k + 1 with those planes of segment k that keep most apart a sample of the pilot at its end."""
+    obstacle, rows, pilot = memory.obstacle, memory.rows, settings.pilot
+    widest, winner = memory.trial[0], memory.checked
+    for n in range(pilot):
+        widest[n], winner[n] = -inf, -1.0
+    for m in range(obstacle.count[k]):
+        gaps_at_end(
+            table, pair, obstacle.planes[k, m], plane_margin(settings), settings.turning, obstacle.node[k + 1], pilot, rows
+        )
+        for n in range(pilot):
+            if memory.alone[n] == inf and rows.gap[1, n] > widest[n]:
+                widest[n], winner[n] = rows.gap[1, n], float(m)
+    for m in range(obstacle.count[k]):
+        kept = False
+        for n in range(pilot):
+            kept |= winner[n] == m
+        if kept:
+            for c in range(PLANE_SIZE):
+                obstacle.planes[k + 1, obstacle.count[k + 1], c] = obstacle.planes[k, m, c]
+            obstacle.count[k + 1] += 1
+
+
+@device
 def begin_segment(table, pair, k, settings, memory, points, first, last):
     """Set the intervals of the samples first:last to those behind the planes of segment k, empty if they met before.
 
-    A segment without planes starts with those of the segment before it.
+    A segment without planes starts with the last ones of the segment before it that kept samples apart.
     """
     obstacle, rows, entry, leave, times = memory.obstacle, memory.rows, memory.entry, memory.leave, memory.alone
     set_samples(obstacle, k, memory.off, points, settings.turning, first, last, rows)
@@ -147,11 +171,6 @@ def begin_segment(table, pair, k, settings, memory, points, first, last):
     for n in range(first, last):
         entry[n] = begin if times[n] == inf else inf
         leave[n] = end
-    if obstacle.count[k] == 0 and k > 0:
-        obstacle.count[k] = obstacle.count[k - 1]
-        for m in range(obstacle.count[k]):
-            for c in range(PLANE_SIZE):
-                obstacle.planes[k, m, c] = obstacle.planes[k - 1, m, c]
     planes, nodes, margin = obstacle.planes[k, 0 : obstacle.count[k]], obstacle.node[k : k + 2], plane_margin(settings)
     enter_planes(table, pair, planes, margin, settings.turning, nodes, first, last, rows, entry, leave)
 

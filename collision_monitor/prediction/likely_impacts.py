@@ -20,13 +20,20 @@ from collision_monitor.narrow_phase.cylinder_cylinder import is_parallel
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.bodies import next_pair, place_shape
 from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
-from collision_monitor.prediction.cutting_planes import CutSettings, cut_planes
+from collision_monitor.prediction.cutting_planes import CutSettings, carry_planes, cut_planes
 from collision_monitor.prediction.error_samples import add_covariance, orientation_spread, set_frame, take_root
 from collision_monitor.prediction.impact_distribution import EARLIEST, PROBABILITY, summarise
 from collision_monitor.prediction.impact_record import CLEAR
 from collision_monitor.prediction.motion import carry_on, half_acceleration
-from collision_monitor.prediction.obstacle_planes import MOST_SEGMENTS, Obstacle, make_obstacle, set_nodes
-from collision_monitor.prediction.sample_gaps import TURNED_FARTHEST, SampleRows, make_sample_rows
+from collision_monitor.prediction.obstacle_planes import Obstacle, make_obstacle, set_nodes
+from collision_monitor.prediction.sample_gaps import (
+    FIRST_ORDER,
+    NOT_TURNED,
+    SERIES,
+    TURNED_FARTHEST,
+    SampleRows,
+    make_sample_rows,
+)
 from collision_monitor.prediction.screening import FURTHEST, design_point, meeting
 from collision_monitor.prediction.sphere_interval import sphere_interval
 from collision_monitor.prediction.spread import is_uncertain, surface_spread
@@ -34,7 +41,7 @@ from collision_monitor.prediction.straight_samples import ERRORS, enter_cylinder
 from collision_monitor.prediction.time_order import sort_times
 from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE, body_has_mesh, first_contact
 
-BENDING: Final = 0.05
+BENDING: Final = 0.1
 """Largest deviation of a gap from a straight line in a segment, in standard deviations of the gap."""
 
 FACETS: Final = 0.015
@@ -42,9 +49,6 @@ FACETS: Final = 0.015
 
 TURNED: Final = 2.0
 """Standard deviations of the errors of angular velocity for which gaps are that straight."""
-
-MOST_PARTS: Final = 4
-"""Pairs that are not sure to meet, and turn so fast that the time has more parts, are left to the exact method."""
 
 VERIFIED_IN_PILOT: Final = 8
 VERIFIED: Final = 48
@@ -103,6 +107,18 @@ class PairErrors(NamedTuple):
     turning: Any  # ((rad, rad/s), (rad, rad/s)): errors of their orientations
     bend: float  # m/s^2: bound on the acceleration of their surfaces
     sigma: float  # m: standard deviation of the gap
+    time: float  # s: of the likeliest contact
+    radius: Any  # (m, m): of the bodies
+
+
+@inlined
+def _order(table, s, errors, body, tolerance):
+    """How the errors of orientation of shape s turn it: the second order counts if it moves the surface that far (m)."""
+    off = errors.turning[body][0] + errors.turning[body][1] * errors.time
+    if off == 0.0:
+        return NOT_TURNED
+    reach = errors.radius[body]
+    return FIRST_ORDER if 0.5 * reach * (TURNED * off) ** 2 < tolerance else SERIES
 
 
 @device
@@ -116,9 +132,9 @@ def _lay_planes(table, parts, pair, errors, until, sampling, lattice, memory, wo
     scratch, alone, sigma = work.scratch, memory.alone, errors.sigma
     margin, size, pilot = sampling.query.margin, lattice.weights.size, lattice.pilot
     tolerance = max(FACETS * sigma, sampling.query.tolerance)
-    turning = (errors.turning[0][0] + errors.turning[0][1] > 0.0, errors.turning[1][0] + errors.turning[1][1] > 0.0)
+    turning = (_order(table, a, errors, 0, tolerance), _order(table, b, errors, 1, tolerance))
     flat = table.kind[a] == HALF_SPACE or table.kind[b] == HALF_SPACE
-    follows = (not flat and (turning[0] or _rate(A) > 0.0), not flat and (turning[1] or _rate(B) > 0.0))
+    follows = (not flat and turning[0] + _rate(A) > 0.0, not flat and turning[1] + _rate(B) > 0.0)
     settings = CutSettings(margin, tolerance, pilot, follows, turning)
     for n in range(size):
         alone[n] = inf
@@ -144,6 +160,8 @@ def _lay_planes(table, parts, pair, errors, until, sampling, lattice, memory, wo
         left = cut_planes(table, parts, pair, k, pilot, VERIFIED_IN_PILOT, settings, memory, lattice.points, scratch)
         if left == 0:
             break
+        if k + 1 < segments:
+            carry_planes(table, pair, k, settings, memory)
     return segments, settings, left == 0 or memory.obstacle.node[segments].time >= end
 
 
@@ -157,8 +175,9 @@ def _enter_pair(table, parts, pair, laid, samples, wanted, lattice, memory, work
     alone, times = memory.alone, memory.times
     for n in range(samples):
         alone[n] = inf
+    each = max(VERIFIED_IN_PILOT, wanted // max(segments, 1))
     for k in range(segments):
-        left = cut_planes(table, parts, pair, k, samples, wanted, settings, memory, lattice.points, work.scratch)
+        left = cut_planes(table, parts, pair, k, samples, each, settings, memory, lattice.points, work.scratch)
         if left == 0:
             break
     for n in range(samples):
@@ -254,7 +273,7 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         take_root(work.joint)
         _clear_upper(work.joint)
         set_errors(work.joint, work.frame, t, lattice.points, memory.off)
-        errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0])
+        errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, (far_i, far_j))
         samples = _enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work)
         if samples < 0:
             answers[k, PROBABILITY] = LEFT
@@ -312,7 +331,7 @@ def _enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
         latest = max(latest, times[n])
         seen += weights[n] if times[n] < inf else 0.0
         part += weights[n]
-    if not reaches or (latest == inf and laid[0] > MOST_PARTS):
+    if not reaches:
         return -1
     if seen < part * PILOT_PART * sampling.min_probability and not sampling.stated:
         return 0

@@ -19,7 +19,7 @@ from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.motion import relative_position, rotation_at
 from collision_monitor.prediction.trigonometry import sin_cos
 
-MOST_SEGMENTS: Final = 16
+MOST_SEGMENTS: Final = 48
 """Largest number of parts of the time. In each part, the gaps are linear in time."""
 
 MOST_PLANES: Final = 64

@@ -32,6 +32,9 @@ from collision_monitor.prediction.obstacle_planes import AT_REST, MODE, from_pla
 TURNED_FARTHEST: Final = 0.7
 """Largest standard deviation of an orientation (rad) for which the series of `_turn` are exact to 0.001 rad."""
 
+NOT_TURNED, FIRST_ORDER, SERIES = 0, 1, 2
+"""How errors of the orientation of a body turn directions: there are none, to first order, or exactly."""
+
 STATE: Final = 9
 """Rows of the samples at a node: position of B relative to A (m), rotation vectors of the errors of A and B (rad)."""
 
@@ -60,7 +63,7 @@ def set_samples(obstacle, k, off, points, turning, first, last, rows):
     """Write the samples first:last at both ends of segment k into rows.node.
 
     off (6, S): errors of position and velocity; points (DIMENSIONS, S): of which the last six are the unit errors of
-    orientation; turning (bool, bool): whether the bodies have errors of orientation.
+    orientation; turning (int, int): NOT_TURNED, FIRST_ORDER or SERIES for both bodies.
     """
     for end in range(2):
         stated_node, node = obstacle.node[k + end], rows.node[end]
@@ -71,7 +74,7 @@ def set_samples(obstacle, k, off, points, turning, first, last, rows):
             for n in range(row.size):
                 row[n] = stated + x[n] + t * v[n]
         for body in range(2):
-            if not turning[body]:
+            if turning[body] == NOT_TURNED:
                 continue
             x = points[6 + 3 * body, first:last]
             y = points[7 + 3 * body, first:last]
@@ -85,13 +88,19 @@ def set_samples(obstacle, k, off, points, turning, first, last, rows):
 
 
 @device
-def _turn(vectors, by, row, sign, first, last):
+def _turn(vectors, by, row, sign, order, first, last):
     """Turn vectors (3, S) by sign (-1 or 1) times the rotation vectors in three rows of `by`, from `row` on.
 
-    Only samples first:last. Series for sine and cosine, see TURNED_FARTHEST.
+    Only samples first:last. order: FIRST_ORDER, or SERIES for sine and cosine, see TURNED_FARTHEST.
     """
     x, y, z = vectors[0, first:last], vectors[1, first:last], vectors[2, first:last]
     bx, by_, bz = by[row, first:last], by[row + 1, first:last], by[row + 2, first:last]
+    if order == FIRST_ORDER:
+        for n in range(x.size):
+            u, v, w = sign * bx[n], sign * by_[n], sign * bz[n]
+            px, py, pz = x[n], y[n], z[n]
+            x[n], y[n], z[n] = px + (v * pz - w * py), py + (w * px - u * pz), pz + (u * py - v * px)
+        return
     for n in range(x.size):
         u, v, w = sign * bx[n], sign * by_[n], sign * bz[n]
         q = u * u + v * v + w * w
@@ -183,14 +192,14 @@ def _gaps_at(table, pair, plane, node, margin, turning, first, last, state, rows
     nx, ny, nz = n
     reach = rounding(table, a) + rounding(table, b) + margin
     x, y, z = state[0, first:last], state[1, first:last], state[2, first:last]
-    turned = mode < AT_REST and turning[mode]
-    varies_a = mode != 0 and (turning[0] or turned)
-    varies_b = mode != 1 and (turning[1] or turned)
+    turned = mode < AT_REST and turning[mode] != NOT_TURNED
+    varies_a = mode != 0 and (turning[0] != NOT_TURNED or turned)
+    varies_b = mode != 1 and (turning[1] != NOT_TURNED or turned)
     if not varies_a:
         reach += reach_of(table, a, R[0], o[0], n)
     if not varies_b:
         reach += reach_of(table, b, R[1], o[1], (-nx, -ny, -nz))
-    if not (turning[0] or turning[1]):
+    if turning[0] == NOT_TURNED and turning[1] == NOT_TURNED:
         for k in range(gap.size):
             gap[k] = nx * x[k] + ny * y[k] + nz * z[k] - reach
         return
@@ -198,7 +207,7 @@ def _gaps_at(table, pair, plane, node, margin, turning, first, last, state, rows
     for k in range(gap.size):
         u[k], v[k], w[k] = nx, ny, nz
     if turned:
-        _turn(rows.normal, state, 3 + 3 * mode, 1.0, first, last)
+        _turn(rows.normal, state, 3 + 3 * mode, 1.0, turning[mode], first, last)
     for k in range(gap.size):
         gap[k] = u[k] * x[k] + v[k] * y[k] + w[k] * z[k] - reach
     for body in range(2):
@@ -207,11 +216,17 @@ def _gaps_at(table, pair, plane, node, margin, turning, first, last, state, rows
         x, y, z = rows.local[0, first:last], rows.local[1, first:last], rows.local[2, first:last]
         for k in range(gap.size):
             x[k], y[k], z[k] = u[k], v[k], w[k]
-        if turning[body]:
-            _turn(rows.local, state, 3 + 3 * body, -1.0, first, last)
+        if turning[body] != NOT_TURNED:
+            _turn(rows.local, state, 3 + 3 * body, -1.0, turning[body], first, last)
         best = rows.gap[2, first:last]
         s, sign = (b, -1.0) if body else (a, 1.0)
         _subtract_reaches(table, s, R[body], o[body], sign, rows.local, gap, first, last, best)
+
+
+@device
+def gaps_at_end(table, pair, plane, margin, turning, node, count, rows):
+    """Write the gaps of the first `count` samples along a plane at the end of a segment (NODE) into rows.gap[1]."""
+    _gaps_at(table, pair, plane, node, margin, turning, 0, count, rows.node[1], rows, rows.gap[1, 0:count])
 
 
 @device

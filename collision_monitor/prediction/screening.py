@@ -14,7 +14,8 @@ import numpy as np
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.prediction.bodies import next_pair, place_shape
-from collision_monitor.prediction.body_impact import ShapePair, Tube, Window
+from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
+from collision_monitor.prediction.impact_record import CLEAR, HIT
 from collision_monitor.prediction.motion import half_acceleration
 from collision_monitor.prediction.obstacle_planes import NO_TURNS, separation_at, set_nodes
 from collision_monitor.prediction.sample_gaps import stated_gap
@@ -24,6 +25,9 @@ FURTHEST: Final = 4.5
 """Standard deviations beyond which errors are neglected; 7 of a million are larger."""
 
 NOT_OFF: Final = (0.0, 0.0, 0.0)
+
+ROUGHLY: Final = 0.1
+"""Tolerance (standard deviations) of the time from which bodies that turn may meet within FURTHEST."""
 
 SAME_TIME: Final = 0.02
 """Fraction of the window by which two times of a design point differ at most when the search for it ends."""
@@ -121,7 +125,13 @@ def design_point(multibody, i, j, tube, turning, bend, sampling, t, obstacle, wo
     while a >= 0:
         pair = ShapePair(A, B, a, b)
         window = Window(*meeting(table, parts, pair, sampling.horizon, margin, wide, work))
-        if window.begin <= window.end:
+        begin, status = window.begin, HIT
+        if bend > 0.0 and begin < window.end:
+            roughly = ImpactQuery(margin, max(sampling.query.tolerance, ROUGHLY * tube.start), sampling.query.iterations)
+            there = Tube(wide.start + wide.growth * begin, wide.growth)
+            status, begin, _, _ = shape_impact(table, parts, pair, window, there, roughly, scratch)
+        window = Window(begin, window.end)
+        if window.begin <= window.end and status != CLEAR:
             length = window.end - window.begin
             set_nodes(table, parts, pair, window, length, NO_TURNS, False, scratch, obstacle)
             bent = 0.125 * bend * length * length
