@@ -7,11 +7,15 @@ their gap gives a new plane.
 from __future__ import annotations
 
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.prediction.obstacle_planes import AT_REST, MOST_PLANES, PLANE_SIZE, separation_at, set_plane
 from collision_monitor.prediction.sample_gaps import enter_planes, gaps_at_end, set_samples
+
+
+TRIED: Final = 32
+"""Number of samples that decide how the normal of a plane turns."""
 
 
 class CutSettings(NamedTuple):
@@ -19,7 +23,7 @@ class CutSettings(NamedTuple):
 
     margin: float  # m
     tolerance: float  # m: gap up to which a sample has entered
-    pilot: int  # number of samples that decide how a normal turns
+    pilot: int  # number of samples of the pilot lattice
     follows: Any  # (bool, bool): whether normals may turn with the bodies
     turning: Any  # (int, int): how errors of orientation turn the bodies, see sample_gaps
 
@@ -51,9 +55,9 @@ def _next_sample(entry, leave, checked, samples, briefest, cursor):
 def _cut(table, pair, n, samples, direction, k, settings, memory):
     """Add the plane along the direction that separates sample n. Its normal may turn with a body.
 
-    The best is the one that the pilot's samples enter latest. Returns whether sample n spends less time inside.
+    The best is the one that TRIED samples enter latest. Returns whether sample n spends less time inside.
     """
-    obstacle, rows, entry, leave, pilot = memory.obstacle, memory.rows, memory.entry, memory.leave, settings.pilot
+    obstacle, rows, entry, leave, tried = memory.obstacle, memory.rows, memory.entry, memory.leave, min(TRIED, settings.pilot)
     count, nodes, end = obstacle.count[k], obstacle.node[k : k + 2], obstacle.node[k + 1].time
     planes, margin, before = obstacle.planes[k, count : count + 1], plane_margin(settings), leave[n] - entry[n]
     obstacle.count[k] += 1
@@ -63,14 +67,14 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
         for mode in range(3):
             if mode == AT_REST or settings.follows[mode]:
                 set_plane(direction, mode, obstacle, planes[0])
-                for m in range(pilot):
+                for m in range(tried):
                     trial_entry[m] = entry[m]
                     trial_leave[m] = leave[m]
                 enter_planes(
-                    table, pair, planes, margin, settings.turning, nodes, 0, pilot, rows, trial_entry, trial_leave
+                    table, pair, planes, margin, settings.turning, nodes, 0, tried, rows, trial_entry, trial_leave
                 )
                 total = 0.0
-                for m in range(pilot):
+                for m in range(tried):
                     total += trial_entry[m] if trial_entry[m] <= trial_leave[m] else end
                 if total > latest:
                     best, latest = mode, total
