@@ -53,7 +53,7 @@ TURNED: Final = 2.0
 FACETS_IN_PILOT: Final = 0.06
 """The same for the pilot lattice, which decides how many samples a pair needs."""
 
-MOST_PARTS: Final = 4
+MOST_PARTS: Final = 2
 """Pairs with large errors of orientation are left to the exact method if the time has more parts, unless they surely
 meet: they need so many planes that it is no faster, and 0.01 off."""
 
@@ -186,7 +186,7 @@ def _enter_pair(table, parts, pair, laid, samples, wanted, tolerance, lattice, m
     alone, times = memory.alone, memory.times
     for n in range(samples):
         alone[n] = inf
-    each = max(VERIFIED_IN_PILOT, wanted // max(segments - MOST_PARTS, 1))
+    each = max(VERIFIED_IN_PILOT, wanted // max(segments - 3, 1))
     for k in range(segments):
         left = cut_planes(table, parts, pair, k, samples, each, settings, memory, lattice.points, work.scratch)
         if left == 0:
