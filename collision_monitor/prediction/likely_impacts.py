@@ -54,8 +54,9 @@ FACETS_IN_PILOT: Final = 0.06
 """The same for the pilot lattice, which decides how many samples a pair needs."""
 
 MOST_PARTS: Final = 2
-"""Pairs with large errors of orientation are left to the exact method if the time has more parts, unless they surely
-meet: they need so many planes that it is no faster, and 0.01 off."""
+SMALL: Final = 0.05
+"""If the time has more parts than MOST_PARTS, and errors are larger than SMALL rad or radii of a shape, the pair is left to
+the exact method unless it surely meets: it needs so many planes that it is no faster."""
 
 VERIFIED_IN_PILOT: Final = 8
 VERIFIED: Final = 48
@@ -119,13 +120,18 @@ class PairErrors(NamedTuple):
 
 
 @inlined
-def _order(table, s, errors, body, tolerance):
-    """How the errors of orientation of shape s turn it: the second order counts if it moves the surface that far (m)."""
-    off = errors.turning[body][0] + errors.turning[body][1] * errors.time
+def _turned_at(errors, body):
+    """Standard deviation of the orientation of a body at the time of the likeliest contact (rad)."""
+    return errors.turning[body][0] + errors.turning[body][1] * errors.time
+
+
+@inlined
+def _order(errors, body, tolerance):
+    """How errors of orientation turn a body: the second order counts if it moves the surface by the tolerance (m)."""
+    off = _turned_at(errors, body)
     if off == 0.0:
         return NOT_TURNED
-    reach = errors.radius[body]
-    return FIRST_ORDER if 0.5 * reach * (TURNED * off) ** 2 < tolerance else SERIES
+    return FIRST_ORDER if 0.5 * errors.radius[body] * (TURNED * off) ** 2 < tolerance else SERIES
 
 
 @device
@@ -139,7 +145,8 @@ def _lay_planes(table, parts, pair, errors, until, sampling, lattice, memory, wo
     scratch, alone, sigma = work.scratch, memory.alone, errors.sigma
     margin, size, pilot = sampling.query.margin, lattice.weights.size, lattice.pilot
     tolerance = max(FACETS_IN_PILOT * sigma, sampling.query.tolerance)
-    turning = (_order(table, a, errors, 0, tolerance), _order(table, b, errors, 1, tolerance))
+    fine = max(FACETS * sigma, sampling.query.tolerance)
+    turning = (_order(errors, 0, fine), _order(errors, 1, fine))
     flat = table.kind[a] == HALF_SPACE or table.kind[b] == HALF_SPACE
     follows = (not flat and turning[0] + _rate(A) > 0.0, not flat and turning[1] + _rate(B) > 0.0)
     settings = CutSettings(margin, tolerance, pilot, follows, turning)
@@ -162,7 +169,9 @@ def _lay_planes(table, parts, pair, errors, until, sampling, lattice, memory, wo
     segments = set_nodes(
         table, parts, pair, window, length, errors.turning, sampling.planar, scratch, memory.obstacle
     )
-    is_rough = segments > MOST_PARTS and (settings.turning[0] == SERIES or settings.turning[1] == SERIES)
+    turned = max(_turned_at(errors, 0), _turned_at(errors, 1))
+    large = TURNED * turned > SMALL or sigma > 2.0 * SMALL * min(table.radius[a], table.radius[b])
+    is_rough = segments > MOST_PARTS and large
     if is_rough and not sampling.stated:
         return segments, settings, False
     left = pilot

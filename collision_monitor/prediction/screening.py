@@ -16,7 +16,7 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.prediction.bodies import next_pair, place_shape
 from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
 from collision_monitor.prediction.impact_record import CLEAR, HIT
-from collision_monitor.prediction.motion import half_acceleration
+from collision_monitor.prediction.motion import half_acceleration, relative_position
 from collision_monitor.prediction.obstacle_planes import NO_TURNS, separation_at, set_nodes
 from collision_monitor.prediction.sample_gaps import stated_gap
 from collision_monitor.prediction.sphere_interval import sphere_interval
@@ -33,7 +33,10 @@ SAME_TIME: Final = 0.02
 """Fraction of the window by which two times of a design point differ at most when the search for it ends."""
 
 DESIGN_STEPS: Final = 3
-"""Largest number of separations towards a design point."""
+"""Largest number of separations towards a design point. The line between the origins is tried before them."""
+
+ENOUGH: Final = 0.2
+"""Fraction of min_probability below which the bound along that line suffices, also of a body of several shapes."""
 
 _FINENESS: Final = 32
 """Steps of TAIL for each standard deviation."""
@@ -106,6 +109,14 @@ def _least_beta(gaps, n, turning, joint, t, window):
     return beta, when, both_signs * (_tail(at_begin) + _tail(at_end))
 
 
+@inlined
+def _towards(A, B, t):
+    """Unit vector from the origin of A to that of B at time t."""
+    x, y, z = relative_position(A, B, t)
+    length = sqrt(x * x + y * y + z * z)
+    return (x / length, y / length, z / length) if length > 0.0 else (1.0, 0.0, 0.0)
+
+
 @device
 def design_point(multibody, i, j, tube, turning, bend, sampling, t, obstacle, work):
     """Return (bound, time): a bound on the probability of contact, and the time at which contact is likeliest.
@@ -136,15 +147,21 @@ def design_point(multibody, i, j, tube, turning, bend, sampling, t, obstacle, wo
             set_nodes(table, parts, pair, window, length, NO_TURNS, False, scratch, obstacle)
             bent = 0.125 * bend * length * length
             at, own = min(max(t, window.begin), window.end), 1.0
-            for _ in range(DESIGN_STEPS):
-                if separation_at(table, parts, pair, at, NOT_OFF, (NOT_OFF, NOT_OFF), obstacle, scratch) <= margin:
-                    own = 1.0
-                    break
-                n = (scratch.out[0], scratch.out[1], scratch.out[2])
+            n = _towards(A, B, at)
+            for step in range(0 if A.radius + B.radius < inf else 1, DESIGN_STEPS + 1):
+                if step > 0:
+                    if separation_at(table, parts, pair, at, NOT_OFF, (NOT_OFF, NOT_OFF), obstacle, scratch) <= margin:
+                        own = 1.0
+                        break
+                    n = (scratch.out[0], scratch.out[1], scratch.out[2])
                 first = stated_gap(table, pair, n, obstacle.node[0], margin + bent)
                 last = stated_gap(table, pair, n, obstacle.node[1], margin + bent) if length > 0.0 else first
                 beta, when, outside = _least_beta((first, last), n, turning, work.joint, t, window)
                 own = min(own, outside)
+                if step == 0:
+                    if own < ENOUGH * sampling.min_probability:
+                        break
+                    continue
                 if beta < least:
                     least, likeliest = beta, when
                     frame[0, 0], frame[0, 1], frame[0, 2] = n
