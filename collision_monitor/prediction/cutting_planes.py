@@ -13,7 +13,6 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.prediction.obstacle_planes import AT_REST, MOST_PLANES, PLANE_SIZE, separation_at, set_plane
 from collision_monitor.prediction.sample_gaps import enter_planes, gaps_at_end, set_samples
 
-
 TRIED: Final = 32
 """Number of samples that decide how the normal of a plane turns."""
 
@@ -57,7 +56,8 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
 
     The best is the one that TRIED samples enter latest. Returns whether sample n spends less time inside.
     """
-    obstacle, rows, entry, leave, tried = memory.obstacle, memory.rows, memory.entry, memory.leave, min(TRIED, settings.pilot)
+    obstacle, rows, entry, leave = memory.obstacle, memory.rows, memory.entry, memory.leave
+    tried = min(TRIED, settings.pilot)
     count, nodes, end = obstacle.count[k], obstacle.node[k : k + 2], obstacle.node[k + 1].time
     planes, margin, before = obstacle.planes[k, count : count + 1], plane_margin(settings), leave[n] - entry[n]
     obstacle.count[k] += 1
@@ -142,14 +142,13 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, points,
 @device
 def carry_planes(table, pair, k, settings, memory):
     """Start segment k + 1 with those planes of segment k that keep most apart a sample of the pilot at its end."""
-    obstacle, rows, pilot = memory.obstacle, memory.rows, settings.pilot
+    obstacle, rows, pilot, turning = memory.obstacle, memory.rows, settings.pilot, settings.turning
+    margin, end = plane_margin(settings), obstacle.node[k + 1]
     widest, winner = memory.trial[0], memory.checked
     for n in range(pilot):
         widest[n], winner[n] = -inf, -1.0
     for m in range(obstacle.count[k]):
-        gaps_at_end(
-            table, pair, obstacle.planes[k, m], plane_margin(settings), settings.turning, obstacle.node[k + 1], pilot, rows
-        )
+        gaps_at_end(table, pair, obstacle.planes[k, m], margin, turning, end, pilot, rows)
         for n in range(pilot):
             if memory.alone[n] == inf and rows.gap[1, n] > widest[n]:
                 widest[n], winner[n] = rows.gap[1, n], float(m)

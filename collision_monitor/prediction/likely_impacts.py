@@ -22,7 +22,7 @@ from collision_monitor.prediction.bodies import next_pair, place_shape
 from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
 from collision_monitor.prediction.cutting_planes import CutSettings, carry_planes, cut_planes
 from collision_monitor.prediction.error_samples import add_covariance, orientation_spread, set_frame, take_root
-from collision_monitor.prediction.impact_distribution import EARLIEST, PROBABILITY, summarise
+from collision_monitor.prediction.impact_distribution import EARLIEST, MOST_LIKELY, PROBABILITY, summarise
 from collision_monitor.prediction.impact_record import CLEAR
 from collision_monitor.prediction.motion import carry_on, half_acceleration
 from collision_monitor.prediction.obstacle_planes import Obstacle, make_obstacle, set_nodes
@@ -55,8 +55,11 @@ FACETS_IN_PILOT: Final = 0.06
 
 MOST_PARTS: Final = 2
 SMALL: Final = 0.05
-"""If the time has more parts than MOST_PARTS, and errors are larger than SMALL rad or radii of a shape, the pair is left to
-the exact method unless it surely meets: it needs so many planes that it is no faster."""
+"""If bodies that turn divide the time into more than MOST_PARTS, and errors exceed SMALL rad, or twice SMALL radii of a
+shape, the pair is left to the exact method unless it surely meets: it needs so many planes that it is no faster."""
+
+SPINS: Final = 4.0
+"""Standard deviations of the angular velocity above which a body counts as one that turns."""
 
 VERIFIED_IN_PILOT: Final = 8
 VERIFIED: Final = 48
@@ -159,7 +162,8 @@ def _lay_planes(table, parts, pair, errors, until, sampling, lattice, memory, wo
         return 0, settings, True
     length = _part_length(A, B, errors)
     if length < end - begin:
-        roughly = ImpactQuery(margin, max(sampling.query.tolerance, SAMPLE_TOLERANCE * sigma), sampling.query.iterations)
+        coarse = max(sampling.query.tolerance, SAMPLE_TOLERANCE * sigma)
+        roughly = ImpactQuery(margin, coarse, sampling.query.iterations)
         there = Tube(wide.start + wide.growth * begin, wide.growth)
         status, begin, _, _ = shape_impact(table, parts, pair, Window(begin, end), there, roughly, scratch)
         if status == CLEAR or not begin < end:
@@ -171,7 +175,8 @@ def _lay_planes(table, parts, pair, errors, until, sampling, lattice, memory, wo
     )
     turned = max(_turned_at(errors, 0), _turned_at(errors, 1))
     large = TURNED * turned > SMALL or sigma > 2.0 * SMALL * min(table.radius[a], table.radius[b])
-    is_rough = segments > MOST_PARTS and large
+    spins = _rate(A) + _rate(B) > SPINS * (errors.turning[0][1] + errors.turning[1][1])
+    is_rough = segments > MOST_PARTS and large and spins
     if is_rough and not sampling.stated:
         return segments, settings, False
     left = pilot
@@ -244,6 +249,8 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
     An answer is NaN if neither body has declared an uncertainty, or if the pair is stated to pass and its probability
     is below min_probability for certain. The probability is LEFT for pairs that `impact_probabilities` has to answer.
     sampling: its own samples are not used; lattice: sample_columns.
+    sampling.only_screens: for pairs that are stated to pass, write a time before which the probability of contact is
+    less than min_probability, the likeliest time of contact, and a bound on its probability, LEFT if unknown.
     """
     table, parts, bodies = multibody
     query, horizon, stale_acceleration = sampling.query, sampling.horizon, sampling.stale_acceleration
@@ -254,9 +261,8 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         answers[k, :] = nan
         if not (is_uncertain(spread, i) or is_uncertain(spread, j)):
             continue
-        if body_has_mesh(table, parts, bodies.first_shape[i]) or body_has_mesh(table, parts, bodies.first_shape[j]):
-            answers[k, PROBABILITY] = LEFT
-            continue
+        has_mesh = body_has_mesh(table, parts, bodies.first_shape[i])
+        has_mesh |= body_has_mesh(table, parts, bodies.first_shape[j])
         ages = (carry_on(bodies, i, now, work.quaternion, A), carry_on(bodies, j, now, work.quaternion, B))
         r_i, r_j = bodies.spin_radius[i], bodies.spin_radius[j]
         now_i, growth_i = surface_spread(spread, i, r_i, ages[0], horizon, stale_acceleration)
@@ -273,14 +279,24 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
             reach = A.radius + B.radius + query.margin + sampling.sigmas * tube.start
             growth = sampling.sigmas * tube.growth + half_acceleration(A, B) * horizon
             p, v = (B.x - A.x, B.y - A.y, B.z - A.z), (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
-            if reach < inf and sphere_interval(p, v, reach, growth, horizon, 1.0)[0] == inf:
+            first = sphere_interval(p, v, reach, growth, horizon, 1.0)[0] if reach < inf else 0.0
+            if first == inf:
+                continue
+            answer = answers[k]
+            answer[EARLIEST], answer[MOST_LIKELY], answer[PROBABILITY] = first, first, LEFT
+            if has_mesh:
                 continue
             _gap_covariance(multibody, spread, i, j, ages, t, sampling, work)
             bound, t = design_point(multibody, i, j, tube, turning, bend, sampling, t, memory.obstacle, work)
             if bound < sampling.min_probability:
+                answer[:] = nan
                 continue
+            if sampling.only_screens:
+                answer[MOST_LIKELY], answer[PROBABILITY] = t, min(bound, 1.0)
+                continue
+            answer[:] = nan
         most = max(turn_i[0] + turn_i[1] * t, turn_j[0] + turn_j[1] * t)
-        if most > TURNED_FARTHEST or (flat and most > 0.0):
+        if has_mesh or most > TURNED_FARTHEST or (flat and most > 0.0):
             answers[k, PROBABILITY] = LEFT
             continue
         if sampling.stated:
@@ -322,7 +338,8 @@ def _enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
     """
     table, parts, bodies = multibody
     A, B = work.motion[0], work.motion[1]
-    times, alone, weights, pilot, size = memory.times, memory.alone, lattice.weights, lattice.pilot, lattice.weights.size
+    times, alone, weights, pilot = memory.times, memory.alone, lattice.weights, lattice.pilot
+    size = weights.size
     margin = sampling.query.margin
     first_a, first_b = bodies.first_shape[i], bodies.first_shape[j]
     single = parts.next[first_a] < 0 and parts.next[first_b] < 0

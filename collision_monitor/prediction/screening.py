@@ -138,7 +138,8 @@ def design_point(multibody, i, j, tube, turning, bend, sampling, t, obstacle, wo
         window = Window(*meeting(table, parts, pair, sampling.horizon, margin, wide, work))
         begin, status = window.begin, HIT
         if bend > 0.0 and begin < window.end:
-            roughly = ImpactQuery(margin, max(sampling.query.tolerance, ROUGHLY * tube.start), sampling.query.iterations)
+            tolerance = max(sampling.query.tolerance, ROUGHLY * tube.start)
+            roughly = ImpactQuery(margin, tolerance, sampling.query.iterations)
             there = Tube(wide.start + wide.growth * begin, wide.growth)
             status, begin, _, _ = shape_impact(table, parts, pair, window, there, roughly, scratch)
         window = Window(begin, window.end)

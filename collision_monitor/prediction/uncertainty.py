@@ -181,6 +181,7 @@ class Sampling(NamedTuple):
     planar: bool
     points: Any  # (S, 12): normal_samples
     weights: Any  # (S,)
+    only_screens: bool = False  # bounds in place of answers, see likely_impacts
 
 
 @allocating_kernel
