@@ -28,8 +28,8 @@ def summarise(times, weights, order, confidence, safe, answer, whole):
     """Write earliest, most likely and latest time (s) and probability into answer (4,).
 
     times (n,): inf: no impact; weights (n,) with the sum `whole`; order (n,): sorts the times; safe: a time before
-    which hardly any impact lies. At most 1 - confidence of the impacts lie before `earliest`, which is at most `safe` if too few samples meet.
-    Both quantiles are moved outward by OUTWARD standard errors, because the samples are few.
+    which hardly any impact lies. At most 1 - confidence of the impacts lie before `earliest`, which is at most `safe`
+    if too few samples meet. Both quantiles are moved outward by OUTWARD standard errors, because the samples are few.
     """
     n = 0
     total = squares = all_squares = 0.0

@@ -61,7 +61,7 @@ shape, the pair is left to the exact method unless it surely meets: it needs so 
 SPINS: Final = 4.0
 """Standard deviations of the angular velocity above which a body counts as one that turns."""
 
-VERIFIED_IN_PILOT: Final = 8
+VERIFIED_IN_PILOT: Final = 6
 VERIFIED: Final = 48
 """Samples of the pilot lattice, and of all, that must need no new plane of a segment."""
 
@@ -200,7 +200,7 @@ def _enter_pair(table, parts, pair, laid, samples, wanted, tolerance, lattice, m
     alone, times = memory.alone, memory.times
     for n in range(samples):
         alone[n] = inf
-    each = max(VERIFIED_IN_PILOT, wanted // max(segments - 3, 1))
+    each = max(VERIFIED_IN_PILOT, wanted // max(segments - 3, 1)) if wanted > 0 else 0
     for k in range(segments):
         left = cut_planes(table, parts, pair, k, samples, each, settings, memory, lattice.points, work.scratch)
         if left == 0:
@@ -373,7 +373,7 @@ def _enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
     if seen < part * PILOT_PART * sampling.min_probability and not sampling.stated:
         return 0
     is_sure = latest < inf
-    samples, wanted = (min(SURE_SAMPLES, size), VERIFIED_IN_PILOT) if is_sure else (size, VERIFIED)
+    samples, wanted = (min(SURE_SAMPLES, size), 0) if is_sure else (size, VERIFIED)
     tolerance = max((FACETS_IN_PILOT if is_sure else FACETS) * errors.sigma, sampling.query.tolerance)
     until = min(sampling.horizon, latest + LATER * (latest - _least(times, pilot))) if is_sure else sampling.horizon
     for n in range(size):
