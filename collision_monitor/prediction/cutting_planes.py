@@ -105,16 +105,34 @@ def _between(first, last, row, n, share):
 
 
 @device
-def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, points, scratch):
+def _check(table, parts, pair, n, at, samples, k, settings, memory, scratch):
+    """Add a plane to segment k if sample n is apart at that time. Return whether that shortens its time inside."""
+    gap = _separation_of(table, parts, pair, n, at, k, memory, scratch) - settings.margin
+    direction = (scratch.out[0], scratch.out[1], scratch.out[2])
+    return gap > settings.tolerance and _cut(table, pair, n, samples, direction, k, settings, memory)
+
+
+@device
+def cut_extremes(table, parts, pair, k, extremes, settings, memory, scratch):
+    """Add planes to segment k of memory.obstacle where some samples of the pilot, the farthest ones, need them.
+
+    The errors with which convex bodies meet are about a convex set, so that the samples between them meet if they do.
+    """
+    obstacle, entry, leave = memory.obstacle, memory.entry, memory.leave
+    for n in extremes:
+        while entry[n] <= leave[n] and obstacle.count[k] < MOST_PLANES:
+            if not _check(table, parts, pair, n, entry[n], settings.pilot, k, settings, memory, scratch):
+                break
+
+
+@device
+def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch):
     """Add planes to segment k of memory.obstacle for a pair of shapes (ShapePair), where the first `samples` need them.
 
     Every second sample is the one that passes the planes most briefly, because it may miss the shapes. The search ends
-    when `wanted` samples needed no plane, half of them after the last plane.
-    memory.alone: times of the samples that met in an earlier segment, else infinite; it gets those of this segment.
-    Returns the number of samples that have not met.
+    when `wanted` samples needed no plane, half of them after the last plane. `begin_segment` comes before it.
     """
-    obstacle, entry, leave, checked, times = memory.obstacle, memory.entry, memory.leave, memory.checked, memory.alone
-    begin_segment(table, pair, k, settings, memory, points, 0, samples)
+    obstacle, entry, leave, checked = memory.obstacle, memory.entry, memory.leave, memory.checked
     for n in range(samples):
         checked[n] = 0.0
     verified = cursor = 0
@@ -129,14 +147,11 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, points,
         cursor = cursor if is_brief else n
         checked[n] = 1.0
         at = 0.5 * (entry[n] + leave[n]) if is_brief else entry[n]
-        gap = _separation_of(table, parts, pair, n, at, k, memory, scratch) - settings.margin
-        direction = (scratch.out[0], scratch.out[1], scratch.out[2])
-        if gap > settings.tolerance and _cut(table, pair, n, samples, direction, k, settings, memory):
+        if _check(table, parts, pair, n, at, samples, k, settings, memory, scratch):
             checked[n] = 0.0
             verified //= 2
         else:
             verified += 1
-    return end_segment(entry, leave, times, 0, samples)
 
 
 @device
@@ -164,9 +179,9 @@ def carry_planes(table, pair, k, settings, memory):
 
 @device
 def begin_segment(table, pair, k, settings, memory, points, first, last):
-    """Set the intervals of the samples first:last to those behind the planes of segment k, empty if they met before.
+    """Set the intervals of the samples first:last to those behind the planes of segment k.
 
-    A segment without planes starts with the last ones of the segment before it that kept samples apart.
+    memory.alone (S,): times of the samples that met in an earlier segment, whose intervals are empty, else infinite.
     """
     obstacle, rows, entry, leave, times = memory.obstacle, memory.rows, memory.entry, memory.leave, memory.alone
     set_samples(obstacle, k, memory.off, points, settings.turning, first, last, rows)
@@ -180,7 +195,7 @@ def begin_segment(table, pair, k, settings, memory, points, first, last):
 
 @device
 def end_segment(entry, leave, times, first, last):
-    """Set the times of the samples first:last that met in a segment; return the number of those that never met."""
+    """Set the times (S,) of the samples first:last that met in a segment; return the number of those that never met."""
     left = 0
     for n in range(first, last):
         if entry[n] <= leave[n]:

@@ -20,7 +20,14 @@ from collision_monitor.narrow_phase.cylinder_cylinder import is_parallel
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.bodies import next_pair, place_shape
 from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
-from collision_monitor.prediction.cutting_planes import CutSettings, carry_planes, cut_planes
+from collision_monitor.prediction.cutting_planes import (
+    CutSettings,
+    begin_segment,
+    carry_planes,
+    cut_extremes,
+    cut_planes,
+    end_segment,
+)
 from collision_monitor.prediction.error_samples import add_covariance, orientation_spread, set_frame, take_root
 from collision_monitor.prediction.impact_distribution import EARLIEST, MOST_LIKELY, PROBABILITY, summarise
 from collision_monitor.prediction.impact_record import CLEAR
@@ -69,7 +76,8 @@ SURE_SAMPLES: Final = 256
 """Number of samples of a pair that meets in all samples of the pilot lattice: they differ only in their times."""
 
 LATER: Final = 0.5
-"""Part of the range of the pilot's times after the last one until which such a pair is followed."""
+SOON: Final = 0.01
+"""Parts of the range of the pilot's times, and of the horizon, after its last time until which it is followed."""
 
 LEFT: Final = -1.0
 """Probability of a pair that this method does not answer: very fast rotation, large errors of orientation, a mesh."""
@@ -181,7 +189,10 @@ def _lay_planes(table, parts, pair, errors, until, sampling, lattice, memory, wo
         return segments, settings, False
     left = pilot
     for k in range(segments):
-        left = cut_planes(table, parts, pair, k, pilot, VERIFIED_IN_PILOT, settings, memory, lattice.points, scratch)
+        begin_segment(table, pair, k, settings, memory, lattice.points, 0, pilot)
+        cut_extremes(table, parts, pair, k, lattice.extremes, settings, memory, scratch)
+        cut_planes(table, parts, pair, k, pilot, VERIFIED_IN_PILOT, settings, memory, scratch)
+        left = end_segment(memory.entry, memory.leave, alone, 0, pilot)
         if left == 0:
             break
         if k + 1 < segments:
@@ -202,8 +213,9 @@ def _enter_pair(table, parts, pair, laid, samples, wanted, tolerance, lattice, m
         alone[n] = inf
     each = max(VERIFIED_IN_PILOT, wanted // max(segments - 3, 1)) if wanted > 0 else 0
     for k in range(segments):
-        left = cut_planes(table, parts, pair, k, samples, each, settings, memory, lattice.points, work.scratch)
-        if left == 0:
+        begin_segment(table, pair, k, settings, memory, lattice.points, 0, samples)
+        cut_planes(table, parts, pair, k, samples, each, settings, memory, work.scratch)
+        if end_segment(memory.entry, memory.leave, alone, 0, samples) == 0:
             break
     for n in range(samples):
         times[n] = min(times[n], alone[n])
@@ -249,8 +261,8 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
     An answer is NaN if neither body has declared an uncertainty, or if the pair is stated to pass and its probability
     is below min_probability for certain. The probability is LEFT for pairs that `impact_probabilities` has to answer.
     sampling: its own samples are not used; lattice: sample_columns.
-    sampling.only_screens: for pairs that are stated to pass, write a time before which the probability of contact is
-    less than min_probability, the likeliest time of contact, and a bound on its probability, LEFT if unknown.
+    sampling.only_screens: for pairs that are stated to pass, write a time before which bodies grown by safe_sigmas do
+    not meet, the likeliest time of contact, and a bound on its probability, LEFT if unknown.
     """
     table, parts, bodies = multibody
     query, horizon, stale_acceleration = sampling.query, sampling.horizon, sampling.stale_acceleration
@@ -283,6 +295,10 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
             if first == inf:
                 continue
             answer = answers[k]
+            if sampling.only_screens and reach < inf:
+                reach += (sampling.safe_sigmas - sampling.sigmas) * tube.start
+                growth += (sampling.safe_sigmas - sampling.sigmas) * tube.growth
+                first = sphere_interval(p, v, reach, growth, horizon, 1.0)[0]
             answer[EARLIEST], answer[MOST_LIKELY], answer[PROBABILITY] = first, first, LEFT
             if has_mesh:
                 continue
@@ -375,7 +391,9 @@ def _enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
     is_sure = latest < inf
     samples, wanted = (min(SURE_SAMPLES, size), 0) if is_sure else (size, VERIFIED)
     tolerance = max((FACETS_IN_PILOT if is_sure else FACETS) * errors.sigma, sampling.query.tolerance)
-    until = min(sampling.horizon, latest + LATER * (latest - _least(times, pilot))) if is_sure else sampling.horizon
+    until = sampling.horizon
+    if is_sure:
+        until = min(until, latest + LATER * (latest - _least(times, pilot)) + SOON * until)
     for n in range(size):
         times[n] = inf
     a, b = first_a, first_b

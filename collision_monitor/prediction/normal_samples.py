@@ -77,9 +77,8 @@ def normal_samples(count: int) -> NormalSamples:
     return NormalSamples(points, weights)
 
 
-def _reversed(k: int, count: int) -> float:
-    """Digits of k < count in base 2 in reverse order, as a fraction (van der Corput): 0, 1/2, 1/4, 3/4 for 0 to 3."""
-    del count
+def _reversed(k: int) -> float:
+    """Digits of k in base 2 in reverse order, as a fraction (van der Corput): 0, 1/2, 1/4, 3/4 for 0 to 3."""
     return float(sum((k >> bit & 1) / 2 ** (bit + 1) for bit in range(k.bit_length())))
 
 
@@ -93,6 +92,8 @@ class SampleColumns(NamedTuple):
     weights: NDArray[np.float64]  # (n,)
     pilot: int
     """Number of samples of the coarser lattice."""
+    extremes: NDArray[np.int64]
+    """The samples of the coarser lattice that are farthest in some directions of position and velocity."""
 
 
 @lru_cache(maxsize=8)
@@ -101,8 +102,19 @@ def sample_columns(count: int) -> SampleColumns:
     points, weights = normal_samples(count)
     stride = max(1, count // PILOT)
     place = np.arange(count)
-    coset = np.array([_reversed(k, stride) for k in range(stride)])
+    coset = np.array([_reversed(k) for k in range(stride)])
     order = np.lexsort((place // stride * _GOLDEN_RATIO % 1.0, coset[place % stride]))
-    columns = SampleColumns(np.ascontiguousarray(points[order].T), weights[order], -(-count // stride))
+    pilot = -(-count // stride)
+    ordered = np.ascontiguousarray(points[order].T)
+    columns = SampleColumns(ordered, weights[order], pilot, _extremes(ordered[:6, :pilot]))
     columns.points.flags.writeable = columns.weights.flags.writeable = False
     return columns
+
+
+def _extremes(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Indices of the points (6, n) that are farthest along both ways of each axis, and of diagonals with the first."""
+    axes = np.eye(6)
+    ways = np.concatenate([axes, axes[0] + axes[1:], axes[0] - axes[1:]])
+    reach = np.concatenate([ways, -ways]) @ points
+    found: NDArray[np.int64] = np.unique(reach.argmax(axis=1)).astype(np.int64)
+    return found
