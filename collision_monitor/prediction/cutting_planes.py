@@ -10,8 +10,15 @@ from math import inf
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.prediction.obstacle_planes import AT_REST, MOST_PLANES, PLANE_SIZE, separation_at, set_plane
-from collision_monitor.prediction.sample_gaps import enter_planes, gaps_at_end, set_samples
+from collision_monitor.prediction.obstacle_planes import (
+    AT_REST,
+    MOST_PLANES,
+    NOT_OFF,
+    PLANE_SIZE,
+    separation_at,
+    set_plane,
+)
+from collision_monitor.prediction.sample_gaps import NOT_TURNED, enter_planes, gaps_at_end, set_samples
 
 TRIED: Final = 32
 """Number of samples that decide how the normal of a plane turns."""
@@ -84,14 +91,15 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
 
 
 @device
-def _separation_of(table, parts, pair, n, t, k, memory, scratch):
+def _separation_of(table, parts, pair, n, t, k, turning, memory, scratch):
     """Separation (m) of sample n at time t in segment k."""
     obstacle, off, first, last = memory.obstacle, memory.off, memory.rows.node[0], memory.rows.node[1]
     begin, end = obstacle.node[k].time, obstacle.node[k + 1].time
     share = (t - begin) / (end - begin)
     error = (off[0, n] + t * off[3, n], off[1, n] + t * off[4, n], off[2, n] + t * off[5, n])
-    turned = (_between(first, last, 3, n, share), _between(first, last, 6, n, share))
-    return separation_at(table, parts, pair, t, error, turned, obstacle, scratch)
+    turned_a = _between(first, last, 3, n, share) if turning[0] != NOT_TURNED else NOT_OFF
+    turned_b = _between(first, last, 6, n, share) if turning[1] != NOT_TURNED else NOT_OFF
+    return separation_at(table, parts, pair, t, error, (turned_a, turned_b), obstacle, scratch)
 
 
 @inlined
@@ -107,7 +115,7 @@ def _between(first, last, row, n, share):
 @device
 def _check(table, parts, pair, n, at, samples, k, settings, memory, scratch):
     """Add a plane to segment k if sample n is apart at that time. Return whether that shortens its time inside."""
-    gap = _separation_of(table, parts, pair, n, at, k, memory, scratch) - settings.margin
+    gap = _separation_of(table, parts, pair, n, at, k, settings.turning, memory, scratch) - settings.margin
     direction = (scratch.out[0], scratch.out[1], scratch.out[2])
     return gap > settings.tolerance and _cut(table, pair, n, samples, direction, k, settings, memory)
 

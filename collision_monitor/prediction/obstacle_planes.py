@@ -33,6 +33,9 @@ AT_REST: Final = 2
 is in the axes of that shape."""
 
 
+NOT_OFF: Final = (0.0, 0.0, 0.0)
+"""Error of a position, or rotation vector of an error, of the stated motion."""
+
 NO_TURNS: Final = ((0.0, 0.0), (0.0, 0.0))
 """Turning of two bodies without errors of orientation, see `set_nodes`."""
 

@@ -1,0 +1,124 @@
+"""Cost of probabilities: planes against the method that follows every sample, in turns, on the same steps.
+
+For each scene with noisy states: ms a step of the profile `fast` (without probabilities), of `balanced`, and of
+`balanced` with every sample followed; and how far the probabilities and times of both differ.
+
+    python benchmarks/uncertain_states.py                    about two minutes
+    python benchmarks/uncertain_states.py --scene fleet hall
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import collision_monitor as cm
+from collision_monitor.monitor import uncertain_predictions
+from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.records import STATE
+from collision_monitor.world import make_scene
+
+States = NDArray[np.void]
+NOISE = 0.005
+PLANES, SAMPLES = uncertain_predictions.FINEST_WITH_PLANES, float("inf")
+
+
+def simulated(name: str, objects: int | None) -> tuple[Sequence[ObjectDescription], Iterator[States]]:
+    """Descriptions and states of a scene at 20 Hz, with the noise of a localiser in all quantities."""
+    scene = make_scene(name, objects=objects, noise=NOISE)
+
+    def states() -> Iterator[States]:
+        while True:
+            yield scene.states()
+            scene.step(0.05)
+
+    return scene.descriptions, states()
+
+
+def hall(people: int) -> tuple[Sequence[ObjectDescription], Iterator[States]]:
+    """People that cross a hall at random, 0.125 for each square metre, uncertain by 0.05 m and 0.15 m/s."""
+    random = np.random.default_rng(0)
+    side = float(np.sqrt(8.0 * people))
+    rows = np.zeros(people, STATE)
+    rows["id"], rows["quaternion"][:, 3] = np.arange(people), 1.0
+    rows["position"][:, :2] = random.uniform(0, side, (people, 2))
+    rows["linear"][:, :2] = random.normal(0, 1, (people, 2))
+    rows["position_stddev"], rows["velocity_stddev"] = 0.05, 0.15
+
+    def states() -> Iterator[States]:
+        while True:
+            yield rows
+            rows["position"] += 0.05 * rows["linear"]
+
+    return [ObjectDescription(k, cm.Cylinder(0.25, 1.75)) for k in range(people)], states()
+
+
+SCENES: dict[str, Callable[[], tuple[Sequence[ObjectDescription], Iterator[States]]]] = {
+    "fleet": lambda: simulated("fleet", None),
+    "fleet of 1000": lambda: simulated("fleet", 1000),
+    "hall": lambda: hall(200),
+    "hall of 1000": lambda: hall(1000),
+    "swarm of 1000": lambda: simulated("swarm", 1000),
+    "particles of 1000": lambda: simulated("particles", 1000),
+    "clutter of 300": lambda: simulated("clutter", 300),
+}
+
+
+def measure(name: str, steps: int) -> str:
+    """One row of the table."""
+    descriptions, states = SCENES[name]()
+    ways = {"fast": ("fast", PLANES), "planes": ("balanced", PLANES), "samples": ("balanced", SAMPLES)}
+    monitors = {way: cm.Monitor(profile) for way, (profile, _) in ways.items()}
+    for monitor in monitors.values():
+        for description in descriptions:
+            monitor.describe(description)
+    took: dict[str, list[float]] = {way: [] for way in ways}
+    off: list[Any] = []
+    for step in range(steps):
+        rows = next(states)
+        told = {}
+        for way, (_, finest) in ways.items():
+            uncertain_predictions.FINEST_WITH_PLANES = finest  # type: ignore[misc]
+            began = time.perf_counter()
+            result = monitors[way].step(50_000_000 * step, rows)
+            took[way].append(1e3 * (time.perf_counter() - began))
+            told[way] = {(p["id_a"], p["id_b"]): p for p in result.predictions}
+        for pair in told["planes"].keys() & told["samples"].keys():
+            one, other = told["planes"][pair], told["samples"][pair]
+            off.append([one[field] - other[field] for field in ("probability", "earliest", "most_likely")])
+    ms = {way: np.array(times[2:]) for way, times in took.items()}
+    apart = np.array(off)
+    rms, worst = np.sqrt(np.mean(apart[:, 0] ** 2)), np.abs(apart[:, 0]).max()
+    median = {way: float(np.median(times)) for way, times in ms.items()}
+    return (
+        f"| {name} | {len(descriptions)} | {median['fast']:.2f} | {median['planes']:.2f} "
+        f"| {np.quantile(ms['planes'], 0.99):.1f} | {median['samples']:.1f} "
+        f"| {median['samples'] / median['planes']:.1f} | {median['planes'] / median['fast']:.1f} "
+        f"| {rms:.4f} | {worst:.3f} | {1e3 * np.median(np.abs(apart[:, 1])):.1f} |"
+    )
+
+
+def main() -> int:
+    """Print a row for each scene."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scene", nargs="+", choices=SCENES, default=list(SCENES), metavar="NAME")
+    parser.add_argument("--steps", type=int, default=12)
+    args = parser.parse_args()
+    print(
+        "| scene | objects | fast (ms) | balanced (ms) | p99 (ms) | every sample (ms) | times as fast "
+        "| balanced / fast | probability off by, RMS | worst | `earliest` off by, median (ms) |"
+    )
+    print("|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|")
+    for name in args.scene:
+        print(measure(name, args.steps), flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
