@@ -278,6 +278,18 @@ def _nearest(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -
     return _nearest_pieces(a, b, offset)
 
 
+def _contact_of_trees(
+    tree_a: Array, X: tuple[Array, Array], tree_b: Array, Y: tuple[Array, Array]
+) -> tuple[int, Array]:
+    """Return what `contact_of_trees` knows and the row of the contact.
+
+    The poses are copied because numba compiles a kernel once more for each combination of read-only arrays.
+    """
+    row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
+    R_a, p_a, R_b, p_b = (each.copy() for each in (*X, *Y))
+    return contact_of_trees(tree_a, R_a, p_a, tree_b, R_b, p_b, np.inf, row, answer, work), row
+
+
 def _meshes_apart(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -> Contact | None:
     """The contact of a concave mesh and another single shape if they are apart; else None."""
     if not (type(shape_a) is Mesh or type(shape_b) is Mesh):
@@ -289,9 +301,9 @@ def _meshes_apart(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Po
     trees = trees_of_pair(shape_a, shape_b)
     if trees is None:
         return None
-    row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
     X, Y = (pose_a.rotation, pose_a.position), (pose_b.rotation, pose_b.position)
-    if contact_of_trees(trees[0], *X, trees[1], *Y, np.inf, row, answer, work) != APART:
+    known, row = _contact_of_trees(trees[0], X, trees[1], Y)
+    if known != APART:
         return None
 
     distance, normal = float(row[DISTANCE]), row[NORMAL : NORMAL + 3]
@@ -367,10 +379,9 @@ def _by_trees(a: _Posed, b: _Posed) -> _Deepest | None:
     trees = shape_tree(pair[0]), shape_tree(pair[1])
     if trees[0] is None or trees[1] is None:
         return None
-    row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
     (R_a, p_a), (R_b, p_b) = _place(a), _place(b)
     p_b = p_b + (b.pose.position - a.pose.position)
-    known = contact_of_trees(trees[0], R_a, p_a, trees[1], R_b, p_b, np.inf, row, answer, work)
+    known, row = _contact_of_trees(trees[0], (R_a, p_a), trees[1], (R_b, p_b))
     if known != APART and not all(isinstance(shape, Mesh | Sphere | Capsule) for shape in pair):
         return None
     if known == OPEN:
