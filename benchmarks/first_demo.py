@@ -20,9 +20,13 @@ import time
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from mcap.reader import make_reader
+
+from collision_monitor.codec import decode_status
+from collision_monitor.pipeline.topics import Topic
+
 ROOT: Final = Path(__file__).resolve().parents[1]
 STAGE: Final = re.compile(r"  (\w+) .*?([0-9.]+) s$")
-STEPS: Final = re.compile(r"(\d+) steps")
 SCENE_S: Final = 10.0
 """The demo's default duration."""
 
@@ -63,6 +67,18 @@ def start(folder: Path, cores: str) -> tuple[list[Bar], str]:
     return bars, last
 
 
+def steps_of(session: Path) -> str:
+    """Return how many states a session holds, how many the node lost, and the longest delay of one that it received."""
+    delays, lost = [], 0
+    with session.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages():
+            if channel.topic.endswith(Topic.STATES.path):
+                delays.append((message.log_time - message.publish_time) * 1e-6)
+            elif channel.topic.endswith(Topic.STATUS.path):
+                lost = decode_status(message.data).messages_lost
+    return f"{len(delays)} steps, {lost} messages lost, at most {max(delays):.1f} ms from a stamp to the node"
+
+
 def plot(bars: list[Bar], path: str) -> None:
     """Draw the bars one below the other."""
     import matplotlib
@@ -91,8 +107,8 @@ def main() -> None:
         subprocess.run(["git", "clone", "-q", ROOT, folder], check=True)
         for title in ("first start", "second start"):
             bars, last = start(folder, args.cores)
-            answered = STEPS.search(last)
-            print(f"{title}: {bars[-2].end:.0f} s, {answered[1] if answered else 'no'} steps\n")
+            newest = max((folder / "sessions").iterdir(), key=lambda path: path.stat().st_mtime)
+            print(f"{title}: {bars[-2].end:.0f} s; {steps_of(newest)}; {last}\n")
             print(f"    {'':26s}{'begin s':>8s}{'end s':>8s}")
             for bar in bars:
                 print(f"    {bar.name:26s}{bar.begin:8.1f}{bar.end:8.1f}")

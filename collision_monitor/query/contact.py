@@ -35,6 +35,7 @@ from collision_monitor.narrow_phase.contact_row import (
 )
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.objects.models import containing_kdop, containing_model, exact_model, parse_model
+from collision_monitor.query.arguments import checked_pose
 from collision_monitor.query.cloud_pair import cloud_contact
 from collision_monitor.query.convex_pairs import convex_contact
 from collision_monitor.query.fillings import fillings
@@ -52,6 +53,10 @@ _DIRECTIONS: Final = np.array(
 
 _COLUMNS: Final = {"normal": NORMAL, "point_a": POINT_A, "point_b": POINT_B}
 _new, _set = object.__new__, object.__setattr__
+
+
+def _missing(contact: object, name: str) -> AttributeError:
+    return AttributeError(f"{type(contact).__name__!r} object has no attribute {name!r}", name=name, obj=contact)
 
 
 def _patch(found: NearestPieces, witness: Array) -> Array:
@@ -101,7 +106,7 @@ class Contact:
         """Make a field of the contact of two convex solids when it is first read."""
         known = vars(self)
         if "_row" not in known:
-            raise AttributeError(name)
+            raise _missing(self, name)
         if name in _COLUMNS:
             value: Any = known["_row"][_COLUMNS[name] : _COLUMNS[name] + 3]
         elif name in ("model_a", "model_b"):
@@ -110,7 +115,7 @@ class Contact:
             arguments = self.arguments
             value = lambda: _nearest(*arguments)  # noqa: E731
         else:
-            raise AttributeError(name)
+            raise _missing(self, name)
         known[name] = value
         return value
 
@@ -401,8 +406,7 @@ def _place(side: _Posed) -> tuple[Array, Array]:
 
 def _posed(shape: Compound, pose: Pose, model: Model | str | ArrayLike, name: str) -> _Posed:
     shapes = shape_pairs(shape, f"shape {name}")
-    if not isinstance(pose, Pose):
-        raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
+    checked_pose(pose, f"pose {name}")
     if isinstance(model, str | int):
         if parse_model(model) in (Model.AUTO, Model.EXACT):
             return _Posed(shapes, pose, shapes)
