@@ -123,6 +123,11 @@ class Monitor:
         """The ids of all described objects, ascending."""
         return self._roster.ids
 
+    def __repr__(self) -> str:
+        """The profile, the objects and the last step."""
+        last = f"step {self.last.step} at {self.last.stamp_ns} ns" if self.last is not None else "no step yet"
+        return f"Monitor({self.profile.name!r}, {len(self.ids)} objects, {last})"
+
     def __contains__(self, object_id: int) -> bool:
         """Whether the object is described."""
         return object_id in self._roster
@@ -144,9 +149,15 @@ class Monitor:
 
         replace: describe a known object anew; it keeps its state. The other fields are those of `ObjectDescription`:
         name, static, pose, group, mask, padding, model, allowed, max_linear_acceleration, max_angular_acceleration.
-        Raises InputError for a known id without replace, and the errors of `describe`.
+        Raises InputError for a known id without replace and for the pose of an object that is not static, and the
+        errors of `describe`.
         """
         description = ObjectDescription(object_id, shape, **fields)
+        if description.pose is not None and not description.static:
+            raise InputError(
+                f"object {object_id}: expected pose= of a static object only, got one of an object that moves; "
+                "write static=True, or pass the pose to step"
+            )
         if not replace and object_id in self._roster:
             raise InputError(
                 f"object {object_id}: expected a new id, got that of {self.name(object_id)!r}; "

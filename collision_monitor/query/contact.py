@@ -35,6 +35,7 @@ from collision_monitor.narrow_phase.contact_row import (
 )
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.objects.models import containing_kdop, containing_model, exact_model, parse_model
+from collision_monitor.query.arguments import checked_pose
 from collision_monitor.query.cloud_pair import cloud_contact
 from collision_monitor.query.convex_pairs import convex_contact
 from collision_monitor.query.fillings import fillings
@@ -52,6 +53,10 @@ _DIRECTIONS: Final = np.array(
 
 _COLUMNS: Final = {"normal": NORMAL, "point_a": POINT_A, "point_b": POINT_B}
 _new, _set = object.__new__, object.__setattr__
+
+
+def _missing(contact: object, name: str) -> AttributeError:
+    return AttributeError(f"{type(contact).__name__!r} object has no attribute {name!r}", name=name, obj=contact)
 
 
 def _patch(found: NearestPieces, witness: Array) -> Array:
@@ -101,7 +106,7 @@ class Contact:
         """Make a field of the contact of two convex solids when it is first read."""
         known = vars(self)
         if "_row" not in known:
-            raise AttributeError(name)
+            raise _missing(self, name)
         if name in _COLUMNS:
             value: Any = known["_row"][_COLUMNS[name] : _COLUMNS[name] + 3]
         elif name in ("model_a", "model_b"):
@@ -110,7 +115,7 @@ class Contact:
             arguments = self.arguments
             value = lambda: _nearest(*arguments)  # noqa: E731
         else:
-            raise AttributeError(name)
+            raise _missing(self, name)
         known[name] = value
         return value
 
@@ -278,6 +283,18 @@ def _nearest(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -
     return _nearest_pieces(a, b, offset)
 
 
+def _contact_of_trees(
+    tree_a: Array, X: tuple[Array, Array], tree_b: Array, Y: tuple[Array, Array]
+) -> tuple[int, Array]:
+    """Return what `contact_of_trees` knows and the row of the contact.
+
+    The poses are copied because numba compiles a kernel once more for each combination of read-only arrays.
+    """
+    row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
+    R_a, p_a, R_b, p_b = (each.copy() for each in (*X, *Y))
+    return contact_of_trees(tree_a, R_a, p_a, tree_b, R_b, p_b, np.inf, row, answer, work), row
+
+
 def _meshes_apart(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -> Contact | None:
     """The contact of a concave mesh and another single shape if they are apart; else None."""
     if not (type(shape_a) is Mesh or type(shape_b) is Mesh):
@@ -289,9 +306,9 @@ def _meshes_apart(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Po
     trees = trees_of_pair(shape_a, shape_b)
     if trees is None:
         return None
-    row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
     X, Y = (pose_a.rotation, pose_a.position), (pose_b.rotation, pose_b.position)
-    if contact_of_trees(trees[0], *X, trees[1], *Y, np.inf, row, answer, work) != APART:
+    known, row = _contact_of_trees(trees[0], X, trees[1], Y)
+    if known != APART:
         return None
 
     distance, normal = float(row[DISTANCE]), row[NORMAL : NORMAL + 3]
@@ -367,10 +384,9 @@ def _by_trees(a: _Posed, b: _Posed) -> _Deepest | None:
     trees = shape_tree(pair[0]), shape_tree(pair[1])
     if trees[0] is None or trees[1] is None:
         return None
-    row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
     (R_a, p_a), (R_b, p_b) = _place(a), _place(b)
     p_b = p_b + (b.pose.position - a.pose.position)
-    known = contact_of_trees(trees[0], R_a, p_a, trees[1], R_b, p_b, np.inf, row, answer, work)
+    known, row = _contact_of_trees(trees[0], (R_a, p_a), trees[1], (R_b, p_b))
     if known != APART and not all(isinstance(shape, Mesh | Sphere | Capsule) for shape in pair):
         return None
     if known == OPEN:
@@ -390,8 +406,7 @@ def _place(side: _Posed) -> tuple[Array, Array]:
 
 def _posed(shape: Compound, pose: Pose, model: Model | str | ArrayLike, name: str) -> _Posed:
     shapes = shape_pairs(shape, f"shape {name}")
-    if not isinstance(pose, Pose):
-        raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
+    checked_pose(pose, f"pose {name}")
     if isinstance(model, str | int):
         if parse_model(model) in (Model.AUTO, Model.EXACT):
             return _Posed(shapes, pose, shapes)

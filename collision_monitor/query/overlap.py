@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from collision_monitor.errors import InputError, PoseError, UnsupportedError
+from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import Hull, convex_hull
 from collision_monitor.geometry.cascade import polyhedra_intersect
 from collision_monitor.geometry.compound import shape_pairs
@@ -20,6 +20,7 @@ from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.meshes.contact import trees_overlap
 from collision_monitor.meshes.nearest import MEMORY
 from collision_monitor.meshes.shape_trees import trees_of_pair
+from collision_monitor.query.arguments import checked_pose
 from collision_monitor.query.contact import Compound, contact
 from collision_monitor.query.convex_pairs import convex_contact
 
@@ -70,8 +71,7 @@ def _named(
     shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose
 ) -> tuple[tuple[Compound, Pose, str], tuple[Compound, Pose, str]]:
     for pose, name in ((pose_a, "A"), (pose_b, "B")):
-        if not isinstance(pose, Pose):
-            raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
+        checked_pose(pose, f"pose {name}")
     return (shape_a, pose_a, "A"), (shape_b, pose_b, "B")
 
 
