@@ -137,6 +137,36 @@ def triangle_depth(S: Triangle, T: Triangle) -> tuple[float, Vector]:
 
 
 @device
+def triangle_contact(S: Triangle, T: Triangle, radius: float) -> tuple[float, Vector, Vector]:
+    """Depth (m) of two triangles enlarged by this radius together, its direction from S to T, and a point on S.
+
+    The depth is negative if they are apart.
+    """
+    crosses, _ = crossing_point(S, T)
+    if crosses:
+        depth, n = triangle_depth(S, T)
+        parted = Triangle(along(T.a, depth, n), along(T.b, depth, n), along(T.c, depth, n))
+        return depth + radius, n, closest_points(S, parted).on_a
+    found = closest_points(S, T)
+    length = sqrt(found.squared)
+    w = minus(found.on_b, found.on_a)
+    n = (w[0] / length, w[1] / length, w[2] / length) if length > 0.0 else (0.0, 0.0, 1.0)
+    return radius - length, n, found.on_a
+
+
+@device
+def contact_of_places(
+    blocks_a: Any, a: int, blocks_b: Any, b: int, X: Any
+) -> tuple[float, Vector, Vector]:
+    """`triangle_contact` of the triangles at two places, WIDTH * block + member; the point is on A's surface."""
+    S = triangle_at(blocks_a, a // WIDTH, a % WIDTH)
+    T = place_triangle(X, triangle_at(blocks_b, b // WIDTH, b % WIDTH))
+    own = blocks_a[a // WIDTH, RADIUS, a % WIDTH]
+    depth, n, x = triangle_contact(S, T, own + blocks_b[b // WIDTH, RADIUS, b % WIDTH])
+    return depth, n, along(x, own, n)
+
+
+@device
 def deepest(
     blocks_a: Any, blocks_b: Any, X: Any, work: Any, count: int, answer: Any
 ) -> tuple[float, Vector, Vector]:
@@ -147,25 +177,10 @@ def deepest(
     best, direction, point = -1.0, (0.0, 0.0, 1.0), NOWHERE
     for k in range(count):
         a, b = int(work[PAIRS + 2 * k]), int(work[PAIRS + 2 * k + 1])
-        S = triangle_at(blocks_a, a // WIDTH, a % WIDTH)
-        T = place_triangle(X, triangle_at(blocks_b, b // WIDTH, b % WIDTH))
-        radius = blocks_a[a // WIDTH, RADIUS, a % WIDTH] + blocks_b[b // WIDTH, RADIUS, b % WIDTH]
-        crosses, _ = crossing_point(S, T)
-        if crosses or radius == 0.0:
-            depth, n = triangle_depth(S, T)
-            parted = Triangle(along(T.a, depth, n), along(T.b, depth, n), along(T.c, depth, n))
-            x = closest_points(S, parted).on_a
-            depth += radius
-        else:
-            found = closest_points(S, T)
-            length = sqrt(found.squared)
-            w = minus(found.on_b, found.on_a)
-            n = (w[0] / length, w[1] / length, w[2] / length) if length > 0.0 else (0.0, 0.0, 1.0)
-            x, depth = found.on_a, radius - length
+        depth, n, x = contact_of_places(blocks_a, a, blocks_b, b, X)
         if depth > best:
-            best, direction = depth, n
+            best, direction, point = depth, n, x
             answer[PLACE_A], answer[PLACE_B] = a, b
-            point = along(x, blocks_a[a // WIDTH, RADIUS, a % WIDTH], n)
     return best, direction, point
 
 
