@@ -134,7 +134,7 @@ def leaf_time(
             found = closest_points(triangle_at(blocks_a, leaf_a, i), T)
             length = sqrt(found.squared)
             gap = length - blocks_a[leaf_a, RADIUS, i] - blocks_b[leaf_b, RADIUS, j] - move.start
-            if gap <= tolerance:
+            if gap <= tolerance or length == 0.0:
                 return 0.0, pair
             w = minus(found.on_b, found.on_a)
             n = w[0] / length, w[1] / length, w[2] / length

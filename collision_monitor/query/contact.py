@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -100,6 +101,9 @@ class Contact:
     def __getattr__(self, name: str) -> Any:
         """Make a field of the contact of two convex solids when it is first read."""
         known = vars(self)
+        if name == "error_bound" and "_arguments" in known:  # of an open mesh, it takes longer than the distance
+            known[name] = _contact(*self.arguments, "exact").error_bound
+            return known[name]
         if "_row" not in known:
             raise AttributeError(name)
         if name in _COLUMNS:
@@ -213,6 +217,13 @@ def contact(
         apart = _meshes_apart(shape_a, pose_a, shape_b, pose_b)
         if apart is not None:
             return apart
+    return _contact(shape_a, pose_a, shape_b, pose_b, model)
+
+
+def _contact(
+    shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, model: Model | str | ArrayLike
+) -> Contact:
+    """`contact` of any shapes and models."""
     a, b = _posed(shape_a, pose_a, model, "A"), _posed(shape_b, pose_b, model, "B")
     planes = {is_planar(shape) for shape, _ in (*a.shapes, *b.shapes)}
     if len(planes) > 1:
@@ -286,7 +297,7 @@ def _meshes_apart(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Po
         return None
     if not (isinstance(pose_a, Pose) and isinstance(pose_b, Pose)):
         return None
-    trees = trees_of_pair(shape_a, shape_b)
+    trees = trees_of_pair(shape_a, shape_b, surface=True)
     if trees is None:
         return None
     row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
@@ -302,6 +313,8 @@ def _meshes_apart(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Po
         distance, float(row[BOUND]), normal, point, far, Model.EXACT, Model.EXACT, lambda: _nearest(*arguments)
     )
     vars(made)["_arguments"] = arguments
+    if not all(shape.surface.certain for shape in (shape_a, shape_b) if isinstance(shape, Mesh)):
+        del vars(made)["error_bound"]
     return made
 
 
@@ -428,14 +441,38 @@ def _where(inner: _Posed, outer: _Posed, offset: Array) -> int:
 
 def _distance_of_fillings(a: _Posed, b: _Posed) -> float:
     """Lower bound (m) of the distances of A's fillings from B and from its fillings; infinite if A has none."""
+    others = [*b.outline, *(fillings(b.shapes) if b.model is Model.EXACT else ())]
+    return _least_gap(fillings(a.shapes) if a.model is Model.EXACT else (), a.pose, others, b.pose)
+
+
+def least_gap(
+    shapes_a: Sequence[tuple[Shape, Pose]], pose_a: Pose, shapes_b: Sequence[tuple[Shape, Pose]], pose_b: Pose
+) -> float:
+    """Lower bound (m) of the distance of two objects, below 0 if they overlap; -inf if one may be inside the other."""
+    a, b = _Posed(shapes_a, pose_a, shapes_a), _Posed(shapes_b, pose_b, shapes_b)
+    offset = pose_b.position - pose_a.position
+    if _where(a, b, offset) != Location.OUTSIDE or _where(b, a, -offset) != Location.OUTSIDE:
+        return -np.inf
+    return _least_gap(shapes_a, pose_a, shapes_b, pose_b)
+
+
+def _least_gap(
+    shapes_a: Sequence[tuple[Shape, Pose]], pose_a: Pose, shapes_b: Sequence[tuple[Shape, Pose]], pose_b: Pose
+) -> float:
+    """The same of all surfaces and solids, each for itself; infinite without any."""
+    offset = pose_b.position - pose_a.position
     least = np.inf
-    for filling in fillings(a.shapes) if a.model is Model.EXACT else ():
-        own = _Posed([filling], a.pose, [filling])
-        for shapes in ([shape] for shape in (*b.outline, *(fillings(b.shapes) if b.model is Model.EXACT else ()))):
-            other = _Posed(shapes, b.pose, shapes)
-            offset = b.pose.position - a.pose.position
-            deepest = _by_clouds(own, other, offset) or _by_trees(own, other) or _by_pieces(own, other, offset)
-            least = min(least, float(deepest.row[DISTANCE] - deepest.row[BOUND]))
+    for pair in product(shapes_a, shapes_b):
+        a, b = (_Posed([own], pose, [own]) for own, pose in zip(pair, (pose_a, pose_b), strict=True))
+        trees = trees_of_pair(pair[0][0], pair[1][0], surface=True)
+        if trees is None:
+            row = (_by_clouds(a, b, offset) or _by_trees(a, b) or _by_pieces(a, b, offset)).row
+        else:
+            row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
+            (R_a, p_a), (R_b, p_b) = _place(a), _place(b)
+            if contact_of_trees(trees[0], R_a, p_a, trees[1], R_b, p_b + offset, np.inf, row, answer, work) == OPEN:
+                return -np.inf
+        least = min(least, float(row[DISTANCE] - row[BOUND]))
     return least
 
 

@@ -40,15 +40,15 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
     True
     """
     if test == "contact":
-        if (found := convex_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
-            return found[0] <= 0.0
         if type(shape_a) is Mesh or type(shape_b) is Mesh:
             posed = isinstance(pose_a, Pose) and isinstance(pose_b, Pose)
             if posed and isinstance(shape_a, Shape) and isinstance(shape_b, Shape):
-                trees = trees_of_pair(shape_a, shape_b)
+                trees = trees_of_pair(shape_a, shape_b, surface=True)
                 if trees is not None:
                     X, Y = (pose_a.rotation, pose_a.position), (pose_b.rotation, pose_b.position)
                     return bool(trees_overlap(trees[0], *X, trees[1], *Y, np.empty(MEMORY)))
+        elif (found := convex_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
+            return found[0] <= 0.0
         return contact(shape_a, pose_a, shape_b, pose_b).overlaps
     if test not in TESTS:
         raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")
