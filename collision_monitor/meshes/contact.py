@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.meshes.inside import INSIDE, OUTSIDE, UNKNOWN, is_in
+from collision_monitor.meshes.inside import INSIDE, UNKNOWN, is_in
 from collision_monitor.meshes.layout import RADIUS, REACH, WIDTH
 from collision_monitor.meshes.nearest import MOST_PAIRS, ON_A, ON_B, PLACE_A, nearest
 from collision_monitor.meshes.placing import inverse, relative
@@ -89,15 +89,3 @@ def contact_of_trees(tree_a, R_a, p_a, tree_b, R_b, p_b, limit, out, answer, wor
     """`tree_contact` of two trees at poses given by rotations (3, 3) and positions (3,) (m); the points are about A."""
     p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
     return tree_contact(tree_a, 0, tree_b, 0, PairPose(R_a, R_b, p), limit, out, answer, work)
-
-
-@kernel
-def trees_overlap(tree_a, R_a, p_a, tree_b, R_b, p_b, work):
-    """Whether two trees, placed as in `contact_of_trees`, have a point in common, on a surface or in a solid."""
-    p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
-    X = relative(R_a, R_b, p)
-    if touching(tree_a, 0, tree_b, 0, X, 1, work)[0] > 0:
-        return True
-    if is_in(tree_a, 0, tree_b, 0, X, 0.0, work) != OUTSIDE:
-        return True
-    return is_in(tree_b, 0, tree_a, 0, inverse(X), 0.0, work) != OUTSIDE

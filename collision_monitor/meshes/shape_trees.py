@@ -21,7 +21,7 @@ _KEPT: Final = "_tree"
 
 CERTAIN, NEVER, UNCERTAIN = range(3)
 """What a tree tells of the inside of its shape: which points are inside; none is certainly inside, because the surface
-has a hole; nothing."""
+has a hole; nothing, also of a cloud."""
 
 
 def shape_tree(shape: Shape) -> Array | None:
@@ -32,12 +32,17 @@ def shape_tree(shape: Shape) -> Array | None:
     """
     kept = shape.__dict__.get(_KEPT)
     if kept is None:
-        inside = CERTAIN if not isinstance(shape, Mesh) or shape.surface.certain else UNCERTAIN
-        if isinstance(shape, Mesh) and len(shape.surface.hole):
-            inside = NEVER
-        kept = shape.__dict__[_KEPT] = (made_tree(shape), is_concave_mesh(shape), inside)
+        kept = _keep(shape)
     tree: Array | None = kept[0]
     return tree
+
+
+def _keep(shape: Shape) -> tuple[Array | None, bool, int]:
+    inside = UNCERTAIN if isinstance(shape, Points) else CERTAIN
+    if isinstance(shape, Mesh) and not shape.surface.certain:
+        inside = NEVER if len(shape.surface.hole) else UNCERTAIN
+    kept = shape.__dict__[_KEPT] = (made_tree(shape), is_concave_mesh(shape), inside)
+    return kept
 
 
 def trees_of_pair(a: Shape, b: Shape, surface: bool = False) -> tuple[Array, Array] | None:
@@ -46,13 +51,12 @@ def trees_of_pair(a: Shape, b: Shape, surface: bool = False) -> tuple[Array, Arr
     Also None for a cloud, and if it is not certain what is inside of a mesh. surface: of a mesh with a hole that is the
     surface alone.
     """
-    if isinstance(a, Points) or isinstance(b, Points):
+    tree_a, concave_a, inside_a = a.__dict__.get(_KEPT) or _keep(a)
+    tree_b, concave_b, inside_b = b.__dict__.get(_KEPT) or _keep(b)
+    most = NEVER if surface else CERTAIN
+    if tree_a is None or tree_b is None or inside_a > most or inside_b > most or not (concave_a or concave_b):
         return None
-    tree_a, tree_b = shape_tree(a), shape_tree(b)
-    (_, concave_a, inside_a), (_, concave_b, inside_b) = a.__dict__[_KEPT], b.__dict__[_KEPT]
-    if tree_a is None or tree_b is None or not (concave_a or concave_b):
-        return None
-    return (tree_a, tree_b) if max(inside_a, inside_b) <= (NEVER if surface else CERTAIN) else None
+    return tree_a, tree_b
 
 
 def _plate(box: Box) -> Array:

@@ -6,9 +6,19 @@ from math import inf, sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.meshes.boxes import box_bounds, triangle_bounds
+from collision_monitor.meshes.boxes import box_separations, triangle_bounds
 from collision_monitor.meshes.layout import CHILD, FACE, RADIUS, WIDTH
-from collision_monitor.meshes.nearest import BOUNDS, NEAR_A, NEAR_B, PAIRS, PLACE_A, PLACE_B, opens_b, triangle_at
+from collision_monitor.meshes.nearest import (
+    BOUNDS,
+    NEAR_A,
+    NEAR_B,
+    PAIRS,
+    PLACE_A,
+    PLACE_B,
+    opens_b,
+    push_nearest_last,
+    triangle_at,
+)
 from collision_monitor.meshes.placing import inverse, place_triangle, relative
 from collision_monitor.meshes.triangle_pair import Triangle, closest_points, crossing_point
 from collision_monitor.narrow_phase.vector import Vector, along, cross, dot, minus
@@ -16,21 +26,12 @@ from collision_monitor.tolerances import PARALLEL_SIN2
 
 NOWHERE: Final = (0.0, 0.0, 0.0)
 
+OPEN: Final = 5e-324
+"""Least gap (m) that separates two boxes: the smallest number above 0."""
+
 MOST_LEAVES: Final = 100_000
 """Most pairs of leaves to examine, about 50 ms. Hostile meshes, such as a million triangles in a point, need more; the
 answer then says that it is not complete."""
-
-
-@device
-def _push_meeting(blocks: Any, block: int, work: Any, waiting: int, fixed: float, fixed_is_a: bool) -> int:
-    """Push the pairs of a box and the members of a block that may overlap; return the stack's new length."""
-    for k in range(WIDTH):
-        if blocks[block, CHILD, k] != 0.0 and work[BOUNDS + k] <= 0.0:
-            place = float(WIDTH * block + k)
-            work[2 * waiting] = fixed if fixed_is_a else place
-            work[2 * waiting + 1] = place if fixed_is_a else fixed
-            waiting += 1
-    return waiting
 
 
 @inlined
@@ -48,11 +49,11 @@ def touching(
     Pair k is at work[PAIRS + 2 k]: the places of both triangles. Other arguments as in `nearest`.
     """
     Y = inverse(X)
-    work[0], work[1] = WIDTH * root_a, WIDTH * root_b
+    work[0], work[1], work[2] = 0.0, WIDTH * root_a, WIDTH * root_b
     waiting, found, leaves = 1, 0, 0
     while waiting > 0:  # terminates: each pair of boxes is opened once
         waiting -= 1
-        place_a, place_b = int(work[2 * waiting]), int(work[2 * waiting + 1])
+        place_a, place_b = int(work[3 * waiting + 1]), int(work[3 * waiting + 2])
         a, i, b, j = place_a // WIDTH, place_a % WIDTH, place_b // WIDTH, place_b % WIDTH
         child_a, child_b = blocks_a[a, CHILD, i], blocks_b[b, CHILD, j]
         if child_a < 0.0 and child_b < 0.0:
@@ -77,12 +78,12 @@ def touching(
                         found += 1
         elif opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
             block = root_b + int(child_b)
-            box_bounds(blocks_a, a, i, blocks_b, block, X, NOWHERE, work, BOUNDS)
-            waiting = _push_meeting(blocks_b, block, work, waiting, float(place_a), True)
+            box_separations(blocks_a, a, i, blocks_b, block, X, work, BOUNDS)
+            waiting = push_nearest_last(blocks_b, block, work, waiting, OPEN, float(place_a), True)
         else:
             block = root_a + int(child_a)
-            box_bounds(blocks_b, b, j, blocks_a, block, Y, NOWHERE, work, BOUNDS)
-            waiting = _push_meeting(blocks_a, block, work, waiting, float(place_b), False)
+            box_separations(blocks_b, b, j, blocks_a, block, Y, work, BOUNDS)
+            waiting = push_nearest_last(blocks_a, block, work, waiting, OPEN, float(place_b), False)
     return found, True
 
 
