@@ -13,12 +13,13 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import device
 from collision_monitor._jit.lanes import Lanes, load, store
 from collision_monitor.meshes.approach import Approach, seen_from_b
 from collision_monitor.meshes.box_times import norm, times_until, triangle_times
 from collision_monitor.meshes.boxes import Block, inner
 from collision_monitor.meshes.layout import CORNERS, RADIUS, WIDTH
+from collision_monitor.meshes.leaf_bounds import least_of_pairs
 from collision_monitor.meshes.nearest import NEAR_A, NEAR_B, triangle_at
 from collision_monitor.meshes.placing import Placing, inverse, place_triangle, turn_back
 from collision_monitor.meshes.triangle_pair import closest_points
@@ -102,16 +103,6 @@ def _raise_along(
         _raise_times(numbers, work, _OTHER, _TIMES + WIDTH * i)
 
 
-@inlined
-def _soonest(work: Any) -> tuple[float, int]:
-    """Least time of a pair, and the pair: WIDTH times the triangle of A plus that of B."""
-    soon, pair = inf, 0
-    for k in range(WIDTH * WIDTH):
-        if work[_TIMES + k] < soon:
-            soon, pair = work[_TIMES + k], k
-    return soon, pair
-
-
 @device
 def leaf_time(
     blocks_a: Any, place_a: int, leaf_a: int, blocks_b: Any, place_b: int, leaf_b: int, X: Placing, move: Approach,
@@ -150,7 +141,7 @@ def leaf_time(
                 for j in range(WIDTH):
                     at = _TIMES + WIDTH * i + j
                     work[at] = max(work[at], max(work[NEAR_A + i], work[NEAR_B + j]))
-        soon, pair = _soonest(work)
+        soon, pair = least_of_pairs(work, _TIMES)
         if soon >= SHARE * best or soon > enough or soon >= move.until or (seen >> pair) & 1:
             return soon, first
         if not is_bounded:

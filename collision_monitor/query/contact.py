@@ -39,6 +39,7 @@ from collision_monitor.objects.models import containing_kdop, containing_model, 
 from collision_monitor.query.cloud_pair import cloud_contact
 from collision_monitor.query.convex_pairs import convex_contact
 from collision_monitor.query.fillings import fillings
+from collision_monitor.query.mesh_pairs import mesh_contact
 from collision_monitor.query.nearest_pieces import NearestPieces
 from collision_monitor.query.piece_table import PieceTable, exact_piece_table, piece_table
 from collision_monitor.records import Model
@@ -99,15 +100,14 @@ class Contact:
     _find: Callable[[], NearestPieces] | None = field(repr=False)  # source of the patch; None: the two points alone
 
     def __getattr__(self, name: str) -> Any:
-        """Make a field of the contact of two convex solids when it is first read."""
+        """Make a field of a contact that was found quickly when it is first read."""
         known = vars(self)
-        if name == "error_bound" and "_arguments" in known:  # of an open mesh, it takes longer than the distance
-            known[name] = _contact(*self.arguments, "exact").error_bound
-            return known[name]
         if "_row" not in known:
             raise AttributeError(name)
-        if name in _COLUMNS:
-            value: Any = known["_row"][_COLUMNS[name] : _COLUMNS[name] + 3]
+        if name == "error_bound":
+            value: Any = _contact(*self.arguments, "exact").error_bound
+        elif name in _COLUMNS:
+            value = known["_row"][_COLUMNS[name] : _COLUMNS[name] + 3]
         elif name in ("model_a", "model_b"):
             value = Model.EXACT
         elif name == "_find":
@@ -211,12 +211,13 @@ def contact(
     Contact(1 m ± ..., box face 0 – sphere surface)
     """
     if isinstance(model, str | int) and model in ("exact", Model.EXACT):
-        quick = convex_contact(shape_a, pose_a, shape_b, pose_b)
+        meshes = [shape for shape in (shape_a, shape_b) if type(shape) is Mesh]
+        quick = (mesh_contact if meshes else convex_contact)(shape_a, pose_a, shape_b, pose_b)
         if quick is not None:
-            return _of_row(quick, (shape_a, pose_a, shape_b, pose_b))
-        apart = _meshes_apart(shape_a, pose_a, shape_b, pose_b)
-        if apart is not None:
-            return apart
+            made = _of_row(quick, (shape_a, pose_a, shape_b, pose_b))
+            if not all(mesh.surface.certain for mesh in meshes):
+                del vars(made)["error_bound"]  # made when it is read, because it takes longer than the distance
+            return made
     return _contact(shape_a, pose_a, shape_b, pose_b, model)
 
 
@@ -275,7 +276,7 @@ def _contact(
 
 
 def _of_row(quick: tuple[float, float, Array], arguments: tuple[Compound, Pose, Compound, Pose]) -> Contact:
-    """Contact of two convex solids. Its arrays are made when they are read, which takes as long as the kernel."""
+    """Contact of a row. Its arrays are made when they are read, which takes as long as the kernel."""
     distance, bound, row = quick
     made = _new(Contact)
     _set(made, "__dict__", {"signed_distance": distance, "error_bound": bound, "_row": row, "_arguments": arguments})
@@ -287,35 +288,6 @@ def _nearest(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -
     a, b = _posed(shape_a, pose_a, Model.EXACT, "A"), _posed(shape_b, pose_b, Model.EXACT, "B")
     offset = b.pose.position - a.pose.position
     return _nearest_pieces(a, b, offset)
-
-
-def _meshes_apart(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -> Contact | None:
-    """The contact of a concave mesh and another single shape if they are apart; else None."""
-    if not (type(shape_a) is Mesh or type(shape_b) is Mesh):
-        return None
-    if not (isinstance(shape_a, Shape) and isinstance(shape_b, Shape)):
-        return None
-    if not (isinstance(pose_a, Pose) and isinstance(pose_b, Pose)):
-        return None
-    trees = trees_of_pair(shape_a, shape_b, surface=True)
-    if trees is None:
-        return None
-    row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
-    X, Y = (pose_a.rotation, pose_a.position), (pose_b.rotation, pose_b.position)
-    if contact_of_trees(trees[0], *X, trees[1], *Y, np.inf, row, answer, work) != APART:
-        return None
-
-    distance, normal = float(row[DISTANCE]), row[NORMAL : NORMAL + 3]
-    point = pose_a.position + row[POINT_A : POINT_A + 3]
-    far = point + distance * normal
-    arguments = shape_a, pose_a, shape_b, pose_b
-    made = Contact(
-        distance, float(row[BOUND]), normal, point, far, Model.EXACT, Model.EXACT, lambda: _nearest(*arguments)
-    )
-    vars(made)["_arguments"] = arguments
-    if not all(shape.surface.certain for shape in (shape_a, shape_b) if isinstance(shape, Mesh)):
-        del vars(made)["error_bound"]
-    return made
 
 
 class _Deepest(NamedTuple):

@@ -17,7 +17,7 @@ from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Polygon, Sh
 from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.query.contact import Compound, contact
 from collision_monitor.query.convex_pairs import convex_contact
-from collision_monitor.query.mesh_overlap import mesh_overlap
+from collision_monitor.query.mesh_pairs import mesh_overlap
 
 TESTS: Final = ("contact", "cascade", "sat", "edges")
 
