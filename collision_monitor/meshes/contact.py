@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.meshes.inside import INSIDE, UNKNOWN, is_in
-from collision_monitor.meshes.layout import RADIUS, REACH, WIDTH
+from collision_monitor.meshes.layout import AXES, CENTER, HALF, RADIUS, REACH, WIDTH
 from collision_monitor.meshes.nearest import MOST_PAIRS, ON_A, ON_B, PLACE_A, nearest
 from collision_monitor.meshes.placing import inverse, relative
 from collision_monitor.meshes.touching import deepest, touching
@@ -36,6 +36,13 @@ def reach_in(blocks: Any, root: int) -> float:
 def reach_of(tree: NDArray[np.float64]) -> float:
     """Distance (m) of the farthest point of a tree from its origin."""
     return float(tree[0, REACH, 1])
+
+
+def in_root_box(tree: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether points (n, 3) in m, in the frame of a tree, are in the box of the whole tree."""
+    axes = tree[0, AXES : AXES + 9, 0].reshape(3, 3)
+    own = (points - tree[0, CENTER : CENTER + 3, 0]) @ axes
+    return np.asarray((np.abs(own) <= tree[0, HALF : HALF + 3, 0]).all(axis=1))
 
 
 @device

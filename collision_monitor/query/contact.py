@@ -21,7 +21,7 @@ from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import Capsule, HalfSpace, Mesh, Points, Shape, Sphere
-from collision_monitor.meshes.contact import APART, ENCLOSED, OPEN, contact_of_trees, reach_of
+from collision_monitor.meshes.contact import APART, ENCLOSED, OPEN, contact_of_trees, in_root_box, reach_of
 from collision_monitor.meshes.extent import extents
 from collision_monitor.meshes.nearest import MEMORY, answer_row
 from collision_monitor.meshes.shape_trees import shape_tree, trees_of_pair
@@ -401,7 +401,8 @@ def _where(inner: _Posed, outer: _Posed, offset: Array) -> int:
         if not isinstance(shape, Mesh):
             continue
         own = (points - outer.rotation @ pose.position) @ (outer.rotation @ pose.rotation)
-        own = own[((own >= shape.vertices.min(axis=0)) & (own <= shape.vertices.max(axis=0))).all(axis=1)]
+        tree = shape_tree(shape)
+        own = own if tree is None else own[in_root_box(tree, own)]
         if len(own):
             location = locate_in_surface(own, shape.surface)
             if ((location == Location.INSIDE) | (location == Location.BOUNDARY)).any():
@@ -420,12 +421,15 @@ def _distance_of_fillings(a: _Posed, b: _Posed) -> float:
 def least_gap(
     shapes_a: Sequence[tuple[Shape, Pose]], pose_a: Pose, shapes_b: Sequence[tuple[Shape, Pose]], pose_b: Pose
 ) -> float:
-    """Lower bound (m) of the distance of two objects, below 0 if they overlap; -inf if one may be inside the other."""
+    """Lower bound (m) of the distance of two objects with the fillings of open meshes, below 0 if these overlap.
+
+    It is -inf if one may be inside the other.
+    """
     a, b = _Posed(shapes_a, pose_a, shapes_a), _Posed(shapes_b, pose_b, shapes_b)
     offset = pose_b.position - pose_a.position
     if _where(a, b, offset) != Location.OUTSIDE or _where(b, a, -offset) != Location.OUTSIDE:
         return -np.inf
-    return _least_gap(shapes_a, pose_a, shapes_b, pose_b)
+    return _least_gap([*shapes_a, *fillings(shapes_a)], pose_a, [*shapes_b, *fillings(shapes_b)], pose_b)
 
 
 def _least_gap(

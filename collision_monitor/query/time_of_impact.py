@@ -120,8 +120,7 @@ def time_of_impact(
     found = _first_impact(a, b, query) if quick is None else _of_times(quick, arguments)
     if all(shape.surface.certain for body in (a, b) for shape, _ in body.shapes if isinstance(shape, Mesh)):
         return found
-    solid_a, solid_b = (make_moving_shape([*s.shapes, *fillings(s.shapes)], s.motion, "filled") for s in (a, b))
-    possible = _first_possible_impact(solid_a, solid_b, query) if found.lower > 0.0 else 0.0
+    possible = _first_possible_impact(a, b, query) if found.lower > 0.0 else 0.0
     return found if possible >= found.lower else _impact(possible, found.upper, found.method, arguments)
 
 
@@ -143,9 +142,11 @@ def _round_off(multibody: Multibody) -> float:
 
 
 def _first_possible_impact(a: MovingShape, b: MovingShape, query: MotionQuery) -> float:
-    """First time (s) at which one of the shapes of A may meet one of B's, or be inside of it; infinite for never."""
+    """First time (s) at which the solids of open meshes may meet; infinite for never."""
+    gap = least_gap(a.shapes, a.motion.pose, b.shapes, b.motion.pose)
+    a, b = (make_moving_shape([*s.shapes, *fillings(s.shapes)], s.motion, "filled") for s in (a, b))
     multibody = lay_out_pair(a, b, query.horizon)
-    if least_gap(a.shapes, a.motion.pose, b.shapes, b.motion.pose) < query.separation - _round_off(multibody):
+    if gap < query.separation - _round_off(multibody):
         return 0.0
     events = first_impacts(multibody, np.array([[0, 1]], np.int32), 0.0, query)
     if len(events) and events[0]["lower"] <= 0.0:
