@@ -318,7 +318,7 @@ class Monitor:
         new = self._predict_moved(step, bounds_only=budget is not None)
         self._examine_due(step, new, budget)
         contacts = self._answers.contacts(step, self._active_pairs)
-        predictions = self._predictions(step)
+        predictions = self._predictions(step, budget)
         is_past = overtaken(predictions, self._age(now_ns))
         predictions["status"][is_past] = PredictionStatus.UNRESOLVED
         status = step_status(step, self._active_pairs, self._events, contacts, predictions)
@@ -415,14 +415,15 @@ class Monitor:
         else:
             self._events.add(pending, version)
             self._time_critical.examine(step, self._active_pairs, self._events, self._first_impacts, budget)
+            if not self._uncertain.counts(step.profile):
+                budget.stop()
 
-    def _predictions(self, step: StepContext) -> NDArray[np.void]:
+    def _predictions(self, step: StepContext, budget: PairBudget | None) -> NDArray[np.void]:
         """Stage 7: return the predictions (records.PREDICTION), with times and probabilities of uncertain states."""
         predictions, slots = self._answers.predictions(step, self._active_pairs, self._events)
         if self._uncertain.active:
-            with self.clock.aside():  # outside of the budget: reserving its time would leave none for the pairs
-                touching = self._active_pairs.touching_keys
-                predictions = self._uncertain.complete(step, predictions, slots, touching, self._first_impacts.pool)
+            touching, pool = self._active_pairs.touching_keys, self._first_impacts.pool
+            predictions = self._uncertain.complete(step, predictions, slots, touching, pool, budget)
         return self._answers.filtered(step, predictions)
 
     # ------------------------------------------------------------------ snapshots
