@@ -55,6 +55,13 @@ class Profile:
         "1",
         "Largest number of points of one contact. Above 1, touching faces have a row for each corner.",
     )
+    distance_tolerance: float = number(
+        0.0,
+        0.0,
+        1.0,
+        "m",
+        "Largest error of the distance of a contact that persists, before it is computed anew. With 0, in every step.",
+    )
     impact_tolerance: float = number(
         1e-4,
         1e-12,
