@@ -18,7 +18,7 @@ from collision_monitor.monitor.answers import Answers, step_status
 from collision_monitor.monitor.budget import PairBudget, StepClock
 from collision_monitor.monitor.candidates import Candidates
 from collision_monitor.monitor.crowding import MOST_PAIRS, crowded
-from collision_monitor.monitor.event_list import EventList
+from collision_monitor.monitor.event_list import NO_EVENTS, EventList, both
 from collision_monitor.monitor.first_impacts import FirstImpacts
 from collision_monitor.monitor.intake import Intake
 from collision_monitor.monitor.result import StepResult
@@ -32,8 +32,7 @@ from collision_monitor.monitor.tracking import Tracking
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled, parse_model, shape_class
-from collision_monitor.prediction.impact_record import IMPACT
-from collision_monitor.records import Model, joined
+from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
 
 FACTS = "monitor"
@@ -338,7 +337,7 @@ class Monitor:
         moved, ending = self._tracking.find(step, self._uncertain)
         which = np.concatenate([moved, ending])
         if len(which) == 0:
-            return np.zeros(0, IMPACT)
+            return NO_EVENTS
         self._tracking.restart(step, moved, ending, self._uncertain, self._candidates.grid)
         pairs = self._leave_out_crowds(step, self._candidates.find(step, which))
         self._uncertain.add_pairs(step, pairs)
@@ -370,14 +369,15 @@ class Monitor:
     def _examine_due(self, step: StepContext, new: Events, budget: PairBudget | None) -> None:
         """Stages 5 and 6: examine the pairs that touch or are due; keep the other new impacts as events."""
         version = step.roster.bodies.version
-        is_due = new["lower"] <= step.now
-        due = joined([self._events.take_due(version, step.now), new.compress(is_due)])
+        due, pending = self._events.take_due(version, step.now), new
+        if len(new):
+            is_due = new["lower"] <= step.now
+            due, pending = both(due, new.compress(is_due)), new.compress(~is_due)
         step.work.events_due = len(due)
         self._active_pairs.unite(step, due)
-        pending = new.compress(~is_due)
         if budget is None:
             later = self._active_pairs.examine_all(step, self._first_impacts.scratch)
-            self._events.add(joined([pending, later]), version)
+            self._events.add(both(pending, later), version)
         else:
             self._events.add(pending, version)
             self._time_critical.examine(step, self._active_pairs, self._events, self._first_impacts, budget)

@@ -110,6 +110,11 @@ class Profile:
         "Largest difference from its predicted angular velocity at which an object keeps its predictions.",
         predictions=True,
     )
+    adaptive_tolerances: bool = switch(
+        False,
+        "Whether the tolerances of an object follow how far it leaves its motion; the set ones are then the widest.",
+        predictions=True,
+    )
     stale_after: float = number(
         0.5,
         0.0,
