@@ -35,7 +35,7 @@ from collision_monitor.narrow_phase.contact_row import (
 from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, UNSETTLED
 from collision_monitor.prediction.body_impact import CLOSING
 from collision_monitor.prediction.impact_record import BOUND_ONLY, TREE_BOUND, UNRESOLVED, ids_of
-from collision_monitor.records import Phase, joined
+from collision_monitor.records import Phase, PredictionStatus, joined
 
 PERSIST: Final = int(Phase.PERSIST)
 BEGIN: Final = int(Phase.BEGIN)
@@ -150,6 +150,12 @@ def step_status(
         events_pending=len(events),
         **vars(step.work),
     )
+
+
+def overtaken(predictions: Rows, age: float) -> NDArray[np.bool_]:
+    """Mask of the certain predictions of collisions that have begun by now, if the states are `age` (s) old."""
+    mask: NDArray[np.bool_] = (predictions["status"] == PredictionStatus.HIT) & (predictions["upper"] < age)
+    return mask
 
 
 @kernel

@@ -14,7 +14,7 @@ from collision_monitor.errors import InputError, Refusal, RefusalWarning
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.monitor.active_pairs import ActivePairs
-from collision_monitor.monitor.answers import Answers, step_status
+from collision_monitor.monitor.answers import Answers, overtaken, step_status
 from collision_monitor.monitor.budget import PairBudget, StepClock
 from collision_monitor.monitor.candidates import Candidates
 from collision_monitor.monitor.crowding import MOST_PAIRS, crowded
@@ -32,7 +32,7 @@ from collision_monitor.monitor.tracking import Tracking
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled, parse_model, shape_class
-from collision_monitor.records import Model
+from collision_monitor.records import Model, PredictionStatus
 from collision_monitor.settings.profile import Profile
 
 FACTS = "monitor"
@@ -261,7 +261,14 @@ class Monitor:
         self._candidates.forget(np.arange(self._roster.top, dtype=np.int32))
 
     def step(
-        self, stamp_ns: int, ids: ArrayLike, poses: Any = None, twists: Any = None, covariance: Any = None
+        self,
+        stamp_ns: int,
+        ids: ArrayLike,
+        poses: Any = None,
+        twists: Any = None,
+        covariance: Any = None,
+        *,
+        now_ns: int | None = None,
     ) -> StepResult:
         """Observe the states of some objects at `stamp_ns` and report on all objects at the latest time so far.
 
@@ -269,6 +276,8 @@ class Monitor:
         a structured array of records.STATE as `ids`. World frame, SI units.
         covariance (N, 12): upper triangles, row by row, of the covariances of position and linear velocity. They
         replace the standard deviations in the states.
+        now_ns: when the answers will be there, by the clock of the stamps. A predicted collision that begins before
+        then is UNRESOLVED, because the prediction is older than what it predicts. None: not known.
         Unusable rows and stamps that jump are refused: the result lists them (`refused`), they raise nothing, and the
         first of each kind is a RefusalWarning. Raises InputError for arrays of another shape.
         """
@@ -278,14 +287,16 @@ class Monitor:
         states, covariances = self._intake.states(ids, poses, twists, covariance)
         self._intake.of_step = {}
         with self.clock:
-            result = self._take_step(int(stamp_ns), states, covariances)
+            result = self._take_step(int(stamp_ns), states, covariances, now_ns)
         for each in result.refused:
             if each.reason in self._unwarned:
                 self._unwarned.discard(each.reason)
                 warnings.warn(f"{each.text} (later ones: see StepResult.refused)", RefusalWarning, stacklevel=2)
         return result
 
-    def _take_step(self, stamp_ns: int, states: NDArray[np.void], covariances: NDArray[np.float64]) -> StepResult:
+    def _take_step(
+        self, stamp_ns: int, states: NDArray[np.void], covariances: NDArray[np.float64], now_ns: int | None
+    ) -> StepResult:
         if not self._advance(stamp_ns, states):
             return replace(self._answers.none(), refused=tuple(self._intake.of_step.values()))
         roster, timeline = self._roster, self._timeline
@@ -296,12 +307,24 @@ class Monitor:
         self._examine_due(step, new, budget)
         contacts = self._answers.contacts(step, self._active_pairs)
         predictions = self._predictions(step)
+        is_past = overtaken(predictions, self._age(now_ns))
+        predictions["status"][is_past] = PredictionStatus.UNRESOLVED
         status = step_status(step, self._active_pairs, self._events, contacts, predictions)
         self._time_critical.end_step(step)
         cut = budget.done if budget is not None and step.work.deferred else None
         refused = tuple(self._intake.of_step.values())
-        result = StepResult(timeline.now_ns, step.number, contacts, predictions, status, cut=cut, refused=refused)
+        result = StepResult(
+            *(timeline.now_ns, step.number, contacts, predictions, status),
+            cut=cut,
+            refused=refused,
+            overtaken=int(is_past.sum()),
+        )
         return self._answers.finish(result)
+
+    def _age(self, now_ns: int | None) -> float:
+        """Return the age (s) of the latest states; 0 if `now_ns` is not known or cannot be of the stamps' clock."""
+        age = (now_ns - self._timeline.now_ns) * 1e-9 if now_ns is not None else 0.0
+        return age if 0.0 <= age <= self._profile.max_time_step else 0.0
 
     def _advance(self, stamp_ns: int, states: NDArray[np.void]) -> bool:
         """Move the timeline to the stamp. Return False if the stamp is refused."""

@@ -72,7 +72,7 @@ class StepResult:
     contact_rows: `contacts` and `ended` together, as the message has them. refused: what the step refused, by reason.
     accepted: False if the step was refused because of its stamp; there are no answers then, and stamp_ns, step and
     status are those of the last accepted step. cut: number of pairs that were examined before the budget ran out;
-    None: all pairs were examined.
+    None: all pairs were examined. overtaken: number of predictions that are UNRESOLVED because of the states' age.
 
     >>> import collision_monitor as cm
     >>> monitor = cm.Monitor()
@@ -89,6 +89,7 @@ class StepResult:
     accepted: bool = True
     cut: int | None = None
     refused: tuple[Refused, ...] = ()
+    overtaken: int = 0
 
     @cached_property
     def contacts(self) -> NDArray[np.void]:

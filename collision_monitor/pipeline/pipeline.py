@@ -43,7 +43,14 @@ from collision_monitor.pipeline.catalogue import Catalogue
 from collision_monitor.pipeline.preparation import STAYS, Job, Preparation
 from collision_monitor.pipeline.provenance import provenance
 from collision_monitor.pipeline.sequence import LostMessages
-from collision_monitor.pipeline.settings_event import LIMIT, RULES, SettingsChange, decode_settings, encode_settings
+from collision_monitor.pipeline.settings_event import (
+    LIMIT,
+    NOW,
+    RULES,
+    SettingsChange,
+    decode_settings,
+    encode_settings,
+)
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
 
@@ -64,15 +71,16 @@ _AS_THEY_WERE: Final[Mapping[str, Any]] = MappingProxyType({})
 class Outputs:
     """Answers of one step: complete CDR messages, and the result that they hold.
 
-    limit: None, or the settings (ParameterEvent) with which a replay stops where the clock stopped this step. They have
-    to be recorded before the states. alerts: a CollisionAlert for each alert that the step has changed.
+    settings: None, or the ParameterEvent with which a replay answers what the clock made of this step: where its budget
+    ended, and how old the states were. It has to be recorded before the states. alerts: a CollisionAlert for each alert
+    that the step has changed.
     """
 
     contacts: bytes
     predictions: bytes
     result: StepResult
     digest: int
-    limit: bytes | None = None
+    settings: bytes | None = None
     alerts: tuple[bytes, ...] = ()
 
 
@@ -112,18 +120,24 @@ class Pipeline:
         self._alerts = Alerts(rules)
         self._kept = frozenset(kept)
         self._limit = self.monitor.profile.pairs_per_step  # the value that a replay has
+        self._now: int | None = None  # recorded time (ns) at which the next states were processed
 
     # -- states: one step
 
-    def on_states(self, data: bytes) -> Outputs | None:
-        """Process an ObjectStateArray, which is one step. None: the message was refused and there is no new answer."""
+    def on_states(self, data: bytes, now_ns: int | None = None) -> Outputs | None:
+        """Process an ObjectStateArray, which is one step. None: the message was refused and there is no new answer.
+
+        now_ns: when the answers will be there, see `Monitor.step`. In a replay the recording holds it.
+        """
+        recorded, self._now = self._now, None
+        now_ns = recorded if now_ns is None else now_ns
         with self.monitor.clock:
             message = self._decode_states(data)
             if message is None:
                 return None
             covariance = message.covariance.reshape(-1, COVARIANCE_SIZE) if len(message.covariance) else None
-            result = self.monitor.step(message.stamp_ns, message.states, covariance=covariance)
-            return self._encode(result) if result.accepted else None
+            result = self.monitor.step(message.stamp_ns, message.states, covariance=covariance, now_ns=now_ns)
+            return self._encode(result, now_ns) if result.accepted else None
 
     def _decode_states(self, data: bytes) -> ObjectStateArray | None:
         """Return the message; None if it was refused."""
@@ -144,15 +158,15 @@ class Pipeline:
             return None
         return message
 
-    def _encode(self, result: StepResult) -> Outputs:
+    def _encode(self, result: StepResult, now_ns: int | None) -> Outputs:
         header = result.stamp_ns, self.frame_id, result.step
         horizon = self.monitor.profile.horizon
         contacts = encode_contacts(*header, result.contact_rows, *self._mentioned(result.contact_rows))
         predictions = encode_predictions(*header, horizon, result.predictions, *self._mentioned(result.predictions))
         alerts = self._alerts.step(self.monitor, result, self.frame_id, self.catalogue.name)
         self.catalogue.end_step()
-        limit, digest = self._limit_of(result), self.monitor.digest
-        return Outputs(contacts, predictions, result, digest, limit, tuple(map(encode_alert, alerts)))
+        settings, digest = self._settings_of(result, now_ns), self.monitor.digest
+        return Outputs(contacts, predictions, result, digest, settings, tuple(map(encode_alert, alerts)))
 
     def _mentioned(self, answers: Records) -> tuple[NDArray[np.uint32], list[str]]:
         """Return the ids in `answers`, ascending, and their names."""
@@ -162,12 +176,15 @@ class Pipeline:
         ids = ids[is_first]
         return ids, self.catalogue.names(ids)
 
-    def _limit_of(self, result: StepResult) -> bytes | None:
+    def _settings_of(self, result: StepResult, now_ns: int | None) -> bytes | None:
+        """Return what a replay of this step needs to know of the clock; None: nothing."""
+        changes: dict[str, Any] = {}
         needed = self.monitor.profile.pairs_per_step if result.cut is None else result.cut
-        if needed == self._limit:
-            return None
-        self._limit = needed
-        return encode_settings(result.stamp_ns, "", {LIMIT: needed})
+        if needed != self._limit:
+            self._limit = changes[LIMIT] = needed
+        if result.overtaken:
+            changes[NOW] = now_ns
+        return encode_settings(result.stamp_ns, "", changes) if changes else None
 
     # -- shapes
 
@@ -304,6 +321,7 @@ class Pipeline:
             changes = {name: value for name, value in decode_settings(data).items() if name not in self._kept}
             if (text := changes.pop(RULES, None)) is not None:
                 self._alerts.use(Rules.parse(str(text)))
+            self._now = _time(changes.pop(NOW, None))
             self.monitor.profile = self.monitor.profile.replace(**changes)
             self._limit = changes.get(LIMIT, self._limit)
         except (MessageError, InputError) as error:
@@ -424,6 +442,13 @@ class Pipeline:
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise InputError(f"snapshot: expected the state of a monitor of this version, got: {error!r}") from None
         return pipeline
+
+
+def _time(value: Any) -> int | None:
+    """Return a recorded time, or None. Raises InputError."""
+    if value is None or type(value) is int:
+        return value
+    raise InputError(f"parameter {NOW}: expected a time in ns, got {value!r}")
 
 
 def _about(object_id: int, text: str) -> str:

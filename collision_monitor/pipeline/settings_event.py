@@ -14,6 +14,9 @@ PROFILE: Final = "profile"
 LIMIT: Final = "pairs_per_step"
 """The setting with which a replay does as much in a step as the clock allowed."""
 
+NOW: Final = "now_ns"
+"""Time of the answers to the states that follow, if it made a prediction UNRESOLVED. It is no field of `Profile`."""
+
 RULES: Final = "rules"
 """The parameter with the rules of the alerts: in a session always as YAML text. It is no field of `Profile`."""
 

@@ -58,3 +58,10 @@ def subscription(
 ) -> Subscription:
     """Create a subscription whose callback gets the bytes of each message. name: as of `publisher`."""
     return node.create_subscription(message_class(topic), name or topic.private, callback, quality_of(topic), raw=True)
+
+
+def take_waiting(subscription: Subscription) -> bytes | None:
+    """Take the next message that waits for a subscription of `subscription`; None: none waits."""
+    with subscription.handle:
+        taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+    return None if taken is None else taken[0]

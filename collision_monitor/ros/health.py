@@ -41,6 +41,7 @@ class Facts:
 
     topic: of the states. silence: s since newer states arrived, by the steady clock; None: none arrived yet.
     stale, unseen: the names of such objects. deferred, unresolved: most pairs in one step since the last report.
+    outdated: messages that were left out because newer states waited. is_reduced: the effort of the steps is reduced.
     other_nodes: nodes of the same name. sources: the lines of the sources file; None: there is no file.
     """
 
@@ -52,16 +53,19 @@ class Facts:
     unseen: str
     deferred: int
     unresolved: int
+    outdated: int
+    is_reduced: bool
     other_nodes: int
     sources: tuple[LineReport, ...] | None = None
 
 
 @dataclass
 class History:
-    """The statuses, and the refusals of each source, at the last reports of one configuration."""
+    """The statuses, the refusals of each source and the outdated messages at the last reports of one configuration."""
 
     _statuses: deque[MonitorStatus] = field(default_factory=lambda: deque(maxlen=HISTORY))
     _refused: deque[dict[str, int]] = field(default_factory=lambda: deque(maxlen=HISTORY))
+    _outdated: deque[int] = field(default_factory=lambda: deque(maxlen=HISTORY))
 
     def increase(self, status: MonitorStatus, counters: Iterable[str]) -> dict[str, int]:
         """Return by how much counters of the status grew since the oldest report; the ones that did not are left out.
@@ -77,9 +81,14 @@ class History:
         first = self._refused[0] if len(self._refused) == HISTORY else {}
         return line.refused - first.get(line.name, 0)
 
+    def outdated(self, facts: Facts) -> int:
+        """Return the number of messages that were left out since the oldest report."""
+        return facts.outdated - (self._outdated[0] if len(self._outdated) == HISTORY else 0)
+
     def add(self, facts: Facts) -> None:
         """Remember the counters of this report."""
         self._statuses.append(facts.status)
+        self._outdated.append(facts.outdated)
         self._refused.append({line.name: line.refused for line in facts.sources or ()})
 
 
@@ -108,7 +117,7 @@ def reports(state: str, failure: str, facts: Facts | None, history: History) -> 
     found = [
         _state(state, failure, facts.other_nodes),
         _inputs(facts, history),
-        _steps(facts),
+        _steps(facts, history),
         _recording(facts.status, history),
     ]
     if facts.sources is not None:
@@ -153,7 +162,7 @@ def _inputs(facts: Facts, history: History) -> Report:
     return findings.report("inputs", f"{status.objects} objects, all up to date", values)
 
 
-def _steps(facts: Facts) -> Report:
+def _steps(facts: Facts, history: History) -> Report:
     status, findings = facts.status, _Findings()
     if status.latency > facts.stale_after:
         findings.add(Level.ERROR, f"late: the answers are {status.latency:.2f} s behind the stamps of their states")
@@ -163,6 +172,10 @@ def _steps(facts: Facts) -> Report:
         findings.add(Level.WARN, f"unresolved: up to {facts.unresolved} pairs in a step; treat them as colliding")
     if facts.deferred:
         findings.add(Level.WARN, f"deferred: the budget ran out, up to {facts.deferred} pairs in a step")
+    if count := history.outdated(facts):
+        findings.add(Level.WARN, f"slower than the states: {count} outdated messages left out lately")
+    if facts.is_reduced:
+        findings.add(Level.WARN, f"reduced effort: profile {status.profile}")
     if status.rate > 1.0 and status.step_duration_p99 * status.rate > 1.0:
         findings.add(
             Level.WARN,
@@ -175,6 +188,7 @@ def _steps(facts: Facts) -> Report:
         "step_duration_p99 [s]": status.step_duration_p99,
         "deferred": facts.deferred,
         "unresolved": facts.unresolved,
+        "outdated": facts.outdated,
         "contacts": status.contacts,
         "predictions": status.predictions,
         "profile": status.profile,

@@ -61,6 +61,10 @@ class LiveSources:
             self._take(each)
         self._search()
 
+    def set_pace(self, period: float) -> None:
+        """Take no more than one step in `period` (s) of the stamps. States wait in the meantime, and newer ones win."""
+        self._feed.least_period = period
+
     # -- topics
 
     def _search(self) -> None:

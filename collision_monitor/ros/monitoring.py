@@ -23,6 +23,7 @@ from collision_monitor.pipeline.topics import STATUS_PERIOD, Topic
 from collision_monitor.records import Phase
 from collision_monitor.ros.endpoints import answer_publisher, subscription
 from collision_monitor.ros.health import Facts
+from collision_monitor.ros.keeping_up import KeepingUp
 from collision_monitor.ros.markers import MarkerView
 from collision_monitor.ros.name_conflict import NameConflict
 from collision_monitor.ros.node_recording import NodeRecording
@@ -93,6 +94,7 @@ class Monitoring:
         states = subscription(node, Topic.STATES, self._on_states)
         self._shapes_in, self._states_in = shapes.topic_name, states.topic_name
         self._refusals = RefusalLog(self._pipeline.monitor, self._logger.warning)
+        self._keeping_up = KeepingUp(states, self._times, self._refusals, profile, enabled=settings.keep_up)
         self._sources = self._live_sources(settings.sources)
         node.create_timer(WATCHDOG_PERIOD, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME))
         gc.unfreeze()  # what an earlier configuration kept
@@ -131,7 +133,7 @@ class Monitoring:
         from collision_monitor.ros.live_sources import LiveSources
 
         def take(given: Input) -> None:
-            (self._on_states if given.topic is Topic.STATES else self._on_shapes)(given.data)
+            (self._take_step if given.topic is Topic.STATES else self._on_shapes)(given.data)
 
         def warn(name: str, text: str, count: int) -> None:
             self._refusals.note("sources", name, text, count, time.monotonic_ns())
@@ -141,9 +143,14 @@ class Monitoring:
     # -- states: one step
 
     def _on_states(self, data: bytes) -> None:
+        """Take a step for each message that waits, without those that are outdated."""
+        for each in self._keeping_up.choose(data):
+            self._take_step(each)
+
+    def _take_step(self, data: bytes) -> None:
         """Publish the answers, then record them. Publish status and markers and record a snapshot if they are due."""
         began, received = time.monotonic_ns(), self._now()
-        outputs = self._answer(data)
+        outputs = self._answer(data, received)
         ended = time.monotonic_ns()
         self._refusals.report(self._states_in, ended)
         if outputs is None:
@@ -152,16 +159,19 @@ class Monitoring:
         if outputs.result.stamp_ns != self._last_stamp:  # a stamp that stands still is no news, however often it comes
             self._last_step, self._last_stamp = ended, outputs.result.stamp_ns
         self._times.add(began, ended, self._now() - outputs.result.stamp_ns)
+        self._keeping_up.end_step(began, ended)
+        if self._sources is not None:
+            self._sources.set_pace(self._keeping_up.pace)
         self._peaks.add(outputs.result.status)
         self._record_step(data, outputs, received)
         self._publish_status_if_due(ended)
         self._publish_markers_if_due(data, outputs, ended)
         self._recording.write_snapshot_if_due(self._pipeline.snapshot)
 
-    def _answer(self, states: bytes) -> Outputs | None:
+    def _answer(self, states: bytes, received: int) -> Outputs | None:
         """Take one step and publish its answers, all within the step's budget."""
         with self._pipeline.monitor.clock:
-            outputs = self._pipeline.on_states(states)
+            outputs = self._pipeline.on_states(states, received + self._keeping_up.mean_step)
             if outputs is not None:
                 self._predictions_out.publish(outputs.predictions)  # first: a warning is worth more if it is early
                 self._contacts_out.publish(outputs.contacts)
@@ -179,8 +189,8 @@ class Monitoring:
         """Record a step in the order that a replay needs: how far the step came, the inputs, the answers."""
         stamp = outputs.result.stamp_ns
         begins = self._is_event_wanted and bool((outputs.result.contacts["phase"] == Phase.BEGIN).any())
-        if outputs.limit is not None:
-            self._recording.write(Topic.SETTINGS, outputs.limit, received, received)
+        if outputs.settings is not None:
+            self._recording.write(Topic.SETTINGS, outputs.settings, received, received)
         self._recording.write(Topic.STATES, states, received, stamp)
         self._recording.write(Topic.CONTACTS, outputs.contacts, received, stamp, event=begins)
         self._recording.write(Topic.PREDICTIONS, outputs.predictions, received, stamp)
@@ -220,14 +230,18 @@ class Monitoring:
 
     def change_settings(self, profile: Profile) -> None:
         """Change the settings. Like all callbacks, this runs between two steps."""
+        self._use(self._keeping_up.reduced(profile))
+        self._times.longest_latency = profile.max_time_step
+        self._logger.info(f"settings changed, profile {profile.name}")
+        self._check_rules()
+
+    def _use(self, profile: Profile) -> None:
+        """Take the next steps with this profile."""
         now = self._now()
         change = self._pipeline.change_settings(profile, now, self._name)
         self._recording.write(Topic.SETTINGS, change.settings, now, now, settings=self._pipeline.settings())
         if change.shapes is not None:
             self._record_shapes(change.shapes, now)
-        self._times.longest_latency = profile.max_time_step
-        self._logger.info(f"settings changed, profile {profile.name}")
-        self._check_rules()
 
     def change_rules(self, rules: Rules) -> None:
         """Change the rules of the alerts from the next step on."""
@@ -274,6 +288,8 @@ class Monitoring:
         if not silent:
             self._refusals.report_stale(self._states_in, now)
         self._refusals.catch_up(now)
+        if (profile := self._keeping_up.look(now)) is not None:
+            self._use(profile)
         self._publish_status_if_due(now)
         if self._pipeline.rules.text:
             self._raised_out.publish(self._pipeline.raised_alerts())
@@ -323,6 +339,8 @@ class Monitoring:
             unseen=named(monitor, monitor.unseen_ids),
             deferred=deferred,
             unresolved=unresolved,
+            outdated=self._keeping_up.outdated,
+            is_reduced=self._keeping_up.is_reduced,
             other_nodes=self._name_conflict.others,
             sources=None if self._sources is None else tuple(self._sources.lines()),
         )

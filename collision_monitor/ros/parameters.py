@@ -78,7 +78,7 @@ RECORD_MODES = ("always", "on_event")
 _RECORD = ("record", "record_mode", "record_before", "record_after", "record_split_size", "record_split_duration")
 
 
-_RUNNING = ("executor", "autostart", "diagnostic_updater.period", "diagnostic_updater.use_fqn")
+_RUNNING = ("executor", "keep_up", "autostart", "diagnostic_updater.period", "diagnostic_updater.use_fqn")
 
 
 @dataclass(frozen=True)
@@ -89,6 +89,7 @@ class MonitorParameters:
     frame_id: str
     record: str
     executor: str
+    keep_up: bool = True
     splitting: Splitting = ONE_FILE
     autostart: bool = True
     diagnostics: DiagnosticsParameters = field(default_factory=DiagnosticsParameters)
@@ -125,6 +126,11 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
         raise ProfileError("parameter frame_id: expected the name of a frame, got an empty text")
     if executor not in EXECUTORS:
         raise ProfileError(f"parameter executor: expected {' or '.join(EXECUTORS)}, got {executor!r}")
+    text = (
+        "Whether to leave out outdated states and to use fewer samples while steps take longer than the period of the "
+        "states."
+    )
+    keep_up = reader.read("keep_up", True, text)
     text = "Whether the node configures and activates itself. If not, a lifecycle manager or ros2 lifecycle does it."
     autostart = reader.read("autostart", True, text)
     return MonitorParameters(
@@ -132,6 +138,7 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
         sources.frame if sources else frame_id,
         record,
         executor,
+        keep_up,
         splitting,
         sources=sources,
         rules=rules,

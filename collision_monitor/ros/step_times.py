@@ -14,7 +14,10 @@ CLOCK_TOLERANCE = 1e-3
 
 
 class StepTimes:
-    """Times of the last steps, in ns: the steady clock for durations and rate, ROS time for the latency."""
+    """Times of the last steps, in ns: the steady clock for durations and rate, ROS time for the latency.
+
+    latency (s): age of the states of the last step when it ended; NaN: not known.
+    """
 
     def __init__(self, longest_latency: float) -> None:
         """longest_latency (s): beyond it the stamps come from another clock, not from a slow network."""
@@ -22,7 +25,7 @@ class StepTimes:
         self._durations = np.zeros(WINDOW)
         self._steps = 0
         self._ends: deque[int] = deque()
-        self._latency = float("nan")
+        self.latency = float("nan")
 
     def add(self, began: int, ended: int, latency: int) -> None:
         """Add one step."""
@@ -32,7 +35,7 @@ class StepTimes:
         self._forget(ended)
         seconds = latency * 1e-9
         agree = -CLOCK_TOLERANCE <= seconds <= self.longest_latency
-        self._latency = max(seconds, 0.0) if agree else float("nan")
+        self.latency = max(seconds, 0.0) if agree else float("nan")
 
     def summary(self, now: int) -> dict[str, float]:
         """Return the timing fields of MonitorStatus, in s and Hz; NaN before the first step."""
@@ -41,9 +44,15 @@ class StepTimes:
         return {
             "step_duration": float(self._durations[(self._steps - 1) % WINDOW]) if self._steps else float("nan"),
             "step_duration_p99": float(np.percentile(known, 99)) if self._steps else float("nan"),
-            "latency": self._latency,
+            "latency": self.latency,
             "rate": float(len(self._ends)),
         }
+
+    def load(self, now: int) -> float:
+        """Return the part of the last second that the steps took, 0 to 1."""
+        self._forget(now)
+        last = np.arange(self._steps - min(len(self._ends), WINDOW), self._steps) % WINDOW
+        return min(1.0, float(self._durations[last].sum()))
 
     def _forget(self, now: int) -> None:
         while self._ends and now - self._ends[0] > 1_000_000_000:

@@ -49,6 +49,7 @@ class Input(NamedTuple):
 class Feed:
     """Converts messages, one by one. scene: what is known, and what was refused. owners: lines of sections by topic.
 
+    least_period: s between two steps at a rate or with a topic. States that arrive in the meantime wait for the next.
     Call `bind` for each topic when its type is known, `begin` once, and `take` for each message. Raises InputError for
     a file that cannot be used.
     """
@@ -65,6 +66,8 @@ class Feed:
         self._timeline = Timeline()
         self._last_stamps: dict[str, int] = {}
         self._tick: int | None = None  # the number of the last step at a rate
+        self._last_step: int | None = None  # its stamp, or that of the last one with a topic
+        self.least_period = 0.0
         self._standing = StandingObjects([entry for entry in mapping.sources if entry.static and not entry.topic])
         self._sources: list[Source] = [self._standing]
         self._by_topic: dict[str, list[Source]] = {}
@@ -184,7 +187,7 @@ class Feed:
         progress = self._advance(raw.topic, stamp)
         if progress is Progress.RESTARTS:
             self.scene.restart()
-            self._tick = None
+            self._tick = self._last_step = None
         elif progress is Progress.REFUSED and self._has_own_steps:
             self.scene.refuse(
                 raw.topic,
@@ -218,13 +221,20 @@ class Feed:
         if not self._has_own_steps:
             return self._timeline.now_ns
         if self.mapping.step_topic:
-            return stamp if topic == self.mapping.step_topic else None
+            return stamp if topic == self.mapping.step_topic and not self._is_too_soon(stamp) else None
         period = round(1e9 / self.mapping.rate)
         tick = self._timeline.now_ns // period
-        if self._tick is not None and tick <= self._tick:
+        if (self._tick is not None and tick <= self._tick) or self._is_too_soon(tick * period):
             return None
         self._tick = tick
         return tick * period
+
+    def _is_too_soon(self, stamp: int) -> bool:
+        """Whether the least period after the last step is not over. If it is, this step is the last one."""
+        if self._last_step is not None and 0 <= stamp - self._last_step < self.least_period * 1e9:
+            return True
+        self._last_step = stamp
+        return False
 
     def _due(self, at: int) -> Iterator[Step]:
         waiting = self.scene.waiting

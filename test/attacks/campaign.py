@@ -269,8 +269,8 @@ class Campaign:
 
     def _compare_with_shadow(self, taken: Message, outputs: Outputs | None) -> None:
         assert self._shadow is not None
-        if outputs is not None and outputs.limit is not None:  # a session holds it before the states
-            self._shadow.on_settings(outputs.limit)
+        if outputs is not None and outputs.settings is not None:  # a session holds it before the states
+            self._shadow.on_settings(outputs.settings)
         other, _ = _process(self._shadow, taken)
         if _bytes(outputs) != _bytes(other) or self.pipeline.monitor.digest != self._shadow.monitor.digest:
             self.problems.append("the pipeline restored from a snapshot gives other bytes")

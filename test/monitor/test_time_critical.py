@@ -185,8 +185,8 @@ def test_a_cut_step_replays_with_the_pairs_it_came_to() -> None:
         live.monitor.clock._deviation = 0.0
         outputs = live.on_states(data)
         assert outputs is not None
-        if outputs.limit is not None:
-            again.on_settings(outputs.limit)
+        if outputs.settings is not None:
+            again.on_settings(outputs.settings)
         replayed = again.on_states(data)
         assert replayed is not None
         assert (replayed.contacts, replayed.predictions) == (outputs.contacts, outputs.predictions)

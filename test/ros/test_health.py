@@ -16,7 +16,8 @@ GOOD = {"step": 9, "objects": 3, "latency": 0.002, "rate": 50.0, "step_duration_
 
 
 def facts(status: dict[str, Any] | None = None, **changes: Any) -> Facts:
-    given = {"silence": 0.01, "stale": "", "unseen": "", "deferred": 0, "unresolved": 0, "other_nodes": 0} | changes
+    given = {"silence": 0.01, "stale": "", "unseen": "", "deferred": 0, "unresolved": 0, "other_nodes": 0}
+    given |= {"outdated": 0, "is_reduced": False, **changes}
     return Facts(status=MonitorStatus(**{**GOOD, **(status or {})}), topic="/states", stale_after=0.5, **given)
 
 
@@ -56,6 +57,13 @@ def test_all_is_well() -> None:
             "steps",
             Level.WARN,
             "slow: 1 % of the steps take 30.0 ms or more at 50 Hz",
+        ),
+        (facts(outdated=7), "steps", Level.WARN, "slower than the states: 7 outdated messages left out lately"),
+        (
+            facts({"profile": "balanced, reduced to 64 samples"}, is_reduced=True),
+            "steps",
+            Level.WARN,
+            "reduced effort: profile balanced, reduced to 64 samples",
         ),
         (facts(other_nodes=1), "state", Level.ERROR, "another node of this name"),
         (

@@ -41,7 +41,7 @@ def test_the_file_as_it_is_gives_the_defaults(read):
 def test_the_file_with_every_line_in_force_gives_the_defaults(read, tmp_path):
     values = next(iter(yaml.safe_load(EVERY_LINE).values()))["ros__parameters"]
     recording = {"record", *(f"record_{n}" for n in ("mode", "before", "after", "split_size", "split_duration"))}
-    running = {"executor", "autostart", "diagnostic_updater.period", "diagnostic_updater.use_fqn"}
+    running = {"executor", "keep_up", "autostart", "diagnostic_updater.period", "diagnostic_updater.use_fqn"}
     others = {"profile", "frame_id", "sources", "rules"}
     assert set(values) == {*others, *running, *recording, *(s.name for s in Profile.fields())}
     (tmp_path / "all.yaml").write_text(EVERY_LINE)

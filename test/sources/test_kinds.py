@@ -156,6 +156,24 @@ def test_a_message_too_old_for_its_step_is_left_out_and_named() -> None:
     assert fed.refused == {"cart: its message is older than max_age at its step": 1}
 
 
+@pytest.mark.parametrize("stepping", [{"rate": 20}, {"step": "/odom"}])
+def test_a_slow_monitor_gets_fewer_steps_and_each_has_the_newest_states(stepping: dict[str, Any]) -> None:
+    names = {"cart": {"topic": "/odom", "shape": SPHERE}, "other": {"topic": "/b", "shape": SPHERE}}
+    fed = Fed(names, **stepping)
+    fed.feed.least_period = 0.12
+    for k in range(10):
+        stamp = at(k)
+        fed.give("/odom", stamp, odometry("map", stamp, (k, 0, 0), (0, 0, 0, 1), (0, 0, 0), (0, 0, 0)))
+        if k % 4 == 1:  # between two steps
+            fed.give("/b", stamp, pose_stamped("map", stamp, (0, k, 0)))
+    assert [step.stamp_ns for step in fed.steps] == [at(0), at(3), at(6), at(9)]
+    assert [step.states["position"][0, 0] for step in fed.steps] == [0, 3, 6, 9]
+    assert [len(step.states) for step in fed.steps] == [1, 2, 2, 1]
+    fed.feed.least_period = 0.0
+    fed.give("/odom", at(10), odometry("map", at(10), (10, 0, 0), (0, 0, 0, 1), (0, 0, 0), (0, 0, 0)))
+    assert fed.steps[-1].stamp_ns == at(10)
+
+
 def test_stamps_of_another_clock_are_refused_until_a_second_one_agrees() -> None:
     fed = Fed({"cart": {"topic": "/odom", "shape": SPHERE}}, rate=20)
 

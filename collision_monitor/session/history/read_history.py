@@ -26,7 +26,7 @@ from collision_monitor.codec import (
 from collision_monitor.errors import MessageError, SessionError
 from collision_monitor.monitor.timeline import NANOSECOND
 from collision_monitor.pipeline.pipeline import Outputs, Pipeline
-from collision_monitor.pipeline.settings_event import LIMIT, RULES
+from collision_monitor.pipeline.settings_event import LIMIT, NOW, RULES
 from collision_monitor.session.history.collisions import find_collisions
 from collision_monitor.session.history.growing_rows import GrowingRows
 from collision_monitor.session.history.history import History, Records
@@ -111,7 +111,7 @@ class _Gathered:
                 if self._pipeline is not None:
                     self._pipeline.on_settings(message.data)
                 changed = decode_parameter_event(message.data).changed
-                if changed.keys() != {LIMIT}:  # that only records how far a step came
+                if not changed.keys() <= {LIMIT, NOW}:  # these only record what the clock made of a step
                     self._settings.append((len(self._steps), changed))
             case "ObjectStateArray":
                 if self._pipeline is not None:
