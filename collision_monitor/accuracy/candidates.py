@@ -35,6 +35,9 @@ DISTANCES: Final = (1e-4, 1e-3, 1e-2)
 MODELS: Final = ("sphere", "obb", "kdop26", "convex_hull")
 """Models from coarse to fine."""
 
+ANY_ERROR: Final = 1e6
+"""Value of model_error (m) with which a chosen model is always used."""
+
 BUDGET_PART: Final = 0.8
 """Part of the demanded time that a budget gives to a step, because the step exceeds it by what it cannot defer."""
 
@@ -138,6 +141,8 @@ def _changed(profile: Profile, **changes: Any) -> Profile:
     """Return the profile with changes, which its name lists."""
     text = ", ".join(f"{name} {_text(value)}" for name, value in changes.items())
     kept = {name: _within(name, value) if isinstance(value, float) else value for name, value in changes.items()}
+    if any(name.startswith("model_") for name in kept):
+        kept["model_error"] = ANY_ERROR
     return profile.replace(name=f"{profile.name}, {text}", **kept)
 
 

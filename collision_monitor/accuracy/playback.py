@@ -19,7 +19,7 @@ Step = tuple[int, NDArray[np.void]]
 """Stamp (ns) and states (records.STATE)."""
 
 
-FEWEST_STEPS: Final = 4
+FEWEST_STEPS: Final = 2
 """Steps of a run that its time cannot cut: the first one initialises everything."""
 
 

@@ -27,13 +27,21 @@ Progress = Callable[[int], None]
 
 
 def exact_answers(
-    described: Iterable[ObjectDescription], steps: Sequence[Step], profile: Profile, progress: Progress
-) -> Reported:
-    """Return the exact answers to all steps, with the horizon and the contact margin of the profile."""
+    described: Iterable[ObjectDescription],
+    steps: Sequence[Step],
+    profile: Profile,
+    progress: Progress,
+    most_seconds: float = inf,
+) -> tuple[Reported, int]:
+    """Return the exact answers with the horizon and the contact margin of the profile, and the number of steps.
+
+    most_seconds: time of the steps after which the others are left out.
+    """
     exact = Profile.named(REFERENCE).replace(
         horizon=profile.horizon, contact_margin=profile.contact_margin, uncertainty=False
     )
-    return Reported.of(play(ReferenceMonitor(exact), described, steps, progress).answers)
+    answers = play(ReferenceMonitor(exact), described, steps, progress, most_seconds).answers
+    return Reported.of(answers), len(answers)
 
 
 def contacts_of(steps: Sequence[Step], truth: Reported, horizon: float) -> Contacts:
@@ -90,7 +98,7 @@ def profile_tradeoff(
         if key in truths:
             progress(len(steps))
         else:
-            truth = exact_answers(described, steps, profile, progress)
+            truth, _ = exact_answers(described, steps, profile, progress)
             truths[key] = truth, contacts_of(steps, truth, profile.horizon)
         tally = measure_profile(described, steps, profile, *truths[key], progress=progress)
         rows.append(tally.measurement(scene, profile, len(described)))

@@ -75,7 +75,7 @@ class Recording:
         for profile in profiles:
             key = (profile.horizon, profile.contact_margin)
             if key not in truths:
-                truths[key] = exact_answers(self.described, steps, profile, lambda done: None)
+                truths[key], _ = exact_answers(self.described, steps, profile, lambda done: None)
             contacts = self.contacts[profile.horizon]
             found.append(
                 measure_profile(

@@ -31,7 +31,7 @@ from collision_monitor.monitor.timeline import Order, Progress, Timeline
 from collision_monitor.monitor.tracking import Tracking
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.objects.models import Modelled, parse_model, shape_class
+from collision_monitor.objects.models import Modelled, monitored_model, parse_model, shape_class
 from collision_monitor.records import Model, PredictionStatus
 from collision_monitor.settings.profile import Profile
 
@@ -159,7 +159,12 @@ class Monitor:
         prepared: what represents the object, if it is known already.
         Raises InputError, ShapeError; UnsupportedError for an unsupported shape or model.
         """
-        i = self._roster.describe(description, self.model_of(description), prepared)
+        model = self.model_of(description)
+        if model is not description.model:
+            prepared = prepared or monitored_model(description.shapes, model)
+            if prepared.excess > self._profile.model_error:
+                model, prepared = description.model, None
+        i = self._roster.describe(description, model, prepared)
         self._make_room()
         self._candidates.forget(np.array([i], np.int32))  # the next step inserts its new box
         self._time_critical.describe(self._roster, i, self._profile)
@@ -169,6 +174,7 @@ class Monitor:
     def model_of(self, description: ObjectDescription) -> Model:
         """The model that represents an object: its own choice, or else the profile's for its class of shapes.
 
+        `describe` makes the object exact instead if the profile's choice exceeds it by more than `model_error`.
         When the profile's choice changes, a described object keeps its model until it is described again.
         """
         kind = shape_class(description.shapes)

@@ -184,6 +184,13 @@ class Profile:
     model_compound: str = choice(
         _MODELS, "Model that represents objects of several shapes, if their description chooses none."
     )
+    model_error: float = number(
+        1e6,
+        0.0,
+        1e6,
+        "m",
+        "Largest distance by which a model that these settings choose may exceed its object, which else is exact.",
+    )
     region_min: tuple[float, float, float] = vector(
         (-EVERYWHERE, -EVERYWHERE, -EVERYWHERE),
         EVERYWHERE,

@@ -46,6 +46,7 @@ OTHER: dict[str, Any] = {
     "model_hull": "sphere",
     "model_mesh": "kdop14",
     "model_compound": "aabb",
+    "model_error": 0.001,
     "region_min": (-3.0, -3.0, -3.0),
     "region_max": (3.0, 20.0, 3.0),
     "min_closing_speed": 0.5,
