@@ -223,10 +223,12 @@ def _enter_pair(table, parts, pair, laid, samples, wanted, tolerance, lattice, m
 
 @device
 def _are_round(table, parts, pair, errors, margin, work):
-    """Whether the closed form of round bodies holds: two balls, or two parallel cylinders, that move straight."""
+    """Whether bodies with these first shapes are two balls, or two parallel cylinders, that move straight."""
     A, B, a, b = pair
     turning = errors.turning
-    if errors.bend > 0.0 or turning[0][0] + turning[0][1] + turning[1][0] + turning[1][1] > 0.0:
+    if parts.next[a] >= 0 or parts.next[b] >= 0 or errors.bend > 0.0:
+        return False
+    if turning[0][0] + turning[0][1] + turning[1][0] + turning[1][1] > 0.0:
         return False
     if table.kind[a] == SPHERE and table.kind[b] == SPHERE:
         return True
@@ -239,19 +241,19 @@ def _are_round(table, parts, pair, errors, margin, work):
 
 
 @device
-def _enter_round(table, parts, pair, end, margin, memory, work):
-    """Lower memory.times to the samples' impacts of two balls or two parallel cylinders that move straight."""
+def _enter_round(table, parts, pair, end, margin, off, times, work):
+    """Lower times (S,) to the samples' impacts of bodies for which `_are_round` holds. off (ERRORS, S or more)."""
     A, B, a, b = pair
     R = work.scratch.rotation
     oa, ob = place_shape(table, parts, a, A.rotation, R[0]), place_shape(table, parts, b, B.rotation, R[1])
     p = (B.x - A.x + ob[0] - oa[0], B.y - A.y + ob[1] - oa[1], B.z - A.z + ob[2] - oa[2])
     v = (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
     if table.kind[a] == SPHERE:
-        enter_sphere(p, v, table.radius[a] + table.radius[b] + margin, end, memory.off, memory.times)
+        enter_sphere(p, v, table.radius[a] + table.radius[b] + margin, end, off, times)
         return
     axis, size = (R[1, 0, 2], R[1, 1, 2], R[1, 2, 2]), table.size
     half = size[a, 1] + size[b, 1]
-    enter_cylinder(p, v, axis, size[a, 0] + size[b, 0], half, end, memory.off, memory.times)
+    enter_cylinder(p, v, axis, size[a, 0] + size[b, 0], half, end, off, times)
 
 
 @allocating_kernel
@@ -326,7 +328,11 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         _clear_upper(work.joint)
         set_errors(work.joint, work.frame, t, lattice.points, memory.off)
         errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, (far_i, far_j))
-        samples = _enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work)
+        pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
+        if _are_round(table, parts, pair, errors, query.margin, work):
+            samples = _enter_round_bodies(table, parts, pair, sampling, lattice, memory, work)
+        else:
+            samples = _enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work)
         if samples < 0:
             answers[k, PROBABILITY] = LEFT
             continue
@@ -346,64 +352,86 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
 
 
 @device
-def _enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
-    """Write the times of the samples' impacts of bodies i and j into memory.times. Return the number of samples.
+def _samples_needed(times, lattice, sampling):
+    """Number of samples for bodies with these times (S,) of the pilot's samples.
 
-    0: the bodies are stated to pass, and hardly meet in the pilot lattice. -1: they turn too fast.
-    Bodies that meet in all samples of the pilot need few samples: only their times differ.
+    0: they are stated to pass, and hardly meet in the pilot. Bodies that meet in all of it need few samples, because
+    only their times differ.
     """
-    table, parts, bodies = multibody
-    A, B = work.motion[0], work.motion[1]
-    times, alone, weights, pilot = memory.times, memory.alone, lattice.weights, lattice.pilot
-    size = weights.size
-    margin = sampling.query.margin
-    first_a, first_b = bodies.first_shape[i], bodies.first_shape[j]
-    single = parts.next[first_a] < 0 and parts.next[first_b] < 0
-    for n in range(size):
-        times[n] = inf
-    if single and _are_round(table, parts, ShapePair(A, B, first_a, first_b), errors, margin, work):
-        _enter_round(table, parts, ShapePair(A, B, first_a, first_b), sampling.horizon, margin, memory, work)
-        return size
-    a, b = first_a, first_b
-    laid = _lay_planes(
-        table, parts, ShapePair(A, B, a, b), errors, sampling.horizon, sampling, lattice, memory, work
-    )
-    reaches = laid[2]
-    while True:
-        for n in range(pilot):
-            times[n] = min(times[n], alone[n])
-        a, b = next_pair(parts, first_b, a, b)
-        if a < 0 or not reaches:
-            break
-        laid = _lay_planes(
-            table, parts, ShapePair(A, B, a, b), errors, sampling.horizon, sampling, lattice, memory, work
-        )
-        reaches = laid[2]
+    weights, pilot = lattice.weights, lattice.pilot
     latest = seen = part = 0.0
     for n in range(pilot):
         latest = max(latest, times[n])
         seen += weights[n] if times[n] < inf else 0.0
         part += weights[n]
-    if not reaches:
-        return -1
     if seen < part * PILOT_PART * sampling.min_probability and not sampling.stated:
         return 0
-    is_sure = latest < inf
-    samples, wanted = (min(SURE_SAMPLES, size), 0) if is_sure else (size, VERIFIED)
-    tolerance = max((FACETS_IN_PILOT if is_sure else FACETS) * errors.sigma, sampling.query.tolerance)
-    until = sampling.horizon
-    if is_sure:
-        until = min(until, latest + LATER * (latest - _least(times, pilot)) + SOON * until)
-    for n in range(size):
+    return weights.size if latest == inf else min(SURE_SAMPLES, weights.size)
+
+
+@device
+def _enter_round_bodies(table, parts, pair, sampling, lattice, memory, work):
+    """`_enter_bodies` for bodies for which `_are_round` holds."""
+    times, margin, end = memory.times, sampling.query.margin, sampling.horizon
+    for n in range(times.size):
+        times[n] = inf
+    _enter_round(table, parts, pair, end, margin, memory.off, times[0 : lattice.pilot], work)
+    samples = _samples_needed(times, lattice, sampling)
+    _enter_round(table, parts, pair, end, margin, memory.off, times[0:samples], work)
+    return samples
+
+
+@device
+def _enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
+    """Write the times of the samples' impacts of bodies i and j into memory.times.
+
+    Returns the number of samples, see `_samples_needed`; -1: the bodies turn too fast.
+    """
+    table, parts, bodies = multibody
+    A, B = work.motion[0], work.motion[1]
+    times, alone, pilot, end = memory.times, memory.alone, lattice.pilot, sampling.horizon
+    first_a, first_b = bodies.first_shape[i], bodies.first_shape[j]
+    single = parts.next[first_a] < 0 and parts.next[first_b] < 0
+    for n in range(times.size):
+        times[n] = inf
+    a, b = first_a, first_b
+    laid = _lay_planes(table, parts, ShapePair(A, B, a, b), errors, end, sampling, lattice, memory, work)
+    while True:
+        for n in range(pilot):
+            times[n] = min(times[n], alone[n])
+        if not laid[2]:
+            return -1
+        a, b = next_pair(parts, first_b, a, b)
+        if a < 0:
+            break
+        laid = _lay_planes(table, parts, ShapePair(A, B, a, b), errors, end, sampling, lattice, memory, work)
+    samples = _samples_needed(times, lattice, sampling)
+    if samples == 0:
+        return 0
+    latest = _largest(times, pilot)
+    wanted, facets = (VERIFIED, FACETS) if latest == inf else (0, FACETS_IN_PILOT)
+    tolerance = max(facets * errors.sigma, sampling.query.tolerance)
+    if latest < inf:
+        end = min(end, latest + LATER * (latest - _least(times, pilot)) + SOON * end)
+    for n in range(times.size):
         times[n] = inf
     a, b = first_a, first_b
     while a >= 0:
         pair = ShapePair(A, B, a, b)
         if not single:
-            laid = _lay_planes(table, parts, pair, errors, until, sampling, lattice, memory, work)
+            laid = _lay_planes(table, parts, pair, errors, end, sampling, lattice, memory, work)
         _enter_pair(table, parts, pair, laid, samples, wanted, tolerance, lattice, memory, work)
         a, b = next_pair(parts, first_b, a, b)
     return samples
+
+
+@inlined
+def _largest(times, count):
+    """Largest of the first `count` times."""
+    largest = 0.0
+    for n in range(count):
+        largest = max(largest, times[n])
+    return largest
 
 
 @inlined
