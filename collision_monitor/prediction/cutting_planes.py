@@ -61,17 +61,17 @@ def _next_sample(entry, leave, checked, samples, briefest, cursor):
 def _cut(table, pair, n, samples, direction, k, settings, memory):
     """Add the plane along the direction that separates sample n. Its normal may turn with a body.
 
-    The best is the one that TRIED samples enter latest. Returns whether sample n spends less time inside.
+    The best is the one behind which TRIED samples spend the least time. Returns whether that is less for sample n.
     """
     obstacle, rows, entry, leave = memory.obstacle, memory.rows, memory.entry, memory.leave
     tried = min(TRIED, settings.pilot)
-    count, nodes, end = obstacle.count[k], obstacle.node[k : k + 2], obstacle.node[k + 1].time
+    count, nodes = obstacle.count[k], obstacle.node[k : k + 2]
     planes, margin, before = obstacle.planes[k, count : count + 1], plane_margin(settings), leave[n] - entry[n]
     obstacle.count[k] += 1
-    best, latest = AT_REST, -inf
+    best, latest, span = AT_REST, -inf, nodes[1].time - nodes[0].time
     if settings.follows[0] or settings.follows[1]:
         trial_entry, trial_leave = memory.trial[0], memory.trial[1]
-        for mode in range(3):
+        for mode in (AT_REST, 0, 1):
             if mode == AT_REST or settings.follows[mode]:
                 set_plane(direction, mode, obstacle, planes[0])
                 for m in range(tried):
@@ -82,7 +82,7 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
                 )
                 total = 0.0
                 for m in range(tried):
-                    total += trial_entry[m] if trial_entry[m] <= trial_leave[m] else end
+                    total += min(max(trial_entry[m] - trial_leave[m], -span), span)
                 if total > latest:
                     best, latest = mode, total
     set_plane(direction, best, obstacle, planes[0])

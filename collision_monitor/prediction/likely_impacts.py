@@ -114,7 +114,9 @@ def _part_length(A, B, errors):
     A normal that turns while the bodies pass each other bends the gap like an acceleration of the surfaces.
     """
     speed = sqrt((B.vx - A.vx) ** 2 + (B.vy - A.vy) ** 2 + (B.vz - A.vz) ** 2)
-    rate = _rate(A) + _rate(B) + TURNED * (errors.turning[0][1] + errors.turning[1][1])
+    rate = _rate(A) if errors.radius[0] > 0.0 else 0.0  # the rotation of a ball moves nothing
+    rate += _rate(B) if errors.radius[1] > 0.0 else 0.0
+    rate += TURNED * (errors.turning[0][1] + errors.turning[1][1])
     bend = errors.bend + speed * rate
     return sqrt(8.0 * BENDING * max(errors.sigma, 1e-300) / bend) if bend > 0.0 else inf
 
@@ -159,7 +161,10 @@ def _lay_planes(table, parts, pair, errors, until, sampling, lattice, memory, wo
     fine = max(FACETS * sigma, sampling.query.tolerance)
     turning = (_order(errors, 0, fine), _order(errors, 1, fine))
     flat = table.kind[a] == HALF_SPACE or table.kind[b] == HALF_SPACE
-    follows = (not flat and turning[0] + _rate(A) > 0.0, not flat and turning[1] + _rate(B) > 0.0)
+    follows = (
+        not flat and errors.radius[0] > 0.0 and turning[0] + _rate(A) > 0.0,
+        not flat and errors.radius[1] > 0.0 and turning[1] + _rate(B) > 0.0,
+    )
     settings = CutSettings(margin, tolerance, pilot, follows, turning)
     for n in range(size):
         alone[n] = inf
@@ -211,7 +216,7 @@ def _enter_pair(table, parts, pair, laid, samples, wanted, tolerance, lattice, m
     alone, times = memory.alone, memory.times
     for n in range(samples):
         alone[n] = inf
-    each = max(VERIFIED_IN_PILOT, wanted // max(segments - 3, 1)) if wanted > 0 else 0
+    each = max(VERIFIED_IN_PILOT, wanted // max(segments - 3, 1))
     for k in range(segments):
         begin_segment(table, pair, k, settings, memory, lattice.points, 0, samples)
         cut_planes(table, parts, pair, k, samples, each, settings, memory, work.scratch)
@@ -409,7 +414,7 @@ def _enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
     if samples == 0:
         return 0
     latest = _largest(times, pilot)
-    wanted, facets = (VERIFIED, FACETS) if latest == inf else (0, FACETS_IN_PILOT)
+    wanted, facets = (VERIFIED, FACETS) if latest == inf else (VERIFIED_IN_PILOT, FACETS_IN_PILOT)
     tolerance = max(facets * errors.sigma, sampling.query.tolerance)
     if latest < inf:
         end = min(end, latest + LATER * (latest - _least(times, pilot)) + SOON * end)
