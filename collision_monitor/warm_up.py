@@ -84,6 +84,8 @@ def _step_uncertain(monitor: Monitor, poses: Array, seconds: int) -> None:
     monitor.step(stamp, states)
     monitor.add(2, Sphere(0.5), max_linear_acceleration=1.0, replace=True)
     monitor.step(stamp + 10_000_000, states, covariance=np.zeros((len(poses), 12)))
+    states["orientation_stddev"] = 1.0  # too large for planes: every sample is followed
+    monitor.step(stamp + 20_000_000, states)
 
 
 def _step_limited(monitor: Monitor, poses: Array, twists: Array, points: int) -> None:
