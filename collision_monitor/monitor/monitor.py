@@ -122,6 +122,11 @@ class Monitor:
         """The ids of all described objects, ascending."""
         return self._roster.ids
 
+    def __repr__(self) -> str:
+        """The profile, the objects and the last step."""
+        last = f"step {self.last.step} at {self.last.stamp_ns} ns" if self.last is not None else "no step yet"
+        return f"Monitor({self.profile.name!r}, {len(self.ids)} objects, {last})"
+
     def __contains__(self, object_id: int) -> bool:
         """Whether the object is described."""
         return object_id in self._roster
@@ -143,9 +148,15 @@ class Monitor:
 
         replace: describe a known object anew; it keeps its state. The other fields are those of `ObjectDescription`:
         name, static, pose, group, mask, padding, model, allowed, max_linear_acceleration, max_angular_acceleration.
-        Raises InputError for a known id without replace, and the errors of `describe`.
+        Raises InputError for a known id without replace and for the pose of an object that is not static, and the
+        errors of `describe`.
         """
         description = ObjectDescription(object_id, shape, **fields)
+        if description.pose is not None and not description.static:
+            raise InputError(
+                f"object {object_id}: expected pose= of a static object only, got one of an object that moves; "
+                "write static=True, or pass the pose to step"
+            )
         if not replace and object_id in self._roster:
             raise InputError(
                 f"object {object_id}: expected a new id, got that of {self.name(object_id)!r}; "
@@ -312,7 +323,7 @@ class Monitor:
         new = self._predict_moved(step, bounds_only=budget is not None)
         self._examine_due(step, new, budget)
         contacts = self._answers.contacts(step, self._active_pairs)
-        predictions = self._predictions(step)
+        predictions = self._predictions(step, budget)
         is_past = overtaken(predictions, self._age(now_ns))
         predictions["status"][is_past] = PredictionStatus.UNRESOLVED
         status = step_status(step, self._active_pairs, self._events, contacts, predictions)
@@ -410,14 +421,15 @@ class Monitor:
         else:
             self._events.add(pending, version)
             self._time_critical.examine(step, self._active_pairs, self._events, self._first_impacts, budget)
+            if not self._uncertain.counts(step.profile):
+                budget.stop()
 
-    def _predictions(self, step: StepContext) -> NDArray[np.void]:
+    def _predictions(self, step: StepContext, budget: PairBudget | None) -> NDArray[np.void]:
         """Stage 7: return the predictions (records.PREDICTION), with times and probabilities of uncertain states."""
         predictions, slots = self._answers.predictions(step, self._active_pairs, self._events)
         if self._uncertain.active:
-            with self.clock.aside():  # outside of the budget: reserving its time would leave none for the pairs
-                touching = self._active_pairs.touching_keys
-                predictions = self._uncertain.complete(step, predictions, slots, touching, self._first_impacts.pool)
+            touching, pool = self._active_pairs.touching_keys, self._first_impacts.pool
+            predictions = self._uncertain.complete(step, predictions, slots, touching, pool, budget)
         return self._answers.filtered(step, predictions)
 
     # ------------------------------------------------------------------ snapshots
