@@ -54,8 +54,8 @@ class Front:
         what = "nothing to trade" if high <= NOTHING_TO_TRADE * low else f"{high / low:.3g} times to trade"
         part = min(0.1 * self.fixed_us / low, 100.0)
         return (
-            f"{self.label}: {what}, {low:.3g} ms a step, {high:.3g} for the smallest error; {self.fixed_us:.0f} µs, {part:.0f} % of the "
-            "cheapest, are fixed: reading the states, following the motions, the broad phase"
+            f"{self.label}: {what}, {low:.3g} ms a step, {high:.3g} for the smallest error; {self.fixed_us:.0f} µs are "
+            f"fixed, {part:.0f} % of the cheapest: reading the states, following the motions, the broad phase"
         )
 
 
