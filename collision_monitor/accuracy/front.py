@@ -12,7 +12,7 @@ from collision_monitor.accuracy.candidates import ANY_ERROR, Space, models_of
 from collision_monitor.accuracy.demands import Demands
 from collision_monitor.accuracy.inputs import Workload
 from collision_monitor.accuracy.measurement import Measurement
-from collision_monitor.accuracy.playback import play
+from collision_monitor.accuracy.playback import FEWEST_STEPS, play
 from collision_monitor.accuracy.profile_tradeoff import Progress, contacts_of, exact_answers, measure_profile
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.settings.profile import Profile
@@ -21,6 +21,8 @@ SETTING_SECONDS: Final = 3.0
 """Longest time of the steps of one setting (s). A slower one is measured on fewer steps."""
 TRUTH_SECONDS: Final = 20.0
 """Longest time of the exact answers (s). The steps after it are left out."""
+FEW_OBJECTS: Final = 60
+"""Objects with which the kernels are loaded."""
 NOTHING_TO_TRADE: Final = 1.5
 """A scene leaves nothing to trade if the smallest error costs at most this many times the cheapest setting."""
 
@@ -84,6 +86,7 @@ def front_settings(work: Workload) -> list[Profile]:
 
 def measure_front(work: Workload, settings: Sequence[Profile], progress: Progress) -> Front:
     """Measure all settings on a recording. progress: called after each, and twice for the exact answers."""
+    _load_kernels(work, settings)
     described = work.descriptions
     truth, count = exact_answers(described, work.steps, settings[0], lambda done: None, TRUTH_SECONDS)
     steps = work.steps[:count]
@@ -95,6 +98,15 @@ def measure_front(work: Workload, settings: Sequence[Profile], progress: Progres
         rows.append(replace(tally.measurement(work.name, profile, len(described)), noise=work.noise))
         progress(1)
     return Front(rows, fixed_part(work))
+
+
+def _load_kernels(work: Workload, settings: Sequence[Profile]) -> None:
+    """Run each setting for two steps with a few of the objects, so that no measured step loads or compiles a kernel."""
+    few = work.descriptions[:FEW_OBJECTS]
+    ids = [each.object_id for each in few]
+    steps = [(stamp, states[np.isin(states["id"], ids)]) for stamp, states in work.steps[:FEWEST_STEPS]]
+    for profile in settings:
+        play(Monitor(profile, warns=False), few, steps, lambda done: None)
 
 
 def fixed_part(work: Workload) -> float:
