@@ -66,6 +66,10 @@ def draw_fronts(
 
 def _draw(panel: Any, fronts: Sequence[Front], quantity: str, marks: Mapping[str, str]) -> None:
     text, least = QUANTITIES[quantity]
+    panel.set(xlabel=text)
+    if all(error_of(row, quantity) != error_of(row, quantity) for front in fronts for row in front.rows):
+        panel.text(0.5, 0.5, "no answers to compare", ha="center", transform=panel.transAxes)
+        return
     for front, colour in zip(fronts, COLOURS, strict=False):
         rows = [row for row in front.rows if error_of(row, quantity) == error_of(row, quantity)]
         place = {row.profile: max(error_of(row, quantity), least) for row in rows}
@@ -81,7 +85,7 @@ def _draw(panel: Any, fronts: Sequence[Front], quantity: str, marks: Mapping[str
                 mark = marks[row.profile]
                 at = place[row.profile], row.step_ms
                 panel.scatter(*at, s=58, marker=mark, color=colour, edgecolor="black", zorder=3)
-    panel.set(xscale="log", yscale="log", xlabel=text)
+    panel.set(xscale="log", yscale="log")
     panel.grid(alpha=0.25, which="major")
     panel.yaxis.set_minor_formatter(NullFormatter())
     low, high = panel.get_ylim()
@@ -104,7 +108,7 @@ def _legend(fronts: Sequence[Front], names: Sequence[str], marks: Mapping[str, s
     found = []
     for front, colour in zip(fronts, COLOURS, strict=False):
         noise = front.rows[0].noise
-        label = f"front, states ± {noise:g}" if noise else "front, as stated"
+        label = f"front, states ± {noise:g}" if noise else "front, true states" if len(fronts) > 1 else "front"
         found.append(Line2D([], [], color=colour, marker="o", ms=4, label=label))
     for name, mark in marks.items():
         found.append(Line2D([], [], color="white", marker=mark, ms=8, markeredgecolor="black", label=name))

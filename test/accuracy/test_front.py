@@ -35,7 +35,7 @@ def test_no_setting_beats_one_of_the_front_and_none_misses_a_collision(front: Fr
 
 
 def test_the_fixed_part_is_less_than_any_step_with_pairs(front: Front) -> None:
-    assert 0.0 < front.fixed_us
+    assert front.fixed_us > 0.0
     assert "µs are fixed" in front.summary() and front.summary().startswith("clutter ± 0.005: ")
 
 
