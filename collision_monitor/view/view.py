@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from queue import SimpleQueue
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,11 @@ from collision_monitor.view.state_text import object_html, state_html
 
 if TYPE_CHECKING:
     import viser
+
+GROWTH = 1.2
+SETTLING = 5.0
+"""s after the first objects in which the camera is set again if the scene grows by this factor: objects of several
+topics get their poses one after the other."""
 
 PERIOD = 0.05
 """Shortest time between two pictures (s). More than 20 a second show people no more."""
@@ -36,6 +42,13 @@ class View:
         self._selected: int | None = None
         self._origin: Floats | None = None
         self.is_outdated = True
+        self._began = 0.0
+        self._furnished = 0.0  # the extent for which the camera is set
+
+    @property
+    def _is_new(self) -> bool:
+        """Whether the scene may still lack objects, so that the camera has to follow its size."""
+        return not self._furnished or time.monotonic() - self._began < SETTLING
 
     @property
     def is_watched(self) -> bool:
@@ -54,6 +67,9 @@ class View:
         picture = draw(moment, origin=self._origin, selected=self._selected, alerts=alerts)
         if self._origin is None and len(moment.ids):
             self._origin = picture.origin
+            self._began = time.monotonic()
+        if self._origin is not None and picture.extent > GROWTH * self._furnished and self._is_new:
+            self._furnished = picture.extent
             self._furnish(picture)
         selected = "" if self._selected is None else object_html(moment, self._selected)
         if self._origin is not None and self._origin.any():

@@ -16,9 +16,16 @@ import pytest
 from browser import CHROMIUM, Browser, until
 from played_session import NASTY, STATES, TYPES
 
+from collision_monitor.codec import encode_descriptions
 from collision_monitor.errors import InputError, UnsupportedError
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import ConvexHull, Points
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session import Recorder, Session
-from collision_monitor.view.server import LOOPBACK, start_server
+from collision_monitor.view.page import MOST_HIDDEN, Page
+from collision_monitor.view.picture import draw
+from collision_monitor.view.scene import Scene
+from collision_monitor.view.server import LOOPBACK, start_server, stop_server
 
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
 
@@ -67,6 +74,20 @@ def reds(png: bytes) -> int:
     """Number of pixels with the hue of what touches, left of the panel."""
     red, green, blue = np.moveaxis(pixels(png)[:, :480], -1, 0)
     return int(((red > 120) & (red > 2 * green) & (red > 2 * blue)).sum())
+
+
+def test_forms_that_come_and_go_do_not_pile_up() -> None:
+    server = start_server(LOOPBACK, 0)
+    page, rng = Page(server, lambda _: None), np.random.default_rng(0)
+    for k in range(3 * MOST_HIDDEN):
+        scene = Scene()
+        hull = ObjectDescription(1, ConvexHull(rng.normal(size=(6, 3))), static=True, pose=Pose())
+        scan = ObjectDescription(2, Points(rng.normal(size=(9, 3)), 0.1), static=True, pose=Pose())
+        scene.take("ObjectDescriptionArray", encode_descriptions(k, "world", [hull, scan], snapshot=True))
+        page.show(draw(scene.moment()))
+        assert len(page._batches) <= MOST_HIDDEN + 1
+    assert page._others["clouds"].points.shape == (9, 3)
+    stop_server(server)
 
 
 @needs_browser
