@@ -121,8 +121,8 @@ def look_at(client: Any, place: Any, distance: float) -> None:
     length = float(np.linalg.norm(direction))
     direction = direction / length if length > 0.0 else np.array([-0.6, -0.6, 0.5])
     with client.atomic():
-        client.camera.look_at = np.asarray(place)
         client.camera.position = np.asarray(place) + distance * direction
+        client.camera.look_at = np.asarray(place)  # last, because a new position moves the point looked at
 
 
 def legend(*, alerts: bool) -> str:

@@ -35,7 +35,8 @@ def test_a_pair_without_a_place_has_no_label() -> None:
 def test_no_text_is_lost_and_no_two_labels_are_near(places: list[tuple[float, ...]], distance: float) -> None:
     given_labels = [Label(str(k), f"text {k}", np.array(each, np.float32)) for k, each in enumerate(places)]
     found = _joined(given_labels, distance)
-    assert sorted(text for each in found for text in each.text.split("\n")) == sorted(each.text for each in given_labels)
+    shown = [text for each in found for text in each.text.split("\n")]
+    assert sorted(shown) == sorted(each.text for each in given_labels)
     for k, each in enumerate(found):
         for other in found[:k]:
             assert np.linalg.norm(each.place - other.place) == pytest.approx(distance) or (
