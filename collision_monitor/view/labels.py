@@ -14,7 +14,7 @@ from collision_monitor.view.pair_list import PairRow
 NAMED: Final = 3
 """Soonest pairs with a label. More labels would hide each other."""
 
-SIZE: Final = 0.2
+SIZE: Final = 0.08
 """Size of a label when the page shows the whole scene, in radii of the scene."""
 
 
