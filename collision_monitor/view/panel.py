@@ -33,6 +33,9 @@ PARTS: Final = {
 }
 """What can be hidden: names of `Page.hidden`, and texts."""
 
+WIDTH: Final = 400
+"""Width of the panel with its margin (pixels of the page)."""
+
 _CLEAR: Final = "no pair touches, and none is predicted to"
 _UNKNOWN: Final = "not known: there are no answers"
 
@@ -116,13 +119,21 @@ class Panel:
 
 
 def look_at(client: Any, place: Any, distance: float) -> None:
-    """Move a camera towards a place, from the side on which it is, or from a corner above if it is straight above."""
+    """Move a camera towards a place, from the side on which it is, or from a corner above if it is straight above.
+
+    The place is shown in the middle of what the panel leaves free.
+    """
     direction = client.camera.position - client.camera.look_at
     length = float(np.linalg.norm(direction))
     direction = direction / length if length > 0.0 else np.array([-0.6, -0.6, 0.5])
+    camera, place = client.camera, np.asarray(place, np.float64)
+    if camera.image_width > 2 * WIDTH:
+        right = np.cross((0.0, 0.0, 1.0), direction)
+        pixel = 2.0 * distance * np.tan(0.5 * camera.fov) / camera.image_height
+        place = place + 0.5 * WIDTH * pixel * right / max(float(np.linalg.norm(right)), 1e-9)
     with client.atomic():
-        client.camera.position = np.asarray(place) + distance * direction
-        client.camera.look_at = np.asarray(place)  # last, because a new position moves the point looked at
+        camera.position = place + distance * direction
+        camera.look_at = place  # last, because a new position moves the point looked at
 
 
 def legend(*, alerts: bool) -> str:

@@ -23,7 +23,7 @@ from collision_monitor.geometry.shapes import ConvexHull, Points
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session import Recorder, Session
 from collision_monitor.view.page import MOST_HIDDEN, Page
-from collision_monitor.view.panel import look_at
+from collision_monitor.view.panel import WIDTH, look_at
 from collision_monitor.view.picture import draw
 from collision_monitor.view.scene import Scene
 from collision_monitor.view.server import LOOPBACK, start_server, stop_server
@@ -94,14 +94,18 @@ def test_forms_that_come_and_go_do_not_pile_up() -> None:
 @needs_browser
 def test_the_camera_looks_at_the_place_that_it_is_sent_to(tmp_path: Path) -> None:
     server = start_server(LOOPBACK, 0)
-    browser = Browser(tmp_path / "browser", 600, 400)
+    browser = Browser(tmp_path / "browser", 1000, 700)
     browser.open(f"http://{LOOPBACK}:{server.get_port()}")
     until(server.get_clients)
     (client,) = server.get_clients().values()
     for place, distance in (((5.0, -40.0, 2.0), 30.0), ((5.0, -40.0, 2.0), 3.0), ((-8.0, 1.0, 0.5), 3.0)):
         look_at(client, place, distance)
-        assert np.linalg.norm(client.camera.position - place) == pytest.approx(distance)
-        assert np.allclose(client.camera.look_at, place)
+        ahead = client.camera.look_at - client.camera.position
+        assert np.linalg.norm(ahead) == pytest.approx(distance)
+        aside = place - client.camera.look_at  # the place is to the left, in the middle of what the panel leaves free
+        half_width = distance * np.tan(0.5 * client.camera.fov) * client.camera.aspect
+        assert aside @ np.cross(ahead, (0, 0, 1)) < 0.0 and abs(aside @ ahead) < 1e-6 and abs(aside[2]) < 1e-6
+        assert np.linalg.norm(aside) == pytest.approx(half_width * WIDTH / client.camera.image_width)
     browser.close()
     stop_server(server)
 
