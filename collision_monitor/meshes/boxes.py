@@ -17,6 +17,7 @@ from collision_monitor._jit import device, inlined
 from collision_monitor._jit.lanes import Lanes, load, store
 from collision_monitor.meshes.layout import AXES, CENTER, CORNERS, HALF, RADIUS, ROWS, WIDTH
 from collision_monitor.meshes.placing import Placing, turned_back
+from collision_monitor.tolerances import SAT_ROUND_OFF
 
 
 @inlined
@@ -108,6 +109,41 @@ def _bounds(typing_context, half, M, n, blocks, block, out, at):
 
 
 @intrinsic
+def _separations(typing_context, half, M, blocks, block, out, at):
+    signature = types.void(half, M, blocks, types.int64, out, types.int64)
+
+    def codegen(context, builder, signature, arguments):
+        def vectors(k: int) -> list[Lanes]:
+            return [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[k])]
+
+        e, placing, one = vectors(0), vectors(1), Lanes.constant(builder, 1.0)
+        members = Block(context, builder, signature.args[2], arguments[2], arguments[3])
+        axes, center, f = members.matrix(AXES), members.vector(CENTER), members.vector(HALF)
+        R = [[inner(placing[3 * r : 3 * r + 3], _column(axes, c)) for c in range(3)] for r in range(3)]
+        x = [inner(placing[3 * r : 3 * r + 3], center) + placing[9 + r] for r in range(3)]
+        size = [[abs(R[r][c]) for c in range(3)] for r in range(3)]
+        gaps = [abs(x[r]) - e[r] - inner(size[r], f) for r in range(3)]
+        gaps += [abs(inner(_column(R, c), x)) - f[c] - inner(_column(size, c), e) for c in range(3)]
+        sizes = inner([abs(each) for each in x], [one] * 3) + inner(e, [one] * 3)
+        slack = Lanes.constant(builder, SAT_ROUND_OFF) * (sizes + inner(f, [one] * 3))
+        widest = gaps[0]
+        for gap in gaps[1:]:
+            widest = widest.largest(gap)
+        crossed = gaps[0]
+        for k in range(3):  # the cross product of axis k of the box and axis c of another
+            i, j = (k + 1) % 3, (k + 2) % 3
+            for c in range(3):
+                a, b = (c + 1) % 3, (c + 2) % 3
+                gap = abs(x[j] * R[i][c] - x[i] * R[j][c]) - e[i] * size[j][c] - e[j] * size[i][c]
+                gap = gap - f[a] * size[k][b] - f[b] * size[k][a]
+                crossed = crossed.largest(gap - slack)
+        store(context, builder, crossed.where(crossed, widest), signature.args[4], arguments[4], arguments[5])
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@intrinsic
 def _triangle_bounds(typing_context, half, M, blocks, block, out, at):
     signature = types.void(half, M, blocks, types.int64, out, types.int64)
 
@@ -138,6 +174,15 @@ def box_bounds(blocks_a, a, member, blocks_b, b, X, n, out, at):
     """
     m = turned_back(blocks_a, a, member, n)
     _bounds(half_of(blocks_a, a, member), seen_from(blocks_a, a, member, X), m, blocks_b, b, out, at)
+
+
+@device
+def box_separations(blocks_a, a, member, blocks_b, b, X, out, at):
+    """Write the largest gaps of a box and the eight boxes of block b along an axis of either to out[at: at + 8] (m).
+
+    Arguments as for `box_bounds`. A gap above 0 separates them; the more it is below 0, the deeper they overlap.
+    """
+    _separations(half_of(blocks_a, a, member), seen_from(blocks_a, a, member, X), blocks_b, b, out, at)
 
 
 @device

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.meshes.inside import INSIDE, OUTSIDE, UNKNOWN, is_in
-from collision_monitor.meshes.layout import RADIUS, REACH, WIDTH
+from collision_monitor.meshes.inside import INSIDE, UNKNOWN, is_in
+from collision_monitor.meshes.layout import AXES, CENTER, HALF, RADIUS, REACH, WIDTH
 from collision_monitor.meshes.nearest import MOST_PAIRS, ON_A, ON_B, PLACE_A, nearest
 from collision_monitor.meshes.placing import inverse, relative
 from collision_monitor.meshes.touching import deepest, touching
@@ -36,6 +36,13 @@ def reach_in(blocks: Any, root: int) -> float:
 def reach_of(tree: NDArray[np.float64]) -> float:
     """Distance (m) of the farthest point of a tree from its origin."""
     return float(tree[0, REACH, 1])
+
+
+def in_root_box(tree: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether points (n, 3) in m, in the frame of a tree, are in the box of the whole tree."""
+    axes = tree[0, AXES : AXES + 9, 0].reshape(3, 3)
+    own = (points - tree[0, CENTER : CENTER + 3, 0]) @ axes
+    return np.asarray((np.abs(own) <= tree[0, HALF : HALF + 3, 0]).all(axis=1))
 
 
 @device
@@ -89,15 +96,3 @@ def contact_of_trees(tree_a, R_a, p_a, tree_b, R_b, p_b, limit, out, answer, wor
     """`tree_contact` of two trees at poses given by rotations (3, 3) and positions (3,) (m); the points are about A."""
     p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
     return tree_contact(tree_a, 0, tree_b, 0, PairPose(R_a, R_b, p), limit, out, answer, work)
-
-
-@kernel
-def trees_overlap(tree_a, R_a, p_a, tree_b, R_b, p_b, work):
-    """Whether two trees, placed as in `contact_of_trees`, have a point in common, on a surface or in a solid."""
-    p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
-    X = relative(R_a, R_b, p)
-    if touching(tree_a, 0, tree_b, 0, X, 1, work)[0] > 0:
-        return True
-    if is_in(tree_a, 0, tree_b, 0, X, 0.0, work) != OUTSIDE:
-        return True
-    return is_in(tree_b, 0, tree_a, 0, inverse(X), 0.0, work) != OUTSIDE

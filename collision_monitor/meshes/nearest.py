@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.meshes.boxes import box_bounds, triangle_bounds
 from collision_monitor.meshes.layout import CHILD, CORNERS, FACE, HALF, RADIUS, WIDTH
+from collision_monitor.meshes.leaf_bounds import least_of_pairs, raise_bounds
 from collision_monitor.meshes.placing import inverse, place_triangle, relative, turn_back
 from collision_monitor.meshes.triangle_pair import Triangle, closest_points
 from collision_monitor.narrow_phase.vector import dot, minus, opposite
@@ -26,8 +27,7 @@ DEEPEST: Final = 24
 WAITING: Final = 3 * WIDTH * DEEPEST
 """Numbers for the pairs of boxes that wait: bound, box of A, box of B, each box as WIDTH * block + member."""
 BOUNDS: Final = WAITING
-_TRIANGLES: Final = BOUNDS + WIDTH
-NEAR_A: Final = _TRIANGLES + 9 * WIDTH
+NEAR_A: Final = BOUNDS + WIDTH
 NEAR_B: Final = NEAR_A + WIDTH
 PAIRS: Final = NEAR_B + WIDTH
 MOST_PAIRS: Final = 4096
@@ -35,6 +35,9 @@ MOST_PAIRS: Final = 4096
 along the curve where they cross. The depth of the others is not known then."""
 MEMORY: Final = PAIRS + 2 * MOST_PAIRS
 """Numbers of scratch memory of a query."""
+
+BETWEEN: Final = PAIRS
+"""Bounds on the squared distances of all pairs of triangles of two leaves (m^2), where `touching` keeps its pairs."""
 
 # columns of an answer
 SQUARED: Final = 0
@@ -71,28 +74,6 @@ def size_of(blocks, block, member):
 
 
 @device
-def _write_triangles(blocks, block, X, work):
-    """Write the corners of the triangles of a block, placed by X, into the scratch memory."""
-    for i in range(3):
-        for k in range(WIDTH):
-            x = blocks[block, CORNERS + 3 * i, k]
-            y = blocks[block, CORNERS + 3 * i + 1, k]
-            z = blocks[block, CORNERS + 3 * i + 2, k]
-            work[_TRIANGLES + WIDTH * (3 * i) + k] = X.r00 * x + X.r01 * y + X.r02 * z + X.x
-            work[_TRIANGLES + WIDTH * (3 * i + 1) + k] = X.r10 * x + X.r11 * y + X.r12 * z + X.y
-            work[_TRIANGLES + WIDTH * (3 * i + 2) + k] = X.r20 * x + X.r21 * y + X.r22 * z + X.z
-
-
-@inlined
-def _written_triangle(work, k):
-    return Triangle(
-        (work[_TRIANGLES + k], work[_TRIANGLES + WIDTH + k], work[_TRIANGLES + 2 * WIDTH + k]),
-        (work[_TRIANGLES + 3 * WIDTH + k], work[_TRIANGLES + 4 * WIDTH + k], work[_TRIANGLES + 5 * WIDTH + k]),
-        (work[_TRIANGLES + 6 * WIDTH + k], work[_TRIANGLES + 7 * WIDTH + k], work[_TRIANGLES + 8 * WIDTH + k]),
-    )
-
-
-@device
 def push_nearest_last(blocks, block, work, waiting, limit, fixed, fixed_is_a):
     """Push the pairs of a box and the members of a block with bounds below the limit; return the stack's new length."""
     first = waiting
@@ -122,49 +103,68 @@ def opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
 
 
 @inlined
+def _unit(w):
+    """A vector with at most the length 1, in spite of round-off."""
+    length = sqrt(dot(w, w)) * (1.0 + 4.0 * EPSILON)
+    return w[0] / length, w[1] / length, w[2] / length
+
+
+@inlined
 def _direction(answer, distance):
     """Unit vector between the closest points of an answer; 0 if there is none."""
     if not 0.0 < distance < inf:
         return 0.0, 0.0, 0.0
-    n = minus((answer[ON_B], answer[ON_B + 1], answer[ON_B + 2]), (answer[ON_A], answer[ON_A + 1], answer[ON_A + 2]))
-    length = sqrt(dot(n, n)) * (1.0 + 4.0 * EPSILON)
-    return n[0] / length, n[1] / length, n[2] / length
+    on_a, on_b = (answer[ON_A], answer[ON_A + 1], answer[ON_A + 2]), (answer[ON_B], answer[ON_B + 1], answer[ON_B + 2])
+    return _unit(minus(on_b, on_a))
+
+
+@inlined
+def _least(work, at):
+    """Least of eight numbers."""
+    least = work[at]
+    for k in range(1, WIDTH):
+        least = min(least, work[at + k])
+    return least
 
 
 @device
 def _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, n, best, answer, work):
-    """Improve the answer by the triangles of two leaves; return the best distance. a, i and b, j: their boxes."""
-    limit = best * best
+    """Improve the answer by the triangles of two leaves; return the best distance. a, i and b, j: their boxes.
+
+    The pair with the least bound is examined; its direction raises the bounds of the others.
+    """
     triangle_bounds(blocks_a, a, i, blocks_b, leaf_b, X, work, NEAR_B)
+    if not _least(work, NEAR_B) < best * best:
+        return best
     triangle_bounds(blocks_b, b, j, blocks_a, leaf_a, inverse(X), work, NEAR_A)
-    _write_triangles(blocks_b, leaf_b, X, work)
-    for m in range(WIDTH):
-        if not work[NEAR_B + m] < limit or (m > 0 and blocks_b[leaf_b, FACE, m] == blocks_b[leaf_b, FACE, m - 1]):
-            continue
-        T = _written_triangle(work, m)
-        for k in range(WIDTH):
-            if not work[NEAR_A + k] < limit or (k > 0 and blocks_a[leaf_a, FACE, k] == blocks_a[leaf_a, FACE, k - 1]):
-                continue
-            S = triangle_at(blocks_a, leaf_a, k)
-            radius = blocks_a[leaf_a, RADIUS, k] + blocks_b[leaf_b, RADIUS, m]
-            # the direction between the nearest pair so far separates most others
-            far = max(dot(S.a, n), max(dot(S.b, n), dot(S.c, n)))
-            near = min(dot(T.a, n), min(dot(T.b, n), dot(T.c, n)))
-            if near - far >= best + radius:
-                continue
-            found = closest_points(S, T)
-            distance = max(sqrt(found.squared) - radius, 0.0)
-            if distance < best:
-                best = distance
-                limit = best * best
-                answer[0] = distance
-                for c in range(3):
-                    answer[ON_A + c], answer[ON_B + c] = found.on_a[c], found.on_b[c]
-                answer[PLACE_A], answer[PLACE_B] = WIDTH * leaf_a + k, WIDTH * leaf_b + m
-                n = _direction(answer, best)
-                if best == 0.0:
-                    return best
-    return best
+    if not _least(work, NEAR_A) < best * best:
+        return best
+    for k in range(1, WIDTH):
+        if blocks_a[leaf_a, FACE, k] == blocks_a[leaf_a, FACE, k - 1]:
+            work[NEAR_A + k] = inf
+        if blocks_b[leaf_b, FACE, k] == blocks_b[leaf_b, FACE, k - 1]:
+            work[NEAR_B + k] = inf
+    raise_bounds(n, blocks_a, leaf_a, blocks_b, leaf_b, X, work, BETWEEN, NEAR_A)
+    while True:  # terminates: each pair is examined once
+        bound, pair = least_of_pairs(work, BETWEEN)
+        if not bound < best * best:
+            return best
+        work[BETWEEN + pair] = inf
+        k, m = pair // WIDTH, pair % WIDTH
+        T = place_triangle(X, triangle_at(blocks_b, leaf_b, m))
+        found = closest_points(triangle_at(blocks_a, leaf_a, k), T)
+        distance = max(sqrt(found.squared) - blocks_a[leaf_a, RADIUS, k] - blocks_b[leaf_b, RADIUS, m], 0.0)
+        if distance < best:
+            best = distance
+            answer[0] = distance
+            for c in range(3):
+                answer[ON_A + c], answer[ON_B + c] = found.on_a[c], found.on_b[c]
+            answer[PLACE_A], answer[PLACE_B] = WIDTH * leaf_a + k, WIDTH * leaf_b + m
+            if best == 0.0:
+                return best
+        if found.squared > 0.0:
+            n = _unit(minus(found.on_b, found.on_a))
+            raise_bounds(n, blocks_a, leaf_a, blocks_b, leaf_b, X, work, BETWEEN, -1)
 
 
 @device

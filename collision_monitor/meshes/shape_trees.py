@@ -19,6 +19,10 @@ Array = NDArray[np.float64]
 _KEPT: Final = "_tree"
 """Where a shape keeps its tree, in a tuple, since `array_bytes` counts the arrays of the user."""
 
+CERTAIN, NEVER, UNCERTAIN = range(3)
+"""What a tree tells of the inside of its shape: which points are inside; none is certainly inside, because the surface
+has a hole; nothing, also of a cloud."""
+
 
 def shape_tree(shape: Shape) -> Array | None:
     """Tree of a shape's surface; None for a shape that triangles with a radius cannot represent exactly.
@@ -28,22 +32,29 @@ def shape_tree(shape: Shape) -> Array | None:
     """
     kept = shape.__dict__.get(_KEPT)
     if kept is None:
-        is_certain = not isinstance(shape, Mesh) or shape.surface.certain
-        kept = shape.__dict__[_KEPT] = (made_tree(shape), is_concave_mesh(shape), is_certain)
+        kept = _keep(shape)
     tree: Array | None = kept[0]
     return tree
 
 
-def trees_of_pair(a: Shape, b: Shape) -> tuple[Array, Array] | None:
+def _keep(shape: Shape) -> tuple[Array | None, bool, int]:
+    inside = UNCERTAIN if isinstance(shape, Points) else CERTAIN
+    if isinstance(shape, Mesh) and not shape.surface.certain:
+        inside = NEVER if len(shape.surface.hole) else UNCERTAIN
+    kept = shape.__dict__[_KEPT] = (made_tree(shape), is_concave_mesh(shape), inside)
+    return kept
+
+
+def trees_of_pair(a: Shape, b: Shape, surface: bool = False) -> tuple[Array, Array] | None:
     """Trees of two shapes; None unless one of them is a concave mesh and the other has a tree.
 
-    Also None for a cloud, and if it is not certain what is inside of a mesh.
+    Also None for a cloud, and if it is not certain what is inside of a mesh. surface: of a mesh with a hole that is the
+    surface alone.
     """
-    if isinstance(a, Points) or isinstance(b, Points):
-        return None
-    tree_a, tree_b = shape_tree(a), shape_tree(b)
-    (_, concave_a, certain_a), (_, concave_b, certain_b) = a.__dict__[_KEPT], b.__dict__[_KEPT]
-    if tree_a is None or tree_b is None or not (concave_a or concave_b) or not (certain_a and certain_b):
+    tree_a, concave_a, inside_a = a.__dict__.get(_KEPT) or _keep(a)
+    tree_b, concave_b, inside_b = b.__dict__.get(_KEPT) or _keep(b)
+    most = NEVER if surface else CERTAIN
+    if tree_a is None or tree_b is None or inside_a > most or inside_b > most or not (concave_a or concave_b):
         return None
     return tree_a, tree_b
 

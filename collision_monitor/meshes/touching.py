@@ -6,9 +6,19 @@ from math import inf, sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.meshes.boxes import box_bounds, triangle_bounds
+from collision_monitor.meshes.boxes import box_separations, triangle_bounds
 from collision_monitor.meshes.layout import CHILD, FACE, RADIUS, WIDTH
-from collision_monitor.meshes.nearest import BOUNDS, NEAR_A, NEAR_B, PAIRS, PLACE_A, PLACE_B, opens_b, triangle_at
+from collision_monitor.meshes.nearest import (
+    BOUNDS,
+    NEAR_A,
+    NEAR_B,
+    PAIRS,
+    PLACE_A,
+    PLACE_B,
+    opens_b,
+    push_nearest_last,
+    triangle_at,
+)
 from collision_monitor.meshes.placing import inverse, place_triangle, relative
 from collision_monitor.meshes.triangle_pair import Triangle, closest_points, crossing_point
 from collision_monitor.narrow_phase.vector import Vector, along, cross, dot, minus
@@ -16,21 +26,12 @@ from collision_monitor.tolerances import PARALLEL_SIN2
 
 NOWHERE: Final = (0.0, 0.0, 0.0)
 
+OPEN: Final = 5e-324
+"""Least gap (m) that separates two boxes: the smallest number above 0."""
+
 MOST_LEAVES: Final = 100_000
 """Most pairs of leaves to examine, about 50 ms. Hostile meshes, such as a million triangles in a point, need more; the
 answer then says that it is not complete."""
-
-
-@device
-def _push_meeting(blocks: Any, block: int, work: Any, waiting: int, fixed: float, fixed_is_a: bool) -> int:
-    """Push the pairs of a box and the members of a block that may overlap; return the stack's new length."""
-    for k in range(WIDTH):
-        if blocks[block, CHILD, k] != 0.0 and work[BOUNDS + k] <= 0.0:
-            place = float(WIDTH * block + k)
-            work[2 * waiting] = fixed if fixed_is_a else place
-            work[2 * waiting + 1] = place if fixed_is_a else fixed
-            waiting += 1
-    return waiting
 
 
 @inlined
@@ -48,11 +49,11 @@ def touching(
     Pair k is at work[PAIRS + 2 k]: the places of both triangles. Other arguments as in `nearest`.
     """
     Y = inverse(X)
-    work[0], work[1] = WIDTH * root_a, WIDTH * root_b
+    work[0], work[1], work[2] = 0.0, WIDTH * root_a, WIDTH * root_b
     waiting, found, leaves = 1, 0, 0
     while waiting > 0:  # terminates: each pair of boxes is opened once
         waiting -= 1
-        place_a, place_b = int(work[2 * waiting]), int(work[2 * waiting + 1])
+        place_a, place_b = int(work[3 * waiting + 1]), int(work[3 * waiting + 2])
         a, i, b, j = place_a // WIDTH, place_a % WIDTH, place_b // WIDTH, place_b % WIDTH
         child_a, child_b = blocks_a[a, CHILD, i], blocks_b[b, CHILD, j]
         if child_a < 0.0 and child_b < 0.0:
@@ -77,12 +78,12 @@ def touching(
                         found += 1
         elif opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
             block = root_b + int(child_b)
-            box_bounds(blocks_a, a, i, blocks_b, block, X, NOWHERE, work, BOUNDS)
-            waiting = _push_meeting(blocks_b, block, work, waiting, float(place_a), True)
+            box_separations(blocks_a, a, i, blocks_b, block, X, work, BOUNDS)
+            waiting = push_nearest_last(blocks_b, block, work, waiting, OPEN, float(place_a), True)
         else:
             block = root_a + int(child_a)
-            box_bounds(blocks_b, b, j, blocks_a, block, Y, NOWHERE, work, BOUNDS)
-            waiting = _push_meeting(blocks_a, block, work, waiting, float(place_b), False)
+            box_separations(blocks_b, b, j, blocks_a, block, Y, work, BOUNDS)
+            waiting = push_nearest_last(blocks_a, block, work, waiting, OPEN, float(place_b), False)
     return found, True
 
 
@@ -137,6 +138,36 @@ def triangle_depth(S: Triangle, T: Triangle) -> tuple[float, Vector]:
 
 
 @device
+def triangle_contact(S: Triangle, T: Triangle, radius: float) -> tuple[float, Vector, Vector]:
+    """Depth (m) of two triangles enlarged by this radius together, its direction from S to T, and a point on S.
+
+    The depth is negative if they are apart.
+    """
+    crosses, _ = crossing_point(S, T)
+    if crosses:
+        depth, n = triangle_depth(S, T)
+        parted = Triangle(along(T.a, depth, n), along(T.b, depth, n), along(T.c, depth, n))
+        return depth + radius, n, closest_points(S, parted).on_a
+    found = closest_points(S, T)
+    length = sqrt(found.squared)
+    w = minus(found.on_b, found.on_a)
+    n = (w[0] / length, w[1] / length, w[2] / length) if length > 0.0 else (0.0, 0.0, 1.0)
+    return radius - length, n, found.on_a
+
+
+@device
+def contact_of_places(
+    blocks_a: Any, a: int, blocks_b: Any, b: int, X: Any
+) -> tuple[float, Vector, Vector]:
+    """`triangle_contact` of the triangles at two places, WIDTH * block + member; the point is on A's surface."""
+    S = triangle_at(blocks_a, a // WIDTH, a % WIDTH)
+    T = place_triangle(X, triangle_at(blocks_b, b // WIDTH, b % WIDTH))
+    own = blocks_a[a // WIDTH, RADIUS, a % WIDTH]
+    depth, n, x = triangle_contact(S, T, own + blocks_b[b // WIDTH, RADIUS, b % WIDTH])
+    return depth, n, along(x, own, n)
+
+
+@device
 def deepest(
     blocks_a: Any, blocks_b: Any, X: Any, work: Any, count: int, answer: Any
 ) -> tuple[float, Vector, Vector]:
@@ -147,25 +178,10 @@ def deepest(
     best, direction, point = -1.0, (0.0, 0.0, 1.0), NOWHERE
     for k in range(count):
         a, b = int(work[PAIRS + 2 * k]), int(work[PAIRS + 2 * k + 1])
-        S = triangle_at(blocks_a, a // WIDTH, a % WIDTH)
-        T = place_triangle(X, triangle_at(blocks_b, b // WIDTH, b % WIDTH))
-        radius = blocks_a[a // WIDTH, RADIUS, a % WIDTH] + blocks_b[b // WIDTH, RADIUS, b % WIDTH]
-        crosses, _ = crossing_point(S, T)
-        if crosses or radius == 0.0:
-            depth, n = triangle_depth(S, T)
-            parted = Triangle(along(T.a, depth, n), along(T.b, depth, n), along(T.c, depth, n))
-            x = closest_points(S, parted).on_a
-            depth += radius
-        else:
-            found = closest_points(S, T)
-            length = sqrt(found.squared)
-            w = minus(found.on_b, found.on_a)
-            n = (w[0] / length, w[1] / length, w[2] / length) if length > 0.0 else (0.0, 0.0, 1.0)
-            x, depth = found.on_a, radius - length
+        depth, n, x = contact_of_places(blocks_a, a, blocks_b, b, X)
         if depth > best:
-            best, direction = depth, n
+            best, direction, point = depth, n, x
             answer[PLACE_A], answer[PLACE_B] = a, b
-            point = along(x, blocks_a[a // WIDTH, RADIUS, a % WIDTH], n)
     return best, direction, point
 
 

@@ -29,7 +29,8 @@ from collision_monitor.prediction.impact_record import (
     UNRESOLVED,
     write_pair,
 )
-from collision_monitor.prediction.mesh_pair import advance_mesh, has_mesh, shapes_within
+from collision_monitor.prediction.mesh_impact import mesh_impact
+from collision_monitor.prediction.mesh_pair import has_mesh, shapes_within, triangles_contact
 from collision_monitor.prediction.motion import half_acceleration, relative_position, relative_velocity, rotation_at
 from collision_monitor.prediction.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
 from collision_monitor.tolerances import EPSILON
@@ -39,6 +40,9 @@ AT_REST: Final = (0.0, 0.0, 0.0)
 FARTHER: Final = 4.0
 """Factor by which the advance along a turning axis may exceed that along an axis at rest. Larger: the bound on where
 the bodies are by then is looser. Smaller: the advance may stop short."""
+
+NO_PLACES: Final = (-1, -1)
+"""In place of the places of two triangles."""
 
 NEWTON_STEPS: Final = 12
 """Steps towards a time of certain overlap; pairs that need more stay UNRESOLVED."""
@@ -129,7 +133,7 @@ def shape_impact(table, parts, pair, window, tube, query, scratch):
     """
     A, B, a, b = pair
     if has_mesh(table, a, b):
-        return _mesh_impact(table, parts, pair, window, tube, query, scratch)
+        return mesh_impact(table, parts, pair, window, tube, query, scratch)
     begin, end = window
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
@@ -178,48 +182,17 @@ def shape_impact(table, parts, pair, window, tube, query, scratch):
 
 
 @device
-def _mesh_impact(table, parts, pair, window, tube, query, scratch):
-    """`shape_impact` of a pair with a mesh: each step advances all of its triangles, through their trees."""
-    A, B, a, b = pair
-    begin, end = window
-    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
-    acceleration = (B.ax - A.ax, B.ay - A.ay, B.az - A.az)
-    w_a, w_b = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
-    scratch.answer[PLACE_A] = scratch.answer[PLACE_B] = -1.0
-    t = t_before = begin
-    gap_before = inf
-    status, iteration, guess = UNRESOLVED, 0, 0.0
-    while iteration < query.iterations:
-        iteration += 1
-        rotation_at(A, t, R_i)
-        rotation_at(B, t, R_j)
-        oa = place_shape(table, parts, a, R_i, R_a)
-        ob = place_shape(table, parts, b, R_j, R_b)
-        p, v = relative_position(A, B, t), relative_velocity(A, B, t)
-        at = Placed(a, b, R_a, R_b, oa, ob, p, v, acceleration, w_a, w_b)
-        margin = query.margin + tube.start + tube.growth * (t - begin)
-        d, gap = advance_mesh(table, at, margin, tube.growth, end - t, query.tolerance, scratch)
-        if d == 0.0:
-            if t > t_before and gap_before > gap:
-                wanted = gap + query.tolerance + 2.0 * (tube.start + tube.growth * (t - begin))
-                guess = wanted * (t - t_before) / (gap_before - gap)
-            status = HIT
-            break
-        if d >= end - t:
-            return CLEAR, end, iteration, guess
-        t_before, gap_before = t, gap
-        if t + d <= t:  # the time has no finer resolution
-            break
-        t += d
-    return status, t, iteration, guess
-
-
-@device
 def contact_at(table, parts, pair, t, scratch):
     """Write the contact of a pair of shapes (ShapePair) at time t into scratch.out; return the signed distance (m).
 
     scratch.out holds a contact row about A's origin, followed by the closing speed (m/s).
     """
+    return _contact_at(table, parts, pair, t, NO_PLACES, scratch)
+
+
+@device
+def _contact_at(table, parts, pair, t, places, scratch):
+    """`contact_at`, or if there are places of two triangles (mesh_pair.py), the contact of these."""
     A, B, a, b = pair
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
@@ -229,7 +202,10 @@ def contact_at(table, parts, pair, t, scratch):
     ob = place_shape(table, parts, b, R_j, R_b)
     p = relative_position(A, B, t)
     pose = PairPose(R_a, R_b, (p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]))
-    shapes_within(table, a, b, pose, inf, out, scratch)
+    if places[0] >= 0:
+        triangles_contact(table, a, b, pose, places, out)
+    else:
+        shapes_within(table, a, b, pose, inf, out, scratch)
     for k in range(3):
         out[POINT_A + k] += oa[k]
         out[POINT_B + k] += oa[k]
@@ -252,9 +228,11 @@ def closing_speed(v, wa, wb, p, out):
     return -(vx * out[NORMAL] + vy * out[NORMAL + 1] + vz * out[NORMAL + 2])
 
 
-@inlined
-def _certain_overlap(multibody, pair, start, guess, window, tube, query, scratch):
+@device
+def _certain_overlap(multibody, pair, start, guess, places, window, tube, query, scratch):
     """Return a time in [start, window.end] at which a pair overlaps by more than the tube; inf: none found.
+
+    places: as for `_contact_at`; two triangles that overlap are enough.
 
     Newton steps on the signed distance; start + guess is tried first if it lies in the interval. The contact at the
     returned time stays in scratch.out. The tube's time begins with the window.
@@ -263,7 +241,7 @@ def _certain_overlap(multibody, pair, start, guess, window, tube, query, scratch
     guessed = 0.0 < guess < end - start
     t = start + guess if guessed else start
     for _ in range(NEWTON_STEPS):
-        distance = contact_at(multibody.table, multibody.parts, pair, t, scratch)
+        distance = _contact_at(multibody.table, multibody.parts, pair, t, places, scratch)
         excess = distance + scratch.out[BOUND] - query.margin + tube.start + tube.growth * (t - begin)
         if excess <= 0.0:
             return t
@@ -321,13 +299,14 @@ def body_impact(multibody, i, j, window, query, scratch, event):
     queries = 0
     start, stop = begin + first, begin + last
     there = Tube(tube.start + tube.growth * first, tube.growth)
-    lower, guess = inf, 0.0
+    lower, guess, places = inf, 0.0, NO_PLACES
     while a >= 0:
         pair = ShapePair(A, B, a, b)
+        scratch.answer[PLACE_A] = -1.0
         status, t, n, soon = shape_impact(table, parts, pair, Window(start, stop), there, query, scratch)
         queries += n
         if status != CLEAR and t < lower:
-            lower, guess = t, soon
+            lower, guess, places = t, soon, (int(scratch.answer[PLACE_A]), int(scratch.answer[PLACE_B]))
             event.status = status
             event.shape_i, event.shape_j = a, b
             stop = t
@@ -335,7 +314,9 @@ def body_impact(multibody, i, j, window, query, scratch, event):
     if event.status == CLEAR:
         return queries
     pair = ShapePair(A, B, event.shape_i, event.shape_j)
-    sure = _certain_overlap(multibody, pair, lower, guess, window, tube, query, scratch)
+    sure = _certain_overlap(multibody, pair, lower, guess, places, window, tube, query, scratch)
+    if sure == inf and places[0] >= 0:  # the first triangles may slide off each other
+        sure = _certain_overlap(multibody, pair, lower, 0.0, NO_PLACES, window, tube, query, scratch)
     if sure == inf:
         contact_at(table, parts, pair, lower, scratch)
     event.lower, event.upper = lower, sure

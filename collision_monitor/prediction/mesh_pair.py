@@ -1,4 +1,4 @@
-"""Pairs of shapes with a mesh or a cloud: their contact at one time, and a time without one, by their trees."""
+"""Contacts of pairs of shapes with a mesh or a cloud, by their trees."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ from math import sqrt
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.shape_table import HALF_SPACE, MESH, POINTS, TREE
-from collision_monitor.meshes.advance import advance_trees
-from collision_monitor.meshes.approach import Approach
 from collision_monitor.meshes.contact import FARTHER, OPEN, tree_contact
 from collision_monitor.meshes.feature import triangle_feature
 from collision_monitor.meshes.layout import FACE, WIDTH
 from collision_monitor.meshes.nearest import PLACE_A, PLACE_B
 from collision_monitor.meshes.placing import relative
-from collision_monitor.meshes.solid import SolidMemory, advance_to_solid, solid_contact
+from collision_monitor.meshes.solid import SolidMemory, solid_contact
+from collision_monitor.meshes.touching import contact_of_places
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,
     DISTANCE,
@@ -23,20 +22,23 @@ from collision_monitor.narrow_phase.contact_row import (
     POINT_A,
     POINT_B,
     VERTEX,
+    write,
 )
 from collision_monitor.narrow_phase.dispatch import contact_within
-from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
-from collision_monitor.narrow_phase.vector import dot, opposite, rotate_back
+from collision_monitor.narrow_phase.pair_pose import swapped
+from collision_monitor.narrow_phase.vector import along, dot, opposite, rotate, rotate_back, sum_of_sizes
+from collision_monitor.tolerances import SAT_ROUND_OFF
 
 
 @inlined
 def has_mesh(table, a, b):
     """Whether one of two shapes is a mesh or a cloud."""
-    return _is_mesh(table, a) or _is_mesh(table, b)
+    return is_mesh(table, a) or is_mesh(table, b)
 
 
 @inlined
-def _is_mesh(table, s):
+def is_mesh(table, s):
+    """Whether a shape is a mesh or a cloud."""
     return table.kind[s] == MESH or table.kind[s] == POINTS
 
 
@@ -46,17 +48,17 @@ def _has_tree(table, s):
 
 
 @inlined
-def _are_trees(table, a, b):
+def have_trees(table, a, b):
     """Whether the trees of both shapes meet. A cloud meets convex solids point by point, which tells how deep."""
     if not (_has_tree(table, a) and _has_tree(table, b)):
         return False
     if table.kind[a] == POINTS or table.kind[b] == POINTS:
-        return _is_mesh(table, a) and _is_mesh(table, b)
+        return is_mesh(table, a) and is_mesh(table, b)
     return True
 
 
 @inlined
-def _root(table, s):
+def root_of(table, s):
     """First block of a shape's tree."""
     return int(table.size[s, TREE]) - 1
 
@@ -69,8 +71,8 @@ def mesh_within(table, a, b, pose, limit, out, scratch):
     pair of triangles or points; a translation that parts them may be longer.
     """
     kind_a, kind_b, p = table.kind[a], table.kind[b], pose.p
-    are_trees = _are_trees(table, a, b)
-    is_swapped = (kind_a > kind_b or (kind_a == kind_b and a > b)) if are_trees else not _is_mesh(table, a)
+    are_trees = have_trees(table, a, b)
+    is_swapped = (kind_a > kind_b or (kind_a == kind_b and a > b)) if are_trees else not is_mesh(table, a)
     if is_swapped:
         a, b = b, a
         pose = swapped(pose)
@@ -78,7 +80,7 @@ def mesh_within(table, a, b, pose, limit, out, scratch):
     if are_trees:
         answer, work = scratch.answer, scratch.tree
         answer[PLACE_A] = answer[PLACE_B] = -1.0
-        first, second = _root(table, a), _root(table, b)
+        first, second = root_of(table, a), root_of(table, b)
         known = tree_contact(table.blocks, first, table.blocks, second, pose, limit + margins, out, answer, work)
         if known == FARTHER:
             return False
@@ -95,7 +97,7 @@ def mesh_within(table, a, b, pose, limit, out, scratch):
         _name_feature(table, b, answer[PLACE_B], rotate_back(pose.R_B, opposite(n)), out, 1)
     else:
         memory = SolidMemory(scratch.triangle, scratch.work, scratch.tree)
-        if not solid_contact(table.blocks, _root(table, a), table.margin[a], table, b, pose, limit, out, memory):
+        if not solid_contact(table.blocks, root_of(table, a), table.margin[a], table, b, pose, limit, out, memory):
             return False
     if is_swapped:
         for c in range(3):
@@ -119,49 +121,19 @@ def _name_feature(table, s, place, n, out, side):
         out[at], out[at + 1] = triangle_feature(table.blocks, block, k, n, table.radius[s])
 
 
+@device
+def triangles_contact(table, a, b, pose, places, out):
+    """Write the contact of two triangles of shapes with trees, at places as in `meshes.nearest`."""
+    X = relative(pose.R_A, pose.R_B, pose.p)
+    depth, n, x = contact_of_places(table.blocks, places[0], table.blocks, places[1], X)
+    n, margins = rotate(pose.R_A, n), table.margin[a] + table.margin[b]
+    round_off = SAT_ROUND_OFF * (table.radius[a] + table.radius[b] + sum_of_sizes(pose.p))
+    write(out, -depth - margins, n, along(rotate(pose.R_A, x), table.margin[a], n), round_off)
+
+
 @inlined
 def shapes_within(table, a, b, pose, limit, out, scratch):
     """`contact_within` of any two shapes, meshes included."""
     if has_mesh(table, a, b):
         return mesh_within(table, a, b, pose, limit, out, scratch)
     return contact_within(table, a, b, pose, limit, out, scratch.work)
-
-
-@device
-def advance_mesh(table, at, margin, growth, until, tolerance, scratch):
-    """Return a time in (0, until] (s) up to which two shapes with a mesh stay apart, and the gap that limits it (m).
-
-    at (Placed): the two shapes now, and their motion. margin (m): gap that counts as contact now; growth: of it (m/s).
-    The time is 0 if the gap is within the tolerance (m). scratch.answer: a hint, as `advance_trees` leaves it.
-    """
-    a, b, R_a, R_b, o_a, o_b = at.a, at.b, at.R_a, at.R_b, at.o_a, at.o_b
-    w_a, w_b, v, acceleration = at.w_a, at.w_b, at.v, at.acceleration
-    p = at.p[0] + o_b[0] - o_a[0], at.p[1] + o_b[1] - o_a[1], at.p[2] + o_b[2] - o_a[2]
-    are_trees = _are_trees(table, a, b)
-    if not are_trees and not _is_mesh(table, a):
-        a, b, R_a, R_b, o_a, o_b = b, a, R_b, R_a, o_b, o_a
-        w_a, w_b, v, acceleration, p = w_b, w_a, opposite(v), opposite(acceleration), opposite(p)
-    # velocity of the shapes' origins, which turn about those of their bodies
-    v = (
-        v[0] + (w_b[1] * o_b[2] - w_b[2] * o_b[1]) - (w_a[1] * o_a[2] - w_a[2] * o_a[1]),
-        v[1] + (w_b[2] * o_b[0] - w_b[0] * o_b[2]) - (w_a[2] * o_a[0] - w_a[0] * o_a[2]),
-        v[2] + (w_b[0] * o_b[1] - w_b[1] * o_b[0]) - (w_a[0] * o_a[1] - w_a[1] * o_a[0]),
-    )
-    bend_a, bend_b = dot(w_a, w_a), dot(w_b, w_b)
-    bend = sqrt(dot(acceleration, acceleration)) + bend_a * sqrt(dot(o_a, o_a)) + bend_b * sqrt(dot(o_b, o_b))
-    move = Approach(
-        rotate_back(R_a, v),
-        rotate_back(R_a, w_a),
-        rotate_back(R_a, w_b),
-        bend_a,
-        bend_b,
-        bend,
-        margin + table.margin[a] + table.margin[b],
-        growth,
-    )
-    if are_trees:
-        X, answer, work = relative(R_a, R_b, p), scratch.answer, scratch.tree
-        first, second = _root(table, a), _root(table, b)
-        return advance_trees(table.blocks, first, table.blocks, second, X, move, until, tolerance, answer, work)
-    pose, memory = PairPose(R_a, R_b, p), SolidMemory(scratch.triangle, scratch.work, scratch.tree)
-    return advance_to_solid(table.blocks, _root(table, a), table, b, pose, move, until, tolerance, memory)

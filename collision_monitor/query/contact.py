@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import Capsule, HalfSpace, Mesh, Points, Shape, Sphere
-from collision_monitor.meshes.contact import APART, ENCLOSED, OPEN, contact_of_trees, reach_of
+from collision_monitor.meshes.contact import APART, ENCLOSED, OPEN, contact_of_trees, in_root_box, reach_of
 from collision_monitor.meshes.extent import extents
 from collision_monitor.meshes.nearest import MEMORY, answer_row
 from collision_monitor.meshes.shape_trees import shape_tree, trees_of_pair
@@ -39,6 +40,7 @@ from collision_monitor.query.arguments import checked_pose
 from collision_monitor.query.cloud_pair import cloud_contact
 from collision_monitor.query.convex_pairs import convex_contact
 from collision_monitor.query.fillings import fillings
+from collision_monitor.query.mesh_pairs import mesh_contact
 from collision_monitor.query.nearest_pieces import NearestPieces
 from collision_monitor.query.piece_table import PieceTable, exact_piece_table, piece_table
 from collision_monitor.records import Model
@@ -103,12 +105,14 @@ class Contact:
     _find: Callable[[], NearestPieces] | None = field(repr=False)  # source of the patch; None: the two points alone
 
     def __getattr__(self, name: str) -> Any:
-        """Make a field of the contact of two convex solids when it is first read."""
+        """Make a field of a contact that was found quickly when it is first read."""
         known = vars(self)
         if "_row" not in known:
             raise _missing(self, name)
-        if name in _COLUMNS:
-            value: Any = known["_row"][_COLUMNS[name] : _COLUMNS[name] + 3]
+        if name == "error_bound":
+            value: Any = _contact(*self.arguments, "exact").error_bound
+        elif name in _COLUMNS:
+            value = known["_row"][_COLUMNS[name] : _COLUMNS[name] + 3]
         elif name in ("model_a", "model_b"):
             value = Model.EXACT
         elif name == "_find":
@@ -212,12 +216,20 @@ def contact(
     Contact(1 m ± ..., box face 0 – sphere surface)
     """
     if isinstance(model, str | int) and model in ("exact", Model.EXACT):
-        quick = convex_contact(shape_a, pose_a, shape_b, pose_b)
+        meshes = [shape for shape in (shape_a, shape_b) if type(shape) is Mesh]
+        quick = (mesh_contact if meshes else convex_contact)(shape_a, pose_a, shape_b, pose_b)
         if quick is not None:
-            return _of_row(quick, (shape_a, pose_a, shape_b, pose_b))
-        apart = _meshes_apart(shape_a, pose_a, shape_b, pose_b)
-        if apart is not None:
-            return apart
+            made = _of_row(quick, (shape_a, pose_a, shape_b, pose_b))
+            if not all(mesh.surface.certain for mesh in meshes):
+                del vars(made)["error_bound"]  # made when it is read, because it takes longer than the distance
+            return made
+    return _contact(shape_a, pose_a, shape_b, pose_b, model)
+
+
+def _contact(
+    shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, model: Model | str | ArrayLike
+) -> Contact:
+    """`contact` of any shapes and models."""
     a, b = _posed(shape_a, pose_a, model, "A"), _posed(shape_b, pose_b, model, "B")
     planes = {is_planar(shape) for shape, _ in (*a.shapes, *b.shapes)}
     if len(planes) > 1:
@@ -269,7 +281,7 @@ def contact(
 
 
 def _of_row(quick: tuple[float, float, Array], arguments: tuple[Compound, Pose, Compound, Pose]) -> Contact:
-    """Contact of two convex solids. Its arrays are made when they are read, which takes as long as the kernel."""
+    """Contact of a row. Its arrays are made when they are read, which takes as long as the kernel."""
     distance, bound, row = quick
     made = _new(Contact)
     _set(made, "__dict__", {"signed_distance": distance, "error_bound": bound, "_row": row, "_arguments": arguments})
@@ -281,45 +293,6 @@ def _nearest(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -
     a, b = _posed(shape_a, pose_a, Model.EXACT, "A"), _posed(shape_b, pose_b, Model.EXACT, "B")
     offset = b.pose.position - a.pose.position
     return _nearest_pieces(a, b, offset)
-
-
-def _contact_of_trees(
-    tree_a: Array, X: tuple[Array, Array], tree_b: Array, Y: tuple[Array, Array]
-) -> tuple[int, Array]:
-    """Return what `contact_of_trees` knows and the row of the contact.
-
-    The poses are copied because numba compiles a kernel once more for each combination of read-only arrays.
-    """
-    row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
-    R_a, p_a, R_b, p_b = (each.copy() for each in (*X, *Y))
-    return contact_of_trees(tree_a, R_a, p_a, tree_b, R_b, p_b, np.inf, row, answer, work), row
-
-
-def _meshes_apart(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -> Contact | None:
-    """The contact of a concave mesh and another single shape if they are apart; else None."""
-    if not (type(shape_a) is Mesh or type(shape_b) is Mesh):
-        return None
-    if not (isinstance(shape_a, Shape) and isinstance(shape_b, Shape)):
-        return None
-    if not (isinstance(pose_a, Pose) and isinstance(pose_b, Pose)):
-        return None
-    trees = trees_of_pair(shape_a, shape_b)
-    if trees is None:
-        return None
-    X, Y = (pose_a.rotation, pose_a.position), (pose_b.rotation, pose_b.position)
-    known, row = _contact_of_trees(trees[0], X, trees[1], Y)
-    if known != APART:
-        return None
-
-    distance, normal = float(row[DISTANCE]), row[NORMAL : NORMAL + 3]
-    point = pose_a.position + row[POINT_A : POINT_A + 3]
-    far = point + distance * normal
-    arguments = shape_a, pose_a, shape_b, pose_b
-    made = Contact(
-        distance, float(row[BOUND]), normal, point, far, Model.EXACT, Model.EXACT, lambda: _nearest(*arguments)
-    )
-    vars(made)["_arguments"] = arguments
-    return made
 
 
 class _Deepest(NamedTuple):
@@ -373,6 +346,18 @@ def _by_clouds(a: _Posed, b: _Posed, offset: Array) -> _Deepest | None:
     return best
 
 
+def _contact_of_trees(
+    trees: tuple[Array, Array], X: tuple[Array, Array], Y: tuple[Array, Array]
+) -> tuple[int, Array]:
+    """Return what `contact_of_trees` knows of two trees with these rotations and positions, and the contact row.
+
+    The rotations are copied because numba compiles a kernel once more for each combination of read-only arrays.
+    """
+    row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
+    R_a, R_b = X[0].copy(), Y[0].copy()
+    return contact_of_trees(trees[0], R_a, X[1], trees[1], R_b, Y[1], np.inf, row, answer, work), row
+
+
 def _by_trees(a: _Posed, b: _Posed) -> _Deepest | None:
     """The contact of a concave mesh and another single shape through their trees; None for other pairs.
 
@@ -386,7 +371,7 @@ def _by_trees(a: _Posed, b: _Posed) -> _Deepest | None:
         return None
     (R_a, p_a), (R_b, p_b) = _place(a), _place(b)
     p_b = p_b + (b.pose.position - a.pose.position)
-    known, row = _contact_of_trees(trees[0], (R_a, p_a), trees[1], (R_b, p_b))
+    known, row = _contact_of_trees((trees[0], trees[1]), (R_a, p_a), (R_b, p_b))
     if known != APART and not all(isinstance(shape, Mesh | Sphere | Capsule) for shape in pair):
         return None
     if known == OPEN:
@@ -431,7 +416,8 @@ def _where(inner: _Posed, outer: _Posed, offset: Array) -> int:
         if not isinstance(shape, Mesh):
             continue
         own = (points - outer.rotation @ pose.position) @ (outer.rotation @ pose.rotation)
-        own = own[((own >= shape.vertices.min(axis=0)) & (own <= shape.vertices.max(axis=0))).all(axis=1)]
+        tree = shape_tree(shape)
+        own = own if tree is None else own[in_root_box(tree, own)]
         if len(own):
             location = locate_in_surface(own, shape.surface)
             if ((location == Location.INSIDE) | (location == Location.BOUNDARY)).any():
@@ -443,14 +429,41 @@ def _where(inner: _Posed, outer: _Posed, offset: Array) -> int:
 
 def _distance_of_fillings(a: _Posed, b: _Posed) -> float:
     """Lower bound (m) of the distances of A's fillings from B and from its fillings; infinite if A has none."""
+    others = [*b.outline, *(fillings(b.shapes) if b.model is Model.EXACT else ())]
+    return _least_gap(fillings(a.shapes) if a.model is Model.EXACT else (), a.pose, others, b.pose)
+
+
+def least_gap(
+    shapes_a: Sequence[tuple[Shape, Pose]], pose_a: Pose, shapes_b: Sequence[tuple[Shape, Pose]], pose_b: Pose
+) -> float:
+    """Lower bound (m) of the distance of two objects with the fillings of open meshes, below 0 if these overlap.
+
+    It is -inf if one may be inside the other.
+    """
+    a, b = _Posed(shapes_a, pose_a, shapes_a), _Posed(shapes_b, pose_b, shapes_b)
+    offset = pose_b.position - pose_a.position
+    if _where(a, b, offset) != Location.OUTSIDE or _where(b, a, -offset) != Location.OUTSIDE:
+        return -np.inf
+    return _least_gap([*shapes_a, *fillings(shapes_a)], pose_a, [*shapes_b, *fillings(shapes_b)], pose_b)
+
+
+def _least_gap(
+    shapes_a: Sequence[tuple[Shape, Pose]], pose_a: Pose, shapes_b: Sequence[tuple[Shape, Pose]], pose_b: Pose
+) -> float:
+    """The same of all surfaces and solids, each for itself; infinite without any."""
+    offset = pose_b.position - pose_a.position
     least = np.inf
-    for filling in fillings(a.shapes) if a.model is Model.EXACT else ():
-        own = _Posed([filling], a.pose, [filling])
-        for shapes in ([shape] for shape in (*b.outline, *(fillings(b.shapes) if b.model is Model.EXACT else ()))):
-            other = _Posed(shapes, b.pose, shapes)
-            offset = b.pose.position - a.pose.position
-            deepest = _by_clouds(own, other, offset) or _by_trees(own, other) or _by_pieces(own, other, offset)
-            least = min(least, float(deepest.row[DISTANCE] - deepest.row[BOUND]))
+    for pair in product(shapes_a, shapes_b):
+        a, b = (_Posed([own], pose, [own]) for own, pose in zip(pair, (pose_a, pose_b), strict=True))
+        trees = trees_of_pair(pair[0][0], pair[1][0], surface=True)
+        if trees is None:
+            row = (_by_clouds(a, b, offset) or _by_trees(a, b) or _by_pieces(a, b, offset)).row
+        else:
+            place_a, (R_b, p_b) = _place(a), _place(b)
+            known, row = _contact_of_trees(trees, place_a, (R_b, p_b + offset))
+            if known == OPEN:
+                return -np.inf
+        least = min(least, float(row[DISTANCE] - row[BOUND]))
     return least
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-import numpy as np
-
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import Hull, convex_hull
 from collision_monitor.geometry.cascade import polyhedra_intersect
@@ -17,12 +15,10 @@ from collision_monitor.geometry.polyhedron_sat import sat_3d
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Polygon, Shape
 from collision_monitor.geometry.triangulation import convex_parts
-from collision_monitor.meshes.contact import trees_overlap
-from collision_monitor.meshes.nearest import MEMORY
-from collision_monitor.meshes.shape_trees import trees_of_pair
 from collision_monitor.query.arguments import checked_pose
 from collision_monitor.query.contact import Compound, contact
 from collision_monitor.query.convex_pairs import convex_contact
+from collision_monitor.query.mesh_pairs import mesh_overlap
 
 TESTS: Final = ("contact", "cascade", "sat", "edges")
 
@@ -41,15 +37,11 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
     True
     """
     if test == "contact":
-        if (found := convex_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
-            return found[0] <= 0.0
         if type(shape_a) is Mesh or type(shape_b) is Mesh:
-            posed = isinstance(pose_a, Pose) and isinstance(pose_b, Pose)
-            if posed and isinstance(shape_a, Shape) and isinstance(shape_b, Shape):
-                trees = trees_of_pair(shape_a, shape_b)
-                if trees is not None:
-                    X, Y = (pose_a.rotation, pose_a.position), (pose_b.rotation, pose_b.position)
-                    return bool(trees_overlap(trees[0], *X, trees[1], *Y, np.empty(MEMORY)))
+            if (meet := mesh_overlap(shape_a, pose_a, shape_b, pose_b)) is not None:
+                return meet
+        elif (found := convex_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
+            return found[0] <= 0.0
         return contact(shape_a, pose_a, shape_b, pose_b).overlaps
     if test not in TESTS:
         raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")

@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from collision_monitor._jit import kernel
+from collision_monitor._jit import inlined, kernel
 from collision_monitor.geometry.shape_table import SPHERE
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE
 from collision_monitor.prediction.bodies import Bodies, Multibody, Parts, make_bodies, make_parts
@@ -41,6 +41,19 @@ def impact_memory() -> ImpactMemory:
     return ImpactMemory(bodies, parts, make_scratch(), np.zeros(1, IMPACT), np.zeros(CONTACT_SIZE))
 
 
+@inlined
+def set_motion(bodies, slot, states, n, table, horizon):
+    """Write the packed motion states[n] to the body in a slot, which has one shape, in the same slot of the table."""
+    motion = bodies.motion[slot]
+    motion.x, motion.y, motion.z = states[n, 0], states[n, 1], states[n, 2]
+    motion.vx, motion.vy, motion.vz = states[n, 7], states[n, 8], states[n, 9]
+    motion.wx, motion.wy, motion.wz = states[n, 10], states[n, 11], states[n, 12]
+    motion.ax, motion.ay, motion.az = states[n, 13], states[n, 14], states[n, 15]
+    motion.radius, motion.cover = table.radius[slot], horizon
+    quaternion_to_matrix(states[:, 3:7], n, motion.rotation)
+    bodies.spin_radius[slot] = 0.0 if table.kind[slot] == SPHERE else table.radius[slot]
+
+
 @kernel
 def pair_impact_rows(a, at_a, states_a, b, at_b, states_b, query, own, memory, rows):
     """Write the first impacts of N pairs to rows (N, 3): lower and upper (s), infinite for none, and a code.
@@ -66,16 +79,8 @@ def pair_impact_rows(a, at_a, states_a, b, at_b, states_b, query, own, memory, r
         if contact[DISTANCE] < separation - round_off:
             rows[k, 0] = rows[k, 1] = 0.0
             continue
-        for slot in range(2):
-            states, n = (states_a, i) if slot == 0 else (states_b, j)
-            motion = bodies.motion[slot]
-            motion.x, motion.y, motion.z = states[n, 0], states[n, 1], states[n, 2]
-            motion.vx, motion.vy, motion.vz = states[n, 7], states[n, 8], states[n, 9]
-            motion.wx, motion.wy, motion.wz = states[n, 10], states[n, 11], states[n, 12]
-            motion.ax, motion.ay, motion.az = states[n, 13], states[n, 14], states[n, 15]
-            motion.radius, motion.cover = table.radius[slot], horizon
-            quaternion_to_matrix(states[:, 3:7], n, motion.rotation)
-            bodies.spin_radius[slot] = 0.0 if table.kind[slot] == SPHERE else table.radius[slot]
+        set_motion(bodies, 0, states_a, i, table, horizon)
+        set_motion(bodies, 1, states_b, j, table, horizon)
         multibody = Multibody(table, parts, bodies)
         body_impact(multibody, first, second, Window(0.0, horizon), search, scratch, event[0])
         if event[0].status == CLEAR:

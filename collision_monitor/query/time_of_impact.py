@@ -10,12 +10,14 @@ import numpy as np
 
 from collision_monitor.errors import TooCostlyError, UnsupportedError
 from collision_monitor.geometry.pose import Motion
-from collision_monitor.geometry.shapes import HalfSpace, Mesh, Sphere
+from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape, Sphere
+from collision_monitor.prediction.bodies import Multibody
 from collision_monitor.prediction.impact_record import HIT
 from collision_monitor.query.arguments import finite_number, whole_number
-from collision_monitor.query.contact import Compound, Contact, contact
+from collision_monitor.query.contact import Compound, Contact, contact, least_gap
 from collision_monitor.query.convex_pairs import convex_impact
 from collision_monitor.query.fillings import fillings
+from collision_monitor.query.mesh_impact import mesh_impact
 from collision_monitor.query.moving_pair import (
     MotionQuery,
     MovingShape,
@@ -108,30 +110,55 @@ def time_of_impact(
 
         duration = finite_number("step", step, positive=True)
         return impact_by_method(shape_a, motion_a, shape_b, motion_b, query, method, duration)
-    quick = convex_impact(shape_a, motion_a, shape_b, motion_b, query)
-    if quick is not None:
-        return _of_times(quick, (shape_a, motion_a, shape_b, motion_b))
+    arguments = shape_a, motion_a, shape_b, motion_b
+    quick = _quick_impact(*arguments, query)
+    meshes = [shape for shape in (shape_a, shape_b) if type(shape) is Mesh]
+    if quick is not None and all(mesh.surface.certain for mesh in meshes):
+        return _of_times(quick, arguments)
     a, b = make_moving_shape(shape_a, motion_a, "A"), make_moving_shape(shape_b, motion_b, "B")
     check_bounded(a, b)
-    found = _first_impact(a, b, query)
+    found = _first_impact(a, b, query) if quick is None else _of_times(quick, arguments)
     if all(shape.surface.certain for body in (a, b) for shape, _ in body.shapes if isinstance(shape, Mesh)):
         return found
-    solid_a, solid_b = (make_moving_shape([*s.shapes, *fillings(s.shapes)], s.motion, "filled") for s in (a, b))
-    possible = _first_impact(solid_a, solid_b, query, uncertain=True).lower
-    if possible >= found.lower:
-        return found
-    if found.status == "hit":
-        return Impact("hit", possible, found.upper, found.contact)
-    meeting = contact(a.shapes, a.motion.at(possible), b.shapes, b.motion.at(possible))
-    return Impact("unresolved", possible, math.inf, meeting)
+    possible = _first_possible_impact(a, b, query) if found.lower > 0.0 else 0.0
+    return found if possible >= found.lower else _impact(possible, found.upper, found.method, arguments)
+
+
+def _quick_impact(
+    shape_a: Compound, motion_a: Motion, shape_b: Compound, motion_b: Motion, query: MotionQuery
+) -> tuple[float, float] | None:
+    """Lower and upper end for two convex solids, or a mesh and a shape with a tree; None for others."""
+    if type(shape_a) is not Mesh and type(shape_b) is not Mesh:
+        return convex_impact(shape_a, motion_a, shape_b, motion_b, query)
+    if isinstance(shape_a, Shape) and isinstance(shape_b, Shape):
+        return mesh_impact(shape_a, motion_a, shape_b, motion_b, query)
+    return None
+
+
+def _round_off(multibody: Multibody) -> float:
+    """Depth (m) of two bodies up to which they only touch."""
+    radii = multibody.bodies.motion["radius"]
+    return GJK_TOUCHING * float(radii[np.isfinite(radii)].sum())
+
+
+def _first_possible_impact(a: MovingShape, b: MovingShape, query: MotionQuery) -> float:
+    """First time (s) at which the solids of open meshes may meet; infinite for never."""
+    gap = least_gap(a.shapes, a.motion.pose, b.shapes, b.motion.pose)
+    a, b = (make_moving_shape([*s.shapes, *fillings(s.shapes)], s.motion, "filled") for s in (a, b))
+    multibody = lay_out_pair(a, b, query.horizon)
+    if gap < query.separation - _round_off(multibody):
+        return 0.0
+    events = first_impacts(multibody, np.array([[0, 1]], np.int32), 0.0, query)
+    if len(events) and events[0]["lower"] <= 0.0:
+        return _first_impact(a, b, query, uncertain=True).lower
+    return float(events[0]["lower"]) if len(events) else math.inf
 
 
 def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain: bool = False) -> Impact:
     """First impact of the shapes, of an open mesh its surface; `uncertain`: a possible overlap at the start counts."""
     start = contact(a.shapes, a.motion.pose, b.shapes, b.motion.pose)
     multibody = lay_out_pair(a, b, query.horizon)
-    radii = multibody.bodies.motion["radius"]
-    round_off = GJK_TOUCHING * float(radii[np.isfinite(radii)].sum())
+    round_off = _round_off(multibody)
     least = start.signed_distance - (start.error_bound if uncertain else 0.0)
     if least < query.separation - round_off:
         return Impact("hit", 0.0, 0.0, start)

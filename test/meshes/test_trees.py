@@ -174,14 +174,14 @@ def test_the_reach_of_a_tree_is_that_of_its_corners():
 
 
 def test_a_point_is_inside_a_closed_surface_where_the_exact_test_says_so():
-    from collision_monitor.meshes.contact import trees_overlap
+    from collision_monitor.query.mesh_pairs import trees_overlap
 
     rng = np.random.default_rng(9)
     tree = tree_of(SURFACES["ring"], closed=True)
     points = rng.uniform(-1.5, 1.5, (300, 3)) * (1, 1, 0.4)
     expected = locate_in_polyhedron(points, RING.vertices, RING.faces) >= 0
     dot = tree_of(np.zeros((1, 3, 3)))
-    eye = np.eye(3)
-    got = [bool(trees_overlap(tree, eye, np.zeros(3), dot, eye, point, WORK)) for point in points]
+    poses = np.column_stack([points, np.zeros((300, 3)), np.ones(300)])
+    got = [bool(trees_overlap(tree, np.eye(7)[6:], dot, pose[None], np.zeros((2, 3, 3)), WORK)) for pose in poses]
     assert got == expected.tolist()
     assert expected.any() and not expected.all()

@@ -1,0 +1,87 @@
+"""Lower bounds on the distances of all pairs of triangles of two leaves, along a direction between any two of them."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any, Final
+
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from collision_monitor._jit import device, inlined
+from collision_monitor._jit.lanes import Lanes, load, store
+from collision_monitor.meshes.boxes import Block, inner
+from collision_monitor.meshes.layout import CORNERS, RADIUS, WIDTH
+from collision_monitor.meshes.placing import Placing, turn_back
+from collision_monitor.narrow_phase.vector import Vector, opposite
+
+PAIRS_OF_LEAVES: Final = WIDTH * WIDTH
+
+
+@intrinsic
+def _reach_along(typing_context, n, blocks, block, out, at):
+    """Write how far the triangles of a block reach along n, with their radii, to out[at: at + 8] (m)."""
+    signature = types.void(n, blocks, types.int64, out, types.int64)
+
+    def codegen(context, builder, signature, arguments):
+        n = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
+        members = Block(context, builder, signature.args[1], arguments[1], arguments[2])
+        x, y, z = (inner(n, members.vector(CORNERS + 3 * i)) for i in range(3))
+        reach = x.largest(y).largest(z) + members.row(RADIUS)
+        store(context, builder, reach, signature.args[3], arguments[3], arguments[4])
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@intrinsic
+def _raise_bounds(typing_context, numbers, work, other, known, out):
+    """Write max(least, known, (gap - other)^2) to work[out: out + 8], of the numbers least (m^2) and gap (m)."""
+    signature = types.void(numbers, work, types.int64, types.int64, types.int64)
+
+    def codegen(context, builder, signature, arguments):
+        least, gap = (Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0]))
+        array = signature.args[1], arguments[1]
+        far, before = (load(context, builder, *array, at) for at in arguments[2:4])
+        open_ = (gap - far).largest(Lanes.constant(builder, 0.0))
+        store(context, builder, before.largest(least).largest(open_ * open_), *array, arguments[4])
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@device
+def raise_bounds(
+    n: Vector, blocks_a: Any, leaf_a: int, blocks_b: Any, leaf_b: int, X: Placing, work: Any, at: int, near: int
+) -> None:
+    """Raise the bounds on the squared distances of all pairs, work[at: at + 64], to those along a unit direction n.
+
+    near >= 0: begin with the larger of work[near + k] and work[near + 8 + m] for the triangles k of A and m of B.
+    """
+    far = at + PAIRS_OF_LEAVES
+    gap = n[0] * X.x + n[1] * X.y + n[2] * X.z
+    _reach_along(n, blocks_a, leaf_a, work, far)
+    _reach_along(turn_back(X, opposite(n)), blocks_b, leaf_b, work, far + WIDTH)
+    for k in range(WIDTH):
+        row = at + WIDTH * k
+        if near >= 0:
+            _raise_bounds((work[near + k], gap - work[far + k]), work, far + WIDTH, near + WIDTH, row)
+        else:
+            _raise_bounds((0.0, gap - work[far + k]), work, far + WIDTH, row, row)
+
+
+@inlined
+def least_of_pairs(work: Any, at: int) -> tuple[float, int]:
+    """Least of the numbers of all pairs of triangles of two leaves, and the pair: 8 k + m."""
+    best, first = inf, 0
+    for row in range(0, PAIRS_OF_LEAVES, WIDTH):
+        least = work[at + row]
+        for k in range(1, WIDTH):
+            least = min(least, work[at + row + k])
+        if least < best:
+            best, first = least, row
+    pair = first
+    while work[at + pair] != best and pair < first + WIDTH - 1:
+        pair += 1
+    return best, pair

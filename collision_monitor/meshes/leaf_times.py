@@ -1,0 +1,148 @@
+"""Time until which the triangles of two leaves stay apart, while both move: one step of conservative advancement.
+
+The direction between the closest points of one pair of triangles bounds the times of all 64 pairs at once. The pair
+with the least bound is looked at next, until it has been.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Any, Final
+
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from collision_monitor._jit import device
+from collision_monitor._jit.lanes import Lanes, load, store
+from collision_monitor.meshes.approach import Approach, seen_from_b
+from collision_monitor.meshes.box_times import norm, times_until, triangle_times
+from collision_monitor.meshes.boxes import Block, inner
+from collision_monitor.meshes.layout import CORNERS, RADIUS, WIDTH
+from collision_monitor.meshes.leaf_bounds import least_of_pairs
+from collision_monitor.meshes.nearest import NEAR_A, NEAR_B, triangle_at
+from collision_monitor.meshes.placing import Placing, inverse, place_triangle, turn_back
+from collision_monitor.meshes.triangle_pair import closest_points
+from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus, opposite
+
+SHARE: Final = 0.7
+"""Share of the time of the best pair known that is a good enough bound. Larger: more pairs are looked at. Smaller: more
+steps."""
+
+FACTS: Final = 4
+"""Rows of `_extents`: largest n . x with the radius, k . x, u . x, and |x| over the points x of a triangle."""
+
+# in the scratch memory of a query, instead of the boxes that wait
+_TIMES: Final = 0
+_OWN: Final = _TIMES + WIDTH * WIDTH
+_OTHER: Final = _OWN + FACTS * WIDTH
+
+
+@intrinsic
+def _extents(typing_context, directions, blocks, block, out, at):
+    signature = types.void(directions, blocks, types.int64, out, types.int64)
+
+    def codegen(context, builder, signature, arguments):
+        numbers = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
+        members = Block(context, builder, signature.args[1], arguments[1], arguments[2])
+        corners = [members.vector(CORNERS + 3 * i) for i in range(3)]
+        rows = [[inner(numbers[3 * k : 3 * k + 3], corner) for corner in corners] for k in range(3)]
+        rows.append([norm(corner) for corner in corners])
+        for k, (x, y, z) in enumerate(rows):
+            largest = x.largest(y).largest(z)
+            row = largest + members.row(RADIUS) if k == 0 else largest
+            store(context, builder, row, signature.args[3], arguments[3], arguments[4], WIDTH * k)
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@intrinsic
+def _raise_times(typing_context, numbers, work, other, times):
+    signature = types.void(numbers, work, types.int64, types.int64)
+
+    def codegen(context, builder, signature, arguments):
+        fields = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
+        gap, speed, bent, largest, change, bend, jerk, until = fields
+        far, forth, curving, reach = (
+            load(context, builder, signature.args[1], arguments[1], arguments[2], WIDTH * k) for k in range(FACTS)
+        )
+        curvatures = largest + bend * reach, bent + curving, change + jerk * reach
+        time = times_until(gap - far, speed + forth, curvatures, until)
+        known = load(context, builder, signature.args[1], arguments[1], arguments[3])
+        store(context, builder, known.largest(time), signature.args[1], arguments[1], arguments[3])
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@device
+def _raise_along(
+    n: Vector, blocks_a: Any, leaf_a: int, blocks_b: Any, leaf_b: int, X: Placing, move: Approach, aim: float, work: Any
+) -> None:
+    """Raise the times of all pairs to those until which they stay `aim` (m) apart along a direction n."""
+    k, m = cross(n, move.w_a), cross(n, move.w_b)
+    u = cross(k, move.w_a)
+    _extents((n[0], n[1], n[2], k[0], k[1], k[2], u[0], u[1], u[2]), blocks_a, leaf_a, work, _OWN)
+    gap = n[0] * X.x + n[1] * X.y + n[2] * X.z - move.start - aim
+    d, f, u = turn_back(X, opposite(n)), turn_back(X, opposite(m)), turn_back(X, cross(move.w_b, m))
+    _extents((d[0], d[1], d[2], f[0], f[1], f[2], u[0], u[1], u[2]), blocks_b, leaf_b, work, _OTHER)
+    speed, bent = move.growth - dot(n, move.v), -dot(n, move.a)
+    for i in range(WIDTH):
+        reach = work[_OWN + 3 * WIDTH + i]
+        numbers = (
+            gap - work[_OWN + i],
+            speed + work[_OWN + WIDTH + i],
+            bent + work[_OWN + 2 * WIDTH + i],
+            move.bend + move.bend_a * reach,
+            move.jerk + move.jerk_a * reach,
+            move.bend_b,
+            move.jerk_b,
+            move.until,
+        )
+        _raise_times(numbers, work, _OTHER, _TIMES + WIDTH * i)
+
+
+@device
+def leaf_time(
+    blocks_a: Any, place_a: int, leaf_a: int, blocks_b: Any, place_b: int, leaf_b: int, X: Placing, move: Approach,
+    tolerance: float, enough: float, pair: int, work: Any,
+) -> tuple[float, int]:
+    """Return a time until which all triangles of two leaves stay apart, and the pair that limits it.
+
+    place_a, place_b: their boxes, WIDTH * block + member. pair: the one to look at first, -1 for none. The time is 0 if
+    a pair is within the tolerance (m) beyond the wanted gap; else the advance aims at half the tolerance, unless a time
+    of `enough` is certain earlier.
+    """
+    for k in range(WIDTH * WIDTH):
+        work[_TIMES + k] = 0.0
+    seen, best, first, is_bounded = 0, inf, pair, False
+    while True:  # terminates: each pair is looked at once
+        if pair >= 0 and not (seen >> pair) & 1:
+            seen |= 1 << pair
+            i, j = pair // WIDTH, pair % WIDTH
+            T = place_triangle(X, triangle_at(blocks_b, leaf_b, j))
+            found = closest_points(triangle_at(blocks_a, leaf_a, i), T)
+            length = sqrt(found.squared)
+            gap = length - blocks_a[leaf_a, RADIUS, i] - blocks_b[leaf_b, RADIUS, j] - move.start
+            if gap <= tolerance or length == 0.0:
+                return 0.0, pair
+            w = minus(found.on_b, found.on_a)
+            n = w[0] / length, w[1] / length, w[2] / length
+            _raise_along(n, blocks_a, leaf_a, blocks_b, leaf_b, X, move, 0.5 * tolerance, work)
+            if work[_TIMES + pair] < best:
+                best, first = work[_TIMES + pair], pair
+        elif not is_bounded:
+            is_bounded = True
+            triangle_times(blocks_a, place_a // WIDTH, place_a % WIDTH, blocks_b, leaf_b, X, move, work, NEAR_B)
+            b, j, back = place_b // WIDTH, place_b % WIDTH, seen_from_b(X, move)
+            triangle_times(blocks_b, b, j, blocks_a, leaf_a, inverse(X), back, work, NEAR_A)
+            for i in range(WIDTH):
+                for j in range(WIDTH):
+                    at = _TIMES + WIDTH * i + j
+                    work[at] = max(work[at], max(work[NEAR_A + i], work[NEAR_B + j]))
+        soon, pair = least_of_pairs(work, _TIMES)
+        if soon >= SHARE * best or soon > enough or soon >= move.until or (seen >> pair) & 1:
+            return soon, first
+        if not is_bounded:
+            pair = -1
