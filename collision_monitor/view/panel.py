@@ -39,7 +39,7 @@ WIDTH: Final = 400
 CORNER: Final = np.array([-0.9, -1.3, 1.3])
 """Direction from the scene to a new camera."""
 
-WHOLE: Final = 1.6
+WHOLE: Final = 2.0
 """Distance from which a camera sees the whole scene, in its radii."""
 
 _CLEAR: Final = "no pair touches, and none is predicted to"
@@ -117,7 +117,7 @@ class Panel:
         """Move the camera of the browser that clicked to a pair."""
         place = self._rows[k].place if k < len(self._rows) else None
         if place is not None and event.client is not None:
-            look_at(event.client, place - self._origin, 8.0 * self._unit)
+            look_at(event.client, place - self._origin, min(8.0 * self._unit, self._extent))
 
     def _home(self, client: Any) -> None:
         if client is not None:
