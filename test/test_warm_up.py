@@ -105,7 +105,7 @@ WATCHED = """
 from collision_monitor import warm_up
 from collision_monitor._jit.kernel_cache import KernelCache
 from collision_monitor.settings.profile import Profile
-warm_up.warm_up_monitor({profile})
+{warm_up}
 loaded, load = [], KernelCache.load_overload
 
 def watch(self, sig, target):
@@ -118,12 +118,18 @@ CERTAIN_SESSION = re.sub(r"    if step == 5:\n.*\n    if step in .*\n.*\n", "", 
 
 
 @pytest.mark.parametrize(
-    ("profile", "session"), [("", SESSION), ("Profile(uncertainty=False)", CERTAIN_SESSION)], ids=["all", "certain"]
+    ("warm_up", "session"),
+    [
+        ("warm_up.warm_up_monitor()", SESSION),
+        ("warm_up.warm_up_monitor(Profile(uncertainty=False))", CERTAIN_SESSION),
+        ("warm_up.warm_up_monitor(); warm_up.warm_up_functions()", FUNCTIONS),
+    ],
+    ids=["all", "certain", "functions"],
 )
-def test_no_step_loads_a_kernel_after_the_warm_up(profile: str, session: str) -> None:
+def test_nothing_is_loaded_after_the_warm_up(warm_up: str, session: str) -> None:
     """The first step of a node once compiled a kernel for 0.5 s that the warm-up did not call."""
-    assert ("contact_points" in session) == (profile == "")
-    program = WATCHED.format(profile=profile) + session.replace("print(json.dumps", "print(json.dumps(loaded)) #")
+    assert "contact_points" in SESSION and "contact_points" not in CERTAIN_SESSION
+    program = WATCHED.format(warm_up=warm_up) + session.replace("print(json.dumps", "print(json.dumps(loaded)) #")
     answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=600)
     assert answer.stdout.strip() == "[]", answer.stderr
 

@@ -27,6 +27,7 @@ from collision_monitor.geometry.shapes import (
     Ellipsoid,
     HalfSpace,
     Mesh,
+    Points,
     Polygon,
     Shape,
     Sphere,
@@ -49,7 +50,8 @@ class Form:
     """A mesh: vertices (v, 3), in m or in units of a piece's scale; faces (f, 3), counter-clockwise from outside.
 
     name: equal forms have equal names. flat: facets are shown, not smoothed. closed: seen only from outside. own: it
-    belongs to one shape, and is not one of the unit forms.
+    belongs to one shape, and is not one of the unit forms. diameter: of the points of a cloud (m); a cloud has no
+    faces.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Form:
     flat: bool
     closed: bool
     own: bool = False
+    diameter: float = 0.0
 
     @cached_property
     def bounds(self) -> tuple[Floats, Floats]:
@@ -106,6 +109,8 @@ def pieces_of(shape: Shape, pose: Pose) -> Iterator[Piece]:
             yield Piece(_own_form("polygon", _filled(shape), closed=False), pose, (1.0, 1.0, 1.0))
         case ConvexHull():
             yield Piece(_own_form("hull", _outward(surface_triangles(shape)), closed=True), pose, (1.0, 1.0, 1.0))
+        case Points():
+            yield Piece(_cloud(shape), pose, (1.0, 1.0, 1.0))
         case _:
             closed = not isinstance(shape, Mesh)
             yield Piece(
@@ -158,6 +163,13 @@ def _welded(name: str, triangles: Floats, *, closed: bool, own: bool = False) ->
 def _own_form(kind: str, triangles: Floats, *, closed: bool) -> Form:
     digest = blake2b(np.ascontiguousarray(triangles).tobytes(), digest_size=8).hexdigest()
     return _welded(f"{kind}_{digest}", triangles, closed=closed, own=True)
+
+
+def _cloud(shape: Points) -> Form:
+    points = np.asarray(shape.points, np.float32)
+    digest = blake2b(points.tobytes(), digest_size=8).hexdigest()
+    none = np.zeros((0, 3), np.uint32)
+    return Form(f"cloud_{digest}", points, none, flat=True, closed=False, diameter=2.0 * shape.radius)
 
 
 def _outward(triangles: Floats) -> Floats:

@@ -25,6 +25,9 @@ _LINEAR: Final = np.round(255.0 * (np.arange(256) / 255.0) ** 2.2).astype(np.uin
 _WHITE: Final = (255, 255, 255)
 _TUBE: Final = (240, 200, 110)
 
+MOST_HIDDEN: Final = 64
+"""Forms without objects that the browser keeps, because meshes come back to their poses of impact."""
+
 Pick = Callable[[int], None]
 
 
@@ -35,7 +38,7 @@ class Page:
         self._server, self._scene, self._on_pick = server, server.scene, on_pick
         self._batches: dict[tuple[Role, str], Any] = {}
         self._ids: dict[tuple[Role, str], Any] = {}
-        self._labels: list[Any] = []
+        self._labels: dict[str, Any] = {}
         self._others: dict[str, Any] = {}
         self.hidden: set[str] = set()
         server.scene.set_up_direction("+z")
@@ -48,8 +51,7 @@ class Page:
     def show(self, picture: Picture) -> None:
         """Show a picture."""
         with self._server.atomic():
-            for key in self._batches.keys() - picture.batches.keys():
-                self._batches[key].visible = False
+            self._hide_batches(picture)
             for key, batch in picture.batches.items():
                 self._show_batch(key, batch)
             self._show_points(picture)
@@ -58,6 +60,15 @@ class Page:
             self._show_labels(picture)
 
     # -- parts
+
+    def _hide_batches(self, picture: Picture) -> None:
+        """Hide the forms that nothing has any more. Remove the oldest, or forms that come and go would pile up."""
+        hidden = [key for key in self._batches if key not in picture.batches]
+        for key in hidden:
+            self._batches[key].visible = False
+        for key in hidden[: max(0, len(hidden) - MOST_HIDDEN)]:
+            self._batches.pop(key).remove()
+            del self._ids[key]
 
     def _show_batch(self, key: tuple[Role, str], batch: Batch) -> None:
         role, name = key
@@ -98,6 +109,7 @@ class Page:
         white = np.tile(np.array(_WHITE, np.uint8), (len(picture.contacts), 1))
         self._points("contacts", picture.contacts, white, 0.12 * picture.unit)
         self._points("impacts", picture.impacts, picture.impact_colors, 0.14 * picture.unit)
+        self._points("clouds", picture.clouds, picture.cloud_colors, picture.cloud_diameter)
 
     def _points(self, name: str, points: Any, colors: Any, size: float) -> None:
         handle = self._others.get(name)
@@ -143,14 +155,18 @@ class Page:
                 handle.vertices, handle.faces = vertices, faces
 
     def _show_labels(self, picture: Picture) -> None:
-        labels = picture.labels if "names" not in self.hidden else []
-        for k, (text, place) in enumerate(labels):
-            if k == len(self._labels):
-                self._labels.append(self._scene.add_label(f"/names/{k}", text, position=place, anchor="bottom-center"))
-            handle = self._labels[k]
-            handle.text, handle.position, handle.visible = text, place, True
-        for handle in self._labels[len(labels) :]:
-            handle.visible = False
+        """Keep one label for each key: a browser moves a label at once and writes a new text on it later."""
+        labels = {each.key: each for each in picture.labels if "names" not in self.hidden}
+        for key in self._labels.keys() - labels.keys():
+            self._labels.pop(key).remove()
+        for key, (_, text, place) in labels.items():
+            handle = self._labels.get(key)
+            if handle is None:
+                self._labels[key] = self._scene.add_label(
+                    f"/names/{key}", text, position=place, anchor="bottom-center"
+                )
+            else:
+                handle.text, handle.position = text, place
 
 
 def _linear(colors: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -54,7 +54,7 @@ def _prediction_row(moment: Moment, row: np.void, level: Level) -> PairRow:
     elif level is Level.POSSIBLE:
         when = f"≥ {lower:.2f} s, {probability:.0%}" if math.isfinite(probability) else f"≥ {lower:.2f} s, possible"
     else:
-        when = f"{lower:.2f} s"
+        when = f"{lower:.2f} s, {probability:.0%}" if math.isfinite(probability) else f"{lower:.2f} s"
     return _row(moment, row, f"{when}, stale" if row["stale"] else when, level, row["point"])
 
 

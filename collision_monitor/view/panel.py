@@ -33,6 +33,15 @@ PARTS: Final = {
 }
 """What can be hidden: names of `Page.hidden`, and texts."""
 
+WIDTH: Final = 400
+"""Width of the panel with its margin (pixels of the page)."""
+
+CORNER: Final = np.array([-0.9, -1.3, 1.3])
+"""Direction from the scene to a new camera."""
+
+WHOLE: Final = 2.0
+"""Distance from which a camera sees the whole scene, in its radii."""
+
 _CLEAR: Final = "no pair touches, and none is predicted to"
 _UNKNOWN: Final = "not known: there are no answers"
 
@@ -108,21 +117,29 @@ class Panel:
         """Move the camera of the browser that clicked to a pair."""
         place = self._rows[k].place if k < len(self._rows) else None
         if place is not None and event.client is not None:
-            look_at(event.client, place - self._origin, 8.0 * self._unit)
+            look_at(event.client, place - self._origin, min(8.0 * self._unit, self._extent))
 
     def _home(self, client: Any) -> None:
         if client is not None:
-            look_at(client, self._centre, 1.6 * self._extent)
+            look_at(client, self._centre, WHOLE * self._extent)
 
 
-def look_at(client: Any, place: Any, distance: float) -> None:
-    """Move a camera towards a place, from the side on which it is, or from a corner above if it is straight above."""
-    direction = client.camera.position - client.camera.look_at
+def look_at(client: Any, place: Any, distance: float, direction: Any = None) -> None:
+    """Move a camera towards a place. direction (3,): from the place to the camera; None: the side on which it is.
+
+    The place is shown in the middle of what the panel leaves free.
+    """
+    camera, place = client.camera, np.asarray(place, np.float64)
+    direction = camera.position - camera.look_at if direction is None else direction
     length = float(np.linalg.norm(direction))
-    direction = direction / length if length > 0.0 else np.array([-0.6, -0.6, 0.5])
+    direction = direction / length if length > 0.0 else CORNER / np.linalg.norm(CORNER)
+    if camera.image_width > 2 * WIDTH:
+        right = np.cross((0.0, 0.0, 1.0), direction)
+        pixel = 2.0 * distance * np.tan(0.5 * camera.fov) / camera.image_height
+        place = place + 0.5 * WIDTH * pixel * right / max(float(np.linalg.norm(right)), 1e-9)
     with client.atomic():
-        client.camera.look_at = np.asarray(place)
-        client.camera.position = np.asarray(place) + distance * direction
+        camera.position = place + distance * direction
+        camera.look_at = place  # last, because a new position moves the point looked at
 
 
 def legend(*, alerts: bool) -> str:

@@ -13,6 +13,7 @@ from collision_monitor.geometry.pose import rotation_matrix
 from collision_monitor.records import Phase, PredictionStatus
 from collision_monitor.view.bodies import Bodies, Floats, Indices
 from collision_monitor.view.forms import PLANE, Form
+from collision_monitor.view.labels import Label, labels
 from collision_monitor.view.levels import COLORS, Level, object_levels, prediction_levels
 from collision_monitor.view.moment import Moment
 from collision_monitor.view.pair_list import PairRow, soonest_pairs
@@ -26,9 +27,6 @@ ROWS: Final = 8
 
 IMPACTS: Final = 24
 """Soonest predicted pairs that are drawn with their paths, and in their poses of impact. More would hide the scene."""
-
-NAMED: Final = 3
-"""Soonest pairs with a label in the scene. More labels would hide each other."""
 
 FAR: Final = 1e3
 """m: a scene farther away than this is drawn about an origin of its own, because a browser computes in single
@@ -58,15 +56,17 @@ class Batch(NamedTuple):
 class Picture:
     """Lengths in m, positions from `origin` (3,).
 
-    batches: by role and form. contacts (c, 3): points; normals (c, 2, 3): lines, from A to B. impacts (i, 3): places of
-    predicted collisions, with colours (i, 3). paths (p, 2, 3): line segments, with colours (p, 2, 3). tubes: vertices
-    (v, 3) and faces (f, 3). labels: texts and their places. rows: the list. is_known: whether
-    there are answers. extent: radius of the scene. unit: size of
-    a typical object.
+    batches: by role and form. clouds: points (n, 3) of scans and maps, with their colours (n, 3) and diameter.
+    contacts (c, 3): points; normals (c, 2, 3): lines, from A to B. impacts (i, 3): places of predicted collisions, with
+    colours (i, 3). paths (p, 2, 3): line segments, with colours (p, 2, 3). tubes: vertices (v, 3) and faces (f, 3).
+    rows: the list. is_known: whether there are answers. extent: radius of the scene. unit: size of a typical object.
     """
 
     origin: Floats
     batches: dict[tuple[Role, str], Batch]
+    clouds: Singles
+    cloud_colors: Bytes
+    cloud_diameter: float
     contacts: Singles
     normals: Singles
     impacts: Singles
@@ -74,7 +74,7 @@ class Picture:
     paths: Singles
     path_colors: Bytes
     tubes: tuple[Singles, NDArray[np.uint32]]
-    labels: list[tuple[str, Singles]]
+    labels: list[Label]
     rows: list[PairRow]
     is_known: bool
     centre: Floats
@@ -107,9 +107,13 @@ def draw(moment: Moment, *, origin: Floats | None = None, selected: int | None =
     placed = shown[np.isfinite(shown["point"]).all(axis=1)]
     line, line_colors, tube = _paths(moment, shown, origin)
     rows = soonest_pairs(moment, ROWS)
+    clouds, cloud_colors, cloud_diameter = _clouds(batches)
     return Picture(
         origin=origin,
-        batches=batches,
+        batches={key: batch for key, batch in batches.items() if len(batch.form.faces)},
+        clouds=clouds,
+        cloud_colors=cloud_colors,
+        cloud_diameter=max(cloud_diameter, 0.004 * extent),
         contacts=point.astype(np.float32),
         normals=np.stack([point, point + unit * contacts["normal"]], axis=1).astype(np.float32),
         impacts=(placed["point"] - origin).astype(np.float32),
@@ -117,7 +121,7 @@ def draw(moment: Moment, *, origin: Floats | None = None, selected: int | None =
         paths=line,
         path_colors=line_colors,
         tubes=tube,
-        labels=_labels(moment, rows, selected, origin),
+        labels=labels(moment, rows, selected, origin, extent, unit),
         rows=rows,
         is_known=moment.is_known,
         centre=centre - origin,
@@ -179,6 +183,22 @@ def _placed(
     return found
 
 
+def _clouds(batches: dict[tuple[Role, str], Batch]) -> tuple[Singles, Bytes, float]:
+    """Return the points (n, 3) of all clouds at their poses, their colours (n, 3) and their largest diameter (m).
+
+    They are drawn together, because a scan has other points each time. Clouds in poses of impact are left out.
+    """
+    points, colors, diameter = [np.zeros((0, 3))], [np.zeros((0, 3), np.uint8)], 0.0
+    for (role, _), batch in batches.items():
+        if len(batch.form.faces) or role is Role.IMPACT:
+            continue
+        diameter = max(diameter, batch.form.diameter)
+        for k, turn in enumerate(rotation_matrix(batch.wxyz[:, [1, 2, 3, 0]].astype(np.float64))):
+            points.append(batch.form.vertices @ turn.T + batch.position[k])
+            colors.append(np.tile(batch.color[k], (len(batch.form.vertices), 1)))
+    return np.concatenate(points).astype(np.float32), np.concatenate(colors), diameter
+
+
 def _impact_batches(moment: Moment, shown: NDArray[np.void], origin: Floats) -> dict[tuple[Role, str], Batch]:
     """Return both objects of each certain collision at the time of impact. Only those have a pose of impact."""
     certain = shown[(shown["status"] == PredictionStatus.HIT) & np.isfinite(shown["lower"])]
@@ -220,13 +240,3 @@ def _paths(
         np.repeat(np.repeat(COLORS[levels], count, axis=0)[:, None], 2, axis=1),
         tubes(path[wide], radius[wide]),
     )
-
-
-def _labels(moment: Moment, rows: list[PairRow], selected: int | None, origin: Floats) -> list[tuple[str, Singles]]:
-    """Return the texts of the soonest pairs, each at its place, and the name of the selected object above it."""
-    labels = [(row.text, row.place - origin) for row in rows[:NAMED] if row.place is not None]
-    at = moment.rows_of(np.array([] if selected is None else [selected], np.uint32))
-    for row in at[at >= 0]:
-        up = min(moment.bodies.reach[moment.body[row]], 2.0 * _unit(moment))
-        labels.append((moment.name_of(int(moment.ids[row])), moment.state["position"][row] - origin + (0.0, 0.0, up)))
-    return [(text, place.astype(np.float32)) for text, place in labels]

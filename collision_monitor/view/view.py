@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from functools import partial
 from queue import SimpleQueue
 from typing import TYPE_CHECKING
 
@@ -10,12 +12,17 @@ import numpy as np
 from collision_monitor.view.bodies import Floats
 from collision_monitor.view.moment import Moment
 from collision_monitor.view.page import Page
-from collision_monitor.view.panel import Panel, Request, look_at
+from collision_monitor.view.panel import CORNER, WHOLE, Panel, Request, look_at
 from collision_monitor.view.picture import Picture, draw
 from collision_monitor.view.state_text import object_html, state_html
 
 if TYPE_CHECKING:
     import viser
+
+GROWTH = 1.2
+SETTLING = 5.0
+"""s after the first objects in which the camera is set again if the scene grows by this factor: objects of several
+topics get their poses one after the other."""
 
 PERIOD = 0.05
 """Shortest time between two pictures (s). More than 20 a second show people no more."""
@@ -36,6 +43,14 @@ class View:
         self._selected: int | None = None
         self._origin: Floats | None = None
         self.is_outdated = True
+        self._began = 0.0
+        self._furnished, self._centre = 0.0, np.zeros(3)  # extent and centre for which the camera is set
+        server.on_client_connect(lambda client: self.requests.put(partial(self._welcome, client)))
+
+    @property
+    def _is_new(self) -> bool:
+        """Whether the scene may still lack objects, so that the camera has to follow its size."""
+        return not self._furnished or time.monotonic() - self._began < SETTLING
 
     @property
     def is_watched(self) -> bool:
@@ -54,6 +69,9 @@ class View:
         picture = draw(moment, origin=self._origin, selected=self._selected, alerts=alerts)
         if self._origin is None and len(moment.ids):
             self._origin = picture.origin
+            self._began = time.monotonic()
+        if self._origin is not None and picture.extent > GROWTH * self._furnished and self._is_new:
+            self._furnished, self._centre = picture.extent, picture.centre
             self._furnish(picture)
         selected = "" if self._selected is None else object_html(moment, self._selected)
         if self._origin is not None and self._origin.any():
@@ -67,15 +85,20 @@ class View:
     def _select(self, object_id: int) -> None:
         self._selected = object_id
 
+    def _welcome(self, client: viser.ClientHandle) -> None:
+        """Show a new browser the whole scene beside its panel; only the browser knows its size."""
+        if self._furnished:
+            look_at(client, self._centre, WHOLE * self._furnished, CORNER)
+
     def _furnish(self, picture: Picture) -> None:
         """Set the camera and the grid for a scene of this size."""
         extent, centre = picture.extent, picture.centre
         camera = self._server.initial_camera
-        camera.look_at, camera.position = centre, centre + extent * np.array([-0.9, -1.3, 1.3])
+        camera.look_at, camera.position = centre, centre + extent * CORNER
         camera.fov = np.radians(50.0)
         camera.near, camera.far = 1e-3 * extent, 50.0 * extent
-        for client in self._server.get_clients().values():
-            look_at(client, centre, 1.6 * extent)
+        for client in self._server.get_clients().values():  # by the next picture, after viser's own first camera
+            self.requests.put(partial(self._welcome, client))
         cell = 10.0 ** np.floor(np.log10(max(extent, 1e-6) / 3.0))
         self._server.scene.add_grid(
             "/grid", infinite_grid=True, cell_size=cell, section_size=5.0 * cell, fade_distance=12.0 * extent,

@@ -120,7 +120,7 @@ def test_each_new_viewer_gets_all_objects_and_then_the_changes(start: Callable[.
     assert len(first.snapshots) == 1
     first.leave()
     team.describe(Removal(1))  # nobody looks
-    team.status(lambda status: status.objects == 2)
+    team.until(lambda: team.say(state(2, 3.0)) and team.statuses[-1].step > 1 and team.statuses[-1].objects == 2)
     second = Watcher(team)
     team.until(lambda: second.snapshots and second.names == ["new", "wall"])
     assert monitor.stop() == 0 and "Traceback" not in monitor.words

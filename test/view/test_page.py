@@ -16,9 +16,17 @@ import pytest
 from browser import CHROMIUM, Browser, until
 from played_session import NASTY, STATES, TYPES
 
+from collision_monitor.codec import encode_descriptions
 from collision_monitor.errors import InputError, UnsupportedError
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import ConvexHull, Points
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session import Recorder, Session
-from collision_monitor.view.server import LOOPBACK, start_server
+from collision_monitor.view.page import MOST_HIDDEN, Page
+from collision_monitor.view.panel import WIDTH, look_at
+from collision_monitor.view.picture import draw
+from collision_monitor.view.scene import Scene
+from collision_monitor.view.server import LOOPBACK, start_server, stop_server
 
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
 
@@ -67,6 +75,39 @@ def reds(png: bytes) -> int:
     """Number of pixels with the hue of what touches, left of the panel."""
     red, green, blue = np.moveaxis(pixels(png)[:, :480], -1, 0)
     return int(((red > 120) & (red > 2 * green) & (red > 2 * blue)).sum())
+
+
+def test_forms_that_come_and_go_do_not_pile_up() -> None:
+    server = start_server(LOOPBACK, 0)
+    page, rng = Page(server, lambda _: None), np.random.default_rng(0)
+    for k in range(3 * MOST_HIDDEN):
+        scene = Scene()
+        hull = ObjectDescription(1, ConvexHull(rng.normal(size=(6, 3))), static=True, pose=Pose())
+        scan = ObjectDescription(2, Points(rng.normal(size=(9, 3)), 0.1), static=True, pose=Pose())
+        scene.take("ObjectDescriptionArray", encode_descriptions(k, "world", [hull, scan], snapshot=True))
+        page.show(draw(scene.moment()))
+        assert len(page._batches) <= MOST_HIDDEN + 1
+    assert page._others["clouds"].points.shape == (9, 3)
+    stop_server(server)
+
+
+@needs_browser
+def test_the_camera_looks_at_the_place_that_it_is_sent_to(tmp_path: Path) -> None:
+    server = start_server(LOOPBACK, 0)
+    browser = Browser(tmp_path / "browser", 1000, 700)
+    browser.open(f"http://{LOOPBACK}:{server.get_port()}")
+    until(server.get_clients)
+    (client,) = server.get_clients().values()
+    for place, distance in (((5.0, -40.0, 2.0), 30.0), ((5.0, -40.0, 2.0), 3.0), ((-8.0, 1.0, 0.5), 3.0)):
+        look_at(client, place, distance)
+        ahead = client.camera.look_at - client.camera.position
+        assert np.linalg.norm(ahead) == pytest.approx(distance)
+        aside = place - client.camera.look_at  # the place is to the left, in the middle of what the panel leaves free
+        half_width = distance * np.tan(0.5 * client.camera.fov) * client.camera.aspect
+        assert aside @ np.cross(ahead, (0, 0, 1)) < 0.0 and abs(aside @ ahead) < 1e-6 and abs(aside[2]) < 1e-6
+        assert np.linalg.norm(aside) == pytest.approx(half_width * WIDTH / client.camera.image_width)
+    browser.close()
+    stop_server(server)
 
 
 @needs_browser

@@ -20,6 +20,7 @@ from collision_monitor.geometry.shapes import (
     Ellipsoid,
     HalfSpace,
     Mesh,
+    Points,
     Polygon,
     Shape,
     Sphere,
@@ -259,3 +260,16 @@ def test_compounds_are_placed_as_a_whole() -> None:
 def test_an_empty_scene_has_a_picture() -> None:
     picture = draw(Scene().moment())
     assert not picture.batches and not picture.rows and not picture.is_known and picture.extent > 0.0
+
+
+def test_clouds_are_points_at_their_poses_in_the_colour_of_their_object() -> None:
+    cloud, turned = np.array([(1.0, 0, 0), (0, 2, 0), (0, 0, 3)]), Pose((5, 0, 0), (0, 0, 1, 0))  # by 180 degrees
+    scan = ObjectDescription(1, Points(cloud, 0.05), static=True, pose=turned)
+    ball = ObjectDescription(2, Sphere(0.5))
+    rows = state_array(np.array([2], np.uint32))
+    rows["position"] = 5, -2, 0
+    picture = draw(answered(scene_of(scan, ball), [scan, ball], rows).moment())
+    assert np.allclose(picture.clouds, [(4, 0, 0), (5, -2, 0), (5, 0, 3)], atol=1e-6)
+    assert (picture.cloud_colors == COLORS[Level.TOUCHING]).all()
+    assert picture.cloud_diameter == pytest.approx(0.1)
+    assert {name for _, name in picture.batches} == {"sphere"}
