@@ -68,10 +68,10 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=7)
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        environment = dict(os.environ)
+        environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
         if args.compile:
             environment["NUMBA_CACHE_DIR"] = folder
-            for part in ("monitor", "functions"):
+            for part in ("monitor", "options", "functions"):
                 subprocess.run([sys.executable, "-c", COMPILE, part, str(args.kernels)], check=True, env=environment)
         times: dict[str, list[float]] = {name: [] for name in PROGRAMS}
         for _ in range(args.rounds + 1):

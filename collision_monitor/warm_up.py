@@ -1,11 +1,14 @@
 """Compile every kernel in advance, so that neither a session's first step nor a first call waits for the compiler.
 
-    python -m collision_monitor.warm_up [monitor | functions]      without an argument: both, one after the other
+    python -m collision_monitor.warm_up [monitor | options | functions]     without an argument: one after the other
+
+monitor: the steps of every scene. options: what uncertain states, budgets and contacts of many points need besides.
 """
 
 from __future__ import annotations
 
 import sys
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +18,41 @@ from collision_monitor.alerts.rules import Rules
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape, Sphere
 from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.monitor.time_critical import TimeCritical
 from collision_monitor.objects.models import containing_model
-from collision_monitor.records import STATE, Model
+from collision_monitor.records import MOST_POINTS, STATE, Model
+from collision_monitor.settings.profile import NO_BUDGET, NO_LIMIT, Profile
 
-OBJECTS = 70  # more than the initial capacity of the arrays, so that growing them is compiled too
+Array = NDArray[np.float64]
+
+CERTAIN: Final = Profile(uncertainty=False)
+"""The settings whose steps need the fewest kernels."""
+
+_UNLIMITED: Final[dict[str, Any]] = {"budget_ms": NO_BUDGET, "pairs_per_step": NO_LIMIT}
+
+OBJECTS = 140
+"""More than the initial capacity of the arrays, so that growing them is compiled too, and so many that one of them is
+few enough (`candidates.MOST_QUERIES`) to be searched for in the grid instead of by a sweep."""
 
 
-def warm_up_monitor() -> None:
-    """Step a small scene through every part of a step; the compiled kernels stay in the cache."""
-    monitor = Monitor()
+def warm_up_monitor(profile: Profile | None = None) -> None:
+    """Step a small scene through every part of a step; the compiled kernels stay in the cache.
+
+    profile: leaves out what no step with these settings needs, up to a third of all kernels; None: leaves out nothing.
+    """
+    monitor = Monitor((profile or Profile()).replace(uncertainty=False, contact_points=1, **_UNLIMITED))
+    poses, twists = _step_certain(monitor)
+    _step_uncertain(monitor, poses, seconds=4)  # its states are also taken if no setting asks for their uncertainty
+    if profile is None or profile.uncertainty:
+        monitor.profile = monitor.profile.replace(uncertainty=True)
+        _step_uncertain(monitor, poses, seconds=5)
+    points = MOST_POINTS if profile is None else profile.contact_points
+    if profile is None or TimeCritical.has_budget(profile) or points > 1:
+        _step_limited(monitor, poses, twists, points)
+
+
+def _step_certain(monitor: Monitor) -> tuple[Array, Array]:
+    """Step objects that fall and leave their predicted motions. Return the poses and twists of those left."""
     monitor.add(OBJECTS, Box((500, 10, 1)), static=True, pose=Pose((0, 0, -0.5)))
     for object_id in range(OBJECTS):
         monitor.add(object_id, Box((1, 1, 1)) if object_id % 2 else Sphere(0.5))
@@ -42,21 +71,26 @@ def warm_up_monitor() -> None:
         twists[step, :] *= -1.0  # one object leaves its predicted motion
     monitor.remove(1)
     monitor.step(3_000_000_000, np.arange(2, OBJECTS), poses[2:], twists[2:])
-    _step_uncertain(monitor, poses[2:])
-    for step, pairs in enumerate((1, 1, 1_000_000)):  # the last step has time for the pairs that the others deferred
-        monitor.profile = monitor.profile.replace(pairs_per_step=pairs, contact_points=4)
-        monitor.step(4_000_000_000 + step * 10_000_000, np.arange(2, OBJECTS), poses[2:], twists[2:])
+    return poses[2:], twists[2:]
 
 
-def _step_uncertain(monitor: Monitor, poses: NDArray[np.float64]) -> None:
+def _step_uncertain(monitor: Monitor, poses: Array, seconds: int) -> None:
     """Step with states that declare an uncertainty, with covariances, and with a bound on an acceleration."""
+    stamp = seconds * 1_000_000_000
     states = np.zeros(len(poses), STATE)
     states["id"] = np.arange(2, OBJECTS)
     states["position"], states["quaternion"] = poses[:, :3], poses[:, 3:]
     states["position_stddev"] = states["orientation_stddev"] = 0.1
-    monitor.step(3_010_000_000, states)
+    monitor.step(stamp, states)
     monitor.add(2, Sphere(0.5), max_linear_acceleration=1.0, replace=True)
-    monitor.step(3_020_000_000, states, covariance=np.zeros((len(poses), 12)))
+    monitor.step(stamp + 10_000_000, states, covariance=np.zeros((len(poses), 12)))
+
+
+def _step_limited(monitor: Monitor, poses: Array, twists: Array, points: int) -> None:
+    """Step with a limit on the pairs, and with contacts of up to `points` points."""
+    for step, pairs in enumerate((1, 1, 1_000_000)):  # the last step has time for the pairs that the others deferred
+        monitor.profile = monitor.profile.replace(pairs_per_step=pairs, contact_points=points)
+        monitor.step(6_000_000_000 + step * 10_000_000, np.arange(2, OBJECTS), poses, twists)
 
 
 def warm_up_alerts() -> None:
@@ -102,7 +136,11 @@ def warm_up_functions() -> None:
         contact(corner, Pose(), corner, at)
 
 
-PARTS = {"monitor": warm_up_monitor, "functions": warm_up_functions}
+PARTS: Final = {
+    "monitor": lambda: warm_up_monitor(CERTAIN),
+    "options": warm_up_monitor,
+    "functions": warm_up_functions,
+}
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 
@@ -98,6 +99,33 @@ def test_nothing_is_compiled_after_the_warm_up(session: str) -> None:
     answer = json.loads(told)
     assert answer["compiled"] == []
     assert answer["contacts"] > 10
+
+
+WATCHED = """
+from collision_monitor import warm_up
+from collision_monitor._jit.kernel_cache import KernelCache
+from collision_monitor.settings.profile import Profile
+warm_up.warm_up_monitor({profile})
+loaded, load = [], KernelCache.load_overload
+
+def watch(self, sig, target):
+    loaded.append(self._name)
+    return load(self, sig, target)
+
+KernelCache.load_overload = watch
+"""
+CERTAIN_SESSION = re.sub(r"    if step == 5:\n.*\n    if step in .*\n.*\n", "", SESSION)
+
+
+@pytest.mark.parametrize(
+    ("profile", "session"), [("", SESSION), ("Profile(uncertainty=False)", CERTAIN_SESSION)], ids=["all", "certain"]
+)
+def test_no_step_loads_a_kernel_after_the_warm_up(profile: str, session: str) -> None:
+    """The first step of a node once compiled a kernel for 0.5 s that the warm-up did not call."""
+    assert ("contact_points" in session) == (profile == "")
+    program = WATCHED.format(profile=profile) + session.replace("print(json.dumps", "print(json.dumps(loaded)) #")
+    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=600)
+    assert answer.stdout.strip() == "[]", answer.stderr
 
 
 @pytest.mark.parametrize("when", ["Monitor(limited)", "Monitor(); monitor.profile = limited"])

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True)
@@ -18,11 +19,11 @@ class Errors:
     worst: float
 
     @classmethod
-    def of(cls, values: Sequence[float]) -> Errors:
+    def of(cls, values: ArrayLike) -> Errors:
         """Return the statistics of these errors."""
-        if not values:
+        found = np.abs(np.asarray(values, np.float64))
+        if not len(found):
             return cls(np.nan, np.nan, np.nan)
-        found = np.abs(values)
         return cls(float(np.median(found)), float(np.percentile(found, 99)), float(found.max()))
 
 
@@ -44,7 +45,7 @@ class Measurement:
     alarms: int
     """Pairs in contact or predicted, summed over all steps."""
     false_alarms: int
-    """Alarms that the exact answers do not have at that step."""
+    """Alarms without a contact of the pair within the horizon (`session.history.alarms`)."""
     misses: int
     """Pairs of the exact answers without an alarm, summed over all steps. Impacts close to the horizon do not count."""
     distance_error_m: float
@@ -55,6 +56,16 @@ class Measurement:
     """Answers that both have and that state a bound: predictions, or distances for models."""
     outside_bound: int
     """Compared answers whose bound does not hold: the interval or the distance excludes the exact value."""
+    open_alarms: int = 0
+    """Alarms that neither a contact nor the end of the horizon has decided when the scene ends."""
+    late: int = 0
+    """True predictions whose interval begins after the contact."""
+    early: int = 0
+    """True predictions whose interval ends before the contact."""
+    beyond_exact: int = 0
+    """Alarms that the exact answers do not have at that step: near misses within the tolerances."""
+    distance_error_p99_m: float = np.nan
+    """99th percentile of the errors of the distance (m)."""
     distance_error_part: float = np.nan
     """Largest error of the distance of models, divided by the size of the smaller object."""
     noise: float = 0.0

@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from math import inf
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,10 @@ Step = tuple[int, NDArray[np.void]]
 """Stamp (ns) and states (records.STATE)."""
 
 
+FEWEST_STEPS: Final = 2
+"""Steps of a run that its time cannot cut: the first one initialises everything."""
+
+
 @dataclass(frozen=True)
 class Played:
     """Answer of a monitor and duration (s) of each step."""
@@ -25,10 +30,18 @@ class Played:
     answers: list[StepResult]
     seconds: NDArray[np.float64]
 
-    def cost(self) -> dict[str, Any]:
-        """Return the times of a Measurement, without the first step, which initialises everything."""
+    def warm(self) -> tuple[NDArray[np.float64], int]:
+        """Return the times (s) of the steps and the pairs that they examined or predicted.
+
+        Without the first step, which initialises everything.
+        """
         warm = self.seconds[1:] if len(self.seconds) > 1 else self.seconds
         pairs = sum(a.status.narrow_phase_tests + a.status.impact_queries for a in self.answers[1:] or self.answers)
+        return warm, pairs
+
+    def cost(self) -> dict[str, Any]:
+        """Return the times of a Measurement."""
+        warm, pairs = self.warm()
         return {
             "step_ms": 1e3 * float(np.median(warm)),
             "step_ms_p99": 1e3 * float(np.percentile(warm, 99)),
@@ -37,18 +50,29 @@ class Played:
 
 
 def play(
-    monitor: Monitor, described: Iterable[ObjectDescription], steps: Sequence[Step], progress: Callable[[int], None]
+    monitor: Monitor,
+    described: Iterable[ObjectDescription],
+    steps: Sequence[Step],
+    progress: Callable[[int], None],
+    most_seconds: float = inf,
 ) -> Played:
-    """Describe all objects to a monitor, then run all steps. progress: called with 1 after each step."""
+    """Describe all objects to a monitor, then run all steps. progress: called with 1 after each step.
+
+    most_seconds: time of the steps after which the others are left out, but at least FEWEST_STEPS are run.
+    """
     for description in described:
         monitor.describe(description)
-    answers, seconds = [], np.empty(len(steps))
+    answers, seconds, left = [], np.empty(len(steps)), most_seconds
     for k, (stamp, states) in enumerate(steps):
+        if left < 0.0 and k >= FEWEST_STEPS:
+            progress(len(steps) - k)
+            break
         begin = time.perf_counter()
         answers.append(monitor.step(stamp, states))
         seconds[k] = time.perf_counter() - begin
+        left -= seconds[k]
         progress(1)
-    return Played(answers, seconds)
+    return Played(answers, seconds[: len(answers)])
 
 
 def by_pair(answers: NDArray[np.void]) -> dict[tuple[int, int], Any]:

@@ -143,5 +143,5 @@ def _approach(rule: Rule, scene: Scene, found: Measures) -> None:
     largest = max(level.values.get(APPROACH[0], 0.0) for level in rule.levels)
     bound = sphere_approach(scene, found.i, found.j, horizon)
     which = np.flatnonzero(bound <= largest * REACH)
-    time, distance = closest_approach(scene, found.i[which], found.j[which], horizon)
+    time, distance = closest_approach(scene, found.i[which], found.j[which], horizon, largest)
     found["distance_at_closest_approach"][which], found["time_to_closest_approach"][which] = distance, time

@@ -26,7 +26,10 @@ examples:
   collision-monitor compare run.mcap --profile fast                   the recorded answers and a replay
   collision-monitor compare before.mcap after.mcap --replay           replays of both sessions
 
-A warning is a certain prediction that no collision followed. Objects are matched by name. Times
+An alarm is a pair that is reported at a step, in contact or predicted. It is false if the pair does
+not touch within the horizon (`tradeoff` and `tune` count the same). A collision is missed if its pair
+is not alarmed in the step before. A warning is an unbroken run of predictions, at least one of them
+certain, that no collision followed. Objects are matched by name. Times
 count from the first step of A, also for B if the stamps of the sessions overlap. Otherwise the
 times of B count from its own first step. Step times are shown but never count as a difference.
 
@@ -118,12 +121,18 @@ def _as_text(found: Changes, limit: int) -> str:
     for title, name in (
         ("objects", "objects"),
         ("collisions", "collisions"),
-        ("  not predicted", "not_predicted"),
-        ("warnings in vain", "in_vain"),
         ("contacts × steps", "contacts"),
         ("predictions × steps", "predictions"),
     ):
         lines.append(_row(title, *(str(getattr(side, name)) for side in sides)))
+    for title, name in (
+        ("alarms × steps", "alarms"),
+        ("  false", "false_alarms"),
+        ("  too late", "late"),
+        ("  too early", "early"),
+        ("collisions missed", "missed"),
+    ):
+        lines.append(_row(title, *(str(getattr(side.alarms, name)) for side in sides)))
     lines.append(_row("step time, median", *(_milliseconds(side.step_median) for side in sides)))
     lines.append(_row("step time, 99 %", *(_milliseconds(side.step_p99) for side in sides)))
     for letter, side in zip("AB", sides, strict=True):

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 START_PATIENCE = 180.0
 """Time for the monitor to answer (s). Its first start on a machine may have to compile the kernels."""
+TELL = 5.0
+"""Time after which the demo prints why it waits for the monitor (s)."""
 FRAME = 0.25
 """Time between two pictures (s)."""
 LINE = 1.0
@@ -108,7 +110,7 @@ def _watch(args: argparse.Namespace, session: Path, stop: StopRequest) -> bool:
         scene += ["--noise", str(args.noise)]
     if args.objects is not None:
         scene += ["--objects", str(args.objects)]
-    with Child("run", "--record", str(session)) as monitor, ros_context([]):
+    with Child("run", "--record", str(session), *_settings(args)) as monitor, ros_context([]):
         from collision_monitor.ros.viewer import Viewer
 
         viewer = Viewer()
@@ -126,13 +128,21 @@ def _watch(args: argparse.Namespace, session: Path, stop: StopRequest) -> bool:
     return True
 
 
+def _settings(args: argparse.Namespace) -> list[str]:
+    """Options of the monitor. Without --noise no state is uncertain, and the kernels for that need not be compiled."""
+    return [] if args.noise is not None else ["--ros-args", "-p", "uncertainty:=false"]
+
+
 def _wait_for_answer(viewer: Viewer, monitor: Child, stop: StopRequest) -> None:
     """Wait for the first status, which the monitor publishes as soon as it listens. Raises ProcessError."""
-    patience = time.monotonic() + START_PATIENCE
+    began, is_told = time.monotonic(), False
     while viewer.status is None and not stop.received:
         viewer.listen(until=time.monotonic() + FRAME)
         monitor.running()
-        if time.monotonic() > patience:
+        if time.monotonic() > began + TELL and not is_told:
+            is_told = True
+            print("waiting for the monitor, which compiles kernels, once for this machine and version", flush=True)
+        if time.monotonic() > began + START_PATIENCE:
             raise ProcessError(f"collision-monitor run: expected a status within {START_PATIENCE:g} s, got none")
 
 

@@ -1,14 +1,19 @@
-"""A progress bar on stderr, shown only if stderr is a terminal."""
+"""A progress bar on stderr if that is a terminal; else, for work of minutes, a line every few seconds."""
 
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from collision_monitor.session import Session
+
+
+LINE_EVERY: Final = 5.0
+"""Time between two lines of progress (s)."""
 
 
 @contextmanager
@@ -17,6 +22,31 @@ def progress_bar(name: str, total: int) -> Iterator[Callable[[int], None]]:
     if not sys.stderr.isatty():
         yield lambda done: None
         return
+    with _bar(name, total) as advance:
+        yield advance
+
+
+@contextmanager
+def progress_anywhere(name: str, total: int) -> Iterator[Callable[[int], None]]:
+    """As `progress_bar`; if stderr is no terminal, print a line every LINE_EVERY seconds instead."""
+    if sys.stderr.isatty():
+        with _bar(name, total) as advance:
+            yield advance
+        return
+    last, done = time.monotonic(), 0
+
+    def print_line(count: int) -> None:
+        nonlocal last, done
+        done += count
+        if time.monotonic() - last >= LINE_EVERY:
+            last = time.monotonic()
+            print(f"{name}: {100.0 * min(done / max(total, 1), 0.99):.0f} %", file=sys.stderr, flush=True)
+
+    yield print_line
+
+
+@contextmanager
+def _bar(name: str, total: int) -> Iterator[Callable[[int], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from collision_monitor.accuracy.default_scenes import DEFAULT_SCENES
 from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.progress import progress_bar
+from collision_monitor.cli.output_file import writing
+from collision_monitor.cli.progress import progress_anywhere, progress_bar
 from collision_monitor.cli.quantities import not_negative, positive, whole
 from collision_monitor.errors import InputError
 
@@ -36,11 +37,13 @@ examples:
   collision-monitor tradeoff --path ../shared/data/citr                   with recorded tracks too
   collision-monitor tradeoff --scene clutter --impact-methods             bisection, swept SAT, …
   collision-monitor tradeoff --scene arm --model obb --model convex_hull  models against the meshes
+  collision-monitor tradeoff run.mcap --front --png front.png              the Pareto front of 17 settings
 
-An alarm is a pair that is reported at a step, as a contact or as a prediction. An alarm is false if
-the exact answers do not have the pair at that step. Most false alarms are near misses within the
-tolerance of the profile. The states of the scene fleet have the noise of a localiser, 5 mm, 5 mrad,
-5 mm/s and 5 mrad/s, and declare it.
+An alarm is a pair that is reported at a step, as a contact or as a prediction. It is false if the
+pair does not touch within the horizon (`compare` and `tune` count the same). `beyond`: alarms that the
+exact answers do not have at that step, most of them near misses within the tolerance of the profile.
+The states of the scene fleet have the noise of a localiser, 5 mm, 5 mrad, 5 mm/s and 5 mrad/s, and
+declare it.
 
 exit codes:
   0  done
@@ -88,6 +91,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--impact-methods", action="store_true",
         help="measure the ways to find a time of impact on the pairs of the scenes, in place of profiles",
     )  # fmt: skip
+    parser.add_argument(
+        "--front", action="store_true",
+        help="measure many settings of tolerances, models and uncertainty, and draw which of them no other one beats",
+    )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="also write the rows to this file")
     parser.add_argument("--png", type=Path, metavar="FILE", help="draw time against error, one panel per scene")
@@ -104,6 +111,8 @@ def tradeoff_command(args: argparse.Namespace) -> int:
         raise InputError("tradeoff: expected a session or scenes, got both")
     if args.model and args.profile:
         raise InputError("tradeoff: expected profiles or models, got both: --profile and --model")
+    if args.front and (args.model or args.profile or args.csv or args.impact_methods):
+        raise InputError("tradeoff, --front: goes without --model, --profile, --csv and --impact-methods")
     if args.impact_methods and (args.model or args.profile or args.csv or args.png):
         raise InputError("tradeoff, --impact-methods: goes without --model, --profile, --csv and --png")
     if args.session is not None and args.noise:
@@ -116,6 +125,8 @@ def tradeoff_command(args: argparse.Namespace) -> int:
     inputs = [recorded(args.session)] if args.session else simulated(
         args.scene, objects=args.objects, seed=args.seed, path=args.path, noise=args.noise, duration=args.seconds
     )  # fmt: skip
+    if args.front:
+        return _measure_fronts(args, inputs)
     if args.impact_methods:
         return _compare_impact_methods(args, inputs)
     rows = tradeoff(inputs, profiles, args.model, progress_bar)
@@ -132,6 +143,31 @@ def tradeoff_command(args: argparse.Namespace) -> int:
             draw_tradeoff(rows, args.png)
     except OSError as error:
         raise InputError(f"expected a file that can be written, got {error.filename}: {error.strerror}") from None
+    return ExitCode.DONE
+
+
+def _measure_fronts(args: argparse.Namespace, inputs: Iterable[Workload]) -> int:
+    """Print the rows of many settings for each scene, and what there is to trade."""
+    from collision_monitor.accuracy.front import front_settings, measure_front
+
+    fronts = []
+    for work in inputs:
+        settings = front_settings(work)
+        with progress_anywhere(work.name, len(settings) + 2) as progress:
+            fronts.append(measure_front(work, settings, progress))
+    rows = [row for front in fronts for row in front.rows]
+    if args.json:
+        best = {each.label: {e: [row.profile for row in each.best(e)] for e in ("time", "distance")} for each in fronts}
+        fixed = {each.label: each.fixed_us for each in fronts}
+        print(json.dumps({"rows": [row.to_dict() for row in rows], "front": best, "fixed_us": fixed}))
+    else:
+        _print_table(rows)
+        print("\n".join(each.summary() for each in fronts))
+    if args.png:
+        from collision_monitor.accuracy.front_picture import draw_fronts
+
+        with writing(args.png):
+            draw_fronts({each.label: [each] for each in fronts}, args.png)
     return ExitCode.DONE
 
 
@@ -173,7 +209,8 @@ def _print_table(rows: Sequence[Measurement]) -> None:
     from collision_monitor.accuracy.measurement import labels_of_models
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for k, heading in enumerate(("scene", "profile\nor model", "ms/step", "µs/pair", "alarms", "false", "missed")):
+    headings = ("scene", "profile\nor model", "ms/step", "µs/pair", "alarms", "false", "beyond", "missed")
+    for k, heading in enumerate(headings):
         table.add_column(heading, justify="left" if k < 2 else "right", no_wrap=k > 0)
     for heading in ("distance\nerror m", "TTC error s\nmedian", "\np99", "\nworst", "in bound\n%"):
         table.add_column(heading, justify="right", no_wrap=True)
@@ -188,9 +225,10 @@ def _print_table(rows: Sequence[Measurement]) -> None:
         numbers = (row.distance_error_m, error.median, error.p99, error.worst)
         table.add_row(
             shown, row.model if scene in of_models else row.profile, f"{row.step_ms:.3f}", f"{row.pair_us:.2f}",
-            str(row.alarms), str(row.false_alarms), str(row.misses), *map(_number, numbers), _percent(row.within_bound),
+            str(row.alarms), str(row.false_alarms), str(row.beyond_exact), str(row.misses), *map(_number, numbers),
+            _percent(row.within_bound),
         )  # fmt: skip
-    Console(width=None if sys.stdout.isatty() else 140).print(table)
+    Console(width=None if sys.stdout.isatty() else 160).print(table)
 
 
 def _flat(row: Measurement) -> dict[str, Any]:

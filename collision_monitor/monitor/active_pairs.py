@@ -11,6 +11,8 @@ from collision_monitor import records
 from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.monitor.candidates import is_checked
+from collision_monitor.monitor.carried_contacts import CARRIED, Carried, carry_over, no_answers, remember, without
+from collision_monitor.monitor.event_list import NO_EVENTS
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
@@ -52,7 +54,7 @@ class Active(NamedTuple):
 class ActivePairs(Stage):
     """The pairs that every step examines, and the contacts whose pair was removed since the last step."""
 
-    SAVED = ("pairs", "events", "_orphans")
+    SAVED = ("pairs", "events", "_orphans", "_carried")
     CACHES = ("results",)
 
     def __init__(self) -> None:
@@ -60,6 +62,7 @@ class ActivePairs(Stage):
         self.events: Rows = np.zeros(0, IMPACT)
         self.results = np.empty((0, RESULT))
         self._orphans: list[tuple[int, float]] = []  # contacts (key, since) of removed pairs
+        self._carried = no_answers()  # of contacts that may persist, with a `distance_tolerance`
 
     @property
     def active(self) -> Active:
@@ -87,7 +90,8 @@ class ActivePairs(Stage):
         self.events = np.delete(self.events, indices)
 
     def end_unchecked(self, roster: Roster, i: int) -> None:
-        """Remove the pairs of body i that are no longer checked."""
+        """Remove the pairs of body i, which was described, that are no longer checked."""
+        self._carried = without(self._carried, int(roster.bodies.id[i]))
         of_body = self.of_body(i)
         if len(of_body):
             pairs = self.pairs[of_body]
@@ -108,6 +112,9 @@ class ActivePairs(Stage):
     def unite(self, step: StepContext, due: Rows) -> None:
         """Add the pairs of the events (IMPACT) that are due. Drop the pairs that ended, or whose motion changed."""
         room = len(self.pairs) + len(due)
+        if not room:
+            self.results = self.results[:0]
+            return
         pairs, events = np.empty(room, PAIR), np.empty(room, IMPACT)
         order = np.argsort(due["key"], kind="stable")
         n = _unite(step.roster.bodies, self.pairs, self.events, due, order, pairs, events)
@@ -120,8 +127,16 @@ class ActivePairs(Stage):
 
     def examine_all(self, step: StepContext, scratch: Scratch) -> Rows:
         """Examine every pair. Return the events (IMPACT) of pairs that are certified apart for a while."""
+        if not len(self.pairs):
+            self._carried = no_answers()
+            return NO_EVENTS
         later = np.empty(len(self.pairs), IMPACT)
-        return later[: self.examine(step, np.arange(len(self.pairs)), scratch, later)]
+        if not step.profile.distance_tolerance:
+            return later[: self.examine(step, np.arange(len(self.pairs)), scratch, later)]
+        left, source = carry_over(step, self._carried, self.pairs, self.results)
+        count = self.examine(step, left, scratch, later) if len(left) else 0
+        self._carried = remember(step, self._carried, self.pairs, self.results, source)
+        return later[:count]
 
     def examine(self, step: StepContext, which: NDArray[np.intp], scratch: Scratch, later: Rows) -> int:
         """Examine the pairs `which` (M,). Write the events of pairs certified apart to `later`; return how many."""
@@ -150,6 +165,7 @@ class ActivePairs(Stage):
     def save(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
         snapshot.arrays.update(pairs=self.pairs.copy(), pair_events=self.events.copy())
+        snapshot.arrays.update(carried_keys=self._carried.keys.copy(), carried=self._carried.rows.copy())
         facts["orphans"] = list(self._orphans)
 
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
@@ -158,6 +174,8 @@ class ActivePairs(Stage):
         self.events = snapshot.array("pair_events", np.empty(0, IMPACT), len(self.pairs))
         snapshot.check_slots("pairs", self.pairs)
         snapshot.check_slots("pair_events", self.events)
+        keys = snapshot.array("carried_keys", np.zeros(0, np.uint64))
+        self._carried = Carried(keys, snapshot.array("carried", np.zeros((0, CARRIED)), len(keys)))
         self._orphans = [(key, since) for key, since in facts["orphans"]]
 
 

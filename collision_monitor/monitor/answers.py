@@ -58,10 +58,11 @@ class Answers(Stage):
         """Contacts (records.CONTACT) of the active pairs, sorted by ids, with the END of contacts of removed pairs."""
         roster, multibody = step.roster, step.roster.multibody
         contacts = np.empty(len(active.pairs), records.CONTACT)
-        scratch = np.empty((1, 4)), np.empty((3, 3, 3))
-        complete_contacts(multibody, active.pairs, active.results, step.now, scratch, np.empty(MEMORY))
-        n = write_contacts(active.pairs, active.results, roster.bodies, roster.parts.index, step.now, contacts)
-        contacts = contacts[:n]
+        if len(contacts):
+            scratch = np.empty((1, 4)), np.empty((3, 3, 3))
+            complete_contacts(multibody, active.pairs, active.results, step.now, scratch, np.empty(MEMORY))
+            n = write_contacts(active.pairs, active.results, roster.bodies, roster.parts.index, step.now, contacts)
+            contacts = contacts[:n]
         if step.profile.contact_points > 1:
             contacts = with_patches(contacts, multibody, active.active, step.now, step.profile.contact_points)
         ended = active.take_orphans(step.now)
@@ -77,6 +78,8 @@ class Answers(Stage):
         pending = events.until(step.now + p.horizon)
         predictions = np.empty(len(pending) + len(active.pairs), records.PREDICTION)
         slots = np.empty((len(predictions), 2), np.int32)
+        if not len(predictions):
+            return predictions, slots
         predicted = Predicted(active.pairs, active.events, pending)
         times = Times(step.now, p.horizon, p.stale_after)
         n = write_predictions(predicted, roster.bodies, roster.parts.index, times, predictions, slots)
@@ -133,15 +136,15 @@ def step_status(
 ) -> StepStatus:
     """Count objects, answers and work of the step."""
     roster = step.roster
-    unresolved = np.count_nonzero(contacts["status"] == UNSETTLED)
-    unresolved += np.count_nonzero(predictions["status"] == UNRESOLVED)
+    unresolved = np.count_nonzero(contacts["status"] == UNSETTLED) if len(contacts) else 0
+    unresolved += np.count_nonzero(predictions["status"] == UNRESOLVED) if len(predictions) else 0
     static, unseen, stale = count_bodies(roster.bodies, roster.top, step.now, step.profile.stale_after)
     return StepStatus(
         objects=len(roster),
         objects_static=int(static),
         objects_unseen=int(unseen),
         objects_stale=int(stale),
-        contacts=int(np.count_nonzero(active.pairs["touching"])),
+        contacts=int(np.count_nonzero(active.pairs["touching"])) if len(active.pairs) else 0,
         predictions=len(predictions),
         unresolved=int(unresolved),
         events_pending=len(events),

@@ -6,8 +6,6 @@ clock decides only how many pairs a step examines. Their order, and the answers 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from time import perf_counter
 from typing import Final, Self
 
@@ -26,8 +24,9 @@ SPREAD: Final = 4.0
 OUTLIER: Final = 4.0
 """A measured time is clipped to this many times the usual one: the machine was busy with something else."""
 
-EXAMINE, REFINE, TREES = 0, 1, 2
-"""Kinds of work: examine a pair now, search for its first impact, or compare a HANDFUL of pairs of sphere trees."""
+EXAMINE, REFINE, TREES, SAMPLE = 0, 1, 2, 3
+"""Kinds of work: examine a pair now, search for its first impact, compare a HANDFUL of pairs of sphere trees, or
+compute the probability of an uncertain pair."""
 
 HANDFUL: Final = 8
 """Number of pairs of sphere trees that cost about as much as one pair of shapes, and count as one pair."""
@@ -41,7 +40,7 @@ class PairBudget:
         self._limit = limit
 
     def next(self, left: int, work: int) -> int:
-        """Return how many of the remaining `left` pairs to do next; 0: stop. work: EXAMINE, REFINE or TREES."""
+        """Return how many of the remaining `left` pairs to do next; 0: stop. work: EXAMINE, REFINE, TREES or SAMPLE."""
         del work
         count = min(left, self._limit - self.done)
         self.done += count
@@ -58,29 +57,22 @@ class StepClock:
     """
 
     def __init__(self) -> None:
-        self.cost = [1e-5, 1e-5, 1e-5]  # estimated time for a pair (s), by kind of work
+        self.cost = [1e-5, 1e-5, 1e-5, 1e-4]  # estimated time for a pair (s), by kind of work
         self.began = self.stopped = 0.0
-        self._end = self._deviation = self._aside = 0.0  # s
+        self._end = self._deviation = 0.0  # s
         self._depth = 0
 
     def __enter__(self) -> Self:
         """Start the clock. Within a running step it continues."""
         if self._depth == 0:
-            self.began, self.stopped, self._aside = perf_counter(), 0.0, 0.0
+            self.began, self.stopped = perf_counter(), 0.0
         self._depth += 1
         return self
-
-    @contextmanager
-    def aside(self) -> Iterator[None]:
-        """Context for work outside of the budget: later steps reserve no time for it."""
-        began = perf_counter()
-        yield
-        self._aside += perf_counter() - began
 
     def __exit__(self, *_: object) -> None:
         self._depth -= 1
         if self._depth == 0 and self.stopped:
-            took = perf_counter() - self.stopped - self._aside
+            took = perf_counter() - self.stopped
             if self._end:
                 took = min(took, OUTLIER * (self._end + self._deviation))
             else:

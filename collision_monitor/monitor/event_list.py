@@ -10,6 +10,7 @@ Source: lecture slides "List of collisions": ordered on time, only the first has
 from __future__ import annotations
 
 from math import inf
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,12 @@ from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.prediction.bodies import Bodies
 from collision_monitor.prediction.impact_record import BOUND_ONLY, HIT, IMPACT, UNRESOLVED, holds
+from collision_monitor.records import joined
 
 Events = NDArray[np.void]
 Versions = NDArray[np.uint32]
+
+NO_EVENTS: Final = np.zeros(0, IMPACT)
 
 
 @device
@@ -167,6 +171,13 @@ def _was_predicted(event, bodies):
     return min(bodies.motion[event.i].covered, bodies.motion[event.j].covered) > -inf
 
 
+def both(a: Events, b: Events) -> Events:
+    """Concatenate events; without a copy if one of the arrays has none."""
+    if not len(a):
+        return b
+    return joined([a, b]) if len(b) else a
+
+
 class EventList(Stage):
     """The predicted impacts (IMPACT), sorted by (lower, key)."""
 
@@ -188,7 +199,10 @@ class EventList(Stage):
 
     def take_due(self, version: Versions, now: float) -> Events:
         """Remove the events due by `now`: their pairs leave the event list here. Return those that still hold."""
-        due = np.empty(count_until(self.events, now), IMPACT)
+        count = count_until(self.events, now)
+        if not count:
+            return NO_EVENTS
+        due = np.empty(count, IMPACT)
         passed, n = take_due(self.events, version, now, due)
         self.events = self.events[passed:]
         return due[:n]
@@ -217,6 +231,8 @@ class EventList(Stage):
     def add(self, new: Events, version: Versions) -> None:
         """Merge `new`, in any order, into the list. Pairs whose motions no longer hold leave the event list here."""
         need = len(self.events) + len(new)
+        if not need:
+            return
         if need > len(self._spare):
             self._spare = np.empty(2 * need, IMPACT)
         order, spare = np.empty((2, len(new)), np.int64)

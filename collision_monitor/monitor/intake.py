@@ -47,7 +47,8 @@ _VERDICTS: Final = {
     NON_FINITE: (
         Refusal.NON_FINITE,
         "object {id}: expected finite numbers up to 1e18 in pose and twist, standard deviations >= 0 and covariances "
-        "that are positive semi-definite (a negative one here is minus the root of a negative eigenvalue), got {row}",
+        "that are positive semi-definite (a negative one here is minus the root of a negative eigenvalue), "
+        "got {unusable}",
     ),
     QUATERNION: (Refusal.QUATERNION, "object {id}: expected a unit quaternion within 1e-3, got {quaternion}"),
     OLD: (
@@ -159,7 +160,7 @@ class Intake(Stage):
             rows = np.flatnonzero(verdicts == verdict)
             if len(rows):
                 row = states[rows[0]]
-                values = {"id": int(row["id"]), "quaternion": row["quaternion"].tolist(), "row": row.item()[:-2]}
+                values = {"id": int(row["id"]), "quaternion": row["quaternion"].tolist(), "unusable": _unusable(row)}
                 values["age"] = _age_text(roster, int(slots[rows[0]]), time) if verdict == OLD else ""
                 self.refuse(reason, text.format(**values), len(rows))
 
@@ -174,6 +175,17 @@ class Intake(Stage):
         self.refused = {reason: facts["refused"][reason.value] for reason in Refusal}
         self.texts = {reason: facts["refusals"][reason.value] for reason in Refusal}
         self.last_refusal = facts["last_refusal"]
+
+
+def _unusable(row: np.void) -> str:
+    """Return the fields of a NON_FINITE state that are not as expected."""
+    named = {name: row[name].tolist() for name in row.dtype.names or () if name not in ("id", "flags")}
+    bad = {
+        name: value
+        for name, value in named.items()
+        if not (np.abs(value) <= LARGEST_INPUT).all() or (name.endswith("_stddev") and value < 0.0)
+    }
+    return ", ".join(f"{name} {value}" for name, value in (bad or named).items())
 
 
 def _age_text(roster: Roster, slot: int, time: float) -> str:

@@ -18,7 +18,7 @@ from collision_monitor.monitor.answers import Answers, overtaken, step_status
 from collision_monitor.monitor.budget import PairBudget, StepClock
 from collision_monitor.monitor.candidates import Candidates
 from collision_monitor.monitor.crowding import MOST_PAIRS, crowded
-from collision_monitor.monitor.event_list import EventList
+from collision_monitor.monitor.event_list import NO_EVENTS, EventList, both
 from collision_monitor.monitor.first_impacts import FirstImpacts
 from collision_monitor.monitor.intake import Intake
 from collision_monitor.monitor.result import StepResult
@@ -31,9 +31,8 @@ from collision_monitor.monitor.timeline import Order, Progress, Timeline
 from collision_monitor.monitor.tracking import Tracking
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.objects.models import Modelled, parse_model, shape_class
-from collision_monitor.prediction.impact_record import IMPACT
-from collision_monitor.records import Model, PredictionStatus, joined
+from collision_monitor.objects.models import Modelled, monitored_model, parse_model, shape_class
+from collision_monitor.records import Model, PredictionStatus
 from collision_monitor.settings.profile import Profile
 
 FACTS = "monitor"
@@ -123,6 +122,11 @@ class Monitor:
         """The ids of all described objects, ascending."""
         return self._roster.ids
 
+    def __repr__(self) -> str:
+        """The profile, the objects and the last step."""
+        last = f"step {self.last.step} at {self.last.stamp_ns} ns" if self.last is not None else "no step yet"
+        return f"Monitor({self.profile.name!r}, {len(self.ids)} objects, {last})"
+
     def __contains__(self, object_id: int) -> bool:
         """Whether the object is described."""
         return object_id in self._roster
@@ -144,9 +148,15 @@ class Monitor:
 
         replace: describe a known object anew; it keeps its state. The other fields are those of `ObjectDescription`:
         name, static, pose, group, mask, padding, model, allowed, max_linear_acceleration, max_angular_acceleration.
-        Raises InputError for a known id without replace, and the errors of `describe`.
+        Raises InputError for a known id without replace and for the pose of an object that is not static, and the
+        errors of `describe`.
         """
         description = ObjectDescription(object_id, shape, **fields)
+        if description.pose is not None and not description.static:
+            raise InputError(
+                f"object {object_id}: expected pose= of a static object only, got one of an object that moves; "
+                "write static=True, or pass the pose to step"
+            )
         if not replace and object_id in self._roster:
             raise InputError(
                 f"object {object_id}: expected a new id, got that of {self.name(object_id)!r}; "
@@ -160,7 +170,12 @@ class Monitor:
         prepared: what represents the object, if it is known already.
         Raises InputError, ShapeError; UnsupportedError for an unsupported shape or model.
         """
-        i = self._roster.describe(description, self.model_of(description), prepared)
+        model = self.model_of(description)
+        if model is not description.model:
+            prepared = prepared or monitored_model(description.shapes, model)
+            if prepared.excess > self._profile.model_error:
+                model, prepared = description.model, None
+        i = self._roster.describe(description, model, prepared)
         self._make_room()
         self._candidates.forget(np.array([i], np.int32))  # the next step inserts its new box
         self._time_critical.describe(self._roster, i, self._profile)
@@ -170,6 +185,7 @@ class Monitor:
     def model_of(self, description: ObjectDescription) -> Model:
         """The model that represents an object: its own choice, or else the profile's for its class of shapes.
 
+        `describe` makes the object exact instead if the profile's choice exceeds it by more than `model_error`.
         When the profile's choice changes, a described object keeps its model until it is described again.
         """
         kind = shape_class(description.shapes)
@@ -307,7 +323,7 @@ class Monitor:
         new = self._predict_moved(step, bounds_only=budget is not None)
         self._examine_due(step, new, budget)
         contacts = self._answers.contacts(step, self._active_pairs)
-        predictions = self._predictions(step)
+        predictions = self._predictions(step, budget)
         is_past = overtaken(predictions, self._age(now_ns))
         predictions["status"][is_past] = PredictionStatus.UNRESOLVED
         status = step_status(step, self._active_pairs, self._events, contacts, predictions)
@@ -361,7 +377,7 @@ class Monitor:
         moved, ending = self._tracking.find(step, self._uncertain)
         which = np.concatenate([moved, ending])
         if len(which) == 0:
-            return np.zeros(0, IMPACT)
+            return NO_EVENTS
         self._tracking.restart(step, moved, ending, self._uncertain, self._candidates.grid)
         pairs = self._leave_out_crowds(step, self._candidates.find(step, which))
         self._uncertain.add_pairs(step, pairs)
@@ -393,25 +409,27 @@ class Monitor:
     def _examine_due(self, step: StepContext, new: Events, budget: PairBudget | None) -> None:
         """Stages 5 and 6: examine the pairs that touch or are due; keep the other new impacts as events."""
         version = step.roster.bodies.version
-        is_due = new["lower"] <= step.now
-        due = joined([self._events.take_due(version, step.now), new.compress(is_due)])
+        due, pending = self._events.take_due(version, step.now), new
+        if len(new):
+            is_due = new["lower"] <= step.now
+            due, pending = both(due, new.compress(is_due)), new.compress(~is_due)
         step.work.events_due = len(due)
         self._active_pairs.unite(step, due)
-        pending = new.compress(~is_due)
         if budget is None:
             later = self._active_pairs.examine_all(step, self._first_impacts.scratch)
-            self._events.add(joined([pending, later]), version)
+            self._events.add(both(pending, later), version)
         else:
             self._events.add(pending, version)
             self._time_critical.examine(step, self._active_pairs, self._events, self._first_impacts, budget)
+            if not self._uncertain.counts(step.profile):
+                budget.stop()
 
-    def _predictions(self, step: StepContext) -> NDArray[np.void]:
+    def _predictions(self, step: StepContext, budget: PairBudget | None) -> NDArray[np.void]:
         """Stage 7: return the predictions (records.PREDICTION), with times and probabilities of uncertain states."""
         predictions, slots = self._answers.predictions(step, self._active_pairs, self._events)
         if self._uncertain.active:
-            with self.clock.aside():  # outside of the budget: reserving its time would leave none for the pairs
-                touching = self._active_pairs.touching_keys
-                predictions = self._uncertain.complete(step, predictions, slots, touching, self._first_impacts.pool)
+            touching, pool = self._active_pairs.touching_keys, self._first_impacts.pool
+            predictions = self._uncertain.complete(step, predictions, slots, touching, pool, budget)
         return self._answers.filtered(step, predictions)
 
     # ------------------------------------------------------------------ snapshots

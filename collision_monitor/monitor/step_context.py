@@ -23,6 +23,7 @@ class MotionSettings(NamedTuple):
     velocity_tolerance: float  # m/s
     angular_velocity_tolerance: float  # rad/s
     stale_after: float  # s
+    adaptive: bool  # whether the tolerances of a body follow its deviations
 
 
 class KernelSettings(NamedTuple):
@@ -47,6 +48,7 @@ class KernelSettings(NamedTuple):
                 p.velocity_tolerance,
                 p.angular_velocity_tolerance,
                 p.stale_after,
+                p.adaptive_tolerances,
             ),
         )
 

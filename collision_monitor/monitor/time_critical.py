@@ -133,7 +133,6 @@ class TimeCritical(Stage):
         if len(which):
             events.replace(which, found.compress(found["status"] != CLEAR), version)
         which, refined = self._refine(step, events.events, impacts, budget)
-        budget.stop()
         events.replace(which, joined([later, refined]), version)
 
     def _let_pass(

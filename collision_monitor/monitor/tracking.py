@@ -28,6 +28,11 @@ SHORTEST_SLACK: Final = 0.0625
 LONGEST_SLACK: Final = 1.0
 """Slack: how far beyond the horizon a body is predicted, in horizons; initial, smallest and largest value."""
 
+NARROWEST: Final = 2.0**-20
+ROOM: Final = 2.0
+"""Width: the part of the tolerances that a body uses. Smallest value; and its ratio to the last deviation, if that was
+within the tolerances, because the next deviation of a noisy state may be larger."""
+
 WIDER: Final = 1.1
 """Factor on the spread of a box, because standard deviations vary a little from state to state."""
 
@@ -48,11 +53,12 @@ class Uncertainty(NamedTuple):
 class Tracking(Stage):
     """Compares the bodies' states with their predicted motions, and starts the bodies anew that left them."""
 
-    SAVED = ("_outside",)
+    SAVED = ("_outside", "_width")
     CACHES = ("_columns",)
 
     def __init__(self) -> None:
         self._outside: NDArray[np.bool_] = np.zeros(0, np.bool_)  # by slot: outside of the region
+        self._width: NDArray[np.float64] = np.zeros(0)  # by slot: part of the tolerances that the body uses
         self._columns = make_columns()
 
     @property
@@ -102,7 +108,15 @@ class Tracking(Stage):
         found = np.empty((2, roster.top), np.int32)
         uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
         n, m = find_moved(roster.bodies, uncertainty, roster.top, step.now, step.settings.motion, self._columns, found)
-        return found[0, :n], found[1, :m]
+        moved, ending = found[0, :n], found[1, :m]
+        if step.profile.adaptive_tolerances:
+            self._make_room(roster.capacity)
+            fit_widths(roster.bodies, moved, ending, step.now, step.settings.motion, self._width)
+        return moved, ending
+
+    def _make_room(self, capacity: int) -> None:
+        if len(self._width) < capacity:
+            self._width = np.append(self._width, np.full(capacity - len(self._width), NARROWEST))
 
     def restart(
         self, step: StepContext, moved: Slots, ending: Slots, uncertain: UncertainPredictions, grid: HashedGrid
@@ -111,7 +125,8 @@ class Tracking(Stage):
         bodies = step.roster.bodies
         uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
         if len(moved):
-            restart_motion(bodies, uncertainty, grid, moved, step.now, step.settings.motion)
+            self._make_room(step.roster.capacity)
+            restart_motion(bodies, uncertainty, grid, moved, step.now, step.settings.motion, self._width)
         if len(ending):
             continue_motion(bodies, uncertainty, grid, ending, step.now, step.settings.motion)
 
@@ -122,10 +137,12 @@ class Tracking(Stage):
     def save(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
         snapshot.arrays["outside"] = self._outside.copy()
+        snapshot.arrays["width"] = self._width.copy()
 
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
         self._outside = snapshot.array("outside", np.zeros(0, np.bool_))[: len(snapshot.arrays["bodies.used"])]
+        self._width = np.clip(snapshot.array("width", np.zeros(0)), NARROWEST, 1.0)
 
 
 @device
@@ -271,15 +288,48 @@ def _cover(bodies, i, now, horizon):
 
 
 @kernel
-def restart_motion(bodies, uncertainty, grid, which, now, settings):
+def fit_widths(bodies, moved, ending, now, settings, width):
+    """Fit the widths (N,) of bodies that leave their motion (`moved`), and of those that kept it to its end.
+
+    A body that deviates within the tolerances is noisy: its next tube has ROOM for more than this deviation. One that
+    deviates further has changed its motion; one that kept it may need less. Both halve their width.
+    """
+    for i in moved:
+        m = bodies.motion[i]
+        r = bodies.spin_radius[i]
+        tube_0 = settings.position_tolerance + r * settings.orientation_tolerance
+        tube_1 = settings.velocity_tolerance + r * settings.angular_velocity_tolerance
+        since = now - m.time
+        apart = drift = off = 0.0
+        p = (m.x + m.vx * since, m.y + m.vy * since, m.z + m.vz * since)
+        v, w = (m.vx, m.vy, m.vz), (m.wx, m.wy, m.wz)
+        for c in range(3):
+            apart += (bodies.position[i, c] - p[c]) ** 2
+            drift += (bodies.linear[i, c] - v[c]) ** 2
+            off += (bodies.angular[i, c] - w[c]) ** 2
+        used = max(sqrt(apart) / max(tube_0, 1e-300), (sqrt(drift) + r * sqrt(off)) / max(tube_1, 1e-300))
+        if bodies.slack[i] == 0.0:
+            width[i] = NARROWEST
+        elif used <= 1.0:
+            width[i] = min(max(ROOM * used, width[i] * ROOM), 1.0)
+        else:
+            width[i] = max(0.5 * width[i], NARROWEST)
+    for i in ending:
+        width[i] = max(0.5 * width[i], NARROWEST)
+
+
+@kernel
+def restart_motion(bodies, uncertainty, grid, which, now, settings, width):
     """Make the last state of each body in `which` (M,) its reference motion, and put its swept box into the grid.
 
     The version of the body changes, so that its pairs leave the event list. A stale object widens its bounds here: its
     tube grows by what it may deviate, at stale_acceleration, until the age of its last state has doubled.
+    width (N,): part of the tolerances that a body uses if they are adaptive.
     """
     stale_acceleration = settings.stale_acceleration
     for k in range(which.size):
         i = which[k]
+        part = width[i] if settings.adaptive else 1.0
         m = bodies.motion[i]
         bodies.version[i] += np.uint32(1)
         age = age_of(bodies, i, now)
@@ -298,8 +348,8 @@ def restart_motion(bodies, uncertainty, grid, which, now, settings):
         _cover(bodies, i, now, settings.horizon)
         if not bodies.static[i]:
             r = bodies.spin_radius[i]
-            m.tube_0 = settings.position_tolerance + r * settings.orientation_tolerance
-            m.tube_1 = settings.velocity_tolerance + r * settings.angular_velocity_tolerance
+            m.tube_0 = part * (settings.position_tolerance + r * settings.orientation_tolerance)
+            m.tube_1 = part * (settings.velocity_tolerance + r * settings.angular_velocity_tolerance)
             if age > 0.0:
                 m.tube_0 += 2.0 * stale_acceleration * age * age
                 m.tube_1 += 2.0 * stale_acceleration * age

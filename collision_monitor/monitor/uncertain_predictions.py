@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
+from collision_monitor.monitor.budget import SAMPLE, PairBudget
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.prediction.acceleration_bounds import Intervals, widen_intervals
 from collision_monitor.prediction.bodies import enlarge
 from collision_monitor.prediction.error_samples import Workspace, make_workspace
-from collision_monitor.prediction.impact_distribution import PROBABILITY
+from collision_monitor.prediction.impact_distribution import EARLIEST, MOST_LIKELY, PROBABILITY
 from collision_monitor.prediction.impact_record import holds, ids_of_keys, pair_keys, write_pair
 from collision_monitor.prediction.likely_impacts import LEFT, PlaneMemory, likely_impacts, make_plane_memory
 from collision_monitor.prediction.normal_samples import normal_samples, sample_columns
@@ -175,30 +176,77 @@ class UncertainPredictions(Stage):
         self.entries = entries
 
     def complete(
-        self, step: StepContext, predictions: Records, slots: Pairs, touching: NDArray[np.uint64], pool: Pool
+        self,
+        step: StepContext,
+        predictions: Records,
+        slots: Pairs,
+        touching: NDArray[np.uint64],
+        pool: Pool,
+        budget: PairBudget | None,
     ) -> Records:
         """Fill in times and probabilities of predictions, and add the pairs that may meet though stated to pass.
 
         predictions (n,): of the stated motions; slots (n, 2): their body slots; touching: keys of the pairs that touch
-        now. Returns the predictions, soonest first.
+        now. Returns the predictions, soonest first. A pair that the budget leaves out is UNRESOLVED, without a
+        probability.
         """
         if not step.profile.horizon > 0.0:
             return predictions
         self._widen(step, predictions, slots)
         if not self.counts(step.profile):
             return _sorted(predictions)
-        for name, column in zip(ANSWERS, self._judge(step, slots, True, pool).T, strict=True):
+        answers, done = self._judge_urgent(step, slots, predictions["lower"], True, pool, budget)
+        for name, column in zip(ANSWERS, answers.T, strict=True):
             predictions[name] = column
+        predictions["status"][~done] = PredictionStatus.UNRESOLVED
         self.add_pairs(step, np.empty((0, 2), np.int32))
         known = pair_keys(predictions["id_a"], predictions["id_b"])
-        entries = self.entries[~np.isin(self.entries["key"], np.concatenate([known, touching]))]
-        if len(entries) == 0:
-            return _sorted(predictions)
+        entries = _without(self.entries, np.concatenate([known, touching]))
+        possible = self._judge_passing(step, entries, pool, budget)
+        if budget is not None:
+            budget.stop()
+        return _sorted(np.concatenate([predictions, possible]) if len(possible) else predictions)
+
+    def _judge_passing(self, step: StepContext, entries: Records, pool: Pool, budget: PairBudget | None) -> Records:
+        """Return predictions of the pairs (ENTRY) that are stated to pass, and meet with enough probability."""
         slots = np.stack([entries["i"], entries["j"]], axis=1)
-        answers = self._judge(step, slots, False, pool)
-        kept = answers[:, PROBABILITY] >= step.profile.min_probability
-        both = np.concatenate([predictions, _possible(step, entries["key"][kept], slots[kept], answers[kept])])
-        return _sorted(both)
+        if budget is None:
+            answers = self._judge(step, slots, False, pool)
+            kept = answers[:, PROBABILITY] >= step.profile.min_probability
+            return _possible(step, entries["key"][kept], slots[kept], answers[kept])
+        bounds = self._screen(step, slots)
+        near = np.flatnonzero(~np.isnan(bounds[:, PROBABILITY]))
+        answers, done = self._judge_urgent(step, slots[near], bounds[near, MOST_LIKELY], False, pool, budget)
+        kept = ~done | (answers[:, PROBABILITY] >= step.profile.min_probability)
+        rows = _possible(step, entries["key"][near[kept]], slots[near[kept]], answers[kept])
+        left = ~done[kept]
+        rows["status"][left], rows["method"][left] = PredictionStatus.UNRESOLVED, Method.BOUND
+        rows["lower"][left] = bounds[near[kept][left], EARLIEST]
+        return rows
+
+    def _judge_urgent(
+        self,
+        step: StepContext,
+        slots: Pairs,
+        soon: NDArray[np.float64],
+        stated: bool,
+        pool: Pool,
+        budget: PairBudget | None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Compute the answers (n, 4) of the pairs within the budget, those with the least `soon` (n,) first.
+
+        Returns the answers, NaN for the others, and the mask (n,) of the pairs that were done.
+        """
+        if budget is None:
+            return self._judge(step, slots, stated, pool), np.ones(len(slots), np.bool_)
+        answers, done = np.full((len(slots), len(ANSWERS)), nan), np.zeros(len(slots), np.bool_)
+        order, at = np.argsort(soon, kind="stable"), 0
+        while at < len(order) and (count := budget.next(len(order) - at, SAMPLE)):
+            some = order[at : at + count]
+            answers[some], done[some] = self._judge(step, slots[some], stated, pool), True
+            at += count
+        step.work.deferred += len(order) - at
+        return answers, done
 
     def _widen(self, step: StepContext, predictions: Records, slots: Pairs) -> None:
         """Widen the intervals of the bodies that declare bounds on their accelerations."""
@@ -211,10 +259,9 @@ class UncertainPredictions(Stage):
         for name, column in zip(INTERVAL, ends, strict=True):
             predictions[name] = column
 
-    def _judge(self, step: StepContext, slots: Pairs, stated: bool, pool: Pool) -> NDArray[np.float64]:
-        """Compute the answers (n, 4) for pairs of body slots (n, 2) on all threads; their number changes no answer."""
+    def _sampling(self, step: StepContext, stated: bool) -> Sampling:
         p = step.profile
-        sampling = Sampling(
+        return Sampling(
             step.settings.impact,
             p.horizon,
             p.stale_acceleration,
@@ -226,6 +273,19 @@ class UncertainPredictions(Stage):
             step.roster.planar,
             *normal_samples(p.uncertainty_samples),
         )
+
+    def _screen(self, step: StepContext, slots: Pairs) -> NDArray[np.float64]:
+        """Bound pairs of body slots (n, 2) that are stated to pass; NaN if they meet with too little probability."""
+        sampling = self._sampling(step, False)._replace(only_screens=True)
+        lattice, multibody = sample_columns(step.profile.uncertainty_samples), step.roster.multibody
+        exact, planes = self._workspaces[0]
+        bounds = np.empty((len(slots), len(ANSWERS)))
+        likely_impacts(multibody, self.spread, slots, step.now, sampling, lattice, planes, exact, bounds)
+        return bounds
+
+    def _judge(self, step: StepContext, slots: Pairs, stated: bool, pool: Pool) -> NDArray[np.float64]:
+        """Compute the answers (n, 4) for pairs of body slots (n, 2) on all threads; their number changes no answer."""
+        p, sampling = step.profile, self._sampling(step, stated)
         fewer = sampling._replace(**normal_samples(max(p.uncertainty_samples // 8, FEWEST_SAMPLES))._asdict())
         lattice, multibody = sample_columns(p.uncertainty_samples), step.roster.multibody
 
@@ -275,6 +335,17 @@ class UncertainPredictions(Stage):
         self.entries = snapshot.array("possible", np.empty(0, ENTRY))
         snapshot.check_slots("possible", self.entries)
         self.active = facts["uncertain"]
+
+
+def _without(entries: Records, keys: NDArray[np.uint64]) -> Records:
+    """Return the entries (ENTRY), sorted by key, without those of some keys."""
+    if not len(entries) or not len(keys):
+        return entries
+    own = np.ascontiguousarray(entries["key"])
+    at = np.minimum(np.searchsorted(own, keys), len(own) - 1)
+    kept = np.ones(len(own), np.bool_)
+    kept[at[own[at] == keys]] = False
+    return entries[kept]
 
 
 def _sorted(predictions: Records) -> Records:

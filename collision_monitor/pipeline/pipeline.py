@@ -335,7 +335,12 @@ class Pipeline:
         models = list(map(monitor.model_of, objects))
         self._limit = changes.get(LIMIT, self._limit)
         monitor.profile = profile
-        remodelled = [it for it, model in zip(objects, models, strict=True) if monitor.model_of(it) is not model]
+        limited = "model_error" in changes
+        remodelled = [
+            it
+            for it, model in zip(objects, models, strict=True)
+            if monitor.model_of(it) is not model or (limited and model is not it.model)
+        ]
         shapes = encode_descriptions(stamp_ns, self.frame_id, remodelled) if remodelled else None
         if shapes is not None:
             shapes = self.take_shapes(shapes).data

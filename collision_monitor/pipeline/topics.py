@@ -27,6 +27,10 @@ LATCHED: Final = "transient_local"
 """The durability that delivers earlier messages to a late subscriber."""
 
 
+_OBJECTS: Final = "collision_monitor_msgs/msg/ObjectDescriptionArray"
+_OBJECT_STATES: Final = "collision_monitor_msgs/msg/ObjectStateArray"
+
+
 class Quality(NamedTuple):
     """Quality of service: depth of the queue, and the policies by their ROS 2 names."""
 
@@ -38,10 +42,10 @@ class Quality(NamedTuple):
 class Topic(Enum):
     """A topic of the node: its name below the node's own, its message and its quality of service."""
 
-    SHAPES = "objects/shapes", "collision_monitor_msgs/msg/ObjectDescriptionArray", Quality(100, durability=LATCHED)
+    SHAPES = "objects/shapes", _OBJECTS, Quality(100, durability=LATCHED)
     """A monitor that starts after the publisher still receives every shape."""
 
-    STATES = "objects/states", "collision_monitor_msgs/msg/ObjectStateArray", Quality(10, "best_effort")
+    STATES = "objects/states", _OBJECT_STATES, Quality(10, "best_effort")
     """Sensor data: a newer state makes an old one worthless. The depth covers one slow step at 1 kHz."""
 
     SETTINGS = "settings", "rcl_interfaces/msg/ParameterEvent", Quality(1000)
@@ -59,6 +63,10 @@ class Topic(Enum):
 
     STATUS = "status", "collision_monitor_msgs/msg/MonitorStatus", Quality(1, durability=LATCHED)
     """A new subscriber gets the last status at once."""
+
+    MONITORED_SHAPES = "monitored/shapes", _OBJECTS, Quality(100, durability=LATCHED)
+    MONITORED_STATES = "monitored/states", _OBJECT_STATES, Quality(10, "best_effort")
+    """What the node takes from its own topics and its sources, for viewers. Not recorded, because the inputs are."""
 
     MARKERS = "markers", "visualization_msgs/msg/MarkerArray", Quality(1)
     """A picture for people, who need only the newest."""

@@ -7,11 +7,14 @@ their gap gives a new plane.
 from __future__ import annotations
 
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.prediction.obstacle_planes import AT_REST, MOST_PLANES, separation_at, set_plane
-from collision_monitor.prediction.straight_samples import enter_plane
+from collision_monitor.prediction.obstacle_planes import AT_REST, MOST_PLANES, PLANE_SIZE, separation_at, set_plane
+from collision_monitor.prediction.sample_gaps import enter_planes, gaps_at_end, set_samples
+
+TRIED: Final = 32
+"""Number of samples that decide how the normal of a plane turns."""
 
 
 class CutSettings(NamedTuple):
@@ -19,9 +22,15 @@ class CutSettings(NamedTuple):
 
     margin: float  # m
     tolerance: float  # m: gap up to which a sample has entered
-    samples: int  # number of samples to try
-    verified: int  # samples that must need no new plane; half of them after the last plane
-    turn: Any  # (bool, bool): whether the bodies turn
+    pilot: int  # number of samples of the pilot lattice
+    follows: Any  # (bool, bool): whether normals may turn with the bodies
+    turning: Any  # (int, int): how errors of orientation turn the bodies, see sample_gaps
+
+
+@inlined
+def plane_margin(settings):
+    """Gap (m) at which a sample is behind a plane. Between planes the obstacle is farther by up to a tolerance."""
+    return settings.margin - 0.5 * settings.tolerance
 
 
 @inlined
@@ -42,73 +51,139 @@ def _next_sample(entry, leave, checked, samples, briefest, cursor):
 
 
 @device
-def _cut(table, pair, n, t, direction, error, k, settings, memory):
-    """Add the plane along the direction that separates sample n at t. Its normal may turn with a body.
+def _cut(table, pair, n, samples, direction, k, settings, memory):
+    """Add the plane along the direction that separates sample n. Its normal may turn with a body.
 
-    The best is the one that the fewest samples enter. Returns whether the time at which sample n enters has changed.
+    The best is the one that TRIED samples enter latest. Returns whether sample n spends less time inside.
     """
-    obstacle, off, samples, entry, leave = memory.obstacle, memory.off, settings.samples, memory.entry, memory.leave
-    trial_entry, trial_leave = memory.trial[0], memory.trial[1]
-    a, b, plane = pair.a, pair.b, obstacle.planes[k, obstacle.count[k]]
-    closer = settings.margin - 0.5 * settings.tolerance  # between planes the obstacle is farther by up to a tolerance
-    best, fewest = AT_REST, samples + 1
-    if settings.turn[0] or settings.turn[1]:
+    obstacle, rows, entry, leave = memory.obstacle, memory.rows, memory.entry, memory.leave
+    tried = min(TRIED, settings.pilot)
+    count, nodes, end = obstacle.count[k], obstacle.node[k : k + 2], obstacle.node[k + 1].time
+    planes, margin, before = obstacle.planes[k, count : count + 1], plane_margin(settings), leave[n] - entry[n]
+    obstacle.count[k] += 1
+    best, latest = AT_REST, -inf
+    if settings.follows[0] or settings.follows[1]:
+        trial_entry, trial_leave = memory.trial[0], memory.trial[1]
         for mode in range(3):
-            if mode == AT_REST or settings.turn[mode]:
-                set_plane(table, a, b, direction, mode, k, t, closer, error, obstacle, plane)
-                for m in range(samples):
+            if mode == AT_REST or settings.follows[mode]:
+                set_plane(direction, mode, obstacle, planes[0])
+                for m in range(tried):
                     trial_entry[m] = entry[m]
                     trial_leave[m] = leave[m]
-                enter_plane(plane, off, 0, samples, trial_entry, trial_leave)
-                hits = 0
-                for m in range(samples):
-                    hits += 1 if trial_entry[m] <= trial_leave[m] else 0
-                if hits < fewest:
-                    best, fewest = mode, hits
-    set_plane(table, a, b, direction, best, k, t, closer, error, obstacle, plane)
-    before = entry[n]
-    enter_plane(plane, off, 0, samples, entry, leave)
-    obstacle.count[k] += 1
-    return entry[n] > before or entry[n] > leave[n]
+                enter_planes(
+                    table, pair, planes, margin, settings.turning, nodes, 0, tried, rows, trial_entry, trial_leave
+                )
+                total = 0.0
+                for m in range(tried):
+                    total += trial_entry[m] if trial_entry[m] <= trial_leave[m] else end
+                if total > latest:
+                    best, latest = mode, total
+    set_plane(direction, best, obstacle, planes[0])
+    enter_planes(table, pair, planes, margin, settings.turning, nodes, 0, samples, rows, entry, leave)
+    return leave[n] - entry[n] < before
 
 
 @device
-def cut_planes(table, parts, pair, k, settings, memory, scratch):
-    """Add planes to segment k of memory.obstacle for a pair of shapes (ShapePair), where the first samples need them.
+def _separation_of(table, parts, pair, n, t, k, memory, scratch):
+    """Separation (m) of sample n at time t in segment k."""
+    obstacle, off, first, last = memory.obstacle, memory.off, memory.rows.node[0], memory.rows.node[1]
+    begin, end = obstacle.node[k].time, obstacle.node[k + 1].time
+    share = (t - begin) / (end - begin)
+    error = (off[0, n] + t * off[3, n], off[1, n] + t * off[4, n], off[2, n] + t * off[5, n])
+    turned = (_between(first, last, 3, n, share), _between(first, last, 6, n, share))
+    return separation_at(table, parts, pair, t, error, turned, obstacle, scratch)
 
-    Every second sample is the one that passes the planes most briefly, because it may miss the shapes.
+
+@inlined
+def _between(first, last, row, n, share):
+    """Vector of sample n in three rows from `row` on, at a share of the way from the array `first` to `last`."""
+    return (
+        first[row, n] + share * (last[row, n] - first[row, n]),
+        first[row + 1, n] + share * (last[row + 1, n] - first[row + 1, n]),
+        first[row + 2, n] + share * (last[row + 2, n] - first[row + 2, n]),
+    )
+
+
+@device
+def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, points, scratch):
+    """Add planes to segment k of memory.obstacle for a pair of shapes (ShapePair), where the first `samples` need them.
+
+    Every second sample is the one that passes the planes most briefly, because it may miss the shapes. The search ends
+    when `wanted` samples needed no plane, half of them after the last plane.
     memory.alone: times of the samples that met in an earlier segment, else infinite; it gets those of this segment.
+    Returns the number of samples that have not met.
     """
-    obstacle, off, samples = memory.obstacle, memory.off, settings.samples
-    entry, leave, checked, times = memory.entry, memory.leave, memory.checked, memory.alone
-    begin, end = obstacle.time[k], obstacle.time[k + 1]
+    obstacle, entry, leave, checked, times = memory.obstacle, memory.entry, memory.leave, memory.checked, memory.alone
+    begin_segment(table, pair, k, settings, memory, points, 0, samples)
     for n in range(samples):
-        entry[n] = begin if times[n] == inf else inf
-        leave[n] = end
         checked[n] = 0.0
-    for m in range(obstacle.count[k]):
-        enter_plane(obstacle.planes[k, m], off, 0, samples, entry, leave)
     verified = cursor = 0
     briefest = True
-    while verified < settings.verified and obstacle.count[k] < MOST_PLANES:
+    while verified < wanted and obstacle.count[k] < MOST_PLANES:
         n = _next_sample(entry, leave, checked, samples, briefest, cursor)
         if n < 0 and briefest:
             break
-        briefest = not briefest
+        is_brief, briefest = briefest, not briefest
         if n < 0:
             continue
-        if briefest:
-            cursor = n
-        t, out = entry[n], scratch.out
+        cursor = cursor if is_brief else n
         checked[n] = 1.0
-        error = (off[0, n] + t * off[3, n], off[1, n] + t * off[4, n], off[2, n] + t * off[5, n])
-        gap = separation_at(table, parts, pair, t, error, obstacle, scratch) - settings.margin
-        direction = (out[0], out[1], out[2])
-        if gap > settings.tolerance and _cut(table, pair, n, t, direction, error, k, settings, memory):
+        at = 0.5 * (entry[n] + leave[n]) if is_brief else entry[n]
+        gap = _separation_of(table, parts, pair, n, at, k, memory, scratch) - settings.margin
+        direction = (scratch.out[0], scratch.out[1], scratch.out[2])
+        if gap > settings.tolerance and _cut(table, pair, n, samples, direction, k, settings, memory):
             checked[n] = 0.0
             verified //= 2
         else:
             verified += 1
-    for n in range(samples):
+    return end_segment(entry, leave, times, 0, samples)
+
+
+@device
+def carry_planes(table, pair, k, settings, memory):
+    """Start segment k + 1 with those planes of segment k that keep most apart a sample of the pilot at its end."""
+    obstacle, rows, pilot, turning = memory.obstacle, memory.rows, settings.pilot, settings.turning
+    margin, end = plane_margin(settings), obstacle.node[k + 1]
+    widest, winner = memory.trial[0], memory.checked
+    for n in range(pilot):
+        widest[n], winner[n] = -inf, -1.0
+    for m in range(obstacle.count[k]):
+        gaps_at_end(table, pair, obstacle.planes[k, m], margin, turning, end, pilot, rows)
+        for n in range(pilot):
+            if memory.alone[n] == inf and rows.gap[1, n] > widest[n]:
+                widest[n], winner[n] = rows.gap[1, n], float(m)
+    for m in range(obstacle.count[k]):
+        kept = False
+        for n in range(pilot):
+            kept |= winner[n] == m
+        if kept:
+            for c in range(PLANE_SIZE):
+                obstacle.planes[k + 1, obstacle.count[k + 1], c] = obstacle.planes[k, m, c]
+            obstacle.count[k + 1] += 1
+
+
+@device
+def begin_segment(table, pair, k, settings, memory, points, first, last):
+    """Set the intervals of the samples first:last to those behind the planes of segment k, empty if they met before.
+
+    A segment without planes starts with the last ones of the segment before it that kept samples apart.
+    """
+    obstacle, rows, entry, leave, times = memory.obstacle, memory.rows, memory.entry, memory.leave, memory.alone
+    set_samples(obstacle, k, memory.off, points, settings.turning, first, last, rows)
+    begin, end = obstacle.node[k].time, obstacle.node[k + 1].time
+    for n in range(first, last):
+        entry[n] = begin if times[n] == inf else inf
+        leave[n] = end
+    planes, nodes, margin = obstacle.planes[k, 0 : obstacle.count[k]], obstacle.node[k : k + 2], plane_margin(settings)
+    enter_planes(table, pair, planes, margin, settings.turning, nodes, first, last, rows, entry, leave)
+
+
+@device
+def end_segment(entry, leave, times, first, last):
+    """Set the times of the samples first:last that met in a segment; return the number of those that never met."""
+    left = 0
+    for n in range(first, last):
         if entry[n] <= leave[n]:
             times[n] = entry[n]
+        left += 1 if times[n] == inf else 0
+    return left

@@ -24,17 +24,17 @@ OUTWARD: Final = 2.0
 
 
 @device
-def summarise(times, weights, order, confidence, safe, answer):
+def summarise(times, weights, order, confidence, safe, answer, whole):
     """Write earliest, most likely and latest time (s) and probability into answer (4,).
 
-    times (n,): inf: no impact; weights (n,); order (n,): sorts the times; safe: a time before which hardly any impact
-    lies. At most 1 - confidence of the impacts lie before `earliest`, which is at most `safe` if too few samples meet.
-    Both quantiles are moved outward by OUTWARD standard errors, because the samples are few.
+    times (n,): inf: no impact; weights (n,) with the sum `whole`; order (n,): sorts the times; safe: a time before
+    which hardly any impact lies. At most 1 - confidence of the impacts lie before `earliest`, which is at most `safe`
+    if too few samples meet. Both quantiles are moved outward by OUTWARD standard errors, because the samples are few.
     """
     n = 0
     total = squares = all_squares = 0.0
     for k in range(order.size):
-        w = weights[order[k]]
+        w = weights[order[k]] / whole
         all_squares += w * w
         if times[order[k]] < inf:
             total += w
@@ -50,14 +50,14 @@ def summarise(times, weights, order, confidence, safe, answer):
     answer[EARLIEST] = min(safe, times[order[0]])
     below = 0.0
     for k in range(n):
-        below += weights[order[k]]
+        below += weights[order[k]] / whole
         if below > few:
             break
         answer[EARLIEST] = times[order[k]]
     most = confidence + OUTWARD * sqrt(variance * all_squares)
     below = 0.0
     for k in range(n):
-        below += weights[order[k]]
+        below += weights[order[k]] / whole
         if below >= most:
             answer[LATEST] = times[order[k]]
             break
@@ -66,9 +66,9 @@ def summarise(times, weights, order, confidence, safe, answer):
     inside = 0.0
     shortest = inf
     for high in range(n):
-        inside += weights[order[high]]
-        while low < high and inside - weights[order[low]] >= 0.5 * total:
-            inside -= weights[order[low]]
+        inside += weights[order[high]] / whole
+        while low < high and inside - weights[order[low]] / whole >= 0.5 * total:
+            inside -= weights[order[low]] / whole
             low += 1
         length = times[order[high]] - times[order[low]]
         if inside >= 0.5 * total and length < shortest:

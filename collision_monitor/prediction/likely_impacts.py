@@ -1,102 +1,82 @@
-"""Time and probability of impact of two bodies with uncertain states, from linearised gaps.
+"""Time and probability of impact of two bodies with uncertain states, from planes that bound the obstacle.
 
-`uncertainty.py` follows each sample as exactly as the stated motion. Here the samples meet planes that bound the
-obstacle (obstacle_planes.py), which costs a few products for each plane and sample. The planes come from exact
-separations at a few samples. Pairs with a mesh, with errors of orientation, or that turn fast, are left to
-`uncertainty.py`. docs/uncertainty.md describes the method.
+`uncertainty.py` follows each sample as exactly as the stated motion. Here the samples meet planes
+(obstacle_planes.py), which costs a few products for each plane and sample. The planes come from exact separations at a
+few samples. Pairs with a mesh, or that turn very fast, are left to `uncertainty.py`. docs/uncertainty.md describes the
+method.
 """
 
 from __future__ import annotations
 
 from math import inf, nan, sqrt
-from statistics import NormalDist
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel, device, inlined
-from collision_monitor.geometry.shape_table import SPHERE
+from collision_monitor.geometry.shape_table import CYLINDER, HALF_SPACE, SPHERE
+from collision_monitor.narrow_phase.cylinder_cylinder import is_parallel
+from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.bodies import next_pair, place_shape
-from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window
-from collision_monitor.prediction.cutting_planes import CutSettings, cut_planes
+from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
+from collision_monitor.prediction.cutting_planes import CutSettings, carry_planes, cut_planes
 from collision_monitor.prediction.error_samples import add_covariance, orientation_spread, set_frame, take_root
-from collision_monitor.prediction.impact_distribution import EARLIEST, PROBABILITY, summarise
+from collision_monitor.prediction.impact_distribution import EARLIEST, MOST_LIKELY, PROBABILITY, summarise
+from collision_monitor.prediction.impact_record import CLEAR
 from collision_monitor.prediction.motion import carry_on, half_acceleration
-from collision_monitor.prediction.obstacle_planes import (
-    AT_REST,
-    GAP,
-    MOST_SEGMENTS,
-    RATE,
-    Obstacle,
-    make_obstacle,
-    separation_at,
-    set_nodes,
-    set_plane,
+from collision_monitor.prediction.obstacle_planes import Obstacle, make_obstacle, set_nodes
+from collision_monitor.prediction.sample_gaps import (
+    FIRST_ORDER,
+    NOT_TURNED,
+    SERIES,
+    TURNED_FARTHEST,
+    SampleRows,
+    make_sample_rows,
 )
+from collision_monitor.prediction.screening import FURTHEST, design_point, meeting
 from collision_monitor.prediction.sphere_interval import sphere_interval
 from collision_monitor.prediction.spread import is_uncertain, surface_spread
-from collision_monitor.prediction.straight_samples import ERRORS, enter_sphere, set_errors
+from collision_monitor.prediction.straight_samples import ERRORS, enter_cylinder, enter_sphere, set_errors
 from collision_monitor.prediction.time_order import sort_times
 from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE, body_has_mesh, first_contact
 
-BENDING: Final = 0.05
+BENDING: Final = 0.1
 """Largest deviation of a gap from a straight line in a segment, in standard deviations of the gap."""
-
-MOST_BENDS: Final = 4.0
-"""Pairs that turn faster, so that the horizon has more parts than this, are left to the exact method."""
 
 FACETS: Final = 0.015
 """Distance between the planes and the obstacle, in standard deviations of the gap, up to which no plane is added."""
 
-VERIFIED_IN_PILOT: Final = 8
-VERIFIED: Final = 64
+TURNED: Final = 2.0
+"""Standard deviations of the errors of angular velocity for which gaps are that straight."""
+
+FACETS_IN_PILOT: Final = 0.06
+"""The same for the pilot lattice, which decides how many samples a pair needs."""
+
+MOST_PARTS: Final = 2
+SMALL: Final = 0.05
+"""If bodies that turn divide the time into more than MOST_PARTS, and errors exceed SMALL rad, or twice SMALL radii of a
+shape, the pair is left to the exact method unless it surely meets: it needs so many planes that it is no faster."""
+
+SPINS: Final = 4.0
+"""Standard deviations of the angular velocity above which a body counts as one that turns."""
+
+VERIFIED_IN_PILOT: Final = 6
+VERIFIED: Final = 48
 """Samples of the pilot lattice, and of all, that must need no new plane of a segment."""
 
-FURTHEST: Final = 4.5
-"""Standard deviations beyond which errors are neglected; 7 of a million are larger."""
+SURE_SAMPLES: Final = 256
+"""Number of samples of a pair that meets in all samples of the pilot lattice: they differ only in their times."""
+
+LATER: Final = 0.5
+"""Part of the range of the pilot's times after the last one until which such a pair is followed."""
 
 LEFT: Final = -1.0
-"""Probability of a pair that this method does not answer: errors of orientation, fast rotation, or a mesh."""
-
-NO_ERROR: Final = (0.0, 0.0, 0.0)
-
-SAME_TIME: Final = 0.02
-"""Fraction of the window by which two times of a design point differ at most when the search for it ends."""
+"""Probability of a pair that this method does not answer: very fast rotation, large errors of orientation, a mesh."""
 
 PILOT_PART: Final = 0.3
 """A pair of shapes that is stated to pass is left out if, in the first coarse lattice of samples, it meets with less
 than this fraction of min_probability."""
-
-_FINENESS: Final = 32
-"""Steps of TAIL for each standard deviation."""
-
-TAIL: Final = np.array([NormalDist().cdf(-k / _FINENESS) for k in range(6 * _FINENESS)])
-"""Probability that a normal error exceeds k / _FINENESS standard deviations."""
-
-
-@inlined
-def _tail(beta):
-    """Probability, rounded up, that a normal error exceeds beta standard deviations."""
-    if not beta > 0.0:
-        return 1.0
-    return TAIL[min(int(beta * _FINENESS), TAIL.size - 1)]
-
-
-@device
-def _meeting(table, parts, pair, horizon, margin, tube, work):
-    """Interval (s) in which the bounding spheres of a pair of shapes meet within the tube; (inf, -inf): never."""
-    A, B, a, b = pair
-    reach = table.radius[a] + table.radius[b] + margin + tube.start
-    if not reach < inf:
-        return 0.0, horizon
-    R_a, R_b = work.scratch.rotation[0], work.scratch.rotation[1]
-    oa, ob = place_shape(table, parts, a, A.rotation, R_a), place_shape(table, parts, b, B.rotation, R_b)
-    p = (B.x - A.x + ob[0] - oa[0], B.y - A.y + ob[1] - oa[1], B.z - A.z + ob[2] - oa[2])
-    bent = half_acceleration(A, B) * horizon
-    bent += sqrt((A.wx * A.wx + A.wy * A.wy + A.wz * A.wz) * (oa[0] * oa[0] + oa[1] * oa[1] + oa[2] * oa[2]))
-    bent += sqrt((B.wx * B.wx + B.wy * B.wy + B.wz * B.wz) * (ob[0] * ob[0] + ob[1] * ob[1] + ob[2] * ob[2]))
-    return sphere_interval(p, (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz), reach, tube.growth + bent, horizon, 1.0)
 
 
 @inlined
@@ -106,91 +86,6 @@ def _approach(A, B, horizon):
     vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
     vv = vx * vx + vy * vy + vz * vz
     return min(max(-(px * vx + py * vy + pz * vz) / vv, 0.0), horizon) if vv > 0.0 else 0.0
-
-
-@inlined
-def _quadratic(block, row, column, n):
-    """n^T C n for the 3 x 3 block of a matrix that begins at (row, column)."""
-    total = 0.0
-    for r in range(3):
-        for c in range(3):
-            total += n[r] * block[row + r, column + c] * n[c]
-    return total
-
-
-@device
-def _least_beta(plane, turning, joint, t, window):
-    """Smallest number of standard deviations between a pair and contact along a plane; its time; a bound.
-
-    turning: standard deviation of the surfaces from errors of orientation (m now, m/s). joint (6, 6): covariance of
-    position at time t and of velocity. The gap is linear in time, so that it closes in the window only if it is closed
-    at one end: the bound is the sum of both probabilities.
-    """
-    n = (plane[0], plane[1], plane[2])
-    pp, pv, vv = _quadratic(joint, 0, 0, n), _quadratic(joint, 0, 3, n), _quadratic(joint, 3, 3, n)
-    # variance c + 2 d s + e s^2
-    c = pp - 2.0 * t * pv + t * t * vv + turning[0] * turning[0]
-    d = pv - t * vv + turning[0] * turning[1]
-    e = vv + turning[1] * turning[1]
-    g, r = plane[GAP], plane[RATE]
-    begin, end = window
-    at_begin = (g + r * begin) / sqrt(max(c + begin * (2.0 * d + begin * e), 1e-300))
-    at_end = (g + r * end) / sqrt(max(c + end * (2.0 * d + end * e), 1e-300))
-    beta, when = (at_begin, begin) if at_begin < at_end else (at_end, end)
-    slope = r * d - g * e
-    if slope != 0.0:
-        s = (g * d - r * c) / slope
-        if begin < s < end:
-            between = (g + r * s) / sqrt(max(c + s * (2.0 * d + s * e), 1e-300))
-            if between < beta:
-                beta, when = between, s
-    both_signs = 2.0 if turning[0] + turning[1] > 0.0 else 1.0  # a turn either way closes the gap
-    return beta, when, both_signs * (_tail(at_begin) + _tail(at_end))
-
-
-DESIGN_STEPS: Final = 3
-"""Largest number of separations towards a design point."""
-
-
-@device
-def _design_point(multibody, i, j, tube, turning, bend, sampling, t, obstacle, work):
-    """Return (bound, time): a bound on the probability of contact, and the time at which contact is likeliest.
-
-    t: time of closest approach. Writes the direction of the gap then into work.frame[0]: the design point of
-    reliability theory. The bound is that of one plane for each pair of shapes, 1 if the gaps are not linear in time.
-    work.joint: covariance of position at t and of velocity, in world axes.
-    """
-    table, parts, bodies = multibody
-    A, B, frame, plane, scratch = work.motion[0], work.motion[1], work.frame, obstacle.planes[0, 0], work.scratch
-    margin = sampling.query.margin
-    wide = Tube(FURTHEST * tube.start, FURTHEST * tube.growth)
-    bound, least, likeliest = 0.0, inf, t
-    a, first_b = bodies.first_shape[i], bodies.first_shape[j]
-    b = first_b
-    while a >= 0:
-        pair = ShapePair(A, B, a, b)
-        window = Window(*_meeting(table, parts, pair, sampling.horizon, margin, wide, work))
-        if window.begin <= window.end:
-            set_nodes(table, parts, pair, window, 1, scratch, obstacle)
-            at, own = min(max(t, window.begin), window.end), 1.0
-            for _ in range(DESIGN_STEPS):
-                if separation_at(table, parts, pair, at, NO_ERROR, obstacle, scratch) <= margin:
-                    own = 1.0
-                    break
-                n = (scratch.out[0], scratch.out[1], scratch.out[2])
-                set_plane(table, a, b, n, AT_REST, 0, at, margin, NO_ERROR, obstacle, plane)
-                beta, when, outside = _least_beta(plane, turning, work.joint, t, window)
-                own = min(own, outside)
-                if beta < least:
-                    least, likeliest = beta, when
-                    frame[0, 0], frame[0, 1], frame[0, 2] = n
-                if abs(when - at) <= SAME_TIME * (window.end - window.begin):
-                    break
-                at = when
-            is_linear = bend * (window.end - window.begin) ** 2 <= 8.0 * BENDING * tube.start
-            bound += own if is_linear else 1.0
-        a, b = next_pair(parts, first_b, a, b)
-    return bound, likeliest
 
 
 @device
@@ -205,54 +100,146 @@ def _gap_covariance(multibody, spread, i, j, ages, t, sampling, work):
 
 
 @inlined
-def _bends(A, B, length, bend, sigma):
-    """Number of parts of a time of this length (s) in which the gaps are straight enough, less 1.
+def _part_length(A, B, errors):
+    """Length (s) of a part of the time in which the gaps are straight enough.
 
-    bend: bound on the acceleration of the surfaces (m/s^2). A normal that turns while the bodies pass each other bends
-    the gap too.
+    A normal that turns while the bodies pass each other bends the gap like an acceleration of the surfaces.
     """
     speed = sqrt((B.vx - A.vx) ** 2 + (B.vy - A.vy) ** 2 + (B.vz - A.vz) ** 2)
-    return length * sqrt((bend + speed * (_rate(A) + _rate(B))) / (8.0 * BENDING * max(sigma, 1e-300)))
+    rate = _rate(A) + _rate(B) + TURNED * (errors.turning[0][1] + errors.turning[1][1])
+    bend = errors.bend + speed * rate
+    return sqrt(8.0 * BENDING * max(errors.sigma, 1e-300) / bend) if bend > 0.0 else inf
+
+
+class PairErrors(NamedTuple):
+    """Uncertainty of a pair of bodies."""
+
+    tube: Any  # Tube: bound on the standard deviation of their surfaces
+    turning: Any  # ((rad, rad/s), (rad, rad/s)): errors of their orientations
+    bend: float  # m/s^2: bound on the acceleration of their surfaces
+    sigma: float  # m: standard deviation of the gap
+    time: float  # s: of the likeliest contact
+    radius: Any  # (m, m): of the bodies
+
+
+@inlined
+def _turned_at(errors, body):
+    """Standard deviation of the orientation of a body at the time of the likeliest contact (rad)."""
+    return errors.turning[body][0] + errors.turning[body][1] * errors.time
+
+
+@inlined
+def _order(errors, body, tolerance):
+    """How errors of orientation turn a body: the second order counts if it moves the surface by the tolerance (m)."""
+    off = _turned_at(errors, body)
+    if off == 0.0:
+        return NOT_TURNED
+    return FIRST_ORDER if 0.5 * errors.radius[body] * (TURNED * off) ** 2 < tolerance else SERIES
 
 
 @device
-def _enter_pair(table, parts, pair, window, bend, sigma, sampling, lattice, memory, work):
-    """Lower memory.times to the samples' impacts of a pair of shapes (ShapePair) in the window.
+def _lay_planes(table, parts, pair, errors, until, sampling, lattice, memory, work):
+    """Bound the obstacle of a pair of shapes (ShapePair) by planes where the pilot's samples need them, until `until`.
 
-    If the pair is stated to pass, and it hardly meets in the pilot lattice, the other samples are left out.
+    Writes the times of the pilot's samples into memory.alone, infinite for the others. Returns (number of segments,
+    settings of the cuts, whether the segments reach the end).
     """
     A, B, a, b = pair
-    obstacle, off, times, weights = memory.obstacle, memory.off, memory.times, lattice.weights
-    margin, size, pilot = sampling.query.margin, weights.size, lattice.pilot
-    if table.kind[a] == SPHERE and table.kind[b] == SPHERE and bend == 0.0:
-        R = work.scratch.rotation
-        oa, ob = place_shape(table, parts, a, A.rotation, R[0]), place_shape(table, parts, b, B.rotation, R[1])
-        p = (B.x - A.x + ob[0] - oa[0], B.y - A.y + ob[1] - oa[1], B.z - A.z + ob[2] - oa[2])
-        v = (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
-        reach = table.radius[a] + table.radius[b] + margin
-        enter_sphere(p, v, reach, window.end, off, times)
-        return
-    segments = 1 + int(min(_bends(A, B, window.end - window.begin, bend, sigma), MOST_SEGMENTS - 1.0))
-    set_nodes(table, parts, pair, window, segments, work.scratch, obstacle)
-    tolerance, turn = max(FACETS * sigma, sampling.query.tolerance), (_rate(A) > 0.0, _rate(B) > 0.0)
-    settings = CutSettings(margin, tolerance, pilot, VERIFIED_IN_PILOT, turn)
-    alone = memory.alone
-    for n in range(pilot):
-        alone[n] = inf
-    for k in range(segments):
-        cut_planes(table, parts, pair, k, settings, memory, work.scratch)
-    seen = 0.0
-    for n in range(pilot):
-        seen += weights[n] if alone[n] < inf else 0.0
-    if seen * size < pilot * PILOT_PART * sampling.min_probability and not sampling.stated:
-        return
-    settings = CutSettings(margin, tolerance, size, VERIFIED, turn)
+    scratch, alone, sigma = work.scratch, memory.alone, errors.sigma
+    margin, size, pilot = sampling.query.margin, lattice.weights.size, lattice.pilot
+    tolerance = max(FACETS_IN_PILOT * sigma, sampling.query.tolerance)
+    fine = max(FACETS * sigma, sampling.query.tolerance)
+    turning = (_order(errors, 0, fine), _order(errors, 1, fine))
+    flat = table.kind[a] == HALF_SPACE or table.kind[b] == HALF_SPACE
+    follows = (not flat and turning[0] + _rate(A) > 0.0, not flat and turning[1] + _rate(B) > 0.0)
+    settings = CutSettings(margin, tolerance, pilot, follows, turning)
     for n in range(size):
         alone[n] = inf
+    wide = Tube(FURTHEST * errors.tube.start, FURTHEST * errors.tube.growth)
+    begin, end = meeting(table, parts, pair, sampling.horizon, margin, wide, work)
+    end = min(end, until)
+    if not begin < end:
+        return 0, settings, True
+    length = _part_length(A, B, errors)
+    if length < end - begin:
+        coarse = max(sampling.query.tolerance, SAMPLE_TOLERANCE * sigma)
+        roughly = ImpactQuery(margin, coarse, sampling.query.iterations)
+        there = Tube(wide.start + wide.growth * begin, wide.growth)
+        status, begin, _, _ = shape_impact(table, parts, pair, Window(begin, end), there, roughly, scratch)
+        if status == CLEAR or not begin < end:
+            return 0, settings, True
+    length = (end - begin) / (1.0 + np.floor((end - begin) / length))
+    window = Window(begin, end)
+    segments = set_nodes(
+        table, parts, pair, window, length, errors.turning, sampling.planar, scratch, memory.obstacle
+    )
+    turned = max(_turned_at(errors, 0), _turned_at(errors, 1))
+    large = TURNED * turned > SMALL or sigma > 2.0 * SMALL * min(table.radius[a], table.radius[b])
+    spins = _rate(A) + _rate(B) > SPINS * (errors.turning[0][1] + errors.turning[1][1])
+    is_rough = segments > MOST_PARTS and large and spins
+    if is_rough and not sampling.stated:
+        return segments, settings, False
+    left = pilot
     for k in range(segments):
-        cut_planes(table, parts, pair, k, settings, memory, work.scratch)
-    for n in range(size):
+        left = cut_planes(table, parts, pair, k, pilot, VERIFIED_IN_PILOT, settings, memory, lattice.points, scratch)
+        if left == 0:
+            break
+        if k + 1 < segments:
+            carry_planes(table, pair, k, settings, memory)
+    return segments, settings, left == 0 or (memory.obstacle.node[segments].time >= end and not is_rough)
+
+
+@device
+def _enter_pair(table, parts, pair, laid, samples, wanted, tolerance, lattice, memory, work):
+    """Lower memory.times to the impacts of the first `samples` with the planes of `_lay_planes`, and some more.
+
+    laid: what it returned; wanted: number of samples that must need no more planes; tolerance (m): see CutSettings.
+    """
+    segments, pilots, _ = laid
+    settings = CutSettings(pilots.margin, tolerance, pilots.pilot, pilots.follows, pilots.turning)
+    alone, times = memory.alone, memory.times
+    for n in range(samples):
+        alone[n] = inf
+    each = max(VERIFIED_IN_PILOT, wanted // max(segments - 3, 1)) if wanted > 0 else 0
+    for k in range(segments):
+        left = cut_planes(table, parts, pair, k, samples, each, settings, memory, lattice.points, work.scratch)
+        if left == 0:
+            break
+    for n in range(samples):
         times[n] = min(times[n], alone[n])
+
+
+@device
+def _are_round(table, parts, pair, errors, margin, work):
+    """Whether the closed form of round bodies holds: two balls, or two parallel cylinders, that move straight."""
+    A, B, a, b = pair
+    turning = errors.turning
+    if errors.bend > 0.0 or turning[0][0] + turning[0][1] + turning[1][0] + turning[1][1] > 0.0:
+        return False
+    if table.kind[a] == SPHERE and table.kind[b] == SPHERE:
+        return True
+    if not (table.kind[a] == table.kind[b] == CYLINDER) or table.margin[a] + table.margin[b] + margin > 0.0:
+        return False
+    R_a, R_b = work.scratch.rotation[0], work.scratch.rotation[1]
+    place_shape(table, parts, a, A.rotation, R_a)
+    place_shape(table, parts, b, B.rotation, R_b)
+    return is_parallel(table, a, PairPose(R_a, R_b, (0.0, 0.0, 0.0)))
+
+
+@device
+def _enter_round(table, parts, pair, end, margin, memory, work):
+    """Lower memory.times to the samples' impacts of two balls or two parallel cylinders that move straight."""
+    A, B, a, b = pair
+    R = work.scratch.rotation
+    oa, ob = place_shape(table, parts, a, A.rotation, R[0]), place_shape(table, parts, b, B.rotation, R[1])
+    p = (B.x - A.x + ob[0] - oa[0], B.y - A.y + ob[1] - oa[1], B.z - A.z + ob[2] - oa[2])
+    v = (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
+    if table.kind[a] == SPHERE:
+        enter_sphere(p, v, table.radius[a] + table.radius[b] + margin, end, memory.off, memory.times)
+        return
+    axis, size = (R[1, 0, 2], R[1, 1, 2], R[1, 2, 2]), table.size
+    half = size[a, 1] + size[b, 1]
+    enter_cylinder(p, v, axis, size[a, 0] + size[b, 0], half, end, memory.off, memory.times)
 
 
 @allocating_kernel
@@ -262,19 +249,20 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
     An answer is NaN if neither body has declared an uncertainty, or if the pair is stated to pass and its probability
     is below min_probability for certain. The probability is LEFT for pairs that `impact_probabilities` has to answer.
     sampling: its own samples are not used; lattice: sample_columns.
+    sampling.only_screens: for pairs that are stated to pass, write a time before which the probability of contact is
+    less than min_probability, the likeliest time of contact, and a bound on its probability, LEFT if unknown.
     """
     table, parts, bodies = multibody
     query, horizon, stale_acceleration = sampling.query, sampling.horizon, sampling.stale_acceleration
-    weights, times, off = lattice.weights, memory.times, memory.off
+    weights, times = lattice.weights, memory.times
     A, B = work.motion[0], work.motion[1]
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
         answers[k, :] = nan
         if not (is_uncertain(spread, i) or is_uncertain(spread, j)):
             continue
-        if body_has_mesh(table, parts, bodies.first_shape[i]) or body_has_mesh(table, parts, bodies.first_shape[j]):
-            answers[k, PROBABILITY] = LEFT
-            continue
+        has_mesh = body_has_mesh(table, parts, bodies.first_shape[i])
+        has_mesh |= body_has_mesh(table, parts, bodies.first_shape[j])
         ages = (carry_on(bodies, i, now, work.quaternion, A), carry_on(bodies, j, now, work.quaternion, B))
         r_i, r_j = bodies.spin_radius[i], bodies.spin_radius[j]
         now_i, growth_i = surface_spread(spread, i, r_i, ages[0], horizon, stale_acceleration)
@@ -285,18 +273,30 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         turn_i, turn_j = orientation_spread(spread, i, r_i, ages[0], t), orientation_spread(spread, j, r_j, ages[1], t)
         far_i, far_j = r_i if r_i < inf else 0.0, r_j if r_j < inf else 0.0  # a half-space does not turn
         turning = (far_i * turn_i[0] + far_j * turn_j[0], far_i * turn_i[1] + far_j * turn_j[1])
+        flat = not (r_i < inf and r_j < inf)
         if not sampling.stated:
             _set_axes(work.frame)
             reach = A.radius + B.radius + query.margin + sampling.sigmas * tube.start
             growth = sampling.sigmas * tube.growth + half_acceleration(A, B) * horizon
             p, v = (B.x - A.x, B.y - A.y, B.z - A.z), (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
-            if reach < inf and sphere_interval(p, v, reach, growth, horizon, 1.0)[0] == inf:
+            first = sphere_interval(p, v, reach, growth, horizon, 1.0)[0] if reach < inf else 0.0
+            if first == inf:
+                continue
+            answer = answers[k]
+            answer[EARLIEST], answer[MOST_LIKELY], answer[PROBABILITY] = first, first, LEFT
+            if has_mesh:
                 continue
             _gap_covariance(multibody, spread, i, j, ages, t, sampling, work)
-            bound, t = _design_point(multibody, i, j, tube, turning, bend, sampling, t, memory.obstacle, work)
+            bound, t = design_point(multibody, i, j, tube, turning, bend, sampling, t, memory.obstacle, work)
             if bound < sampling.min_probability:
+                answer[:] = nan
                 continue
-        if turning[0] + turning[1] > 0.0:
+            if sampling.only_screens:
+                answer[MOST_LIKELY], answer[PROBABILITY] = t, min(bound, 1.0)
+                continue
+            answer[:] = nan
+        most = max(turn_i[0] + turn_i[1] * t, turn_j[0] + turn_j[1] * t)
+        if has_mesh or most > TURNED_FARTHEST or (flat and most > 0.0):
             answers[k, PROBABILITY] = LEFT
             continue
         if sampling.stated:
@@ -308,29 +308,93 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         _gap_covariance(multibody, spread, i, j, ages, t, sampling, work)
         take_root(work.joint)
         _clear_upper(work.joint)
-        balls = r_i == 0.0 and r_j == 0.0
-        if not balls and _bends(A, B, horizon, bend, work.joint[0, 0]) > MOST_BENDS:
+        set_errors(work.joint, work.frame, t, lattice.points, memory.off)
+        errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, (far_i, far_j))
+        samples = _enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work)
+        if samples < 0:
             answers[k, PROBABILITY] = LEFT
             continue
-        set_errors(work.joint, work.frame, t, lattice.points, off)
-        times[:] = inf
-        wide = Tube(FURTHEST * tube.start, FURTHEST * tube.growth)
-        a, first_b = bodies.first_shape[i], bodies.first_shape[j]
-        b = first_b
-        while a >= 0:
-            pair = ShapePair(A, B, a, b)
-            window = Window(*_meeting(table, parts, pair, horizon, query.margin, wide, work))
-            if window.begin <= window.end:
-                _enter_pair(table, parts, pair, window, bend, work.joint[0, 0], sampling, lattice, memory, work)
-            a, b = next_pair(parts, first_b, a, b)
-        sort_times(times, memory.order, memory.bucket, memory.ends)
-        answer = answers[k]
-        summarise(times, weights, memory.order, sampling.confidence, 0.0, answer)
-        if answer[EARLIEST] == 0.0 and times[memory.order[0]] > 0.0:  # too few samples meet
+        if samples == 0:
+            continue
+        order, answer = memory.order[0:samples], answers[k]
+        sort_times(times[0:samples], order, memory.bucket[0:samples], memory.ends[0 : samples + 1])
+        part = 0.0
+        for n in range(samples):
+            part += weights[n]
+        summarise(times[0:samples], weights[0:samples], order, sampling.confidence, 0.0, answer, part)
+        if answer[EARLIEST] == 0.0 and times[order[0]] > 0.0:  # too few samples meet
             wide = Tube(sampling.safe_sigmas * tube.start, sampling.safe_sigmas * tube.growth)
             roughly = ImpactQuery(query.margin, max(query.tolerance, SAMPLE_TOLERANCE * tube.start), query.iterations)
             safe = first_contact(multibody, i, j, Window(0.0, horizon), wide, roughly, work)
-            answer[EARLIEST] = min(safe, times[memory.order[0]])
+            answer[EARLIEST] = min(safe, times[order[0]])
+
+
+@device
+def _enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
+    """Write the times of the samples' impacts of bodies i and j into memory.times. Return the number of samples.
+
+    0: the bodies are stated to pass, and hardly meet in the pilot lattice. -1: they turn too fast.
+    Bodies that meet in all samples of the pilot need few samples: only their times differ.
+    """
+    table, parts, bodies = multibody
+    A, B = work.motion[0], work.motion[1]
+    times, alone, weights, pilot = memory.times, memory.alone, lattice.weights, lattice.pilot
+    size = weights.size
+    margin = sampling.query.margin
+    first_a, first_b = bodies.first_shape[i], bodies.first_shape[j]
+    single = parts.next[first_a] < 0 and parts.next[first_b] < 0
+    for n in range(size):
+        times[n] = inf
+    if single and _are_round(table, parts, ShapePair(A, B, first_a, first_b), errors, margin, work):
+        _enter_round(table, parts, ShapePair(A, B, first_a, first_b), sampling.horizon, margin, memory, work)
+        return size
+    a, b = first_a, first_b
+    laid = _lay_planes(
+        table, parts, ShapePair(A, B, a, b), errors, sampling.horizon, sampling, lattice, memory, work
+    )
+    reaches = laid[2]
+    while True:
+        for n in range(pilot):
+            times[n] = min(times[n], alone[n])
+        a, b = next_pair(parts, first_b, a, b)
+        if a < 0 or not reaches:
+            break
+        laid = _lay_planes(
+            table, parts, ShapePair(A, B, a, b), errors, sampling.horizon, sampling, lattice, memory, work
+        )
+        reaches = laid[2]
+    latest = seen = part = 0.0
+    for n in range(pilot):
+        latest = max(latest, times[n])
+        seen += weights[n] if times[n] < inf else 0.0
+        part += weights[n]
+    if not reaches:
+        return -1
+    if seen < part * PILOT_PART * sampling.min_probability and not sampling.stated:
+        return 0
+    is_sure = latest < inf
+    samples, wanted = (min(SURE_SAMPLES, size), 0) if is_sure else (size, VERIFIED)
+    tolerance = max((FACETS_IN_PILOT if is_sure else FACETS) * errors.sigma, sampling.query.tolerance)
+    until = min(sampling.horizon, latest + LATER * (latest - _least(times, pilot))) if is_sure else sampling.horizon
+    for n in range(size):
+        times[n] = inf
+    a, b = first_a, first_b
+    while a >= 0:
+        pair = ShapePair(A, B, a, b)
+        if not single:
+            laid = _lay_planes(table, parts, pair, errors, until, sampling, lattice, memory, work)
+        _enter_pair(table, parts, pair, laid, samples, wanted, tolerance, lattice, memory, work)
+        a, b = next_pair(parts, first_b, a, b)
+    return samples
+
+
+@inlined
+def _least(times, count):
+    """Smallest of the first `count` times."""
+    least = inf
+    for n in range(count):
+        least = min(least, times[n])
+    return least
 
 
 @inlined
@@ -366,6 +430,7 @@ class PlaneMemory(NamedTuple):
     """Scratch memory of one thread for S samples."""
 
     obstacle: Obstacle
+    rows: SampleRows
     off: Any  # (ERRORS, S)
     times: Any  # (S,): s
     alone: Any  # (S,): those of one pair of shapes
@@ -388,6 +453,7 @@ def make_plane_memory(samples: int) -> PlaneMemory:
 
     return PlaneMemory(
         obstacle=make_obstacle(),
+        rows=make_sample_rows(samples),
         off=np.zeros((ERRORS, samples)),
         times=numbers(),
         alone=numbers(),

@@ -77,8 +77,17 @@ def normal_samples(count: int) -> NormalSamples:
     return NormalSamples(points, weights)
 
 
+def _reversed(k: int, count: int) -> float:
+    """Digits of k < count in base 2 in reverse order, as a fraction (van der Corput): 0, 1/2, 1/4, 3/4 for 0 to 3."""
+    del count
+    return float(sum((k >> bit & 1) / 2 ** (bit + 1) for bit in range(k.bit_length())))
+
+
 class SampleColumns(NamedTuple):
-    """The same samples by coordinate, those of the coarser lattice first; any few in succession are spread out."""
+    """The same samples by coordinate, the coarser lattices first; any few in succession are spread out.
+
+    The first pilot samples are a lattice, and twice, four times as many are too, if all are a multiple.
+    """
 
     points: NDArray[np.float64]  # (DIMENSIONS, n)
     weights: NDArray[np.float64]  # (n,)
@@ -92,7 +101,8 @@ def sample_columns(count: int) -> SampleColumns:
     points, weights = normal_samples(count)
     stride = max(1, count // PILOT)
     place = np.arange(count)
-    order = np.lexsort((place // stride * _GOLDEN_RATIO % 1.0, place % stride))
+    coset = np.array([_reversed(k, stride) for k in range(stride)])
+    order = np.lexsort((place // stride * _GOLDEN_RATIO % 1.0, coset[place % stride]))
     columns = SampleColumns(np.ascontiguousarray(points[order].T), weights[order], -(-count // stride))
     columns.points.flags.writeable = columns.weights.flags.writeable = False
     return columns

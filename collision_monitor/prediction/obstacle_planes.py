@@ -7,146 +7,190 @@ linear in time. A normal that turns with one of the bodies goes on bounding a fa
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.shape_table import HALF_SPACE
-from collision_monitor.narrow_phase.core import rounding
 from collision_monitor.narrow_phase.dispatch import separation
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.narrow_phase.support_value import core_support
 from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.motion import relative_position, rotation_at
+from collision_monitor.prediction.trigonometry import sin_cos
 
-MOST_SEGMENTS: Final = 16
+MOST_SEGMENTS: Final = 48
 """Largest number of parts of the time. In each part, the gaps are linear in time."""
 
 MOST_PLANES: Final = 64
-"""Largest number of planes in a segment. Each costs 1 to 2 ns per sample."""
+"""Largest number of planes in a segment. Each costs 1 to 10 ns per sample."""
 
-GAP, RATE, PLANE_SIZE = 3, 4, 5
-"""Columns of a plane, after its normal: gap (m) at time 0 and its rate (m/s) for the stated motion."""
+MODE, PLANE_SIZE = 3, 4
+"""Column of a plane behind its normal: mode; number of columns."""
 
 AT_REST: Final = 2
-"""Mode of a plane: its normal does not turn. 0 and 1: it turns with the first or the second body."""
+"""Mode of a plane: its normal, in world axes, does not turn. 0 and 1: it turns with the first or the second shape, and
+is in the axes of that shape."""
+
+
+NO_TURNS: Final = ((0.0, 0.0), (0.0, 0.0))
+"""Turning of two bodies without errors of orientation, see `set_nodes`."""
+
+
+NODE = np.dtype(
+    [
+        ("time", np.float64),  # s
+        ("position", np.float64, 3),  # of body B relative to body A (m)
+        ("rotation", np.float64, (2, 3, 3)),  # of the shapes
+        ("offset", np.float64, (2, 3)),  # of the shapes from their bodies, in world axes (m)
+        ("turn", np.float64, (2, 3, 3)),  # rotation vectors of the bodies for unit errors of orientation (rad)
+    ]
+)
+"""The stated motion at one end of a segment. One record, because a function takes it as one pointer."""
 
 
 class Obstacle(NamedTuple):
     """The planes of one pair of shapes; scratch memory of one thread. Node k is the begin of segment k."""
 
-    planes: Any  # (MOST_SEGMENTS, MOST_PLANES, PLANE_SIZE)
+    planes: Any  # (MOST_SEGMENTS, MOST_PLANES + 1, PLANE_SIZE)
     placed: Any  # (2, 3, 3): rotation of both shapes where a plane is sought
     count: Any  # (MOST_SEGMENTS,) int64: planes of each segment
-    time: Any  # (MOST_SEGMENTS + 1,): of the nodes (s)
-    position: Any  # (MOST_SEGMENTS + 1, 3): of body B relative to body A (m)
-    rotation: Any  # (MOST_SEGMENTS + 1, 2, 3, 3): of the shapes
-    offset: Any  # (MOST_SEGMENTS + 1, 2, 3): of the shapes from their bodies, in world axes (m)
+    node: Any  # (MOST_SEGMENTS + 1,) NODE
 
 
 def make_obstacle() -> Obstacle:
     """Make the scratch memory of one thread."""
-    nodes = MOST_SEGMENTS + 1
     return Obstacle(
-        np.zeros((MOST_SEGMENTS, MOST_PLANES, PLANE_SIZE)),
+        np.zeros((MOST_SEGMENTS, MOST_PLANES + 1, PLANE_SIZE)),
         np.zeros((2, 3, 3)),
         np.zeros(MOST_SEGMENTS, np.int64),
-        np.zeros(nodes),
-        np.zeros((nodes, 3)),
-        np.zeros((nodes, 2, 3, 3)),
-        np.zeros((nodes, 2, 3)),
+        np.zeros(MOST_SEGMENTS + 1, NODE),
     )
 
 
 @device
-def set_nodes(table, parts, pair, window, segments, scratch, obstacle):
-    """Divide the window into segments without planes, and place the shapes of the pair (ShapePair) at their ends."""
+def set_nodes(table, parts, pair, window, length, turning, planar, scratch, obstacle):
+    """Divide the window into segments of this length (s) without planes; return their number, at most MOST_SEGMENTS.
+
+    The last one is shorter, or the segments end before the window. Places the shapes of the pair (ShapePair) at their
+    ends. turning: for both bodies, error of orientation now and its rate (rad, rad/s), one standard deviation, only
+    about the z axis if planar.
+    """
     A, B, a, b = pair
     R_i, R_j = scratch.rotation[0], scratch.rotation[1]
     begin, end = window
-    for k in range(segments + 1):
-        t = begin + (end - begin) * k / segments
-        obstacle.time[k] = t
+    segments = 0
+    for k in range(MOST_SEGMENTS + 1):
+        t = min(begin + k * length, end)
+        node = obstacle.node[k]
+        node.time = t
         rotation_at(A, t, R_i)
         rotation_at(B, t, R_j)
-        p, offset = relative_position(A, B, t), obstacle.offset[k]
-        oa = place_shape(table, parts, a, R_i, obstacle.rotation[k, 0])
-        ob = place_shape(table, parts, b, R_j, obstacle.rotation[k, 1])
+        p = relative_position(A, B, t)
+        oa = place_shape(table, parts, a, R_i, node.rotation[0])
+        ob = place_shape(table, parts, b, R_j, node.rotation[1])
         for c in range(3):
-            obstacle.position[k, c] = p[c]
-            offset[0, c], offset[1, c] = oa[c], ob[c]
+            node.position[c] = p[c]
+            node.offset[0, c], node.offset[1, c] = oa[c], ob[c]
+        _set_turn(A, t, turning[0], planar, node.turn[0])
+        _set_turn(B, t, turning[1], planar, node.turn[1])
+        segments = k
+        if t >= end:
+            break
     for k in range(segments):
         obstacle.count[k] = 0
+    return segments
+
+
+@device
+def _set_turn(m, t, off, planar, out):
+    """Write the matrix (3, 3) that maps a unit error to the rotation vector (rad) of motion m's error at time t.
+
+    off: error of orientation at time 0 (rad) and of the angular velocity (rad/s). The first turns with the body:
+    exp(w t). The second adds up in turning axes: the integral of exp(w s) for s from 0 to t.
+    """
+    if off[0] + off[1] == 0.0:
+        return
+    rate = sqrt(m.wx * m.wx + m.wy * m.wy + m.wz * m.wz)
+    angle = rate * t
+    sine, cosine = sin_cos(angle)
+    x, y, z = (m.wx / rate, m.wy / rate, m.wz / rate) if angle > 0.0 else (0.0, 0.0, 0.0)
+    whole = 1.0
+    mean = slow = 0.0
+    if angle > 1e-4:
+        whole, mean, slow = sine / angle, (1.0 - cosine) / angle, 1.0 - sine / angle
+    drift = off[1] * t
+    same = off[0] * cosine + drift * whole
+    along = off[0] * (1.0 - cosine) + drift * slow
+    across = off[0] * sine + drift * mean
+    out[0, 0], out[0, 1], out[0, 2] = same + along * x * x, along * x * y - across * z, along * x * z + across * y
+    out[1, 0], out[1, 1], out[1, 2] = along * x * y + across * z, same + along * y * y, along * y * z - across * x
+    out[2, 0], out[2, 1], out[2, 2] = along * x * z - across * y, along * y * z + across * x, same + along * z * z
+    if planar:
+        for c in range(3):
+            out[c, 0] = out[c, 1] = 0.0
 
 
 @inlined
-def _reach(table, s, R, o, x, y, z):
-    """Support value (m) about its body's origin of the core of shape s, with rotation R and offset o (3,)."""
-    if table.kind[s] == HALF_SPACE:
-        return table.size[s, 3]
-    core = core_support(
-        table, s,
-        x * R[0, 0] + y * R[1, 0] + z * R[2, 0],
-        x * R[0, 1] + y * R[1, 1] + z * R[2, 1],
-        x * R[0, 2] + y * R[1, 2] + z * R[2, 2],
-    )  # fmt: skip
-    return x * o[0] + y * o[1] + z * o[2] + core
-
-
-@inlined
-def _turned(n, R, T):
-    """Unit vector n turned from rotation T (3, 3) to rotation R (3, 3)."""
-    x = n[0] * T[0, 0] + n[1] * T[1, 0] + n[2] * T[2, 0]
-    y = n[0] * T[0, 1] + n[1] * T[1, 1] + n[2] * T[2, 1]
-    z = n[0] * T[0, 2] + n[1] * T[1, 2] + n[2] * T[2, 2]
+def from_plane(plane, R):
+    """Normal of a plane in world axes, at a node with the rotations R (2, 3, 3) of the shapes."""
+    x, y, z, mode = plane[0], plane[1], plane[2], int(plane[MODE])
+    if mode == AT_REST:
+        return x, y, z
+    T = R[mode]
     return (
-        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
-        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
-        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
+        T[0, 0] * x + T[0, 1] * y + T[0, 2] * z,
+        T[1, 0] * x + T[1, 1] * y + T[1, 2] * z,
+        T[2, 0] * x + T[2, 1] * y + T[2, 2] * z,
     )
 
 
+@inlined
+def set_plane(n, mode, obstacle, plane):
+    """Write the plane along n (3,), a unit vector from shape a to shape b, where obstacle.placed has the shapes."""
+    x, y, z = n
+    if mode != AT_REST:
+        T = obstacle.placed[mode]
+        x, y, z = (
+            T[0, 0] * x + T[1, 0] * y + T[2, 0] * z,
+            T[0, 1] * x + T[1, 1] * y + T[2, 1] * z,
+            T[0, 2] * x + T[1, 2] * y + T[2, 2] * z,
+        )
+    plane[0], plane[1], plane[2], plane[MODE] = x, y, z, mode
+
+
+@inlined
+def _turn_by(R, v):
+    """Turn the rotation R (3, 3) by the rotation vector v (3,)."""
+    x, y, z = v
+    angle = sqrt(x * x + y * y + z * z)
+    if angle == 0.0:
+        return
+    half_sine, half_cosine = sin_cos(0.5 * angle)
+    c = 2.0 * half_sine * half_sine
+    s = 2.0 * half_sine * half_cosine
+    x, y, z = x / angle, y / angle, z / angle
+    for j in range(3):
+        u, v, w = R[0, j], R[1, j], R[2, j]
+        ax, ay, az = y * w - z * v, z * u - x * w, x * v - y * u
+        R[0, j] = u + s * ax + c * (y * az - z * ay)
+        R[1, j] = v + s * ay + c * (z * ax - x * az)
+        R[2, j] = w + s * az + c * (x * ay - y * ax)
+
+
 @device
-def set_plane(table, a, b, n, mode, k, t, margin, error, obstacle, plane):
-    """Write the plane along n (3,), a unit vector from shape a to shape b, in segment k into plane (PLANE_SIZE,).
-
-    It holds near the place at time t that is off the stated motion by `error` (3,). mode: AT_REST, or the body that the
-    normal turns with. obstacle.placed: the shapes at t.
-    """
-    rounded = rounding(table, a) + rounding(table, b) + margin
-    begin, length = obstacle.time[k], obstacle.time[k + 1] - obstacle.time[k]
-    share = (t - begin) / length if length > 0.0 else 0.0
-    first, last = obstacle.position[k], obstacle.position[k + 1]
-    x = first[0] + share * (last[0] - first[0])
-    y = first[1] + share * (last[1] - first[1])
-    z = first[2] + share * (last[2] - first[2])
-    gap_0 = gap = 0.0
-    for node in range(k, k + 2):
-        p, R, o, m = obstacle.position[node], obstacle.rotation[node], obstacle.offset[node], n
-        if mode != AT_REST:
-            m = _turned(n, R[mode], obstacle.placed[mode])
-        gap_0 = gap
-        gap = n[0] * (p[0] - x) + n[1] * (p[1] - y) + n[2] * (p[2] - z)
-        gap += m[0] * x + m[1] * y + m[2] * z
-        gap += (m[0] - n[0]) * error[0] + (m[1] - n[1]) * error[1] + (m[2] - n[2]) * error[2]
-        gap -= _reach(table, a, R[0], o[0], m[0], m[1], m[2]) + rounded
-        gap -= _reach(table, b, R[1], o[1], -m[0], -m[1], -m[2])
-    plane[0], plane[1], plane[2] = n[0], n[1], n[2]
-    plane[RATE] = (gap - gap_0) / length if length > 0.0 else 0.0
-    plane[GAP] = gap_0 - begin * plane[RATE]
-
-
-@device
-def separation_at(table, parts, pair, t, error, obstacle, scratch):
+def separation_at(table, parts, pair, t, error, turned, obstacle, scratch):
     """Return the separation (m) of a pair of shapes at time t, with B off by `error` (3,).
 
-    Writes its direction into scratch.out, and the rotations of the shapes into obstacle.placed.
+    turned: rotation vectors (3,) of the errors of orientation of A and of B. Writes the direction of the separation
+    into scratch.out, and the rotations of the shapes into obstacle.placed.
     """
     A, B, a, b = pair
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], obstacle.placed[0], obstacle.placed[1]
     rotation_at(A, t, R_i)
     rotation_at(B, t, R_j)
+    _turn_by(R_i, turned[0])
+    _turn_by(R_j, turned[1])
     oa = place_shape(table, parts, a, R_i, R_a)
     ob = place_shape(table, parts, b, R_j, R_b)
     x, y, z = relative_position(A, B, t)

@@ -1,4 +1,4 @@
-"""Samples of uncertain straight motions, side by side: their errors, and when each enters planes or a sphere.
+"""Samples of uncertain straight motions, side by side: their errors, and when each enters a sphere.
 
 The loops over samples have no branches, so that LLVM computes several samples at a time. They run over slices, because
 an index that may be negative prevents that. Each sample is rounded as if it were alone.
@@ -10,10 +10,10 @@ from math import inf, sqrt
 from typing import Final
 
 from collision_monitor._jit import device
-from collision_monitor.prediction.obstacle_planes import GAP, RATE
 
 ERRORS: Final = 6
 """Rows of the errors: position at time 0 (m) and velocity (m/s) of B relative to A."""
+
 
 @device
 def set_errors(root, frame, t, points, off):
@@ -45,22 +45,6 @@ def set_errors(root, frame, t, points, off):
 
 
 @device
-def enter_plane(plane, off, first, last, entry, leave):
-    """Restrict the intervals [entry, leave] (S,) of samples first:last to the time behind a plane (PLANE_SIZE,)."""
-    x, y, z = off[0, first:last], off[1, first:last], off[2, first:last]
-    vx, vy, vz = off[3, first:last], off[4, first:last], off[5, first:last]
-    entry, leave = entry[first:last], leave[first:last]
-    nx, ny, nz, g, r = plane[0], plane[1], plane[2], plane[GAP], plane[RATE]
-    for n in range(entry.size):
-        gap = g + nx * x[n] + ny * y[n] + nz * z[n]
-        rate = r + nx * vx[n] + ny * vy[n] + nz * vz[n] + 0.0  # -0.0 becomes 0.0
-        at = -gap / rate
-        closes = rate < 0.0
-        entry[n] = at if closes and at > entry[n] else entry[n]
-        leave[n] = at if not closes and at < leave[n] else leave[n]
-
-
-@device
 def enter_sphere(p, v, reach, end, off, times):
     """Lower the times (S,) of the samples to where they come within `reach` (m) of the origin, until `end`.
 
@@ -78,3 +62,33 @@ def enter_sphere(p, v, reach, end, off, times):
         meets = d >= 0.0 and b < 0.0 and at <= end
         at = 0.0 if c <= 0.0 else (at if meets else inf)
         times[n] = at if at < times[n] else times[n]
+
+
+@device
+def enter_cylinder(p, v, axis, radius, half, end, off, times):
+    """Lower the times (S,) of the samples to where they enter a cylinder about the origin, until `end`.
+
+    p, v (3,): stated position and velocity of B relative to A. axis (3,): unit vector; radius, half the height (m).
+    """
+    px, py, pz = p
+    vx, vy, vz = v
+    ax, ay, az = axis
+    for n in range(times.size):
+        x, y, z = px + off[0, n], py + off[1, n], pz + off[2, n]
+        u, w, q = vx + off[3, n], vy + off[4, n], vz + off[5, n]
+        h, s = x * ax + y * ay + z * az, u * ax + w * ay + q * az + 0.0  # -0.0 becomes 0.0
+        a = u * u + w * w + q * q - s * s
+        b = x * u + y * w + z * q - h * s
+        c = x * x + y * y + z * z - h * h - radius * radius
+        d = b * b - a * c
+        root = sqrt(d if d > 0.0 else 0.0)
+        # inside of the disc from first to last, between the planes from low to high
+        first = 0.0 if c <= 0.0 else (c / (root - b) if d >= 0.0 and b < 0.0 else inf)
+        last = (root - b) / a if a > 0.0 else inf
+        below, above = (-half - h) / s, (half - h) / s
+        low, high = (below, above) if s > 0.0 else (above, below)
+        low, high = (low, high) if s != 0.0 else (-inf, (inf if abs(h) <= half else -inf))
+        at = low if low > first else first
+        leave = high if high < last else last
+        leave = end if end < leave else leave
+        times[n] = at if at <= leave and at < times[n] else times[n]

@@ -181,6 +181,7 @@ class Sampling(NamedTuple):
     planar: bool
     points: Any  # (S, 12): normal_samples
     weights: Any  # (S,)
+    only_screens: bool = False  # bounds in place of answers, see likely_impacts
 
 
 @allocating_kernel
@@ -269,4 +270,4 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                     remember(table, parts, pair, times[n] == inf, n, work.scratch, work.axes)
                 seen += weights[n] if times[n] < inf else 0.0
         if likely:
-            summarise(times, weights, np.argsort(times), sampling.confidence, safe, answers[k])
+            summarise(times, weights, np.argsort(times), sampling.confidence, safe, answers[k], 1.0)

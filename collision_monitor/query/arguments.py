@@ -1,4 +1,4 @@
-"""Conversion of a user's numbers to float and int, because other types would compile the kernels anew."""
+"""Checks of a user's arguments; numbers become float and int, because other types would compile the kernels anew."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ import math
 import operator
 from typing import Any
 
-from collision_monitor.errors import InputError
+import numpy as np
+
+from collision_monitor.errors import InputError, PoseError
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Shape
 
 
 def finite_number(name: str, value: Any, positive: bool = False) -> float:
@@ -30,3 +34,18 @@ def whole_number(name: str, value: Any) -> int:
     if result < 1:
         raise InputError(f"{name}: expected a whole number from 1, got {value!r}")
     return min(result, 2**31)
+
+
+def checked_pose(pose: Any, name: str) -> Pose:
+    """Return the pose. Raises PoseError for anything else, with what to write instead."""
+    if isinstance(pose, Pose):
+        return pose
+    if isinstance(pose, Shape):
+        hint = "each shape is followed by its pose: shape_a, pose_a, shape_b, pose_b"
+    elif np.shape(pose) in ((4, 4), (3, 3)):
+        hint = "write Pose.from_matrix(matrix)"
+    elif np.shape(pose) == (7,):
+        hint = "write Pose((x, y, z), (qx, qy, qz, qw))"
+    else:
+        hint = "write Pose((x, y, z))"
+    raise PoseError(f"{name}: expected a Pose, got {type(pose).__name__}; {hint}")

@@ -36,6 +36,7 @@ from collision_monitor.narrow_phase.contact_row import (
 )
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.objects.models import containing_kdop, containing_model, exact_model, parse_model
+from collision_monitor.query.arguments import checked_pose
 from collision_monitor.query.cloud_pair import cloud_contact
 from collision_monitor.query.convex_pairs import convex_contact
 from collision_monitor.query.fillings import fillings
@@ -54,6 +55,10 @@ _DIRECTIONS: Final = np.array(
 
 _COLUMNS: Final = {"normal": NORMAL, "point_a": POINT_A, "point_b": POINT_B}
 _new, _set = object.__new__, object.__setattr__
+
+
+def _missing(contact: object, name: str) -> AttributeError:
+    return AttributeError(f"{type(contact).__name__!r} object has no attribute {name!r}", name=name, obj=contact)
 
 
 def _patch(found: NearestPieces, witness: Array) -> Array:
@@ -103,7 +108,7 @@ class Contact:
         """Make a field of a contact that was found quickly when it is first read."""
         known = vars(self)
         if "_row" not in known:
-            raise AttributeError(name)
+            raise _missing(self, name)
         if name == "error_bound":
             value: Any = _contact(*self.arguments, "exact").error_bound
         elif name in _COLUMNS:
@@ -114,7 +119,7 @@ class Contact:
             arguments = self.arguments
             value = lambda: _nearest(*arguments)  # noqa: E731
         else:
-            raise AttributeError(name)
+            raise _missing(self, name)
         known[name] = value
         return value
 
@@ -341,6 +346,18 @@ def _by_clouds(a: _Posed, b: _Posed, offset: Array) -> _Deepest | None:
     return best
 
 
+def _contact_of_trees(
+    trees: tuple[Array, Array], X: tuple[Array, Array], Y: tuple[Array, Array]
+) -> tuple[int, Array]:
+    """Return what `contact_of_trees` knows of two trees with these rotations and positions, and the contact row.
+
+    The rotations are copied because numba compiles a kernel once more for each combination of read-only arrays.
+    """
+    row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
+    R_a, R_b = X[0].copy(), Y[0].copy()
+    return contact_of_trees(trees[0], R_a, X[1], trees[1], R_b, Y[1], np.inf, row, answer, work), row
+
+
 def _by_trees(a: _Posed, b: _Posed) -> _Deepest | None:
     """The contact of a concave mesh and another single shape through their trees; None for other pairs.
 
@@ -352,10 +369,9 @@ def _by_trees(a: _Posed, b: _Posed) -> _Deepest | None:
     trees = shape_tree(pair[0]), shape_tree(pair[1])
     if trees[0] is None or trees[1] is None:
         return None
-    row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
     (R_a, p_a), (R_b, p_b) = _place(a), _place(b)
     p_b = p_b + (b.pose.position - a.pose.position)
-    known = contact_of_trees(trees[0], R_a, p_a, trees[1], R_b, p_b, np.inf, row, answer, work)
+    known, row = _contact_of_trees((trees[0], trees[1]), (R_a, p_a), (R_b, p_b))
     if known != APART and not all(isinstance(shape, Mesh | Sphere | Capsule) for shape in pair):
         return None
     if known == OPEN:
@@ -375,8 +391,7 @@ def _place(side: _Posed) -> tuple[Array, Array]:
 
 def _posed(shape: Compound, pose: Pose, model: Model | str | ArrayLike, name: str) -> _Posed:
     shapes = shape_pairs(shape, f"shape {name}")
-    if not isinstance(pose, Pose):
-        raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
+    checked_pose(pose, f"pose {name}")
     if isinstance(model, str | int):
         if parse_model(model) in (Model.AUTO, Model.EXACT):
             return _Posed(shapes, pose, shapes)
@@ -444,9 +459,9 @@ def _least_gap(
         if trees is None:
             row = (_by_clouds(a, b, offset) or _by_trees(a, b) or _by_pieces(a, b, offset)).row
         else:
-            row, answer, work = np.empty(CONTACT_SIZE), answer_row(), np.empty(MEMORY)
-            (R_a, p_a), (R_b, p_b) = _place(a), _place(b)
-            if contact_of_trees(trees[0], R_a, p_a, trees[1], R_b, p_b + offset, np.inf, row, answer, work) == OPEN:
+            place_a, (R_b, p_b) = _place(a), _place(b)
+            known, row = _contact_of_trees(trees, place_a, (R_b, p_b + offset))
+            if known == OPEN:
                 return -np.inf
         least = min(least, float(row[DISTANCE] - row[BOUND]))
     return least

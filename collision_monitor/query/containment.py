@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from collision_monitor.errors import InputError, PoseError
+from collision_monitor.errors import InputError
 from collision_monitor.geometry.compound import shape_pairs
 from collision_monitor.geometry.containment import TESTS, inside
 from collision_monitor.geometry.coordinates import Booleans, coordinates
 from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.pose import Pose
+from collision_monitor.query.arguments import checked_pose
 from collision_monitor.query.contact import Compound
 
 
@@ -28,8 +29,7 @@ def contains(shape: Compound, pose: Pose, points: ArrayLike, test: str = "closed
     >>> contains(cm.Sphere(0.5), cm.Pose(), [(0, 0, 0.4), (0, 0, 0.6)])
     array([ True, False])
     """
-    if not isinstance(pose, Pose):
-        raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
+    checked_pose(pose, "pose")
     if test not in TESTS:
         raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")
     given = coordinates(points, "points")

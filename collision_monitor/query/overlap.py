@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from collision_monitor.errors import InputError, PoseError, UnsupportedError
+from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import Hull, convex_hull
 from collision_monitor.geometry.cascade import polyhedra_intersect
 from collision_monitor.geometry.compound import shape_pairs
@@ -15,6 +15,7 @@ from collision_monitor.geometry.polyhedron_sat import sat_3d
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Polygon, Shape
 from collision_monitor.geometry.triangulation import convex_parts
+from collision_monitor.query.arguments import checked_pose
 from collision_monitor.query.contact import Compound, contact
 from collision_monitor.query.convex_pairs import convex_contact
 from collision_monitor.query.mesh_pairs import mesh_overlap
@@ -62,8 +63,7 @@ def _named(
     shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose
 ) -> tuple[tuple[Compound, Pose, str], tuple[Compound, Pose, str]]:
     for pose, name in ((pose_a, "A"), (pose_b, "B")):
-        if not isinstance(pose, Pose):
-            raise PoseError(f"pose {name}: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
+        checked_pose(pose, f"pose {name}")
     return (shape_a, pose_a, "A"), (shape_b, pose_b, "B")
 
 

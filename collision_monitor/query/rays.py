@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from collision_monitor.errors import InputError, PoseError
+from collision_monitor.errors import InputError
 from collision_monitor.geometry.compound import shape_pairs
 from collision_monitor.geometry.coordinates import Array, Booleans, coordinates
 from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.ray_casting import first_hits
+from collision_monitor.query.arguments import checked_pose
 from collision_monitor.query.contact import Compound
 
 
@@ -51,8 +52,7 @@ def cast_ray(
     >>> cast_ray(cm.Box((1, 1, 1)), cm.Pose(), origin=(0, 0, 2), direction=(0, 0, -1)).point
     array([0. , 0. , 0.5])
     """
-    if not isinstance(pose, Pose):
-        raise PoseError(f"pose: expected a Pose, got {type(pose).__name__}; write Pose((x, y, z))")
+    checked_pose(pose, "pose")
     p, d = coordinates(origin, "origin", 3), coordinates(direction, "direction", 3)
     limit = np.asarray(length, dtype=np.float64)
     if not (limit >= 0.0).all():

@@ -74,11 +74,11 @@ def _findings(facts: ReportFacts) -> list[str]:
     there = len(facts.collisions) - len(leads) - len(facts.surprises)
     if there:
         lines.append(f"{_were(there)} in contact from the first step on")
-    if facts.nothing:
-        pairs = len({alert.pair for alert in facts.nothing})
+    judged = facts.judged
+    if judged.false_alarms:
         lines.append(
-            f"{counted(len(facts.nothing), 'warning')} of {counted(pairs, 'pair')} came to nothing: the objects "
-            "changed their motion, or passed each other within the tolerance"
+            f"{judged.false_alarms} of {judged.alarms} alarms (pairs × steps) were false, without a contact within the "
+            "horizon: the objects changed their motion, or passed each other within the tolerance"
         )
     due = sum(each[-1].certain and each[-1].outcome is AlertOutcome.OPEN for each in facts.alerts.values())
     if due:

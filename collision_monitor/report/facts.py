@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from collision_monitor.report.tracks import Tracks
+from collision_monitor.session.history.alarms import Alarms, alarms_of
 from collision_monitor.session.history.alerts import Alert, AlertOutcome, alert_before, alerts_of
 from collision_monitor.session.history.history import CollisionEvent, Floats, History, Pair
 
@@ -17,8 +18,9 @@ class ReportFacts:
 
     period: median time between steps (s). gaps: from, to (s), without an answered step. collisions: certain contacts.
     surprises: collisions without a prediction right before. possible: contacts that could not be excluded. alerts: by
-    pair. nothing: certain alerts that ended without a contact. risky: all pairs that touched or were predicted to
-    touch, the riskiest first. answered: the alert of each predicted collision.
+    pair. nothing: certain alerts that ended without a contact. judged: counts of false and late alarms, as `tradeoff`
+    and `compare` have them. risky: all pairs that touched or were predicted to touch, the riskiest first. answered: the
+    alert of each predicted collision.
     """
 
     period: float
@@ -28,6 +30,7 @@ class ReportFacts:
     possible: list[CollisionEvent]
     alerts: dict[Pair, list[Alert]]
     nothing: list[Alert]
+    judged: Alarms
     risky: list[Pair]
     answered: dict[CollisionEvent, Alert]
     tracks: Tracks
@@ -50,6 +53,7 @@ def gather(history: History) -> ReportFacts:
         possible=[each for each in history.collisions if not each.certain],
         alerts=alerts,
         nothing=[alert for alert in found if alert.certain and alert.outcome is AlertOutcome.NOTHING],
+        judged=alarms_of(history),
         risky=_riskiest(history, alerts),
         answered={collision: alert for collision, alert in before.items() if alert is not None},
         tracks=Tracks(history),

@@ -21,6 +21,10 @@ LEARNING: Final = 0.2
 """Weight of the last step in the mean duration."""
 
 
+OUTLIER: Final = 4.0
+"""A step counts as at most so many mean steps: a single slow one does not mean that the next ones are slow."""
+
+
 class Backlog:
     """Chooses among the states that wait. outdated: messages left out so far. mean: duration of a step, s.
 
@@ -49,7 +53,7 @@ class Backlog:
         """Note when a step began and ended (ns, steady clock)."""
         self._ended = ended
         took = (ended - began) * 1e-9
-        self.mean += (LEARNING if self.mean else 1.0) * (took - self.mean)
+        self.mean += LEARNING * (min(took, OUTLIER * self.mean) - self.mean) if self.mean else took
 
 
 def without_outdated(waiting: Sequence[bytes], step_s: float) -> list[bytes]:

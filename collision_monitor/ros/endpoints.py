@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import Any, Final
 
 from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -44,13 +45,15 @@ def publisher(node: Node, topic: Topic, name: str | None = None) -> Publisher:
     return node.create_publisher(message_class(topic), name or topic.private, quality_of(topic))
 
 
-def answer_publisher(node: LifecycleNode, topic: Topic) -> LifecyclePublisher:
+def answer_publisher(
+    node: LifecycleNode, topic: Topic, events: PublisherEventCallbacks | None = None
+) -> LifecyclePublisher:
     """Create a publisher that is silent while the node is inactive; answers have a deadline and a liveliness."""
     quality = quality_of(topic)
     if topic in _ANSWERS:
         quality.deadline = quality.liveliness_lease_duration = Duration(seconds=ALIVE_S)
         quality.liveliness = LivelinessPolicy.MANUAL_BY_TOPIC
-    return node.create_lifecycle_publisher(message_class(topic), topic.private, quality)
+    return node.create_lifecycle_publisher(message_class(topic), topic.private, quality, event_callbacks=events)
 
 
 def subscription(

@@ -11,7 +11,7 @@ from pathlib import Path
 from rclpy.node import Node
 
 from collision_monitor import warm_up
-from collision_monitor._jit.compilation import on_first_compilation
+from collision_monitor._jit.compilation import compiling_nothing, on_first_compilation
 from collision_monitor.alerts.rules import Rules
 from collision_monitor.errors import CollisionMonitorError
 from collision_monitor.pipeline.topics import NODE
@@ -55,13 +55,18 @@ class MonitorNode(Managed, Node):
         self._diagnostics = Diagnostics(self, self._health, self.settings.diagnostics)
 
     def _warm_up(self, stop: StopRequest) -> None:
-        """Load or compile the kernels before messages arrive, because messages that wait for the compiler are lost."""
+        """Load or compile the kernels before messages arrive, because messages that wait for the compiler are lost.
+
+        Those that the settings do not need now are loaded too, for a later change, unless they were never compiled.
+        """
         log = self.get_logger().info
         text = "compiling the kernels, once for this machine and version: this takes a minute or two"
         with stop.ending(), on_first_compilation(lambda: log(text)):
-            warm_up.warm_up_monitor()
+            warm_up.warm_up_monitor(self._profile)
             if self._rules.rules:
                 warm_up.warm_up_alerts()
+        with stop.ending(), compiling_nothing():
+            warm_up.warm_up_monitor()
 
     # -- life cycle
 

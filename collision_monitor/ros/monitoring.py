@@ -25,6 +25,7 @@ from collision_monitor.ros.endpoints import answer_publisher, subscription
 from collision_monitor.ros.health import Facts
 from collision_monitor.ros.keeping_up import KeepingUp
 from collision_monitor.ros.markers import MarkerView
+from collision_monitor.ros.monitored import Monitored
 from collision_monitor.ros.name_conflict import NameConflict
 from collision_monitor.ros.node_recording import NodeRecording
 from collision_monitor.ros.parameters import MonitorParameters
@@ -87,6 +88,7 @@ class Monitoring:
         self._raised_out = answer_publisher(node, Topic.RAISED_ALERTS)
         self._status_out = answer_publisher(node, Topic.STATUS)
         self._markers_out = answer_publisher(node, Topic.MARKERS)
+        self._monitored = Monitored(node, self._pipeline.catalogue, settings.frame_id)
         self._recording = NodeRecording(node, record, lambda: self._pipeline.metadata(self._name), settings.splitting)
         resources.callback(self._recording.close)
         # Shapes first: if both wait, the executor takes them in this order.
@@ -118,6 +120,7 @@ class Monitoring:
     def activate(self) -> None:
         """Publish the status at once, now that the publishers are active."""
         self._publish_status()
+        self._monitored.renew()
         self._logger.info("active: answers are published")
 
     def deactivate(self) -> None:
@@ -166,6 +169,7 @@ class Monitoring:
         self._record_step(data, outputs, received)
         self._publish_status_if_due(ended)
         self._publish_markers_if_due(data, outputs, ended)
+        self._monitored.move(data)
         self._recording.write_snapshot_if_due(self._pipeline.snapshot)
 
     def _answer(self, states: bytes, received: int) -> Outputs | None:
@@ -218,6 +222,7 @@ class Monitoring:
         self._record_shapes(taken.data, received)
         if taken.changes:
             self._markers.update(taken.changes)
+            self._monitored.describe(taken.changes)
             _keep_from_collector()
 
     def _take_prepared(self) -> None:

@@ -17,7 +17,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Final
 
-from collision_monitor.errors import InputError
+from collision_monitor.errors import InputError, UnsupportedError
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -117,12 +117,20 @@ def stay_on_this_machine() -> None:
 
 @contextmanager
 def ros_context(arguments: Sequence[str] | None = None) -> Iterator[None]:
-    """Run rclpy from init to shutdown, without its signal handlers. Raises InputError for arguments that ROS refuses.
+    """Run rclpy from init to shutdown, without its signal handlers.
+
+    Raises InputError for arguments that ROS refuses, UnsupportedError without ROS 2.
 
     arguments: as sys.argv, including those that are not for ROS.
     """
-    import rclpy
-    from rclpy.signals import SignalHandlerOptions
+    try:
+        import rclpy
+        from rclpy.signals import SignalHandlerOptions
+    except ModuleNotFoundError as error:
+        raise UnsupportedError(
+            f"expected ROS 2, got no module {error.name!r}: source a ROS 2 install (source /opt/ros/jazzy/setup.bash), "
+            "or run `make setup` in a clone, which installs ROS 2 into .venv"
+        ) from None
 
     given = list(sys.argv if arguments is None else arguments)
     try:

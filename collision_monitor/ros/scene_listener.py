@@ -1,4 +1,4 @@
-"""A subscriber to all that the view shows: the inputs of a monitor and its answers, as bytes."""
+"""A subscriber to all that the view shows: what a monitor monitors and its answers, as bytes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from rclpy.executors import SingleThreadedExecutor
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.ros.endpoints import subscription
 
-TOPICS: Final = (*(Topic.SHAPES, Topic.STATES, Topic.CONTACTS, Topic.PREDICTIONS, Topic.RAISED_ALERTS, Topic.STATUS),)
+TOPICS: Final = (
+    *(Topic.MONITORED_SHAPES, Topic.MONITORED_STATES, Topic.CONTACTS, Topic.PREDICTIONS, Topic.RAISED_ALERTS),
+    Topic.STATUS,
+)
 
 
 class SceneListener:

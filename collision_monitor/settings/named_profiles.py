@@ -13,6 +13,11 @@ BASED_ON: Final = "based_on"
 
 _TOLERANCES: Final = ("position_tolerance", "orientation_tolerance", "velocity_tolerance", "angular_velocity_tolerance")
 
+_EVERYTHING_EXACT: Final[dict[str, Any]] = {"adaptive_tolerances": False, "distance_tolerance": 0.0} | {
+    "model_mesh": "auto",
+    "model_error": 1e6,
+}
+
 NAMED_PROFILES: Final[dict[str, dict[str, Any]]] = {
     "balanced": {
         "impact_tolerance": 1e-4,
@@ -20,16 +25,21 @@ NAMED_PROFILES: Final[dict[str, dict[str, Any]]] = {
         "uncertainty": True,
         "uncertainty_samples": 1024,
         **dict.fromkeys(_TOLERANCES, 1e-3),
+        **_EVERYTHING_EXACT,
     },
     "fast": {
         "impact_tolerance": 1e-3,
         "impact_iterations": 64,
         "uncertainty": False,  # sampling takes by far the longest of all parts of a step
         "uncertainty_samples": 128,
-        "position_tolerance": 1e-2,
-        "orientation_tolerance": 1e-2,
-        "velocity_tolerance": 2e-2,
-        "angular_velocity_tolerance": 2e-2,
+        "position_tolerance": 5e-2,
+        "orientation_tolerance": 5e-2,
+        "velocity_tolerance": 4e-2,
+        "angular_velocity_tolerance": 4e-2,
+        "adaptive_tolerances": True,
+        "distance_tolerance": 1e-3,
+        "model_mesh": "convex_hull",
+        "model_error": 0.1,
     },
     "exact": {
         "impact_tolerance": 1e-6,
@@ -37,6 +47,7 @@ NAMED_PROFILES: Final[dict[str, dict[str, Any]]] = {
         "uncertainty": True,
         "uncertainty_samples": 2048,
         **dict.fromkeys(_TOLERANCES, 1e-9),
+        **_EVERYTHING_EXACT,
     },
 }
 """All profiles name the same settings, so that a switch leaves no setting of the previous profile."""

@@ -55,6 +55,13 @@ class Profile:
         "1",
         "Largest number of points of one contact. Above 1, touching faces have a row for each corner.",
     )
+    distance_tolerance: float = number(
+        0.0,
+        0.0,
+        1.0,
+        "m",
+        "Largest error of the distance of a contact that persists, before it is computed anew. With 0, in every step.",
+    )
     impact_tolerance: float = number(
         1e-4,
         1e-12,
@@ -101,6 +108,11 @@ class Profile:
         1e3,
         "rad/s",
         "Largest difference from its predicted angular velocity at which an object keeps its predictions.",
+        predictions=True,
+    )
+    adaptive_tolerances: bool = switch(
+        False,
+        "Whether the tolerances of an object follow how far it leaves its motion; the set ones are then the widest.",
         predictions=True,
     )
     stale_after: float = number(
@@ -171,6 +183,13 @@ class Profile:
     )
     model_compound: str = choice(
         _MODELS, "Model that represents objects of several shapes, if their description chooses none."
+    )
+    model_error: float = number(
+        1e6,
+        0.0,
+        1e6,
+        "m",
+        "Largest distance by which a model that these settings choose may exceed its object, which else is exact.",
     )
     region_min: tuple[float, float, float] = vector(
         (-EVERYWHERE, -EVERYWHERE, -EVERYWHERE),

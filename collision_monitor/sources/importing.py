@@ -25,6 +25,8 @@ from collision_monitor.sources.mapping import Mapping
 from collision_monitor.sources.tf_objects import TRANSFORMS
 
 _INPUTS: Final = (Topic.STATES, Topic.SHAPES)
+_REPEATED: Final = (Topic.MONITORED_STATES.path, Topic.MONITORED_SHAPES.path)
+"""Where a monitor publishes its inputs again; used only if a bag lacks the inputs, which came from sources."""
 
 
 @dataclass
@@ -213,6 +215,7 @@ def _recorded_inputs(bag: Bag, node: str | None) -> tuple[str, Iterator[Input]]:
     chosen: dict[str, Topic] = {}
     for topic in _INPUTS:
         found = [name for name, kind in bag.topics.items() if kind == topic.type_name]
+        found = [name for name in found if not name.endswith(_REPEATED)] or found
         if node is not None:
             found = [name for name in found if name.startswith(f"{node.rstrip('/')}/")]
         if len(found) > 1:

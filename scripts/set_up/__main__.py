@@ -11,17 +11,16 @@ import fcntl
 import os
 import subprocess
 import sys
-import time
-from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import IO
 
 import machine
+import schedule
 import stages
 
 STAMPS = stages.VENV / ".set_up"
 LOG = stages.BUILD / "set_up.log"
-REST_LOG = stages.BUILD / "functions.log"
+REST_LOG = stages.BUILD / "rest.log"
 
 HINTS = {
     "Temporary failure in name resolution": "no network: the first set-up downloads from the Python package index",
@@ -89,24 +88,11 @@ def _run(pending: list[stages.Stage], reason: str, ros: machine.RosInstall | Non
         log.write(f"{reason}\n")
         for stage in pending:
             _stamp(stage).unlink(missing_ok=True)
-        with ThreadPoolExecutor(max_workers=2) as pool:  # all are compilers, and more than two wait for memory
-            running: list[tuple[stages.Stage, Future[None]]] = []
-            for stage in pending:
-                print(f"  {stage.name:<12} {stage.text:<34}", end="", flush=True)
-                start = time.monotonic()
-                running.append((stage, pool.submit(_finish, stage, ros, log)))
-                if stage.alongside and stage is not pending[-1]:
-                    print("…", flush=True)
-                    continue
-                for each, work in running:
-                    try:
-                        work.result()
-                    except (OSError, subprocess.CalledProcessError) as error:
-                        print("failed", flush=True)
-                        log.write(f"{error}\n")
-                        raise machine.SetupError(f"{each.name}: {_explain(log)} (log: build/{LOG.name})") from error
-                running.clear()
-                print(f"{time.monotonic() - start:5.1f} s", flush=True)
+        try:
+            schedule.run(pending, lambda stage: _finish(stage, ros, log))
+        except schedule.StageError as error:
+            log.write(f"{error}\n")
+            raise machine.SetupError(f"{error.stage.name}: {_explain(log)} (log: build/{LOG.name})") from error
 
 
 def _finish(stage: stages.Stage, ros: machine.RosInstall | None, log: IO[str]) -> None:
@@ -116,31 +102,36 @@ def _finish(stage: stages.Stage, ros: machine.RosInstall | None, log: IO[str]) -
     _stamp(stage).write_text(inputs)
 
 
+def _rest() -> list[stages.Stage]:
+    """The kernels that the demo does not need and that are not compiled yet."""
+    rest = [stage for stage in stages.STAGES if stage.name in ("options", "functions")]
+    return [each for each in rest if not _stamp(each).is_file() or _stamp(each).read_text() != each.inputs(None)]
+
+
 def _compile_the_rest() -> None:
     """Compile in the background what the demo does not need; what an interrupted run has compiled is kept."""
-    rest = next(stage for stage in stages.STAGES if stage.name == "functions")
-    if _stamp(rest).is_file() and _stamp(rest).read_text() == rest.inputs(None):
+    if not _rest():
         return
-    command = [sys.executable, "-I", "-S", "-B", str(Path(__file__).parent), "functions"]
+    command = [sys.executable, "-I", "-S", "-B", str(Path(__file__).parent), "rest"]
     with REST_LOG.open("w") as log:
         subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
     print(
-        f"  {rest.name:<12} compiling in the background, at low priority (log: build/{REST_LOG.name}); "
+        f"  the rest     compiles in the background, at low priority (log: build/{REST_LOG.name}); "
         "an interrupted run continues at the next make",
         flush=True,
     )
 
 
-def _run_functions() -> int:
-    """Compile the functions at the lowest priority, unless another set-up runs; return the exit code."""
+def _run_rest() -> int:
+    """Compile the rest at the lowest priority, unless another set-up runs; return the exit code."""
     os.nice(19)
     if hasattr(os, "SCHED_IDLE"):
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
     with (stages.BUILD / "set_up.lock").open("w") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            stage = next(stage for stage in stages.STAGES if stage.name == "functions")
-            _finish(stage, machine.ros_install(os.environ, stages.VENV), sys.stdout)
+            for stage in _rest():
+                _finish(stage, machine.ros_install(os.environ, stages.VENV), sys.stdout)
         except (OSError, subprocess.CalledProcessError) as error:
             print(error, flush=True)
             return 1
@@ -150,9 +141,9 @@ def _run_functions() -> int:
 def main() -> int:
     """Bring the environment up to date; return the exit code. Argument `demo`: only what the demo needs."""
     for_demo = sys.argv[1:] == ["demo"]
-    if sys.argv[1:] == ["functions"]:
+    if sys.argv[1:] == ["rest"]:
         os.chdir(stages.ROOT)
-        return _run_functions()
+        return _run_rest()
     os.chdir(stages.ROOT)
     stages.BUILD.mkdir(exist_ok=True)
     with (stages.BUILD / "set_up.lock").open("w") as lock:

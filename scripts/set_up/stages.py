@@ -30,14 +30,14 @@ _IMPORT = re.compile(rf"^\s*from ({PACKAGE}[\w.]*) import (\([^)]*\)|[^\n]*)", r
 class Stage:
     """One stage: its name, the text shown while it runs, the digest of its inputs, and its work.
 
-    alongside: it may run in parallel with the next stage. for_demo: the demo needs it.
+    after: the stages that have to be done before, all of them. for_demo: the demo needs it.
     """
 
     name: str
     text: str
     inputs: Callable[[machine.RosInstall | None], str]
     run: Callable[[machine.RosInstall | None, IO[str]], None]
-    alongside: bool = False
+    after: tuple[str, ...] = ()
     for_demo: bool = True
 
 
@@ -96,6 +96,12 @@ def _project() -> dict[str, Any]:
     return tomllib.loads((ROOT / "pyproject.toml").read_text())
 
 
+def compiler() -> list[str]:
+    """What compiles the kernels and runs them. They are compiled while the other packages are installed."""
+    wanted: list[str] = _project()["project"]["dependencies"]
+    return [each for each in wanted if re.split(r"[<>=]", each)[0] in COMPILER]
+
+
 def requirements(ros: machine.RosInstall | None) -> list[str]:
     """What the program and its set-up need: the project's own requirements, and ROS 2 unless an install is sourced."""
     project = _project()
@@ -116,14 +122,24 @@ def ros_wheels() -> list[str]:
     return [line for line in lines if line and not line.startswith("#")]
 
 
+COMPILER = ("numpy", "numba", "llvmlite", "scipy", "PyYAML")
+"""All that the compilation of the kernels imports."""
+
+
+def _compiler_inputs(ros: machine.RosInstall | None) -> str:
+    return _digest(*compiler())
+
+
+def _install_compiler(ros: machine.RosInstall | None, log: IO[str]) -> None:
+    _install(ros, log, compiler())
+
+
 def _packages_inputs(ros: machine.RosInstall | None) -> str:
     return _digest(*requirements(ros))
 
 
 def _install_packages(ros: machine.RosInstall | None, log: IO[str]) -> None:
-    # --no-compile: half of the modules are never imported, and the others are compiled at their import
-    pip = (PYTHON, "-m", "pip", "install", "--no-user", "--no-compile", "--disable-pip-version-check")
-    _call(log, ros, *pip, *requirements(ros))
+    _install(ros, log, requirements(ros))
     if not ros:
         correct_exported_paths(log)
 
@@ -133,8 +149,13 @@ def _tools_inputs(ros: machine.RosInstall | None) -> str:
 
 
 def _install_tools(ros: machine.RosInstall | None, log: IO[str]) -> None:
+    _install(ros, log, tools())
+
+
+def _install(ros: machine.RosInstall | None, log: IO[str], wanted: list[str]) -> None:
+    # --no-compile: half of the modules are never imported, and the others are compiled at their import
     pip = (PYTHON, "-m", "pip", "install", "--no-user", "--no-compile", "--disable-pip-version-check")
-    _call(log, ros, *pip, *tools())
+    _call(log, ros, *pip, *wanted)
 
 
 def correct_exported_paths(log: IO[str]) -> None:
@@ -174,8 +195,9 @@ def _build_messages(ros: machine.RosInstall | None, log: IO[str]) -> None:
         PYTHON, "-c", colcon, "--log-base", build / "log",
         "build", "--base-paths", MESSAGES, "--build-base", build, "--install-base", VENV, "--merge-install",
         "--event-handlers", "console_direct+",
-        "--cmake-args", *([] if ros else ["-G", "Ninja"]), "-DBUILD_TESTING=OFF", "-DCMAKE_BUILD_TYPE=Release",
-        f"-DPython3_EXECUTABLE={PYTHON}", f"-DPYTHON_EXECUTABLE={PYTHON}", "-Wno-deprecated",
+        "--cmake-args", *([] if ros else ["-G", "Ninja", "-DPYTHON_ONLY=ON"]), "-DBUILD_TESTING=OFF",
+        "-DCMAKE_BUILD_TYPE=Release", f"-DPython3_EXECUTABLE={PYTHON}", f"-DPYTHON_EXECUTABLE={PYTHON}",
+        "-Wno-deprecated",
     )  # fmt: skip
 
 
@@ -260,6 +282,10 @@ def _compile_monitor(ros: machine.RosInstall | None, log: IO[str]) -> None:
     _call(log, ros, PYTHON, "-m", "collision_monitor.warm_up", "monitor")
 
 
+def _compile_options(ros: machine.RosInstall | None, log: IO[str]) -> None:
+    _call(log, ros, PYTHON, "-m", "collision_monitor.warm_up", "options")
+
+
 def _compile_functions(ros: machine.RosInstall | None, log: IO[str]) -> None:
     _call(log, ros, PYTHON, "-m", "collision_monitor.warm_up", "functions")
 
@@ -271,14 +297,18 @@ def remove_old_kernels() -> None:
             shutil.rmtree(folder, ignore_errors=True)
 
 
+_PIP = ("compiler", "packages", "package")  # one after the other, because they write into the same folders
+
 STAGES = (
     Stage("environment", "making .venv", _environment_inputs, _make_environment),
-    Stage("packages", "installing Python packages", _packages_inputs, _install_packages),
-    Stage("package", "installing collision-monitor", _package_inputs, _install_package),
-    Stage("messages", "building collision_monitor_msgs", _messages_inputs, _build_messages, alongside=True),
-    Stage("monitor", "compiling the monitor", _kernel_inputs, _compile_monitor, alongside=True),
-    Stage("functions", "compiling other functions", _kernel_inputs, _compile_functions, alongside=True, for_demo=False),
-    Stage("tools", "installing tools for the tests", _tools_inputs, _install_tools, for_demo=False),
+    Stage("compiler", "installing NumPy and numba", _compiler_inputs, _install_compiler, ("environment",)),
+    Stage("packages", "installing ROS 2 and other packages", _packages_inputs, _install_packages, _PIP[:1]),
+    Stage("monitor", "compiling the monitor", _kernel_inputs, _compile_monitor, _PIP[:1]),
+    Stage("package", "installing collision-monitor", _package_inputs, _install_package, _PIP[:2]),
+    Stage("messages", "building collision_monitor_msgs", _messages_inputs, _build_messages, _PIP[:2]),
+    Stage("options", "compiling the monitor's options", _kernel_inputs, _compile_options, (_PIP[0], "monitor"), False),
+    Stage("functions", "compiling other functions", _kernel_inputs, _compile_functions, (_PIP[0], "monitor"), False),
+    Stage("tools", "installing tools for the tests", _tools_inputs, _install_tools, _PIP, False),
 )
 
 MODULES = ("scipy", "numba", "trimesh", "collada", "mcap", "rich", "matplotlib", "yaml", "rosbags", "colcon_core")

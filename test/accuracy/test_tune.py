@@ -1,22 +1,30 @@
-"""Tests of tuning: the cheapest settings that meet the demands, their parameter file, and the failed demands."""
+"""Tests of tuning: the cheapest profile that meets the demands, its parameter file, and the failed demands."""
 
 from __future__ import annotations
 
 import json
 import subprocess
 import sys
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import yaml
 
-from collision_monitor.accuracy.inputs import recorded
+from collision_monitor.accuracy.candidates import Space, models_of
+from collision_monitor.accuracy.demands import Demands
+from collision_monitor.accuracy.halving import rungs_of
+from collision_monitor.accuracy.inputs import Workload, recorded
 from collision_monitor.accuracy.measurement import Errors
-from collision_monitor.accuracy.tune import FACTORS, Demands, candidates, parameter_file, tune
+from collision_monitor.accuracy.profile_tradeoff import profile_tradeoff
+from collision_monitor.accuracy.tune import parameter_file, space_of, tune
 from collision_monitor.cli.main import main
 from collision_monitor.cli.parameter_file import check_parameter_file
 from collision_monitor.errors import InputError
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Sphere
+from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.settings.profile import Profile
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "balanced.mcap"
@@ -24,32 +32,55 @@ PROGRAM = Path(sys.executable).with_name("collision-monitor")
 
 
 @pytest.fixture(scope="module")
-def trials():
-    name, descriptions, steps, _ = recorded(GOLDEN)
+def work() -> Workload:
+    return recorded(GOLDEN)
+
+
+@pytest.fixture(scope="module")
+def tuned(work: Workload):
     told = []
-    chosen, trials = tune(name, descriptions, steps[:80], Demands(ttc_error=0.01), progress=told.append)
-    assert sum(told) == 2 * 80 * len(trials)
-    return chosen, trials
+    space = space_of(work, Profile(), Demands(ttc_error=0.01))
+    found = tune(work, space, lambda name, total: nullcontext(told.append), jobs=1)
+    assert sum(told) > len(found.trials)
+    return found
 
 
-def test_tighter_profiles_err_less_and_the_chosen_one_little_enough(trials) -> None:
-    chosen, found = trials
-    assert [each.profile.name for each in found] == ["fast", *(f"balanced × {factor:g}" for factor in FACTORS), "exact"]
-    errors = [each.measurement.ttc_error_s.p99 for each in found]
-    assert errors[0] > 0.01 > errors[-1]
-    assert all(bool(each.failures) == (each.measurement.ttc_error_s.p99 > 0.01) for each in found)
-    taken = next(each for each in found if each.profile is chosen)
-    assert not taken.failures
-    assert taken.measurement.step_ms <= 1.05 * min(each.measurement.step_ms for each in found if not each.failures)
+def test_the_chosen_profile_is_the_cheapest_that_is_good_on_all_of_the_recording(tuned, work: Workload) -> None:
+    taken = next(each for each in tuned.trials if each.profile is tuned.chosen)
+    assert not taken.failures and taken.timed and taken.measurement.steps == len(work.steps)
+    rivals = [each.measurement.step_ms for each in tuned.trials if each.timed and not each.failures]
+    assert taken.measurement.step_ms <= 1.05 * min(rivals)
+    assert all(bool(each.failures) == (each.measurement.ttc_error_s.p99 > 0.01) for each in tuned.trials)
 
 
-def test_each_demand_fails_with_its_measure(trials) -> None:
+def test_the_parts_of_a_recording_add_up_to_the_whole(tuned, work: Workload) -> None:
+    """Each tile begins with a new monitor, so its first predictions are fresher, and never looser."""
+    taken = next(each for each in tuned.trials if each.profile is tuned.chosen)
+    (whole,) = profile_tradeoff(work.name, work.descriptions, work.steps, [tuned.chosen])
+    assert (taken.measurement.misses, taken.measurement.outside_bound) == (whole.misses, whole.outside_bound) == (0, 0)
+    assert taken.measurement.steps == whole.steps
+    assert taken.measurement.alarms == pytest.approx(whole.alarms, rel=0.02)
+
+
+def test_each_axis_of_a_profile_is_tried(tuned) -> None:
+    names = " / ".join(each.profile.name for each in tuned.trials)
+    for each in ("fast", "exact", "balanced × 100", "distance_tolerance", "impact_tolerance", "model_primitive obb"):
+        assert each in names
+
+
+def test_three_lines_say_why(tuned) -> None:
+    assert [line.partition(":")[0] for line in tuned.reasons] == ["chosen", "cheaper", "dearer"]
+    assert tuned.chosen.name in tuned.reasons[0]
+
+
+def test_each_demand_fails_with_its_measure(tuned) -> None:
     row = replace(
-        trials[1][0].measurement,
+        tuned.trials[0].measurement,
         misses=0,
         outside_bound=0,
         distance_error_m=0.5,
         ttc_error_s=Errors(0.1, 0.2, 0.3),
+        step_ms=2.0,
         step_ms_p99=8.0,
     )
     assert Demands().failures(row) == []
@@ -58,13 +89,38 @@ def test_each_demand_fails_with_its_measure(trials) -> None:
         "TTC error 0.2 s, 2 times the 0.1 s allowed",
         "step time 8 ms, 2 times the 4 ms allowed",
     ]
+    assert Demands(budget_ms=4.0).failures(row, median=True) == []
+    assert Demands(0.1, 0.1, 4.0).excess(row) == 5.0
     assert Demands().failures(replace(row, misses=2)) == ["2 collisions missed"]
     none = replace(row, distance_error_m=float("nan"))
     assert Demands(distance_error=0.1).failures(none) == []
 
 
+def test_a_demand_for_probabilities_keeps_uncertainty_on() -> None:
+    space = Space(Profile(), Demands(probability_error=0.02), uncertain=True, models={})
+    found = [*space.first_generation(), *space.variations(space.first_generation()[0])]
+    assert found and all(each.uncertainty and 0.5 / each.uncertainty_samples**0.5 <= 0.02 for each in found)
+    free = Space(Profile(), Demands(), uncertain=True, models={}).first_generation()
+    assert {each.uncertainty for each in free} == {True, False}
+
+
+def test_models_are_tried_only_where_all_objects_of_a_class_have_them() -> None:
+    hull = ConvexHull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
+    objects = [ObjectDescription(1, Sphere(1)), ObjectDescription(2, HalfSpace((0, 0, 1), 0), static=True, pose=Pose())]
+    objects += [ObjectDescription(3, Box((1, 1, 1))), ObjectDescription(4, hull, model="obb")]
+    assert models_of(objects) == {"primitive": ("sphere", "obb", "kdop26", "convex_hull")}
+
+
+def test_rungs_grow_to_all_tiles() -> None:
+    assert rungs_of(16, 4) == [4, 8, 16]
+    assert rungs_of(7, 4) == [4, 7]
+    assert rungs_of(1, 4) == [1, 1]
+
+
 def test_the_file_makes_the_profile_again(tmp_path: Path) -> None:
-    for profile in candidates(1.5, 0.1):
+    space = Space(Profile(horizon=1.5, contact_margin=0.1), Demands(), uncertain=True, models={"primitive": ("obb",)})
+    first = space.first_generation()
+    for profile in [*first, *space.variations(first[3])]:
         text = parameter_file(profile, ["two", "lines"])
         assert text.startswith("# two\n# lines\n")
         (tmp_path / "tuned.yaml").write_text(text)
@@ -74,22 +130,33 @@ def test_the_file_makes_the_profile_again(tmp_path: Path) -> None:
         assert again.replace(name=profile.name) == profile
 
 
-def test_a_demand_of_nothing_is_refused() -> None:
-    with pytest.raises(InputError, match="budget_ms: expected a number above 0, got 0"):
-        tune("none", [], [], Demands(budget_ms=0.0))
+@pytest.mark.parametrize(
+    ("demands", "words"),
+    [
+        ({"budget_ms": 0.0}, "budget_ms: expected a number above 0, got 0"),
+        ({"probability_error": 0.001}, "probability_error: expected 0.007812, with 4096 samples, to 0.5, got 0.001"),
+        ({"horizon": 3.0}, "horizon: expected at most that of the recording, 2 s, got 3 s"),
+        ({"ttc_error": 2.5}, "ttc_error, horizon: expected an error below the horizon of 2 s, got 2.5 s"),
+        ({"probability_error": 0.1}, "probability_error: expected states that declare an uncertainty, got none"),
+    ],
+)
+def test_contradictory_demands_are_refused(work: Workload, demands: dict[str, float], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        space_of(work, Profile(), Demands(**demands))
 
 
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: object) -> tuple[int, str, str]:
-        code = main(["tune", str(GOLDEN), *map(str, arguments)])
+        code = main(["tune", str(GOLDEN), "-j", "1", *map(str, arguments)])
         return code, *capsys.readouterr()
 
-    command = [PROGRAM, "tune", GOLDEN, "--max-ttc-error", "0.05", "--png", "tried.png"]
+    command = [PROGRAM, "tune", GOLDEN, "--max-ttc-error", "0.05", "--png", "tried.png", "-j", "2"]
     good = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert good.returncode == 0, good.stderr
-    assert "→ " in good.stdout and "written balanced.yaml" in good.stdout
+    assert "steps, about" in good.stderr
+    assert "→ " in good.stdout and "\nchosen: " in good.stdout and "written balanced.yaml" in good.stdout
     check_parameter_file(tmp_path / "balanced.yaml")
     assert (tmp_path / "tried.png").read_bytes().startswith(b"\x89PNG")
     code, _, told = run("--max-ttc-error", 0.05)
@@ -97,7 +164,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     code, out, _ = run("--budget-ms", 1e-6, "--json", "-o", "none.yaml")
     assert code == 3
     answer = json.loads(out)
-    assert answer["chosen"] is None
+    assert answer["chosen"] is None and answer["reasons"][0].startswith("none of")
     assert all("step time" in each["failures"][-1] for each in answer["rows"])
     assert not (tmp_path / "none.yaml").exists()
     with pytest.raises(SystemExit) as wrong:

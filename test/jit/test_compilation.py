@@ -24,6 +24,25 @@ double(1)  # another type: compiled outside of the block
 """
 
 
+LOADING = PROGRAM.partition("with on_first")[0] + """
+from collision_monitor._jit.compilation import compiling_nothing
+
+with compiling_nothing():
+    print(double(1.0))
+    print(triple(1.0))
+    print("never")
+print(triple(1.0))
+"""
+
+
+def test_only_what_is_compiled_already_is_called(tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    environment = {"PYTHONPATH": ":".join(filter(None, sys.path)), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    program.write_text(LOADING.replace("with compiling_nothing():", "double(1.0)\nwith compiling_nothing():"))
+    done = subprocess.run([sys.executable, program], env=environment, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("2.0\n3.0\n", "")
+
+
 def test_only_a_compilation_is_noticed_and_only_the_first(tmp_path: Path) -> None:
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)

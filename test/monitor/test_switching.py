@@ -24,12 +24,14 @@ OTHER: dict[str, Any] = {
     "horizon": 3.5,
     "contact_margin": 0.05,
     "contact_points": 4,
+    "distance_tolerance": 1e-3,
     "impact_tolerance": 1e-6,
     "impact_iterations": 200,
     "position_tolerance": 1e-2,
     "orientation_tolerance": 1e-2,
     "velocity_tolerance": 1e-2,
     "angular_velocity_tolerance": 1e-2,
+    "adaptive_tolerances": True,
     "stale_after": 0.1,
     "stale_acceleration": 2.0,
     "uncertainty": False,
@@ -44,6 +46,7 @@ OTHER: dict[str, Any] = {
     "model_hull": "sphere",
     "model_mesh": "kdop14",
     "model_compound": "aabb",
+    "model_error": 0.001,
     "region_min": (-3.0, -3.0, -3.0),
     "region_max": (3.0, 20.0, 3.0),
     "min_closing_speed": 0.5,
@@ -101,7 +104,7 @@ def test_every_setting_can_change_and_holds_from_then_on(setting: Any) -> None:
 
 def test_predictions_are_as_exact_as_the_new_profile() -> None:
     scene = make_scene("clutter")
-    monitor, fresh = Monitor("fast"), Monitor("exact")
+    monitor, fresh = Monitor(Profile.named("fast").replace(adaptive_tolerances=False)), Monitor("exact")
     for description in scene.descriptions:
         monitor.describe(description)
         fresh.describe(description)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+import numpy as np
 import pytest
 
 from collision_monitor.geometry.shapes import Sphere
@@ -11,6 +12,7 @@ from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.records import PredictionStatus
 from collision_monitor.settings.profile import Profile
+from collision_monitor.world import make_scene
 
 FIRST, SECOND, OTHER = 1, 2, 3
 
@@ -55,3 +57,41 @@ def test_a_publisher_that_is_slower_than_others_is_not_predicted_anew_at_each_st
     ids = [(FIRST, OTHER) if step % 10 == 0 else (OTHER,) for step in range(300)]
     moved = [road.step(0.01, each).status.objects_moved for each in ids]
     assert sum(moved[50:]) < 10
+
+
+def _moved_per_step(profile: Profile, noise: float) -> list[int]:
+    scene = make_scene("fleet", objects=20, noise=noise)
+    monitor = Monitor(profile)
+    for description in scene.descriptions:
+        monitor.describe(description)
+    return [monitor.step(round(k * 2e7), scene.step(0.02)).status.objects_moved for k in range(60)]
+
+
+def test_adaptive_tolerances_are_as_narrow_as_the_noise_allows() -> None:
+    """With exact states predictions are as tight as without tolerance; with noise most objects keep theirs."""
+    wide = Profile.named("fast")
+    fixed = wide.replace(adaptive_tolerances=False)
+    assert sum(_moved_per_step(wide, 0.005)[20:]) < 0.5 * 20 * 40
+    scene = make_scene("clutter")
+    unresolved = []
+    for profile in (wide, fixed):
+        monitor = Monitor(profile)
+        for description in scene.descriptions:
+            monitor.describe(description)
+        predictions = monitor.step(0, scene.states()).predictions
+        unresolved.append(np.count_nonzero(predictions["status"] == PredictionStatus.UNRESOLVED))
+    assert unresolved[0] < 0.1 * unresolved[1]
+
+
+def test_adaptive_tolerances_survive_a_snapshot() -> None:
+    scene = make_scene("fleet", objects=20, noise=0.005)
+    monitor = Monitor("fast")
+    for description in scene.descriptions:
+        monitor.describe(description)
+    for k in range(30):
+        monitor.step(round(k * 2e7), scene.step(0.02))
+    again = Monitor.restored(monitor.profile, monitor.snapshot())
+    for k in range(30, 40):
+        states = scene.step(0.02)
+        mine, theirs = (each.step(round(k * 2e7), states.copy()) for each in (monitor, again))
+        assert mine.predictions.tobytes() == theirs.predictions.tobytes()

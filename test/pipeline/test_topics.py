@@ -26,7 +26,12 @@ def test_a_topic_has_the_names_that_its_users_need() -> None:
 
 
 def test_all_is_recorded_but_a_picture_and_what_other_messages_tell() -> None:
-    assert set(Topic) - set(RECORDED) == {Topic.MARKERS, Topic.RAISED_ALERTS}
+    assert set(Topic) - set(RECORDED) == {
+        Topic.MARKERS,
+        Topic.RAISED_ALERTS,
+        Topic.MONITORED_SHAPES,
+        Topic.MONITORED_STATES,
+    }
 
 
 @pytest.mark.parametrize("name", [f'"{NODE}"', f'"/{NODE}', "~/objects", '"objects/s', '"~/'])

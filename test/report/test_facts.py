@@ -36,7 +36,7 @@ def test_a_drive_and_a_warning_that_came_to_nothing(drive: Path) -> None:
     assert np.all(stated_error(facts.answered[collision], collision, facts.period) == 0.0)
     found = assess(history, facts)
     assert (found.kind, found.answer, found.doubts) == ("collisions", "1 collision", [])
-    assert any("1 warning of 1 pair came to nothing" in line for line in found.findings)
+    assert any("alarms (pairs × steps) were false" in line for line in found.findings)
 
 
 def test_an_alert_at_the_end_is_open(tmp_path: Path) -> None:

@@ -84,3 +84,13 @@ def test_no_more_messages_are_taken_than_allowed() -> None:
     end = monotonic_ns()
     backlog.end_step(end - 100 * MS, end)
     assert len(backlog.choose(STREAM[0])) == 10
+
+
+def test_a_single_slow_step_is_not_the_duration_of_the_next_ones() -> None:
+    backlog = Backlog(lambda: None, 10)
+    for took in [5] * 20 + [1000]:
+        backlog.end_step(0, took * MS)
+    assert backlog.mean < 0.01
+    for _ in range(20):
+        backlog.end_step(0, 100 * MS)
+    assert backlog.mean == pytest.approx(0.1, rel=0.05)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import importlib.util
 import os
 import subprocess
+import threading
 import time
 from pathlib import Path
 
 import machine
 import pytest
+import schedule
 import stages
 
 ROOT = Path(__file__).parents[2]
@@ -63,13 +65,13 @@ def test_an_interrupted_installation_starts_anew(stamps: Path, name: str) -> Non
     assert pending() == NAMES
 
 
-@pytest.mark.parametrize("name", ["messages", "package", "monitor", "functions", "tools"])
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in ("environment", "packages")])
 def test_an_interrupted_later_stage_runs_alone(stamps: Path, name: str) -> None:
     (stamps / name).unlink()
     assert pending() == [name]
 
 
-@pytest.mark.parametrize("name", ["packages", "messages", "package", "monitor", "functions", "tools"])
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "environment"])
 def test_changed_inputs_run_their_stage_alone(stamps: Path, name: str) -> None:
     (stamps / name).write_text("the digest of something else")
     assert pending() == [name]
@@ -209,7 +211,80 @@ def test_a_second_run_only_checks() -> None:
 
 
 def test_a_demo_waits_only_for_what_it_shows(stamps: Path) -> None:
-    for name in ("functions", "tools"):
+    for name in ("options", "functions", "tools"):
         (stamps / name).unlink()
     assert set_up.stages_to_run(ROS, for_demo=True)[0] == []
-    assert pending() == ["functions", "tools"]
+    assert pending() == ["options", "functions", "tools"]
+    assert [stage.name for stage in set_up._rest()] == ["options", "functions"]
+
+
+ABSENT = """
+import os, sys, sysconfig
+
+class Absent:
+    @staticmethod
+    def find_spec(name, path=None, target=None):
+        top = name.partition(".")[0]
+        site = sysconfig.get_path("purelib")
+        if top not in {allowed} and any(os.path.exists(os.path.join(site, top + end)) for end in ("", ".py")):
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+
+sys.meta_path.insert(0, Absent)
+from collision_monitor import warm_up
+warm_up.PARTS["monitor"]()
+"""
+
+
+def test_the_compilation_needs_nothing_that_is_installed_beside_it() -> None:
+    """It runs while pip installs the other packages."""
+    program = ABSENT.format(allowed={"yaml", "_yaml", *stages.COMPILER})
+    answer = subprocess.run([stages.PYTHON, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=600)
+    assert answer.returncode == 0, answer.stderr
+
+
+def stage(name: str, *after: str) -> stages.Stage:
+    return stages.Stage(name, "", lambda _: "", lambda _, __: None, after)
+
+
+CHAIN = [stage("a"), stage("b", "a"), stage("c", "a"), stage("d", "a", "b")]
+
+
+def test_stages_run_side_by_side_and_none_before_those_it_needs() -> None:
+    began: list[str] = []
+    together = threading.Barrier(2)  # b and c wait for each other, so they must run at the same time
+
+    def work(each: stages.Stage) -> None:
+        began.append(each.name)
+        if each.name in "bc":
+            together.wait(timeout=10)
+
+    schedule.run(CHAIN, work)
+    assert began[0] == "a"
+    assert began[3] == "d"
+    assert sorted(began) == list("abcd")
+
+
+def test_a_stage_waits_only_for_those_that_run_again() -> None:
+    began: list[str] = []
+    schedule.run(CHAIN[3:], lambda each: began.append(each.name))
+    assert began == ["d"]
+
+
+def test_no_stage_begins_after_a_failure() -> None:
+    began: list[str] = []
+
+    def work(each: stages.Stage) -> None:
+        began.append(each.name)
+        if each.name == "a":
+            raise OSError("no space")
+
+    with pytest.raises(schedule.StageError, match="a: no space"):
+        schedule.run(CHAIN, work)
+    assert began == ["a"]
+
+
+def test_stages_need_only_earlier_ones() -> None:
+    known: set[str] = set()
+    for each in stages.STAGES:
+        assert set(each.after) <= known
+        known.add(each.name)

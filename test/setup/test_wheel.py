@@ -32,6 +32,7 @@ try:
     main(["world", "--list"])
 except SystemExit as ended:
     assert not ended.code, ended.code
+assert main(["sources"]) == 1
 """
 
 
@@ -57,3 +58,4 @@ def test_the_wheel_works_without_ros(tmp_path: Path) -> None:
         cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+    assert "expected ROS 2, got no module 'rclpy': source a ROS 2 install" in done.stderr

@@ -11,6 +11,7 @@ import numpy as np
 
 from collision_monitor.monitor.timeline import NANOSECOND
 from collision_monitor.records import Phase
+from collision_monitor.session.history.alarms import Alarms, alarms_of
 from collision_monitor.session.history.alerts import AlertOutcome, alerts_of
 from collision_monitor.session.history.history import History, Pair
 
@@ -57,7 +58,10 @@ class EventChange:
 
 @dataclass(frozen=True)
 class SessionSummary:
-    """Figures of one session. contacts, predictions: pairs, counted at each step. Step times in s, NaN if unknown."""
+    """Figures of one session. contacts, predictions: pairs, counted at each step. Step times in s, NaN if unknown.
+
+    alarms: judged by what followed, see `alarms`.
+    """
 
     session: str
     profile: str
@@ -67,8 +71,7 @@ class SessionSummary:
     duration: float
     objects: int
     collisions: int
-    not_predicted: int
-    in_vain: int
+    alarms: Alarms
     contacts: int
     predictions: int
     step_median: float
@@ -193,8 +196,7 @@ def _summary(history: History) -> SessionSummary:
         duration=history.duration,
         objects=len(history.objects),
         collisions=len(history.collisions),
-        not_predicted=sum(each.warned == 0.0 for each in history.collisions),
-        in_vain=sum(each.certain and each.outcome is AlertOutcome.NOTHING for each in alerts_of(history)),
+        alarms=alarms_of(history),
         contacts=int(np.count_nonzero(history.contacts["phase"] != Phase.END)),
         predictions=len(history.predictions),
         step_median=float(np.median(durations)) if len(durations) else math.nan,

@@ -1,0 +1,251 @@
+"""Gaps of many samples of a pair of shapes along a plane, side by side, with each sample's errors of orientation.
+
+A direction separates two bodies by the gap along it, which the support values of both shapes give exactly, also of
+bodies that are turned by an error. The loops over samples have no branches, so that LLVM computes several samples at a
+time. They run over slices, because an index that may be negative prevents that. Each sample is rounded as if it were
+alone.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.shape_table import (
+    BOX,
+    CAPSULE,
+    CIRCLE,
+    CONE,
+    CONVEX_HULL,
+    CYLINDER,
+    ELLIPSOID,
+    HALF_SPACE,
+    POLYGON,
+)
+from collision_monitor.narrow_phase.core import rounding
+from collision_monitor.narrow_phase.support_value import core_support
+from collision_monitor.prediction.obstacle_planes import AT_REST, MODE, from_plane
+
+TURNED_FARTHEST: Final = 0.7
+"""Largest standard deviation of an orientation (rad) for which the series of `_turn` are exact to 0.001 rad."""
+
+NOT_TURNED, FIRST_ORDER, SERIES = 0, 1, 2
+"""How errors of the orientation of a body turn directions: there are none, to first order, or exactly."""
+
+STATE: Final = 9
+"""Rows of the samples at a node: position of B relative to A (m), rotation vectors of the errors of A and B (rad)."""
+
+
+class SampleRows(NamedTuple):
+    """Samples at both ends of a segment; scratch memory of one thread for S samples."""
+
+    node: Any  # (2, STATE, S)
+    normal: Any  # (3, S)
+    local: Any  # (3, S): directions in the axes of a shape
+    gap: Any  # (3, S): gaps at both ends (m), and support values
+
+
+def make_sample_rows(samples: int) -> SampleRows:
+    """Make the scratch memory of one thread."""
+    return SampleRows(
+        np.zeros((2, STATE, samples)),
+        np.zeros((3, samples)),
+        np.zeros((3, samples)),
+        np.zeros((3, samples)),
+    )
+
+
+@device
+def set_samples(obstacle, k, off, points, turning, first, last, rows):
+    """Write the samples first:last at both ends of segment k into rows.node.
+
+    off (6, S): errors of position and velocity; points (DIMENSIONS, S): of which the last six are the unit errors of
+    orientation; turning (int, int): NOT_TURNED, FIRST_ORDER or SERIES for both bodies.
+    """
+    for end in range(2):
+        stated_node, node = obstacle.node[k + end], rows.node[end]
+        t = stated_node.time
+        for c in range(3):
+            row, x, v = node[c, first:last], off[c, first:last], off[3 + c, first:last]
+            stated = stated_node.position[c]
+            for n in range(row.size):
+                row[n] = stated + x[n] + t * v[n]
+        for body in range(2):
+            if turning[body] == NOT_TURNED:
+                continue
+            x = points[6 + 3 * body, first:last]
+            y = points[7 + 3 * body, first:last]
+            z = points[8 + 3 * body, first:last]
+            for c in range(3):
+                m = stated_node.turn[body, c]
+                u, v, w = m[0], m[1], m[2]
+                row = node[3 + 3 * body + c, first:last]
+                for n in range(row.size):
+                    row[n] = u * x[n] + v * y[n] + w * z[n]
+
+
+@device
+def _turn(vectors, by, row, sign, order, first, last):
+    """Turn vectors (3, S) by sign (-1 or 1) times the rotation vectors in three rows of `by`, from `row` on.
+
+    Only samples first:last. order: FIRST_ORDER, or SERIES for sine and cosine, see TURNED_FARTHEST.
+    """
+    x, y, z = vectors[0, first:last], vectors[1, first:last], vectors[2, first:last]
+    bx, by_, bz = by[row, first:last], by[row + 1, first:last], by[row + 2, first:last]
+    if order == FIRST_ORDER:
+        for n in range(x.size):
+            u, v, w = sign * bx[n], sign * by_[n], sign * bz[n]
+            px, py, pz = x[n], y[n], z[n]
+            x[n], y[n], z[n] = px + (v * pz - w * py), py + (w * px - u * pz), pz + (u * py - v * px)
+        return
+    for n in range(x.size):
+        u, v, w = sign * bx[n], sign * by_[n], sign * bz[n]
+        q = u * u + v * v + w * w
+        s = 1.0 - q * (1.0 / 6.0 - q * (1.0 / 120.0 - q * (1.0 / 5040.0)))
+        c = 0.5 - q * (1.0 / 24.0 - q * (1.0 / 720.0 - q * (1.0 / 40320.0)))
+        px, py, pz = x[n], y[n], z[n]
+        ax, ay, az = v * pz - w * py, w * px - u * pz, u * py - v * px
+        x[n] = px + s * ax + c * (v * az - w * ay)
+        y[n] = py + s * ay + c * (w * ax - u * az)
+        z[n] = pz + s * az + c * (u * ay - v * ax)
+
+
+@inlined
+def reach_of(table, s, R, o, n):
+    """Support value (m) about its body's origin of the core of shape s, with rotation R and offset o (3,)."""
+    if table.kind[s] == HALF_SPACE:
+        return table.size[s, 3]
+    x, y, z = n
+    core = core_support(
+        table, s,
+        x * R[0, 0] + y * R[1, 0] + z * R[2, 0],
+        x * R[0, 1] + y * R[1, 1] + z * R[2, 1],
+        x * R[0, 2] + y * R[1, 2] + z * R[2, 2],
+    )  # fmt: skip
+    return x * o[0] + y * o[1] + z * o[2] + core
+
+
+@inlined
+def stated_gap(table, pair, n, node, margin):
+    """Gap (m) beyond the margin of the stated motion along the unit vector n (3,), in world axes, at a node (NODE)."""
+    a, b = pair.a, pair.b
+    p, R, o = node.position, node.rotation, node.offset
+    reach = reach_of(table, a, R[0], o[0], n) + reach_of(table, b, R[1], o[1], (-n[0], -n[1], -n[2]))
+    return n[0] * p[0] + n[1] * p[1] + n[2] * p[2] - reach - rounding(table, a) - rounding(table, b) - margin
+
+
+@inlined
+def _subtract_reaches(table, s, R, o, sign, local, gap, first, last, best):
+    """Subtract `reach_of` along sign times the directions local (3, S), in world axes, from gap (last - first,).
+
+    Only samples first:last. Overwrites local. best (last - first,): scratch.
+    """
+    x, y, z = local[0, first:last], local[1, first:last], local[2, first:last]
+    ox, oy, oz = o[0], o[1], o[2]
+    xx, xy, xz, yx, yy, yz = R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2]
+    zx, zy, zz = R[2, 0], R[2, 1], R[2, 2]
+    for n in range(gap.size):
+        u, v, w = sign * x[n], sign * y[n], sign * z[n]
+        gap[n] -= u * ox + v * oy + w * oz
+        x[n], y[n], z[n] = u * xx + v * yx + w * zx, u * xy + v * yy + w * zy, u * xz + v * yz + w * zz
+    kind, s0, s1, s2 = table.kind[s], table.size[s, 0], table.size[s, 1], table.size[s, 2]
+    if kind == BOX:
+        for n in range(gap.size):
+            gap[n] -= abs(x[n]) * s0 + abs(y[n]) * s1 + abs(z[n]) * s2
+    elif kind == CAPSULE:
+        for n in range(gap.size):
+            gap[n] -= abs(z[n]) * s1
+    elif kind == CYLINDER or kind == CIRCLE:
+        height = s1 if kind == CYLINDER else 0.0
+        for n in range(gap.size):
+            gap[n] -= abs(z[n]) * height + s0 * sqrt(x[n] * x[n] + y[n] * y[n])
+    elif kind == CONE:
+        for n in range(gap.size):
+            top, rim = z[n] * s1, s0 * sqrt(x[n] * x[n] + y[n] * y[n]) - z[n] * s1
+            gap[n] -= top if top > rim else rim
+    elif kind == ELLIPSOID:
+        for n in range(gap.size):
+            u, v, w = x[n] * s0, y[n] * s1, z[n] * s2
+            gap[n] -= sqrt(u * u + v * v + w * w)
+    elif kind == CONVEX_HULL or kind == POLYGON:
+        for n in range(gap.size):
+            best[n] = -inf
+        start = table.vertex_start[s]
+        for k in range(start, start + table.vertex_count[s]):
+            u, v, w = table.vertices[0, k], table.vertices[1, k], table.vertices[2, k]
+            for n in range(gap.size):
+                value = x[n] * u + y[n] * v + z[n] * w
+                best[n] = value if value > best[n] else best[n]
+        for n in range(gap.size):
+            gap[n] -= best[n]
+
+
+@inlined
+def _gaps_at(table, pair, plane, node, margin, turning, first, last, state, rows, gap):
+    """Write the gaps (last - first,) of samples along a plane at a node (NODE); state (STATE, S): the samples there."""
+    a, b, mode = pair.a, pair.b, int(plane[MODE])
+    R, o = node.rotation, node.offset
+    n = from_plane(plane, R)
+    nx, ny, nz = n
+    reach = rounding(table, a) + rounding(table, b) + margin
+    x, y, z = state[0, first:last], state[1, first:last], state[2, first:last]
+    turned = mode < AT_REST and turning[mode] != NOT_TURNED
+    varies_a = mode != 0 and (turning[0] != NOT_TURNED or turned)
+    varies_b = mode != 1 and (turning[1] != NOT_TURNED or turned)
+    if not varies_a:
+        reach += reach_of(table, a, R[0], o[0], n)
+    if not varies_b:
+        reach += reach_of(table, b, R[1], o[1], (-nx, -ny, -nz))
+    if turning[0] == NOT_TURNED and turning[1] == NOT_TURNED:
+        for k in range(gap.size):
+            gap[k] = nx * x[k] + ny * y[k] + nz * z[k] - reach
+        return
+    u, v, w = rows.normal[0, first:last], rows.normal[1, first:last], rows.normal[2, first:last]
+    for k in range(gap.size):
+        u[k], v[k], w[k] = nx, ny, nz
+    if turned:
+        _turn(rows.normal, state, 3 + 3 * mode, 1.0, turning[mode], first, last)
+    for k in range(gap.size):
+        gap[k] = u[k] * x[k] + v[k] * y[k] + w[k] * z[k] - reach
+    for body in range(2):
+        if not (varies_b if body else varies_a):
+            continue
+        x, y, z = rows.local[0, first:last], rows.local[1, first:last], rows.local[2, first:last]
+        for k in range(gap.size):
+            x[k], y[k], z[k] = u[k], v[k], w[k]
+        if turning[body] != NOT_TURNED:
+            _turn(rows.local, state, 3 + 3 * body, -1.0, turning[body], first, last)
+        best = rows.gap[2, first:last]
+        s, sign = (b, -1.0) if body else (a, 1.0)
+        _subtract_reaches(table, s, R[body], o[body], sign, rows.local, gap, first, last, best)
+
+
+@device
+def gaps_at_end(table, pair, plane, margin, turning, node, count, rows):
+    """Write the gaps of the first `count` samples along a plane at the end of a segment (NODE) into rows.gap[1]."""
+    _gaps_at(table, pair, plane, node, margin, turning, 0, count, rows.node[1], rows, rows.gap[1, 0:count])
+
+
+@device
+def enter_planes(table, pair, planes, margin, turning, nodes, first, last, rows, entry, leave):
+    """Restrict the intervals [entry, leave] (S,) of samples first:last in a segment to the time behind planes.
+
+    planes (M, PLANE_SIZE); nodes (2,) NODE: both ends of the segment; rows: see `set_samples`. margin (m): the gap from
+    which on a sample is behind a plane.
+    """
+    begin, length = nodes[0].time, nodes[1].time - nodes[0].time
+    entry, leave = entry[first:last], leave[first:last]
+    g, h = rows.gap[0, first:last], rows.gap[1, first:last]
+    for m in range(planes.shape[0]):
+        for end in range(2):
+            gap = rows.gap[end, first:last]
+            _gaps_at(table, pair, planes[m], nodes[end], margin, turning, first, last, rows.node[end], rows, gap)
+        for n in range(entry.size):
+            change = h[n] - g[n] + 0.0  # -0.0 becomes 0.0
+            at = begin + length * (-g[n] / change)
+            closes = change < 0.0
+            entry[n] = at if closes and at > entry[n] else entry[n]
+            leave[n] = at if not closes and at < leave[n] else leave[n]

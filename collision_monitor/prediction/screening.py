@@ -1,0 +1,174 @@
+"""Screening of uncertain pairs: a bound on the probability of contact from one plane, in closed form.
+
+Along one direction the gap of a pair is linear in time and normally distributed, so that two tails of the normal
+distribution bound the probability that it closes. Most pairs are so far apart that no sample is needed.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from statistics import NormalDist
+from typing import Final
+
+import numpy as np
+
+from collision_monitor._jit import device, inlined
+from collision_monitor.prediction.bodies import next_pair, place_shape
+from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
+from collision_monitor.prediction.impact_record import CLEAR, HIT
+from collision_monitor.prediction.motion import half_acceleration, relative_position
+from collision_monitor.prediction.obstacle_planes import NO_TURNS, separation_at, set_nodes
+from collision_monitor.prediction.sample_gaps import stated_gap
+from collision_monitor.prediction.sphere_interval import sphere_interval
+
+FURTHEST: Final = 4.5
+"""Standard deviations beyond which errors are neglected; 7 of a million are larger."""
+
+NOT_OFF: Final = (0.0, 0.0, 0.0)
+
+ROUGHLY: Final = 0.1
+"""Tolerance (standard deviations) of the time from which bodies that turn may meet within FURTHEST."""
+
+SAME_TIME: Final = 0.02
+"""Fraction of the window by which two times of a design point differ at most when the search for it ends."""
+
+DESIGN_STEPS: Final = 3
+"""Largest number of separations towards a design point. The line between the origins is tried before them."""
+
+ENOUGH: Final = 0.2
+"""Fraction of min_probability below which the bound along that line suffices, also of a body of several shapes."""
+
+_FINENESS: Final = 32
+"""Steps of TAIL for each standard deviation."""
+
+TAIL: Final = np.array([NormalDist().cdf(-k / _FINENESS) for k in range(6 * _FINENESS)])
+"""Probability that a normal error exceeds k / _FINENESS standard deviations."""
+
+
+@inlined
+def _tail(beta):
+    """Probability, rounded up, that a normal error exceeds beta standard deviations."""
+    if not beta > 0.0:
+        return 1.0
+    return TAIL[min(int(beta * _FINENESS), TAIL.size - 1)]
+
+
+@device
+def meeting(table, parts, pair, horizon, margin, tube, work):
+    """Interval (s) in which the bounding spheres of a pair of shapes meet within the tube; (inf, -inf): never."""
+    A, B, a, b = pair
+    reach = table.radius[a] + table.radius[b] + margin + tube.start
+    if not reach < inf:
+        return 0.0, horizon
+    R_a, R_b = work.scratch.rotation[0], work.scratch.rotation[1]
+    oa, ob = place_shape(table, parts, a, A.rotation, R_a), place_shape(table, parts, b, B.rotation, R_b)
+    p = (B.x - A.x + ob[0] - oa[0], B.y - A.y + ob[1] - oa[1], B.z - A.z + ob[2] - oa[2])
+    bent = half_acceleration(A, B) * horizon
+    bent += sqrt((A.wx * A.wx + A.wy * A.wy + A.wz * A.wz) * (oa[0] * oa[0] + oa[1] * oa[1] + oa[2] * oa[2]))
+    bent += sqrt((B.wx * B.wx + B.wy * B.wy + B.wz * B.wz) * (ob[0] * ob[0] + ob[1] * ob[1] + ob[2] * ob[2]))
+    return sphere_interval(p, (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz), reach, tube.growth + bent, horizon, 1.0)
+
+
+@inlined
+def _quadratic(block, row, column, n):
+    """n^T C n for the 3 x 3 block of a matrix that begins at (row, column)."""
+    total = 0.0
+    for r in range(3):
+        for c in range(3):
+            total += n[r] * block[row + r, column + c] * n[c]
+    return total
+
+
+@device
+def _least_beta(gaps, n, turning, joint, t, window):
+    """Smallest number of standard deviations between a pair and contact along n (3,); its time; a bound.
+
+    gaps: at both ends of the window (m). turning: standard deviation of the surfaces from errors of orientation (m now,
+    m/s). joint (6, 6): covariance of position at time t and of velocity. The gap is linear in time, so that it closes
+    in the window only if it is closed at one end: the bound is the sum of both probabilities.
+    """
+    pp, pv, vv = _quadratic(joint, 0, 0, n), _quadratic(joint, 0, 3, n), _quadratic(joint, 3, 3, n)
+    # variance c + 2 d s + e s^2
+    c = pp - 2.0 * t * pv + t * t * vv + turning[0] * turning[0]
+    d = pv - t * vv + turning[0] * turning[1]
+    e = vv + turning[1] * turning[1]
+    begin, end = window
+    r = (gaps[1] - gaps[0]) / (end - begin) if end > begin else 0.0
+    g = gaps[0] - r * begin
+    at_begin = gaps[0] / sqrt(max(c + begin * (2.0 * d + begin * e), 1e-300))
+    at_end = gaps[1] / sqrt(max(c + end * (2.0 * d + end * e), 1e-300))
+    beta, when = (at_begin, begin) if at_begin < at_end else (at_end, end)
+    slope = r * d - g * e
+    if slope != 0.0:
+        s = (g * d - r * c) / slope
+        if begin < s < end:
+            between = (g + r * s) / sqrt(max(c + s * (2.0 * d + s * e), 1e-300))
+            if between < beta:
+                beta, when = between, s
+    both_signs = 2.0 if turning[0] + turning[1] > 0.0 else 1.0  # a turn either way closes the gap
+    return beta, when, both_signs * (_tail(at_begin) + _tail(at_end))
+
+
+@inlined
+def _towards(A, B, t):
+    """Unit vector from the origin of A to that of B at time t."""
+    x, y, z = relative_position(A, B, t)
+    length = sqrt(x * x + y * y + z * z)
+    return (x / length, y / length, z / length) if length > 0.0 else (1.0, 0.0, 0.0)
+
+
+@device
+def design_point(multibody, i, j, tube, turning, bend, sampling, t, obstacle, work):
+    """Return (bound, time): a bound on the probability of contact, and the time at which contact is likeliest.
+
+    t: time of closest approach; bend: bound on the acceleration of the surfaces (m/s^2), by which a gap may be smaller
+    between the ends of a window than a straight line. Writes the direction of the gap then into work.frame[0]: the
+    design point of reliability theory. The bound is that of one plane for each pair of shapes.
+    work.joint: covariance of position at t and of velocity, in world axes.
+    """
+    table, parts, bodies = multibody
+    A, B, frame, scratch = work.motion[0], work.motion[1], work.frame, work.scratch
+    margin = sampling.query.margin
+    wide = Tube(FURTHEST * tube.start, FURTHEST * tube.growth)
+    bound, least, likeliest = 0.0, inf, t
+    a, first_b = bodies.first_shape[i], bodies.first_shape[j]
+    b = first_b
+    while a >= 0:
+        pair = ShapePair(A, B, a, b)
+        window = Window(*meeting(table, parts, pair, sampling.horizon, margin, wide, work))
+        begin, status = window.begin, HIT
+        if bend > 0.0 and begin < window.end:
+            tolerance = max(sampling.query.tolerance, ROUGHLY * tube.start)
+            roughly = ImpactQuery(margin, tolerance, sampling.query.iterations)
+            there = Tube(wide.start + wide.growth * begin, wide.growth)
+            status, begin, _, _ = shape_impact(table, parts, pair, window, there, roughly, scratch)
+        window = Window(begin, window.end)
+        if window.begin <= window.end and status != CLEAR:
+            length = window.end - window.begin
+            set_nodes(table, parts, pair, window, length, NO_TURNS, False, scratch, obstacle)
+            bent = 0.125 * bend * length * length
+            at, own = min(max(t, window.begin), window.end), 1.0
+            n = _towards(A, B, at)
+            for step in range(0 if A.radius + B.radius < inf else 1, DESIGN_STEPS + 1):
+                if step > 0:
+                    if separation_at(table, parts, pair, at, NOT_OFF, (NOT_OFF, NOT_OFF), obstacle, scratch) <= margin:
+                        own = 1.0
+                        break
+                    n = (scratch.out[0], scratch.out[1], scratch.out[2])
+                first = stated_gap(table, pair, n, obstacle.node[0], margin + bent)
+                last = stated_gap(table, pair, n, obstacle.node[1], margin + bent) if length > 0.0 else first
+                beta, when, outside = _least_beta((first, last), n, turning, work.joint, t, window)
+                own = min(own, outside)
+                if step == 0:
+                    if own < ENOUGH * sampling.min_probability:
+                        break
+                    continue
+                if beta < least:
+                    least, likeliest = beta, when
+                    frame[0, 0], frame[0, 1], frame[0, 2] = n
+                if abs(when - at) <= SAME_TIME * length:
+                    break
+                at = when
+            bound += own
+        a, b = next_pair(parts, first_b, a, b)
+    return bound, likeliest
