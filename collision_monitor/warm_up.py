@@ -134,6 +134,8 @@ def warm_up_functions() -> None:
     for at in (Pose(), Pose((3, 0, 0))):
         overlap(corner, Pose(), corner, at)
         contact(corner, Pose(), corner, at)
+        time_of_impact(corner, Motion(Pose()), corner, Motion(at, (-1, 0, 0)))
+        contact(corner, Pose(), corner, at)
 
 
 PARTS: Final = {

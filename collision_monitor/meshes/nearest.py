@@ -50,8 +50,8 @@ ANSWER: Final = 10
 """Numbers of an answer: distance of the surfaces (m), closest points on both in A's frame (m), the places of the two
 triangles, WIDTH * block + member, which serve as a hint for a later query, and a lower bound on the distance (m)."""
 
-MOST_LEAVES: Final = 300_000
-"""Most pairs of leaves to examine, 0.1 s. Hostile meshes, such as a million triangles in a point, need more; the lower
+MOST_LEAVES: Final = 100_000
+"""Most pairs of leaves to examine, up to 1 s. Hostile meshes, such as a million triangles in a point, need more; the lower
 bound then is that of the boxes."""
 
 
