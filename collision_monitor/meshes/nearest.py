@@ -51,8 +51,8 @@ ANSWER: Final = 10
 triangles, WIDTH * block + member, which serve as a hint for a later query, and a lower bound on the distance (m)."""
 
 MOST_LEAVES: Final = 100_000
-"""Most pairs of leaves to examine, up to 1 s. Hostile meshes, such as a million triangles in a point, need more; the lower
-bound then is that of the boxes."""
+"""Most pairs of leaves to examine, up to 1 s. Hostile meshes, such as a million triangles in a point, need more; the
+lower bound then is that of the boxes."""
 
 
 def answer_row() -> NDArray[np.float64]:
