@@ -1,7 +1,8 @@
 """Measure the gain of the event list over plain recomputation of every prediction.
 
-    python benchmarks/event_list.py                    # 10,000 boxes at 100 Hz, four kinds of motion
+    python benchmarks/event_list.py                    # 10,000 boxes at 100 Hz, five kinds of motion
     python benchmarks/event_list.py --objects 1000 --seconds 60 --every 1   # compared at every step of a minute
+    python benchmarks/event_list.py --distance-tolerance 0.001 --moves steady,slow   # keeps contacts that hardly move
 
 Both monitors get the same states in one run. At every --every th step the reference monitor recomputes everything, and
 the answers are compared: no collision may be missed, late or invented, within the stated bounds.
@@ -27,7 +28,7 @@ from collision_monitor.geometry.pose import from_rotation_vector, multiply
 from collision_monitor.settings.profile import Profile
 
 RATE = 100.0
-MOVES = ("steady", "turns", "noise", "jumps")
+MOVES = ("steady", "turns", "noise", "jumps", "slow")
 
 
 class Boxes:
@@ -75,11 +76,13 @@ class Boxes:
 def run(move: str, args: argparse.Namespace) -> dict[str, object]:
     """Measure one kind of motion; returns the row of the table."""
     boxes = Boxes(args.objects, args.seed)
-    profile = Profile(threads=args.threads)
+    profile = Profile(threads=args.threads, distance_tolerance=args.distance_tolerance)
+    if move == "slow":
+        boxes.linear, boxes.angular = 0.01 * boxes.linear, 0.01 * boxes.angular
     # half of the declared tolerances, so that two noisy states stay within them
     noise = 0.49 * profile.position_tolerance if move == "noise" else 0.0
     turning = {"turns": 0.01, "jumps": 1.0}.get(move, 0.0)
-    mine, plain = Monitor(profile), ReferenceMonitor(profile)
+    mine, plain = Monitor(profile), ReferenceMonitor(profile.replace(distance_tolerance=0.0))
     for monitor in (mine, plain):
         for i, size in enumerate(boxes.size):
             monitor.add(i, Box(size))
@@ -100,7 +103,7 @@ def run(move: str, args: argparse.Namespace) -> dict[str, object]:
             wrong += [f"step {step}: {text}" for text in disagreements(answer, truth, profile.horizon)]
             compared += 1
         boxes.move(1 / RATE, turning)
-        if move != "steady":
+        if move not in ("steady", "slow"):
             boxes.walls()
     warm = min(10, steps // 4)
     own, full = 1e3 * np.array(spent["event list"][warm:]), 1e3 * np.array(spent["plain"][1:] or spent["plain"])
@@ -128,6 +131,7 @@ def main() -> int:
     parser.add_argument("--objects", type=int, default=10_000)
     parser.add_argument("--seconds", type=float, default=5.0, help="simulated time at 100 Hz")
     parser.add_argument("--every", type=int, default=25, help="compare with recomputation at every K-th step")
+    parser.add_argument("--distance-tolerance", type=float, default=0.0, help="distance_tolerance of the profile (m)")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--moves", default=",".join(MOVES), help=f"kinds of motion: {', '.join(MOVES)}")

@@ -105,10 +105,12 @@ def tune_command(args: argparse.Namespace) -> int:
     else:
         print("\n".join([*_as_text(found.trials, chosen), "", *found.reasons]))
     if args.png:
-        from collision_monitor.accuracy.pictures import draw_tradeoff
+        from collision_monitor.accuracy.front import Front
+        from collision_monitor.accuracy.front_picture import draw_fronts
 
+        front = Front([each.measurement for each in found.trials], fixed_us=float("nan"))
         with writing(args.png):
-            draw_tradeoff([each.measurement for each in found.trials], args.png)
+            draw_fronts({work.name: [front]}, args.png, chosen=chosen.name if chosen else None)
     if chosen is None:
         return ExitCode.NOT_AS_EXPECTED
     notes = [f"Found by `collision-monitor tune` on {args.session.name}", f"demands: {demands}", *found.reasons]

@@ -133,9 +133,15 @@ class ActivePairs(Stage):
         later = np.empty(len(self.pairs), IMPACT)
         if not step.profile.distance_tolerance:
             return later[: self.examine(step, np.arange(len(self.pairs)), scratch, later)]
-        left, source = carry_over(step, self._carried, self.pairs, self.results)
+        if len(self._carried.keys):
+            left, source = carry_over(step, self._carried, self.pairs, self.results)
+        else:
+            left, source = np.arange(len(self.pairs)), np.full(len(self.pairs), -1, np.int32)
         count = self.examine(step, left, scratch, later) if len(left) else 0
-        self._carried = remember(step, self._carried, self.pairs, self.results, source)
+        if self.pairs["touching"].any():
+            self._carried = remember(step, self._carried, self.pairs, self.results, source)
+        else:
+            self._carried = no_answers()
         return later[:count]
 
     def examine(self, step: StepContext, which: NDArray[np.intp], scratch: Scratch, later: Rows) -> int:

@@ -33,6 +33,11 @@ ROOM: Final = 2.0
 """Width: the part of the tolerances that a body uses. Smallest value; and its ratio to the last deviation, if that was
 within the tolerances, because the next deviation of a noisy state may be larger."""
 
+FUTILE_STEPS: Final = 4.0
+PATIENCE: Final = 16.0
+"""A body with half of the tolerances or more that leaves its motion within FUTILE_STEPS steps turns or accelerates. Its
+tolerances are NARROWEST for its next PATIENCE motions; its width is minus the number of those that are left."""
+
 WIDER: Final = 1.1
 """Factor on the spread of a box, because standard deviations vary a little from state to state."""
 
@@ -53,12 +58,13 @@ class Uncertainty(NamedTuple):
 class Tracking(Stage):
     """Compares the bodies' states with their predicted motions, and starts the bodies anew that left them."""
 
-    SAVED = ("_outside", "_width")
+    SAVED = ("_outside", "_width", "_before")
     CACHES = ("_columns",)
 
     def __init__(self) -> None:
         self._outside: NDArray[np.bool_] = np.zeros(0, np.bool_)  # by slot: outside of the region
         self._width: NDArray[np.float64] = np.zeros(0)  # by slot: part of the tolerances that the body uses
+        self._before = 0.0  # time of the step before (s)
         self._columns = make_columns()
 
     @property
@@ -109,9 +115,11 @@ class Tracking(Stage):
         uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
         n, m = find_moved(roster.bodies, uncertainty, roster.top, step.now, step.settings.motion, self._columns, found)
         moved, ending = found[0, :n], found[1, :m]
-        if step.profile.adaptive_tolerances:
+        if step.profile.adaptive_tolerances and n + m:
             self._make_room(roster.capacity)
-            fit_widths(roster.bodies, moved, ending, step.now, step.settings.motion, self._width)
+            futile = FUTILE_STEPS * (step.now - self._before)
+            fit_widths(roster.bodies, moved, ending, step.now, futile, step.settings.motion, self._width)
+        self._before = step.now
         return moved, ending
 
     def _make_room(self, capacity: int) -> None:
@@ -138,11 +146,13 @@ class Tracking(Stage):
         """See Stage."""
         snapshot.arrays["outside"] = self._outside.copy()
         snapshot.arrays["width"] = self._width.copy()
+        facts["before"] = self._before
 
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
         self._outside = snapshot.array("outside", np.zeros(0, np.bool_))[: len(snapshot.arrays["bodies.used"])]
-        self._width = np.clip(snapshot.array("width", np.zeros(0)), NARROWEST, 1.0)
+        self._width = np.clip(snapshot.array("width", np.zeros(0)), -PATIENCE, 1.0)
+        self._before = float(facts["before"])
 
 
 @device
@@ -288,14 +298,21 @@ def _cover(bodies, i, now, horizon):
 
 
 @kernel
-def fit_widths(bodies, moved, ending, now, settings, width):
+def fit_widths(bodies, moved, ending, now, futile, settings, width):
     """Fit the widths (N,) of bodies that leave their motion (`moved`), and of those that kept it to its end.
 
     A body that deviates within the tolerances is noisy: its next tube has ROOM for more than this deviation. One that
-    deviates further has changed its motion; one that kept it may need less. Both halve their width.
+    deviates further has changed its motion; one that kept it may need less. Both halve their width. futile: s, see
+    FUTILE_STEPS.
     """
     for i in moved:
         m = bodies.motion[i]
+        if width[i] < 0.0:
+            width[i] = width[i] + 1.0 if width[i] < -1.0 else NARROWEST
+            continue
+        if width[i] >= 0.5 and now - m.time <= futile:
+            width[i] = -PATIENCE
+            continue
         r = bodies.spin_radius[i]
         tube_0 = settings.position_tolerance + r * settings.orientation_tolerance
         tube_1 = settings.velocity_tolerance + r * settings.angular_velocity_tolerance
@@ -315,7 +332,7 @@ def fit_widths(bodies, moved, ending, now, settings, width):
         else:
             width[i] = max(0.5 * width[i], NARROWEST)
     for i in ending:
-        width[i] = max(0.5 * width[i], NARROWEST)
+        width[i] = max(0.5 * width[i], NARROWEST)  # also one that was given up
 
 
 @kernel
@@ -329,7 +346,7 @@ def restart_motion(bodies, uncertainty, grid, which, now, settings, width):
     stale_acceleration = settings.stale_acceleration
     for k in range(which.size):
         i = which[k]
-        part = width[i] if settings.adaptive else 1.0
+        part = max(width[i], NARROWEST) if settings.adaptive else 1.0
         m = bodies.motion[i]
         bodies.version[i] += np.uint32(1)
         age = age_of(bodies, i, now)

@@ -37,7 +37,7 @@ NAMED_PROFILES: Final[dict[str, dict[str, Any]]] = {
         "velocity_tolerance": 4e-2,
         "angular_velocity_tolerance": 4e-2,
         "adaptive_tolerances": True,
-        "distance_tolerance": 1e-3,
+        "distance_tolerance": 0.0,
         "model_mesh": "convex_hull",
         "model_error": 0.1,
     },

@@ -92,7 +92,9 @@ def test_gaps_ends_and_possible_predictions() -> None:
 
 def test_tradeoff_and_compare_count_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     session = str(record_scene(tmp_path / "clutter.mcap", "clutter", 3.0, objects=30))
-    profiles = ["--profile", "fast", "--profile", "exact"]
+    coarse = tmp_path / "coarse.yaml"
+    coarse.write_text("based_on: fast\nadaptive_tolerances: false\n")
+    profiles = ["--profile", str(coarse), "--profile", "exact"]
     main(["compare", session, *profiles, "--json"])
     compared = json.loads(capsys.readouterr().out)
     main(["tradeoff", session, *profiles, "--json"])

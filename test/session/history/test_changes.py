@@ -77,12 +77,14 @@ def test_two_profiles_on_one_session(folder: Path, capsys: pytest.CaptureFixture
     assert main(["compare", session, "--profile", "exact", "--profile", "exact"]) == 0
     capsys.readouterr()
     scene = record_scene(folder / "crossing.mcap", "crossing", 4.0)
-    assert main(["compare", str(scene), "--profile", "fast", "--profile", "exact", "--json"]) == 3
+    coarse = folder / "coarse.yaml"
+    coarse.write_text("based_on: fast\nadaptive_tolerances: false\n")
+    assert main(["compare", str(scene), "--profile", str(coarse), "--profile", "exact", "--json"]) == 3
     found = json.loads(capsys.readouterr().out)
-    assert (found["a"]["profile"], found["b"]["profile"]) == ("fast", "exact")
+    assert (found["a"]["profile"], found["b"]["profile"]) == ("coarse", "exact")
     assert found["a"]["replayed"] and found["b"]["replayed"]
     assert found["a"]["step_median"] > 0.0
-    # both find every collision in the same step; the fast profile warns earlier, because it allows for more error
+    # both find every collision in the same step; the coarse profile warns earlier, because it allows for more error
     collisions = [each for each in found["changes"] if (each["a"] or each["b"])["what"] == "collision"]
     assert collisions
     for each in collisions:
