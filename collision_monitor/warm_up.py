@@ -136,7 +136,7 @@ def warm_up_functions() -> None:
     for at in (Pose(), Pose((3, 0, 0))):
         overlap(corner, Pose(), corner, at)
         contact(corner, Pose(), corner, at)
-    time_of_impact(corner, Motion(Pose()), corner, Motion(Pose((3, 0, 0)), (-1, 0, 0)))
+        time_of_impact(corner, Motion(Pose()), corner, Motion(at, (-1, 0, 0)))
 
 
 PARTS: Final = {

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.meshes.inside import INSIDE, UNKNOWN, is_in
 from collision_monitor.meshes.layout import AXES, CENTER, HALF, RADIUS, REACH, WIDTH
-from collision_monitor.meshes.nearest import MOST_PAIRS, ON_A, ON_B, PLACE_A, nearest
+from collision_monitor.meshes.nearest import LEAST, MOST_PAIRS, ON_A, ON_B, PLACE_A, nearest
 from collision_monitor.meshes.placing import inverse, relative
 from collision_monitor.meshes.touching import deepest, touching
 from collision_monitor.narrow_phase.contact_row import write
@@ -76,7 +76,7 @@ def tree_contact(
     elif inside == UNKNOWN:
         known = OPEN
     if distance == inf:
-        if known == APART:
+        if known == APART and answer[LEAST] == inf:
             return FARTHER
         distance = nearest(blocks_a, root_a, blocks_b, root_b, X, inf, answer, work)
     on_a, on_b = (answer[ON_A], answer[ON_A + 1], answer[ON_A + 2]), (answer[ON_B], answer[ON_B + 1], answer[ON_B + 2])
@@ -87,6 +87,9 @@ def tree_contact(
     on_a = along(on_a, blocks_a[place // WIDTH, RADIUS, place % WIDTH], n)
     if known == ENCLOSED:
         distance, n = -distance, opposite(n)
+    round_off += max(abs(distance) - answer[LEAST], 0.0)  # of a search that ended early
+    if known == APART and answer[LEAST] <= limit < distance:
+        known = OPEN
     write(out, distance, rotate(pose.R_A, n), rotate(pose.R_A, on_a), round_off)
     return known
 

@@ -45,9 +45,14 @@ ON_A: Final = 1
 ON_B: Final = 4
 PLACE_A: Final = 7
 PLACE_B: Final = 8
-ANSWER: Final = 9
-"""Numbers of an answer: distance of the surfaces (m), closest points on both in A's frame (m), and the places of the
-two triangles, WIDTH * block + member, which serve as a hint for a later query."""
+LEAST: Final = 9
+ANSWER: Final = 10
+"""Numbers of an answer: distance of the surfaces (m), closest points on both in A's frame (m), the places of the two
+triangles, WIDTH * block + member, which serve as a hint for a later query, and a lower bound on the distance (m)."""
+
+MOST_LEAVES: Final = 100_000
+"""Most pairs of leaves to examine, up to 1 s. Hostile meshes, such as a million triangles in a point, need more; the
+lower bound then is that of the boxes."""
 
 
 def answer_row() -> NDArray[np.float64]:
@@ -189,16 +194,21 @@ def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
                 answer[ON_A + c], answer[ON_B + c] = closest.on_a[c], closest.on_b[c]
     Y = inverse(X)
     work[0], work[1], work[2] = 0.0, WIDTH * root_a, WIDTH * root_b
-    waiting = 1
+    waiting, leaves = 1, 0
     n = _direction(answer, found)
     while waiting > 0 and best > 0.0:  # terminates: each pair of boxes is opened once
         waiting -= 1
-        if not work[3 * waiting] < best * best:
+        limit = best * best
+        if not work[3 * waiting] < limit:
             continue
         place_a, place_b = int(work[3 * waiting + 1]), int(work[3 * waiting + 2])
         a, i, b, j = place_a // WIDTH, place_a % WIDTH, place_b // WIDTH, place_b % WIDTH
         child_a, child_b = blocks_a[a, CHILD, i], blocks_b[b, CHILD, j]
         if child_a < 0.0 and child_b < 0.0:
+            leaves += 1
+            if leaves > MOST_LEAVES:
+                waiting += 1
+                break
             leaf_a, leaf_b = root_a - int(child_a), root_b - int(child_b)
             distance = _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, n, best, answer, work)
             if distance < best:
@@ -207,11 +217,15 @@ def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
         elif opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
             block = root_b + int(child_b)
             box_bounds(blocks_a, a, i, blocks_b, block, X, n, work, BOUNDS)
-            waiting = push_nearest_last(blocks_b, block, work, waiting, best * best, float(place_a), True)
+            waiting = push_nearest_last(blocks_b, block, work, waiting, limit, float(place_a), True)
         else:
             block = root_a + int(child_a)
             box_bounds(blocks_b, b, j, blocks_a, block, Y, opposite(turn_back(X, n)), work, BOUNDS)
-            waiting = push_nearest_last(blocks_a, block, work, waiting, best * best, float(place_b), False)
+            waiting = push_nearest_last(blocks_a, block, work, waiting, limit, float(place_b), False)
+    least = found * found
+    for k in range(waiting):  # of a search that ended early
+        least = min(least, work[3 * k])
+    answer[LEAST] = sqrt(least)
     return found
 
 

@@ -72,10 +72,10 @@ def touching(
                         continue
                     radius = blocks_a[leaf_a, RADIUS, k] + blocks_b[leaf_b, RADIUS, m]
                     if meet(triangle_at(blocks_a, leaf_a, k), T, radius):
-                        if found == most:
-                            return found, False
                         work[PAIRS + 2 * found], work[PAIRS + 2 * found + 1] = WIDTH * leaf_a + k, WIDTH * leaf_b + m
                         found += 1
+                        if found == most:
+                            return found, False
         elif opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
             block = root_b + int(child_b)
             box_separations(blocks_a, a, i, blocks_b, block, X, work, BOUNDS)

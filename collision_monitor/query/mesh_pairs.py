@@ -81,13 +81,13 @@ def _place(pose_a: Any, pose_b: Any, R: Any) -> tuple[float, float, float]:
 
 @kernel
 def trees_overlap(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, R: Any, work: Any) -> bool:
-    """Whether two trees have a point in common, on a surface or in a solid.
+    """Whether two trees have a point in common, on a surface or in a solid, or may have one if it takes too long.
 
     pose_a, pose_b (1, 7): position (m) and unit quaternion (x, y, z, w). Scratch memory: R (2, 3, 3), work (MEMORY,).
     """
     p = _place(pose_a, pose_b, R)
     X = relative(R[0], R[1], p)
-    if touching(tree_a, 0, tree_b, 0, X, 1, work)[0] > 0:
+    if not touching(tree_a, 0, tree_b, 0, X, 1, work)[1]:
         return True
     if is_in(tree_a, 0, tree_b, 0, X, 0.0, work) != OUTSIDE:
         return True

@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.errors import TooCostlyError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import Capsule, Circle, Cone, Cylinder, Sphere
@@ -28,6 +29,9 @@ Array = NDArray[np.float64]
 
 PARTING_TIMES: Final = 80
 """Number of times tried for the parting of touching shapes: the horizon, half of it, …, down to 1e-24 of it."""
+
+MOST_PAIRS: Final = 1_000_000
+"""Most pairs of pieces to follow, 2 s. Two meshes that coincide have more, and all of them touch."""
 
 DEEPENING_TIMES: Final = 40
 """Number of times tried for their penetration, a distance query each: down to 1e-12 of the horizon."""
@@ -49,7 +53,12 @@ def _interval(event: np.void) -> ImpactInterval:
 
 
 def follow(a: MovingShape, b: MovingShape, query: MotionQuery, round_off: float) -> ImpactInterval:
-    """First impact of two bodies that touch at the start: the time at which they are deeper than `round_off` (m)."""
+    """First impact of two bodies that touch at the start: the time at which they are deeper than `round_off` (m).
+
+    Raises TooCostlyError for more than MOST_PAIRS pairs of pieces.
+    """
+    if len(a.pieces) * len(b.pieces) > MOST_PAIRS:
+        raise TooCostlyError(f"expected at most {MOST_PAIRS} pairs of pieces, got {len(a.pieces) * len(b.pieces)}")
     multibody = lay_out_pair(a, b, query.horizon, apart=True)
     touching, later = _pairs(a, b, multibody, query)
     directions = [normal for _, _, normal in touching]
