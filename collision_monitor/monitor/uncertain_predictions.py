@@ -29,7 +29,7 @@ from collision_monitor.prediction.likely_impacts import LEFT, PlaneMemory, likel
 from collision_monitor.prediction.normal_samples import normal_samples, sample_columns
 from collision_monitor.prediction.pair_impacts import cover_of
 from collision_monitor.prediction.spread import Spread, is_uncertain, make_spread, take_spread
-from collision_monitor.prediction.uncertainty import Sampling, find_meshes, impact_probabilities
+from collision_monitor.prediction.uncertainty import Sampling, find_costly, impact_probabilities
 from collision_monitor.records import PREDICTION, Method, PredictionStatus
 from collision_monitor.settings.profile import Profile
 
@@ -58,8 +58,8 @@ FINEST_WITH_PLANES: Final = 1e-5
 `exact`, each sample is followed to its impact."""
 
 FEWEST_SAMPLES: Final = 16
-"""Fewest samples of a pair with a mesh or a cloud. It has an eighth of `uncertainty_samples`, because each sample takes
-as long as a hundred of convex shapes."""
+"""Fewest samples of a pair with a mesh, a cloud or a body that spins. It has an eighth of `uncertainty_samples`, since
+each sample takes as long as a hundred of convex shapes."""
 
 Records = NDArray[np.void]
 Pairs = NDArray[np.int32]
@@ -291,8 +291,8 @@ class UncertainPredictions(Stage):
 
         def part(slots: Pairs, work: Workspaces) -> NDArray[np.float64]:
             answers = np.full((len(slots), len(ANSWERS)), LEFT)
-            meshes = np.empty(len(slots), bool)
-            find_meshes(multibody, slots, meshes)
+            costly = np.empty(len(slots), bool)
+            find_costly(multibody, slots, p.horizon, costly)
 
             def follow(some: NDArray[np.bool_], samples: Sampling) -> None:
                 """Follow each sample of some of the pairs exactly."""
@@ -304,8 +304,9 @@ class UncertainPredictions(Stage):
             if p.impact_tolerance >= FINEST_WITH_PLANES:
                 exact, planes = work
                 likely_impacts(multibody, self.spread, slots, step.now, sampling, lattice, planes, exact, answers)
-            follow(meshes, fewer)
-            follow((answers[:, PROBABILITY] == LEFT) & ~meshes, sampling)
+            left = answers[:, PROBABILITY] == LEFT
+            follow(left & costly, fewer)
+            follow(left & ~costly, sampling)
             return answers
 
         if len(self._workspaces[0].planes.times) != p.uncertainty_samples:

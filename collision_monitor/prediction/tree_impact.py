@@ -34,6 +34,12 @@ STEPS: Final = 1000
 """Pairs of boxes to examine for each distance query that is allowed, 0.3 ms. Hostile meshes, such as a million
 triangles in a point, need more than any limit; their impact is UNRESOLVED."""
 
+MOST_TURNED: Final = 1e4
+"""rad: 1,600 turns. A body that turns farther in the time of a search is faulty."""
+
+FEWER_STEPS: Final = 16
+"""Part of the STEPS for such a body, which needs more than any limit too."""
+
 ENTRY: Final = 4
 """Numbers of a waiting pair of boxes: time, both places, and the pair of triangles that limited its last step."""
 
@@ -112,6 +118,13 @@ def approach_at(table, parts, pair, t, margin, growth, until, scratch):
     )
 
 
+@inlined
+def spins(A, B, duration):
+    """Whether two bodies turn by more than MOST_TURNED against each other within a duration (s)."""
+    rate = sqrt(A.wx * A.wx + A.wy * A.wy + A.wz * A.wz) + sqrt(B.wx * B.wx + B.wy * B.wy + B.wz * B.wz)
+    return rate * duration > MOST_TURNED
+
+
 @device
 def tree_impact(table, parts, pair, window, tube, query, scratch):
     """`shape_impact` of two shapes with trees; scratch.answer then has the places of the triangles that meet."""
@@ -120,6 +133,8 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
     root_a, root_b = int(table.size[pair.a, TREE]) - 1, int(table.size[pair.b, TREE]) - 1
     place_a, place_b = float(WIDTH * root_a), float(WIDTH * root_b)
     start, most = begin, query.iterations * STEPS
+    if spins(pair.A, pair.B, end - begin):
+        most //= FEWER_STEPS
     waiting, steps, later = _push(work, 0, begin, place_a, place_b, -1.0), 0, end
     while True:
         if waiting == 0 or work[PAIRS] >= later:

@@ -44,6 +44,7 @@ from collision_monitor.prediction.motion import (
 from collision_monitor.prediction.normal_samples import PILOT
 from collision_monitor.prediction.sphere_interval import sphere_interval
 from collision_monitor.prediction.spread import is_uncertain, surface_spread
+from collision_monitor.prediction.tree_impact import spins
 
 GAP_NODES: Final = 9
 """Number of times from now to the horizon at which the gap is compared with its uncertainty."""
@@ -127,12 +128,17 @@ def body_has_mesh(table, parts, shape):
 
 
 @kernel
-def find_meshes(multibody, pairs, found):
-    """Write to found (P,) whether a body of each pair (P, 2) has a mesh or a cloud."""
+def find_costly(multibody, pairs, horizon, found):
+    """Write to found (P,) whether to follow fewer samples of each pair (P, 2).
+
+    A body of it has a mesh or a cloud, or it spins within the horizon (s).
+    """
     table, parts, bodies = multibody
     for k in range(len(pairs)):
-        a, b = bodies.first_shape[pairs[k, 0]], bodies.first_shape[pairs[k, 1]]
+        i, j = pairs[k, 0], pairs[k, 1]
+        a, b = bodies.first_shape[i], bodies.first_shape[j]
         found[k] = body_has_mesh(table, parts, a) or body_has_mesh(table, parts, b)
+        found[k] |= spins(bodies.motion[i], bodies.motion[j], horizon)
 
 
 @device
