@@ -67,8 +67,8 @@ class GuardNode(Node):
         self._nav2 = _nav2_state()
         self._nav2_out = self._nav2 and self.create_publisher(self._nav2, "collision_monitor_state", 1)
         for topic, callback in (
-            (Topic.SHAPES, self._on_shapes),
-            (Topic.STATES, self._on_states),
+            (Topic.MONITORED_SHAPES, self._on_shapes),  # with what the monitor reads from its sources
+            (Topic.MONITORED_STATES, self._on_states),
             (Topic.STATUS, self._on_status),
             (Topic.RAISED_ALERTS, self._on_alerts),
         ):
@@ -111,6 +111,8 @@ class GuardNode(Node):
             message = codec.decode_descriptions(data)
         except MessageError:
             return
+        if message.snapshot:
+            self._robot = None
         for each in message.objects:
             if isinstance(each, codec.Removal):
                 self._robot = None if each.object_id == self._robot else self._robot

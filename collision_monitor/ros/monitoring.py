@@ -169,7 +169,6 @@ class Monitoring:
         self._record_step(data, outputs, received)
         self._publish_status_if_due(ended)
         self._publish_markers_if_due(data, outputs, ended)
-        self._monitored.move(data)
         self._recording.write_snapshot_if_due(self._pipeline.snapshot)
 
     def _answer(self, states: bytes, received: int) -> Outputs | None:
@@ -179,6 +178,7 @@ class Monitoring:
             if outputs is not None:
                 self._predictions_out.publish(outputs.predictions)  # first: a warning is worth more if it is early
                 self._contacts_out.publish(outputs.contacts)
+                self._monitored.move(states)  # before the alerts, which a guard compares with them
                 self._publish_alerts(outputs.alerts)
             return outputs
 

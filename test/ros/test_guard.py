@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
+from nav_msgs.msg import Odometry
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
@@ -106,6 +107,46 @@ def test_commands_pass_and_stop_at_an_obstacle_and_without_answers(start, team, 
     assert len(base.passed) == count
     process.send_signal(signal.SIGINT)
     assert process.wait(10.0) == 0
+
+
+SOURCES = """\
+frame: map
+rate: 20
+objects:
+  robot_1: {topic: /odom, shape: {cylinder: [0.3, 1.0]}}
+  person: {topic: /person, shape: {cylinder: [0.25, 1.0]}}
+"""
+
+
+def test_objects_of_a_sources_file_are_guarded_too(start, team, guard, tmp_path):
+    (tmp_path / "sources.yaml").write_text(SOURCES)
+    base = Base(team)
+    guard("robot:=robot_1", "max_age:=1.0")
+    start("run", "--rules", str(RULES), "--sources", "sources.yaml")
+    odometry = team.node.create_publisher(Odometry, "/odom", 10)
+    person = team.node.create_publisher(PoseStamped, "/person", 10)
+
+    def drive(distance, speed):
+        """Send commands until this one passes, with the person at a distance before the robot."""
+
+        def look():
+            here, there = Odometry(child_frame_id="base"), PoseStamped()
+            for message in (here, there):
+                message.header.stamp, message.header.frame_id = team.node.get_clock().now().to_msg(), "map"
+            here.pose.pose.orientation.w = there.pose.orientation.w = 1.0
+            there.pose.position.x = distance
+            odometry.publish(here)
+            person.publish(there)
+            base.send(0.4)
+            team.listen(0.03)
+            return base.passed and base.last() == speed
+
+        team.until(look, 60.0)
+
+    drive(9.0, 0.4)
+    drive(0.8, 0.0)
+    team.until(lambda: "stops: critical: robot_1 and person: distance" in base.said[-1])
+    drive(9.0, 0.4)
 
 
 def test_a_monitor_without_rules_stops_the_robot(start, team, guard):
