@@ -194,7 +194,7 @@ def _as_text(report: ReplayReport) -> str:
     lines = [
         *([f"from       {report.begin:.3f} s"] if report.begin else []),
         f"steps      {report.steps}",
-        f"messages   {report.messages}, of which {report.compared} answers were compared",
+        f"messages   {report.messages}; {report.compared} answers were compared",
         f"recorded   {report.recorded_duration:.3f} s",
         f"replayed   {report.replay_duration:.3f} s, {report.speed:.1f} × real time",
         f"digest     {report.digest:016x}",

@@ -1,4 +1,4 @@
-"""First impact of two shapes of which one is a mesh or a cloud."""
+"""First impact of two shapes, at least one a mesh or a cloud."""
 
 from __future__ import annotations
 

@@ -62,8 +62,8 @@ def make_sample_rows(samples: int) -> SampleRows:
 def set_samples(obstacle, k, off, points, turning, first, last, rows):
     """Write the samples first:last at both ends of segment k into rows.node.
 
-    off (6, S): errors of position and velocity; points (DIMENSIONS, S): of which the last six are the unit errors of
-    orientation; turning (int, int): NOT_TURNED, FIRST_ORDER or SERIES for both bodies.
+    off (6, S): errors of position and velocity; points (DIMENSIONS, S): the last six are unit errors of orientation;
+    turning (int, int): NOT_TURNED, FIRST_ORDER or SERIES for both bodies.
     """
     for end in range(2):
         stated_node, node = obstacle.node[k + end], rows.node[end]

@@ -37,8 +37,11 @@ triangles in a point, need more than any limit; their impact is UNRESOLVED."""
 MOST_TURNED: Final = 1e4
 """rad: 1,600 turns. A body that turns farther in the time of a search is faulty."""
 
-FEWER_STEPS: Final = 16
-"""Part of the STEPS for such a body, which needs more than any limit too."""
+MOST_SWEPT: Final = 1e6
+"""Radii of the smaller body by which points of the other one may move as it turns. Beyond, it is faulty as well."""
+
+FEWER_STEPS: Final = 256
+"""Divisor of the STEPS for such bodies, which need more than any limit too."""
 
 ENTRY: Final = 4
 """Numbers of a waiting pair of boxes: time, both places, and the pair of triangles that limited its last step."""
@@ -120,9 +123,12 @@ def approach_at(table, parts, pair, t, margin, growth, until, scratch):
 
 @inlined
 def spins(A, B, duration):
-    """Whether two bodies turn by more than MOST_TURNED against each other within a duration (s)."""
-    rate = sqrt(A.wx * A.wx + A.wy * A.wy + A.wz * A.wz) + sqrt(B.wx * B.wx + B.wy * B.wy + B.wz * B.wz)
-    return rate * duration > MOST_TURNED
+    """Whether two bodies turn too far within a duration (s): by MOST_TURNED, or with points that move MOST_SWEPT."""
+    rate_a = sqrt(A.wx * A.wx + A.wy * A.wy + A.wz * A.wz)
+    rate_b = sqrt(B.wx * B.wx + B.wy * B.wy + B.wz * B.wz)
+    swept = rate_a * A.radius + rate_b * B.radius
+    smaller = max(min(A.radius, B.radius), 1e-3)
+    return (rate_a + rate_b) * duration > MOST_TURNED or swept * duration > MOST_SWEPT * smaller
 
 
 @device
