@@ -220,7 +220,8 @@ def draw(path: Path, clip: Clip, played: Played) -> None:
     found = [rows[rows["probability"] >= 0.05] for rows in played.answers.values()]
     rows = np.concatenate(found) if found else np.zeros(0)
     place = above.scatter(rows["point"][:, 0], rows["point"][:, 1], c=rows["probability"], s=9, cmap="autumn_r",
-                          vmin=0, vmax=1, label="predicted collisions", zorder=3)  # fmt: skip
+                          vmin=0, vmax=1, zorder=3)  # fmt: skip
+    above.plot([], [], "o", ms=4, color="tab:orange", label="predicted collisions")
     figure.colorbar(place, ax=above, label="probability", shrink=0.8)
     above.set(aspect="equal", xlabel="x, m", ylabel="y, m", title="A robot with an arm among people, seen from above")
     above.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=4, fontsize=8)
