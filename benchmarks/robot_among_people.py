@@ -17,7 +17,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -34,7 +33,7 @@ from collision_monitor.cli.child import Child
 from collision_monitor.codec import decode_predictions
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.ros.domain import free_domain
-from collision_monitor.ros.endpoints import subscription
+from collision_monitor.ros.endpoints import message_class, subscription
 from collision_monitor.ros.process import ros_context, stay_on_this_machine
 from collision_monitor.session import Session
 from collision_monitor.session.replaying.replay import replay
@@ -149,12 +148,6 @@ def scan(clip: Clip, x: float, y: float, heading: float, rows: Floats, stamp: in
         stopped = (along > 0) & (np.abs(way @ (-person[1], person[0])) < PERSON) & (along < ranges)
         ranges[stopped] = np.inf
     return laser_scan("laser", stamp, ranges, start=float(angles[0]), step=2 * np.pi / BEAMS)
-
-
-def message_class(kind: str) -> Any:
-    """Return the class of a message type such as `nav_msgs/msg/Odometry`."""
-    package, _, name = kind.split("/")
-    return getattr(import_module(f"{package}.msg"), name)
 
 
 def play(bag: Path, child: Child) -> Played:

@@ -34,15 +34,18 @@ def quality_of(topic: Topic) -> QoSProfile:
     )
 
 
-def message_class(topic: Topic) -> Any:
-    """Return the generated class of the topic's message."""
-    package, _, name = topic.type_name.split("/")
+def message_class(type_name: str) -> Any:
+    """Return the generated class of a type such as `nav_msgs/msg/Odometry`.
+
+    Raises ImportError or AttributeError if it is not installed.
+    """
+    package, _, name = type_name.split("/")
     return getattr(import_module(f"{package}.msg"), name)
 
 
 def publisher(node: Node, topic: Topic, name: str | None = None) -> Publisher:
     """Create a publisher. name: the topic's full name; None: below the node's own."""
-    return node.create_publisher(message_class(topic), name or topic.private, quality_of(topic))
+    return node.create_publisher(message_class(topic.type_name), name or topic.private, quality_of(topic))
 
 
 def answer_publisher(
@@ -53,14 +56,16 @@ def answer_publisher(
     if topic in _ANSWERS:
         quality.deadline = quality.liveliness_lease_duration = Duration(seconds=ALIVE_S)
         quality.liveliness = LivelinessPolicy.MANUAL_BY_TOPIC
-    return node.create_lifecycle_publisher(message_class(topic), topic.private, quality, event_callbacks=events)
+    kind = message_class(topic.type_name)
+    return node.create_lifecycle_publisher(kind, topic.private, quality, event_callbacks=events)
 
 
 def subscription(
     node: Node, topic: Topic, callback: Callable[[bytes], object], name: str | None = None
 ) -> Subscription:
     """Create a subscription whose callback gets the bytes of each message. name: as of `publisher`."""
-    return node.create_subscription(message_class(topic), name or topic.private, callback, quality_of(topic), raw=True)
+    kind = message_class(topic.type_name)
+    return node.create_subscription(kind, name or topic.private, callback, quality_of(topic), raw=True)
 
 
 def take_waiting(subscription: Subscription) -> bytes | None:

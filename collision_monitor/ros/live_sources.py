@@ -7,7 +7,6 @@ that cannot be used is logged with the reason and reported in `~/sources`; the o
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -16,6 +15,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.pipeline.topics import SOURCES
+from collision_monitor.ros.endpoints import message_class
 from collision_monitor.ros.line_report import Level, LineReport
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage
@@ -89,11 +89,11 @@ class LiveSources:
         return usable[0]
 
     def _bind(self, topic: str, resolved: str, kind: str, infos: list[Any]) -> None:
-        package, _, name = kind.split("/")
         try:
-            message_class = getattr(import_module(f"{package}.msg"), name)
+            message = message_class(kind)
             self._decoder.define(kind, definition(kind))
         except (ImportError, AttributeError, CollisionMonitorError):
+            package = kind.partition("/")[0]
             raise InputError(
                 f"{self._line(topic)}: {topic} carries {kind}, and package {package} is not installed; "
                 f"`make interfaces` builds it, or install ros-<distro>-{package.replace('_', '-')}"
@@ -103,7 +103,7 @@ class LiveSources:
         for name, text in self._feed.bind(topic, kind).items():
             self._set_problem(name, text)
         self._node.create_subscription(
-            message_class,
+            message,
             resolved,
             lambda data: self._on_message(topic, kind, data),
             quality_of_all(topic, infos),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from importlib import import_module
 from typing import Any, Final
 
 import rclpy
@@ -13,6 +12,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from collision_monitor.errors import CollisionMonitorError
+from collision_monitor.ros.endpoints import message_class
 from collision_monitor.ros.line_report import LineReport
 from collision_monitor.ros.live_sources import LiveSources, quality_of_all
 from collision_monitor.session.mcap.definitions import definition
@@ -80,13 +80,12 @@ def _subscribe(node: Node, topic: str, kind: str, found: dict[str, TopicFacts], 
         return
     facts = found[topic] = TopicFacts(topic, kind)
     try:
-        package, _, name = kind.split("/")
-        message_class = getattr(import_module(f"{package}.msg"), name)
+        message = message_class(kind)
         decoder.define(kind, definition(kind))
     except (ImportError, AttributeError, CollisionMonitorError):
         facts.installed = False
         return
-    node.create_subscription(message_class, topic, _noting(facts, decoder), quality_of_all(topic, infos), raw=True)
+    node.create_subscription(message, topic, _noting(facts, decoder), quality_of_all(topic, infos), raw=True)
 
 
 def _noting(facts: TopicFacts, decoder: Decoder) -> Callable[[bytes], None]:
