@@ -23,7 +23,7 @@ SHAPES = tuple(kind.name.lower() for kind in ShapeType if kind not in (ShapeType
 def table(value: Any, what: str, keys: Collection[str]) -> dict[str, Any]:
     """Return a table with these keys only."""
     if not isinstance(value, dict):
-        raise InputError(f"{what}: expected a table with {', '.join(keys)}, got {value!r}")
+        raise InputError(f"{what}: expected a table with {', '.join(keys)}, got {value!r:.200}")
     for key in value:
         known(str(key), keys, what)
     return {str(key): each for key, each in value.items()}

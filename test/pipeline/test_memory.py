@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import struct
-import time
 import tracemalloc
 from collections.abc import Callable
 
 import numpy as np
 import pytest
+from processor_time import within
 
 from collision_monitor import codec, records
 from collision_monitor.codec import Removal, encode_descriptions, encode_states
@@ -224,10 +224,9 @@ def test_allowed_pairs_of_a_megabyte_take_no_quadratic_time() -> None:
     pipeline = Pipeline()
     describe(pipeline, ObjectDescription(5_000, BALL))
     message = [ObjectDescription(i, BALL, allowed=tuple(range(i, i + 200))) for i in range(1_000)]
-    start = time.process_time()
-    assert len(describe(pipeline, *message)) == 1_000
-    outputs = pipeline.on_states(encode_states(STAMP, "world", 1, states(0, 100, 300, 600)))
-    assert time.process_time() - start < 5.0  # 88 s before
+    with within(5.0):  # 88 s before
+        assert len(describe(pipeline, *message)) == 1_000
+        outputs = pipeline.on_states(encode_states(STAMP, "world", 1, states(0, 100, 300, 600)))
     assert outputs is not None
     checked = {(0, 300), (0, 600), (100, 300), (100, 600), (300, 600)}  # 0 allows 0 to 199, 100 allows 100 to 299
     assert {(c["id_a"], c["id_b"]) for c in outputs.result.contacts} == checked
@@ -266,10 +265,8 @@ def test_a_length_beyond_the_message_allocates_nothing(name: str) -> None:
     for rest in (b"", bytes(100), bytes(1_000_000)):
         message = data + rest
         tracemalloc.start()
-        start = time.process_time()
-        with pytest.raises(MessageError, match="expected"):
+        with within(0.1, name), pytest.raises(MessageError, match="expected"):
             decode(message)
-        elapsed, peak = time.process_time() - start, tracemalloc.get_traced_memory()[1]
+        peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
-        assert elapsed < 0.1
         assert peak < 100_000
