@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, kernel
+from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, put_box, remove_boxes
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
@@ -38,6 +38,9 @@ PATIENCE: Final = 128.0
 """A body with half of the tolerances or more that leaves its motion within FUTILE_STEPS steps turns or accelerates. Its
 tolerances are NARROWEST for its next PATIENCE motions; its width is minus the number of those that are left. A body
 with the NARROWEST tolerances that kept its motion for longer has no noise, and keeps them."""
+
+WIDEST: Final = 0.4
+"""Widest adaptive tube at the end of the horizon, in radii of its body. Larger: it meets more pairs than it saves."""
 
 WIDER: Final = 1.1
 """Factor on the spread of a box, because standard deviations vary a little from state to state."""
@@ -291,6 +294,17 @@ def _cover(bodies, i, now, horizon):
     m.cover = now + horizon + bodies.slack[i] * share
 
 
+@inlined
+def _widest_tube(bodies, i, settings):
+    """Deviation (m) and drift (m/s) that the tolerances allow body i. Adaptive ones depend on its size."""
+    r, radius = bodies.spin_radius[i], bodies.motion[i].radius
+    tube_0 = settings.position_tolerance + r * settings.orientation_tolerance
+    tube_1 = settings.velocity_tolerance + r * settings.angular_velocity_tolerance
+    if settings.adaptive:
+        tube_1 = min(tube_1, WIDEST * radius / max(settings.horizon, 1e-9))
+    return tube_0, tube_1
+
+
 @device
 def _fit_width(bodies, i, now, futile, settings, width):
     """Fit the width (N,) of body i, which leaves its motion.
@@ -310,8 +324,7 @@ def _fit_width(bodies, i, now, futile, settings, width):
         width[i] = NARROWEST
         return
     r = bodies.spin_radius[i]
-    tube_0 = settings.position_tolerance + r * settings.orientation_tolerance
-    tube_1 = settings.velocity_tolerance + r * settings.angular_velocity_tolerance
+    tube_0, tube_1 = _widest_tube(bodies, i, settings)
     apart = drift = off = 0.0
     p = (m.x + m.vx * since, m.y + m.vy * since, m.z + m.vz * since)
     v, w_m = (m.vx, m.vy, m.vz), (m.wx, m.wy, m.wz)
@@ -362,9 +375,8 @@ def restart_motion(bodies, uncertainty, grid, which, now, futile, settings, widt
         m.tube_0 = m.tube_1 = 0.0
         _cover(bodies, i, now, settings.horizon)
         if not bodies.static[i]:
-            r = bodies.spin_radius[i]
-            m.tube_0 = part * (settings.position_tolerance + r * settings.orientation_tolerance)
-            m.tube_1 = part * (settings.velocity_tolerance + r * settings.angular_velocity_tolerance)
+            tube_0, tube_1 = _widest_tube(bodies, i, settings)
+            m.tube_0, m.tube_1 = part * tube_0, part * tube_1
             if age > 0.0:
                 m.tube_0 += 2.0 * stale_acceleration * age * age
                 m.tube_1 += 2.0 * stale_acceleration * age
