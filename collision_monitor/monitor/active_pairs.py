@@ -12,6 +12,7 @@ from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.monitor.candidates import is_checked
 from collision_monitor.monitor.carried_contacts import CARRIED, Carried, carry_over, no_answers, remember, without
+from collision_monitor.monitor.contact_details import complete_contact
 from collision_monitor.monitor.event_list import NO_EVENTS
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
@@ -268,6 +269,8 @@ def _examine(multibody, active, which, now, queries, scratch, later):
                     n_later += 1
                 else:
                     stays = True
+        if touching:
+            complete_contact(multibody, i, j, now, scratch, results[k])
         if touching and pair.touched == 0:
             pair.since = now
         pair.touching = 1 if touching else 0

@@ -13,7 +13,6 @@ from collision_monitor import records
 from collision_monitor._jit import kernel
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.active_pairs import ActivePairs
-from collision_monitor.monitor.contact_details import complete_contact
 from collision_monitor.monitor.event_list import EventList
 from collision_monitor.monitor.patches import with_patches
 from collision_monitor.monitor.result import StepResult, StepStatus
@@ -32,7 +31,7 @@ from collision_monitor.narrow_phase.contact_row import (
     POINT_B,
 )
 from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, UNSETTLED
-from collision_monitor.prediction.body_impact import CLOSING, Scratch
+from collision_monitor.prediction.body_impact import CLOSING
 from collision_monitor.prediction.impact_record import BOUND_ONLY, HIT, TREE_BOUND, UNRESOLVED, ids_of
 from collision_monitor.records import Phase, joined
 
@@ -53,12 +52,14 @@ class Answers(Stage):
         self.step_count = 0
         self.last: StepResult | None = None
 
-    def contacts(self, step: StepContext, active: ActivePairs, scratch: Scratch) -> Rows:
+    def contacts(self, step: StepContext, active: ActivePairs) -> Rows:
         """Contacts (records.CONTACT) of the active pairs, sorted by ids, with the END of contacts of removed pairs."""
         multibody = step.roster.multibody
         contacts = np.empty(len(active.pairs), records.CONTACT)
         if len(contacts):
-            contacts = contacts[: write_contacts(multibody, active.pairs, active.results, step.now, contacts, scratch)]
+            b = step.roster.bodies
+            columns = b.model, multibody.parts.index
+            contacts = contacts[: write_contacts(active.pairs, active.results, *columns, step.now, contacts)]
         if step.profile.contact_points > 1:
             contacts = with_patches(contacts, multibody, active.active, step.now, step.profile.contact_points)
         ended = active.take_orphans(step.now)
@@ -176,23 +177,21 @@ def count_answers(pairs, contacts, predictions):
 
 
 @kernel
-def write_contacts(multibody, pairs, results, now, contacts, scratch):
+def write_contacts(pairs, results, model, shape_index, now, contacts):
     """Write the contacts (records.CONTACT) of the pairs that touch or have just ended; return their number.
 
-    results (n, RESULT): of the pairs; completed here.
+    results (n, RESULT): of the pairs. model (N,): column of Bodies. shape_index (S,): a shape's place in its object's
+    description.
     """
-    bodies, shape_index = multibody.bodies, multibody.parts.index
     n = 0
     for k in range(pairs.size):
         pair, row = pairs[k], results[k]
         if pair.touching == 0 and pair.touched == 0:
             continue
-        if pair.touching == 1:
-            complete_contact(multibody, pair.i, pair.j, row, now, scratch)
         contact = contacts[n]
         contact.id_a, contact.id_b = ids_of(pair.key)
         contact.duration = now - pair.since
-        contact.model_a, contact.model_b = bodies.model[pair.i], bodies.model[pair.j]
+        contact.model_a, contact.model_b = model[pair.i], model[pair.j]
         contact.point_index, contact.point_count = 0, 1
         if pair.touching == 1:
             contact.signed_distance = row[DISTANCE]

@@ -1,6 +1,6 @@
 """What the pair tests leave open in the contacts of a step: which features touch, and how deep compounds may overlap.
 
-Only the pairs that are reported need it, so it is computed when the answers are made.
+Only the pairs that touch need it.
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ def _reach_of_body(multibody: Any, i: int, n: Vector, R_body: Any, R_shape: Any,
 
 
 @device
-def complete_contact(multibody: Any, i: int, j: int, row: Any, now: float, scratch: Any) -> None:
+def complete_contact(multibody: Any, i: int, j: int, now: float, scratch: Any, row: Any) -> None:
     """Name the features that are UNKNOWN in a result row (RESULT) of bodies i and j, which touch, and widen its bound.
 
     Features are named where the contact is settled and the object is tested exactly.

@@ -322,7 +322,7 @@ class Monitor:
         budget = self._time_critical.budget(self._profile)
         new = self._predict_moved(step, bounds_only=budget is not None)
         self._examine_due(step, new, budget)
-        contacts = self._answers.contacts(step, self._active_pairs, self._first_impacts.scratch)
+        contacts = self._answers.contacts(step, self._active_pairs)
         predictions = self._predictions(step, budget)
         age = self._age(now_ns)
         past = mark_overtaken(predictions, age) if age > 0.0 else 0

@@ -74,10 +74,19 @@ def test_a_pair_that_moves_together_keeps_its_answer_and_its_points_follow() -> 
     first, at = distance(monitor, 0, (0, 0, 0), (0.9, 0, 0))
     assert distance(monitor, 1, (5, 0, 0), (5.9, 0, 0)) == pytest.approx((first, at + 5))
     assert monitor.last.status.narrow_phase_tests == 0
-    assert distance(monitor, 2, (5, 0, 0), (5.905, 0, 0))[0] == pytest.approx(first)
-    assert monitor.last.contacts["error_bound"][0] == pytest.approx(0.005)
-    assert distance(monitor, 3, (5, 0, 0), (5.915, 0, 0))[0] == pytest.approx(first + 0.015)
+    assert distance(monitor, 2, (5, 0, 0), (5.895, 0, 0))[0] == pytest.approx(first)
+    assert monitor.last.contacts["error_bound"][0] == pytest.approx(0.005, abs=1e-7)
+    assert distance(monitor, 3, (5, 0, 0), (5.885, 0, 0))[0] == pytest.approx(first - 0.015)
     assert monitor.last.contacts["error_bound"][0] < 1e-8
+    assert monitor.last.status.narrow_phase_tests == 1
+
+
+def test_a_pair_that_separates_along_its_normal_keeps_an_answer_that_follows() -> None:
+    monitor = two_boxes()
+    first, _ = distance(monitor, 0, (0, 0, 0), (0.9, 0, 0))
+    assert distance(monitor, 1, (0, 0, 0), (0.98, 0, 0))[0] == pytest.approx(first + 0.08, abs=1e-6)
+    assert monitor.last.contacts["error_bound"][0] < 1e-6
+    assert monitor.last.status.narrow_phase_tests == 0
 
 
 def test_new_shapes_and_restored_monitors() -> None:
