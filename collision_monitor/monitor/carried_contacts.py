@@ -5,7 +5,8 @@ the angle that each body turns times its radius, because every point of the surf
 at least the gap along the old normal, which changes by the motion along it, minus the same angles times the radii. An
 answer is carried over, to the middle of this range, while half of the range is within the tolerance and the pair
 certainly touches; half of the range is added to the error of the answer. Its witness points move with the bodies.
-Contacts of meshes, compounds and other concave shapes are answered anew in every step, because their depth has no such bound.
+Contacts of meshes, compounds and other concave shapes are answered anew in every step, because their distance has no
+such bounds.
 """
 
 from __future__ import annotations
