@@ -1,4 +1,4 @@
-"""The contact of a cloud with another shape, and its points that are near one, by the kernel of the monitor."""
+"""The contact of a mesh or a cloud with another shape, and points near a shape, by the kernels of the monitor."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ class _Memory(threading.local):
 _MEMORY: Final = _Memory()
 
 
-def cloud_contact(a: Shape, X_A: tuple[Array, Array], b: Shape, X_B: tuple[Array, Array]) -> Array:
-    """Contact row of a cloud and another shape, in either order, about A's origin in world axes.
+def surface_contact(a: Shape, X_A: tuple[Array, Array], b: Shape, X_B: tuple[Array, Array]) -> Array:
+    """Contact row of a mesh or a cloud and another shape, in either order, about A's origin in world axes.
 
-    A mesh counts as its surface.
+    A mesh counts as its surface, without an inside.
 
     X_A, X_B: rotation (3, 3) and position (3,) of each (m).
     """
