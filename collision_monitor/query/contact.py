@@ -125,12 +125,15 @@ class Contact:
 
         Otherwise `point_a` alone. Computed on first access.
         """
-        return self.point_a[None] if self._find is None else _patch(self._find(), self.point_a)
+        found = None if self._find is None else self._find()
+        if found is None or found.best[DISTANCE] > 0.0 >= self.signed_distance:  # one is in the other: no surfaces meet
+            return self.point_a[None]
+        return _patch(found, self.point_a)
 
     @cached_property
     def points_b(self) -> Array:
         """The same points on B: those on A plus the signed distance along the normal."""
-        return self.point_b[None] if self._find is None else self.points_a + self.signed_distance * self.normal
+        return self.point_b[None] if len(self.points_a) == 1 else self.points_a + self.signed_distance * self.normal
 
 
 def contact(
@@ -179,12 +182,11 @@ def _contact(
         check_in_plane(b)
     offset = b.pose.position - a.pose.position
     deepest = by_clouds(a, b, offset) or by_trees(a, b, offset) or by_pieces(a, b, offset)
-    row, enclosed = deepest.row, deepest.enclosed
+    row = deepest.row
     least = np.inf
     if row[DISTANCE] > 0.0 and (a.is_uncertain or b.is_uncertain):
         places = locate(a, b, offset), locate(b, a, -offset)
-        enclosed = Location.INSIDE in places
-        if enclosed:
+        if Location.INSIDE in places:
             turn_inward(row)
         else:
             least = -np.inf if UNKNOWN in places else min(distance_of_fillings(a, b), distance_of_fillings(b, a))
@@ -209,7 +211,7 @@ def _contact(
         point_b=point.copy() if unbounded else point + distance * normal,
         model_a=a.model,
         model_b=b.model,
-        _find=None if enclosed or unbounded else deepest.pieces,
+        _find=None if unbounded else deepest.pieces,
     )
     vars(made)["_arguments"] = shape_a, pose_a, shape_b, pose_b
     return made

@@ -12,7 +12,7 @@ from collision_monitor.geometry.convex_pieces import is_concave_mesh
 from collision_monitor.geometry.inside import UNKNOWN, locate_in_surface
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.shapes import Capsule, ConvexHull, Mesh, Points, Sphere
-from collision_monitor.meshes.contact import APART, ENCLOSED, OPEN, contact_of_trees, in_root_box, reach_of
+from collision_monitor.meshes.contact import APART, OPEN, contact_of_trees, in_root_box, reach_of
 from collision_monitor.meshes.nearest import MEMORY, answer_row
 from collision_monitor.meshes.shape_trees import shape_tree
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A
@@ -28,13 +28,11 @@ Array = NDArray[np.float64]
 class Deepest(NamedTuple):
     """The nearest or deepest contact of two objects, about A's origin in world axes.
 
-    pieces: finds the pieces that touch in one plane; None: the contact is one point. enclosed: no surfaces meet, but
-    one object is inside the other.
+    pieces: finds the pieces that touch in one plane; None: the contact is one point.
     """
 
     row: Array
     pieces: Callable[[], NearestPieces] | None
-    enclosed: bool
 
 
 def nearest_pieces(a: Posed, b: Posed, offset: Array) -> NearestPieces:
@@ -47,15 +45,9 @@ def by_pieces(a: Posed, b: Posed, offset: Array) -> Deepest:
     found = nearest_pieces(a, b, offset)
     row = found.best.copy()
     row[POINT_A : POINT_A + 3] += found.position[found.pair[0]]
-    return _of_surfaces(a, b, offset, row, lambda: found)
-
-
-def _of_surfaces(a: Posed, b: Posed, offset: Array, row: Array, pieces: Callable[[], NearestPieces]) -> Deepest:
-    """The contact of two objects from that of their surfaces: one may be inside a mesh of the other."""
-    enclosed = bool(row[DISTANCE] > 0.0 and Location.INSIDE in (locate(a, b, offset), locate(b, a, -offset)))
-    if enclosed:
+    if row[DISTANCE] > 0.0 and Location.INSIDE in (locate(a, b, offset), locate(b, a, -offset)):
         turn_inward(row)
-    return Deepest(row, pieces, enclosed)
+    return Deepest(row, lambda: found)
 
 
 def turn_inward(row: Array) -> None:
@@ -79,7 +71,7 @@ def by_clouds(a: Posed, b: Posed, offset: Array) -> Deepest | None:
             else:
                 row = (by_trees(own, other, offset) or by_pieces(own, other, offset)).row
             if best is None or row[DISTANCE] < best.row[DISTANCE]:
-                best = Deepest(row, None, False)
+                best = Deepest(row, None)
     return best
 
 
@@ -117,12 +109,12 @@ def by_trees(a: Posed, b: Posed, offset: Array) -> Deepest | None:
             if known == OPEN:
                 row[BOUND] += reach_of(trees[0]) + reach_of(trees[1]) + float(np.linalg.norm(p_b - p_a))
             row[POINT_A : POINT_A + 3] += p_a
-            return Deepest(row, pieces, known == ENCLOSED)
+            return Deepest(row, pieces)
     if any(isinstance(shape, ConvexHull) for shape in pair):  # the kernel of a triangle and a solid takes no corners
         return None
     row = surface_contact(pair[0], (R_a, p_a), pair[1], (R_b, p_b))
     row[POINT_A : POINT_A + 3] += p_a
-    return _of_surfaces(a, b, offset, row, pieces)
+    return Deepest(row, pieces)
 
 
 def locate(inner: Posed, outer: Posed, offset: Array) -> int:
