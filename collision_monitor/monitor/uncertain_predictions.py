@@ -212,12 +212,9 @@ class UncertainPredictions(Stage):
     def _near(self, step: StepContext) -> Records:
         """Return the entries of the pairs that could meet within the horizon."""
         p, found = step.profile, np.empty(len(self.entries), np.int64)
-        nearness = Nearness(
-            sigmas_for(p.min_probability), step.settings.impact.margin, p.horizon, p.stale_acceleration
-        )
-        return self.entries[
-            found[: find_near(step.roster.bodies, self.spread, self.entries, step.now, nearness, found)]
-        ]
+        nearness = Nearness(sigmas_for(p.min_probability), step.settings.impact.margin, p.horizon, p.stale_acceleration)
+        count = find_near(step.roster.bodies, self.spread, self.entries, step.now, nearness, found)
+        return self.entries[found[:count]]
 
     def _judge_passing(self, step: StepContext, entries: Records, pool: Pool, budget: PairBudget | None) -> Records:
         """Return predictions of the pairs (ENTRY) that are stated to pass, and meet with enough probability."""

@@ -98,15 +98,15 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
             frame[0, 2] = B.z - A.z + t * (B.vz - A.vz)
         set_frame(work.frame, B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
         set_gap_covariance(multibody, spread, i, j, ages, t, sampling, work)
+        pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
+        sure = sampling.stated and surely_meet(table, parts, pair, work.joint, turning, t, query.margin, work.scratch)
         take_root(work.joint)
         _clear_upper(work.joint)
         errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, (far_i, far_j))
-        pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
         if are_round(table, parts, pair, errors, query.margin, work):
             samples = enter_round_bodies(table, parts, pair, errors, sampling, lattice, memory, work)
-        elif sampling.stated and surely_meet(multibody, i, j, tube, horizon if flat else t, query.margin, work):
-            until = horizon if flat else t
-            samples = enter_surely(multibody, i, j, errors, until, sampling, lattice, memory, work)
+        elif sure:
+            samples = enter_surely(multibody, i, j, errors, sampling, lattice, memory, work)
         else:
             samples = enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work)
         if samples < 0:

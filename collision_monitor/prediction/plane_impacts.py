@@ -45,13 +45,9 @@ VERIFIED_IN_PILOT: Final = 6
 VERIFIED: Final = 48
 """Samples of the pilot lattice, and of all, that must need no new plane of a segment."""
 
-SURE_EXTREMES: Final = 12
-"""Number of the extreme samples at which the planes of bodies that surely meet are checked: one for each way of the six
-axes of position and velocity."""
-
-LATER: Final = 0.5
-SOON: Final = 0.01
-"""Parts of the range of the pilot's times, and of the horizon, after its last time until which it is followed."""
+SURE_EXTREMES: Final = 6
+"""Number of the extreme samples at which the planes of bodies that surely meet are checked: one for each axis of
+position and velocity."""
 
 TOO_FAST: Final = -1
 """Number of samples of bodies that turn too fast for planes."""
@@ -64,6 +60,7 @@ class Search(NamedTuple):
     samples: int  # the first ones of these
     extremes: Any  # indices of those that come first
     verified: int  # number of others that must need no new plane of a segment
+    fineness: float  # standard deviations of the gap by which errors of orientation may move a surface unnoticed
     until: float  # s
 
 
@@ -85,7 +82,7 @@ def _lay_planes(table, parts, pair, errors, search, sampling, memory, work):
     scratch, alone, sigma, samples = work.scratch, memory.alone, errors.sigma, search.samples
     margin = sampling.query.margin
     tolerance = max(FACETS_IN_PILOT * sigma, sampling.query.tolerance)
-    fine = max(FACETS * sigma, sampling.query.tolerance)
+    fine = max(search.fineness * sigma, sampling.query.tolerance)
     turning = (turning_order(errors, 0, fine), turning_order(errors, 1, fine))
     flat = table.kind[a] == HALF_SPACE or table.kind[b] == HALF_SPACE
     follows = (
@@ -110,9 +107,7 @@ def _lay_planes(table, parts, pair, errors, search, sampling, memory, work):
             return Laid(0, settings, True)
     length = (end - begin) / (1.0 + np.floor((end - begin) / length))
     window = Window(begin, end)
-    segments = set_nodes(
-        table, parts, pair, window, length, errors.turning, sampling.planar, scratch, memory.obstacle
-    )
+    segments = set_nodes(table, parts, pair, window, length, errors.turning, sampling.planar, scratch, memory.obstacle)
     turned = max(turned_at(errors, 0), turned_at(errors, 1))
     large = TURNED * turned > SMALL or sigma > 2.0 * SMALL * min(table.radius[a], table.radius[b])
     spins = spin_rate(A) + spin_rate(B) > SPINS * (errors.turning[0][1] + errors.turning[1][1])
@@ -133,19 +128,19 @@ def _lay_planes(table, parts, pair, errors, search, sampling, memory, work):
 
 
 @device
-def _enter_pair(table, parts, pair, laid, search, tolerance, memory, work):
-    """Lower memory.times to the impacts of the samples of a search with the planes that are laid, and some more.
+def _enter_pair(table, parts, pair, laid, points, samples, tolerance, memory, work):
+    """Lower memory.times to the impacts of the first `samples` with the planes that are laid, and some more.
 
     tolerance (m): see CutSettings.
     """
     segments, pilots, _ = laid
     settings = CutSettings(pilots.margin, tolerance, pilots.pilot, pilots.follows, pilots.turning)
-    alone, times, samples = memory.alone, memory.times, search.samples
+    alone, times = memory.alone, memory.times
     for n in range(samples):
         alone[n] = inf
-    each = max(VERIFIED_IN_PILOT, search.verified // max(segments - 3, 1))
+    each = max(VERIFIED_IN_PILOT, VERIFIED // max(segments - 3, 1))
     for k in range(segments):
-        begin_segment(table, pair, k, settings, memory, search.points, 0, samples)
+        begin_segment(table, pair, k, settings, memory, points, 0, samples)
         cut_planes(table, parts, pair, k, samples, each, settings, memory, work.scratch)
         if end_segment(memory.entry, memory.leave, alone, 0, samples) == 0:
             break
@@ -166,7 +161,7 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
     set_errors(work.joint, work.frame, errors.time, points, 0, pilot, memory.off)
     for n in range(times.size):
         times[n] = inf
-    search = Search(points, pilot, lattice.extremes, VERIFIED_IN_PILOT, end)
+    search = Search(points, pilot, lattice.extremes, VERIFIED_IN_PILOT, FACETS, end)
     a, b = first_a, first_b
     laid = _lay_planes(table, parts, ShapePair(A, B, a, b), errors, search, sampling, memory, work)
     while True:
@@ -180,36 +175,29 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
     samples = samples_needed(times, lattice, sampling)
     if samples == 0:
         return 0
-    latest = _largest(times, pilot)
-    wanted, facets = (VERIFIED, FACETS) if latest == inf else (VERIFIED_IN_PILOT, FACETS_IN_PILOT)
-    tolerance = max(facets * errors.sigma, sampling.query.tolerance)
-    if latest < inf:
-        end = min(end, latest + LATER * (latest - _least(times, pilot)) + SOON * end)
-    if samples > pilot:
-        set_errors(work.joint, work.frame, errors.time, points, pilot, samples, memory.off)
+    set_errors(work.joint, work.frame, errors.time, points, pilot, samples, memory.off)
     for n in range(times.size):
         times[n] = inf
-    pilots = Search(points, pilot, lattice.extremes, VERIFIED_IN_PILOT, end)
-    search = Search(points, samples, lattice.extremes, wanted, end)
+    tolerance = max(FACETS * errors.sigma, sampling.query.tolerance)
     a, b = first_a, first_b
     while a >= 0:
         pair = ShapePair(A, B, a, b)
         if not single:
-            laid = _lay_planes(table, parts, pair, errors, pilots, sampling, memory, work)
-        _enter_pair(table, parts, pair, laid, search, tolerance, memory, work)
+            laid = _lay_planes(table, parts, pair, errors, search, sampling, memory, work)
+        _enter_pair(table, parts, pair, laid, points, samples, tolerance, memory, work)
         a, b = next_pair(parts, first_b, a, b)
     return samples
 
 
 @device
-def enter_surely(multibody, i, j, errors, until, sampling, lattice, memory, work):
-    """`enter_bodies` for bodies that surely meet until a time (s): only the times of their impacts are sought."""
+def enter_surely(multibody, i, j, errors, sampling, lattice, memory, work):
+    """`enter_bodies` for bodies that surely meet until errors.time: only the times of their impacts are sought."""
     table, parts, bodies = multibody
     times, points, samples = memory.times, lattice.points, min(SURE_SAMPLES, lattice.weights.size)
     set_errors(work.joint, work.frame, errors.time, points, 0, samples, memory.off)
     for n in range(samples):
         times[n] = inf
-    search = Search(points, samples, lattice.extremes[0:SURE_EXTREMES], 0, until)
+    search = Search(points, samples, lattice.extremes[0:SURE_EXTREMES], 0, FACETS_IN_PILOT, errors.time)
     a, first_b = bodies.first_shape[i], bodies.first_shape[j]
     b = first_b
     while a >= 0:
@@ -226,21 +214,3 @@ def _lower(times, others, count):
     """Lower the first `count` times to the others."""
     for n in range(count):
         times[n] = min(times[n], others[n])
-
-
-@inlined
-def _largest(times, count):
-    """Largest of the first `count` times."""
-    largest = 0.0
-    for n in range(count):
-        largest = max(largest, times[n])
-    return largest
-
-
-@inlined
-def _least(times, count):
-    """Smallest of the first `count` times."""
-    least = inf
-    for n in range(count):
-        least = min(least, times[n])
-    return least

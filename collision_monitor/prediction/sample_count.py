@@ -8,7 +8,8 @@ from typing import Final
 from collision_monitor._jit import device
 
 SURE_SAMPLES: Final = 256
-"""Number of samples of a pair that surely meets, or meets in all of the pilot: they differ only in their times."""
+"""Number of samples of a pair that surely meets, or meets in all of the pilot: they differ only in their times. With
+fewer, the earliest time would have to be that of grown bodies."""
 
 PILOT_PART: Final = 0.3
 """A pair of shapes that is stated to pass is left out if it meets in the pilot with less than this fraction of
@@ -19,7 +20,7 @@ min_probability."""
 def samples_needed(times, lattice, sampling):
     """Number of samples for bodies with these times (S,) of the pilot's samples; infinite: they do not meet.
 
-    0: the bodies are stated to pass, and hardly meet in the pilot.
+    0: the bodies are stated to pass, and hardly meet in the pilot. SURE_SAMPLES: they meet in all of it.
     """
     weights, pilot = lattice.weights, lattice.pilot
     latest = seen = part = 0.0

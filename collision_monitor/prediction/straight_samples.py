@@ -47,9 +47,9 @@ def set_errors(root, frame, t, points, first, last, off):
 
 @device
 def enter_sphere(p, v, reach, end, off, first, last, times):
-    """Write the times (S,) at which the samples first:last come within `reach` (m) of the origin, until `end`; inf: never.
+    """Write the times (S,) at which the samples first:last come within `reach` (m) of the origin, until `end`.
 
-    p, v (3,): stated position and velocity of B relative to A.
+    p, v (3,): stated position and velocity of B relative to A. A time is infinite if there is none.
     """
     px, py, pz = p
     vx, vy, vz = v
@@ -69,9 +69,10 @@ def enter_sphere(p, v, reach, end, off, first, last, times):
 
 @device
 def enter_cylinder(p, v, axis, radius, half, end, off, first, last, times):
-    """Write the times (S,) at which the samples first:last enter a cylinder about the origin, until `end`; inf: never.
+    """Write the times (S,) at which the samples first:last enter a cylinder about the origin, until `end`.
 
     p, v (3,): stated position and velocity of B relative to A. axis (3,): unit vector; radius, half the height (m).
+    A time is infinite if there is none.
     """
     px, py, pz = p
     vx, vy, vz = v
