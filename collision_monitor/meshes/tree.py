@@ -1,7 +1,7 @@
 """Tree of oriented boxes over triangles, eight boxes or triangles in a block.
 
-Triangles are halved along the longest side of their centres' bounds, so that all blocks but the last are full; eight such
-parts make a block.
+Triangles are halved along the longest side of their centres' bounds; eight such parts make a block. Parts are cut so
+that they fill their blocks.
 (Gottschalk, Lin, Manocha, OBBTree, 1996; Wald, Benthin, Boulos, Getting rid of packets, 2008: wide trees)
 """
 

@@ -436,6 +436,12 @@ def _distance_of_fillings(a: _Posed, b: _Posed) -> float:
     return _least_gap(fillings(a.shapes) if a.model is Model.EXACT else (), a.pose, others, b.pose)
 
 
+def may_be_inside(inner: Compound, pose: Pose, outer: Compound, outer_pose: Pose) -> bool:
+    """Whether one of two objects whose surfaces are apart may be inside a mesh of the other one."""
+    a, b = _posed(inner, pose, "exact", "A"), _posed(outer, outer_pose, "exact", "B")
+    return _where(a, b, outer_pose.position - pose.position) != Location.OUTSIDE
+
+
 def least_gap(
     shapes_a: Sequence[tuple[Shape, Pose]], pose_a: Pose, shapes_b: Sequence[tuple[Shape, Pose]], pose_b: Pose
 ) -> float:
@@ -443,9 +449,7 @@ def least_gap(
 
     It is -inf if one may be inside the other.
     """
-    a, b = _Posed(shapes_a, pose_a, shapes_a), _Posed(shapes_b, pose_b, shapes_b)
-    offset = pose_b.position - pose_a.position
-    if _where(a, b, offset) != Location.OUTSIDE or _where(b, a, -offset) != Location.OUTSIDE:
+    if may_be_inside(shapes_a, pose_a, shapes_b, pose_b) or may_be_inside(shapes_b, pose_b, shapes_a, pose_a):
         return -np.inf
     return _least_gap([*shapes_a, *fillings(shapes_a)], pose_a, [*shapes_b, *fillings(shapes_b)], pose_b)
 
