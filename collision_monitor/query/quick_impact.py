@@ -5,14 +5,15 @@ from __future__ import annotations
 from itertools import product
 from math import dist, inf
 
-from collision_monitor.geometry.pose import Motion
+from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import Mesh, Shape
 from collision_monitor.meshes.shape_trees import kept_tree
-from collision_monitor.query.contact import Compound, may_be_inside
+from collision_monitor.query.arguments import Compound
 from collision_monitor.query.convex_pairs import convex_contact, convex_impact
 from collision_monitor.query.fillings import filled_box
 from collision_monitor.query.mesh_impact import mesh_impact
 from collision_monitor.query.moving_pair import MotionQuery
+from collision_monitor.query.open_gap import may_be_inside
 from collision_monitor.tolerances import GJK_TOUCHING
 
 
@@ -54,9 +55,10 @@ def quick_possible_impact(
             return 0.0 if _overlap(a, motion_a, b, motion_b, query) else None
         first = min(first, times[0])
     pose_a, pose_b = motion_a.pose, motion_b.pose
+    own, other = [(shape_a, Pose())], [(shape_b, Pose())]
     if dist(pose_a.position, pose_b.position) <= kept_tree(shape_a).reach + kept_tree(shape_b).reach and (
-        (shape_b in parts_b and may_be_inside(shape_a, pose_a, shape_b, pose_b))
-        or (shape_a in parts_a and may_be_inside(shape_b, pose_b, shape_a, pose_a))
+        (shape_b in parts_b and may_be_inside(own, pose_a, other, pose_b))
+        or (shape_a in parts_a and may_be_inside(other, pose_b, own, pose_a))
     ):
         return 0.0
     return first

@@ -13,8 +13,8 @@ from collision_monitor.geometry.pose import Motion
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Sphere
 from collision_monitor.prediction.bodies import Multibody
 from collision_monitor.prediction.impact_record import HIT
-from collision_monitor.query.arguments import finite_number, whole_number
-from collision_monitor.query.contact import Compound, Contact, contact, least_gap
+from collision_monitor.query.arguments import Compound, finite_number, whole_number
+from collision_monitor.query.contact import Contact, contact
 from collision_monitor.query.fillings import fillings
 from collision_monitor.query.moving_pair import (
     MotionQuery,
@@ -24,6 +24,7 @@ from collision_monitor.query.moving_pair import (
     lay_out_pair,
     make_moving_shape,
 )
+from collision_monitor.query.open_gap import least_gap
 from collision_monitor.query.quick_impact import quick_impact, quick_possible_impact
 from collision_monitor.query.touching import follow
 from collision_monitor.records import Method

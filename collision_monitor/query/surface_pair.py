@@ -1,4 +1,4 @@
-"""The contact of a cloud with another shape, and its points that are near one, by the kernel of the monitor."""
+"""The contact of a mesh or a cloud with another shape, and points near a shape, by the kernels of the monitor."""
 
 from __future__ import annotations
 
@@ -17,12 +17,15 @@ from collision_monitor.geometry.shapes import Mesh, Points, Shape
 from collision_monitor.meshes.shape_trees import shape_tree
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE
 from collision_monitor.prediction.body_impact import make_scratch
-from collision_monitor.prediction.mesh_contact import mark_near_points, mesh_contact
+from collision_monitor.prediction.mesh_contact import mesh_contacts
 
 Array = NDArray[np.float64]
 
 REMEMBERED: Final = 64 << 20
 """Bytes of the tables of pairs that are remembered. Less: each query copies the tree, 1 ms for 20,000 points."""
+
+
+_HERE: Final = np.zeros((1, 3))
 
 
 class _Memory(threading.local):
@@ -33,15 +36,15 @@ class _Memory(threading.local):
 _MEMORY: Final = _Memory()
 
 
-def cloud_contact(a: Shape, X_A: tuple[Array, Array], b: Shape, X_B: tuple[Array, Array]) -> Array:
-    """Contact row of a cloud and another shape, in either order, about A's origin in world axes.
+def surface_contact(a: Shape, X_A: tuple[Array, Array], b: Shape, X_B: tuple[Array, Array]) -> Array:
+    """Contact row of a mesh or a cloud and another shape, in either order, about A's origin in world axes.
 
-    A mesh counts as its surface.
+    A mesh that does not close counts as its surface.
 
     X_A, X_B: rotation (3, 3) and position (3,) of each (m).
     """
-    row = np.empty(CONTACT_SIZE)
-    mesh_contact(_table(a, b), np.stack([X_A[0], X_B[0]]), X_B[1] - X_A[1], np.inf, row, _MEMORY.scratch)
+    row, R = np.empty(CONTACT_SIZE), np.stack([X_A[0], X_B[0]])
+    mesh_contacts(_table(a, b), _HERE, R, X_B[1] - X_A[1], np.inf, np.empty(1, np.bool_), row, _MEMORY.scratch)
     return row
 
 
@@ -51,7 +54,7 @@ def points_near(points: Array, radius: float, pose: Pose, shape: Shape, at: Pose
     R = np.stack([np.eye(3), pose.rotation.T @ at.rotation])
     p = pose.rotation.T @ (at.position - pose.position)
     row = np.empty(CONTACT_SIZE)
-    mark_near_points(_table(_at_origin(radius), shape), points, R, p, limit, near, row, _MEMORY.scratch)
+    mesh_contacts(_table(_at_origin(radius), shape), points, R, p, limit, near, row, _MEMORY.scratch)
     return near
 
 
