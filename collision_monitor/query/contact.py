@@ -153,14 +153,11 @@ def contact(
     >>> cm.contact(cm.Box((1, 1, 1)), cm.Pose(), cm.Sphere(0.5), cm.Pose((2, 0, 0)))
     Contact(1 m ± ..., box face 0 – sphere surface)
     """
-    if isinstance(model, str | int) and model in ("exact", Model.EXACT):
-        meshes = [shape for shape in (shape_a, shape_b) if type(shape) is Mesh]
-        quick = (mesh_contact if meshes else convex_contact)(shape_a, pose_a, shape_b, pose_b)
+    if (type(model) is str and model == "exact") or (isinstance(model, str | int) and model == Model.EXACT):
+        by_kernel = mesh_contact if type(shape_a) is Mesh or type(shape_b) is Mesh else convex_contact
+        quick = by_kernel(shape_a, pose_a, shape_b, pose_b)
         if quick is not None:
-            made = _of_row(quick, (shape_a, pose_a, shape_b, pose_b))
-            if not all(mesh.surface.certain for mesh in meshes):
-                del vars(made)["error_bound"]  # made when it is read, because it takes longer than the distance
-            return made
+            return _of_row(quick, (shape_a, pose_a, shape_b, pose_b))
     return _contact(shape_a, pose_a, shape_b, pose_b, model)
 
 
@@ -217,11 +214,17 @@ def _contact(
     return made
 
 
-def _of_row(quick: tuple[float, float, Array], arguments: tuple[Compound, Pose, Compound, Pose]) -> Contact:
-    """Contact of a row. Its arrays are made when they are read, which takes as long as the kernel."""
+def _of_row(quick: tuple[float, float | None, Array], arguments: tuple[Compound, Pose, Compound, Pose]) -> Contact:
+    """Contact of a row. Its arrays are made when they are read, which takes as long as the kernel.
+
+    So is a bound that is None, because it takes longer than the distance.
+    """
     distance, bound, row = quick
     made = _new(Contact)
-    _set(made, "__dict__", {"signed_distance": distance, "error_bound": bound, "_row": row, "_arguments": arguments})
+    known = {"signed_distance": distance, "error_bound": bound, "_row": row, "_arguments": arguments}
+    if bound is None:
+        del known["error_bound"]
+    _set(made, "__dict__", known)
     return made
 
 

@@ -25,6 +25,14 @@ def distance_of_fillings(a: Posed, b: Posed) -> float:
     return _least_gap(fillings(a.shapes) if a.model is Model.EXACT else (), a.pose, others, b.pose)
 
 
+def may_be_inside(
+    inner: Sequence[tuple[Shape, Pose]], pose: Pose, outer: Sequence[tuple[Shape, Pose]], outer_pose: Pose
+) -> bool:
+    """Whether an object may be inside a mesh of another one, although their surfaces are apart."""
+    a, b = Posed(inner, pose, inner), Posed(outer, outer_pose, outer)
+    return locate(a, b, outer_pose.position - pose.position) != Location.OUTSIDE
+
+
 def least_gap(
     shapes_a: Sequence[tuple[Shape, Pose]], pose_a: Pose, shapes_b: Sequence[tuple[Shape, Pose]], pose_b: Pose
 ) -> float:
@@ -32,9 +40,7 @@ def least_gap(
 
     It is -inf if one may be inside the other.
     """
-    a, b = Posed(shapes_a, pose_a, shapes_a), Posed(shapes_b, pose_b, shapes_b)
-    offset = pose_b.position - pose_a.position
-    if locate(a, b, offset) != Location.OUTSIDE or locate(b, a, -offset) != Location.OUTSIDE:
+    if may_be_inside(shapes_a, pose_a, shapes_b, pose_b) or may_be_inside(shapes_b, pose_b, shapes_a, pose_a):
         return -np.inf
     return _least_gap([*shapes_a, *fillings(shapes_a)], pose_a, [*shapes_b, *fillings(shapes_b)], pose_b)
 
