@@ -29,15 +29,18 @@ LONGEST_SLACK: Final = 1.0
 """Slack: how far beyond the horizon a body is predicted, in horizons; initial, smallest and largest value."""
 
 NARROWEST: Final = 2.0**-26
+ONCE: Final = 2.0**-25
 ROOM: Final = 2.0
-"""Width: the part of the tolerances that a body uses. Smallest value; and its ratio to the last deviation, if that was
-within the tolerances, because the next deviation of a noisy state may be larger."""
+"""Width: the part of the tolerances that a body uses. Smallest value; that of a body which left
+its motion within FUTILE_STEPS steps once; and its ratio to the last deviation, if that was within the tolerances,
+because the next deviation of a noisy state may be larger."""
 
 FUTILE_STEPS: Final = 4.0
 PATIENCE: Final = 128.0
 """A body with half of the tolerances or more that leaves its motion within FUTILE_STEPS steps turns or accelerates. Its
 tolerances are NARROWEST for its next PATIENCE motions; its width is minus the number of those that are left. A body
-with the NARROWEST tolerances that kept its motion for longer has no noise, and keeps them."""
+with the NARROWEST tolerances has noise only if it leaves its motion so soon twice in a row; one that bounces has none.
+"""
 
 FEW_BODIES: Final = 32
 """Up to this number of moving bodies keep the NARROWEST adaptive tolerances, because to predict them anew takes less
@@ -326,7 +329,7 @@ def _fit_width(bodies, i, now, limits, settings, width):
     futile, are_few = limits
     m = bodies.motion[i]
     w, since = width[i], now - m.time
-    if are_few:
+    if are_few or bodies.slack[i] == 0.0:  # 0: the body is new
         width[i] = NARROWEST
         return
     if w < 0.0:
@@ -335,8 +338,8 @@ def _fit_width(bodies, i, now, limits, settings, width):
     if w >= 0.5 and since <= futile:
         width[i] = -PATIENCE
         return
-    if bodies.slack[i] == 0.0 or (w <= NARROWEST and since > futile):
-        width[i] = NARROWEST
+    if w <= NARROWEST or (w <= ONCE and since > futile):
+        width[i] = ONCE if since <= futile else NARROWEST
         return
     r = bodies.spin_radius[i]
     tube_0, tube_1 = _widest_tube(bodies, i, settings)
