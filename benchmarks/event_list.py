@@ -157,7 +157,7 @@ def main() -> int:
             numbers.append(f"×{row['median_ms'] / last['median_ms']:.1f}" if last and grows else "")
             ends = str(row["compared_steps"]), str(row["disagreements"])
             table.add_row(str(row["move"]), str(row["objects"]), *numbers, *ends)
-        Console().print(table)
+        Console(width=None if sys.stdout.isatty() else 160).print(table)
         for row in rows:
             if row["first_disagreement"]:
                 print(f"{row['move']}: {row['first_disagreement']}", file=sys.stderr)
