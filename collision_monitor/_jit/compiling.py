@@ -10,6 +10,7 @@ import numba
 from numba.core import event
 from numba.core.types.misc import unliteral
 
+from collision_monitor._jit.compilation import Announcement
 from collision_monitor._jit.kernel_cache import KernelCache
 from collision_monitor._jit.libraries import DeviceCompiler, OutlinedCompiler
 
@@ -36,6 +37,7 @@ class _LessCollection(event.Listener):  # type: ignore[misc]
 
 
 event.register("numba:compile", _LessCollection())
+event.register("numba:compile", Announcement())
 
 
 def make_dispatcher(function: Callable[..., Any], options: dict[str, Any], kind: str) -> Any:
