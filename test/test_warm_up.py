@@ -166,8 +166,8 @@ print(json.dumps([len(files), sum(each.stat().st_size for each in files)]))
 
 
 def test_kernels_do_not_repeat_large_functions() -> None:
-    """With the time of impact in each of ten kernels, the machine code and its compile time were four times as much."""
+    """With the time of impact in each of ten kernels, all kernels had five times as many instructions."""
     subprocess.run([sys.executable, "-m", "collision_monitor.warm_up"], check=True)
     done = subprocess.run([sys.executable, "-c", VOLUME], check=True, capture_output=True, text=True)
     functions, size = json.loads(done.stdout)
-    assert functions < 120 and size < 12_000_000
+    assert functions < 120 and size < 18_000_000

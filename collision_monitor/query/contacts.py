@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.geometry.pose import Pose
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.query.batch_result import Batch, Pairs
 from collision_monitor.query.contact import Contact, contact, contact_of_row
@@ -73,14 +74,14 @@ class Contacts(Batch[Contact]):
 
     def _one(self, k: int) -> Contact:
         shape_a, x_a, shape_b, x_b = self._pairs.of(self._number[k])
-        arguments = shape_a, pose_of(x_a), shape_b, pose_of(x_b)
         if self._is_single[k]:
-            return contact(*arguments)
+            return contact(shape_a, _pose(x_a), shape_b, _pose(x_b))
         row = np.zeros(CONTACT_SIZE)
         row[DISTANCE], row[BOUND] = self.signed_distance[k], self.error_bound[k]
         for column, values in ((NORMAL, self.normal), (POINT_A, self.point_a), (POINT_B, self.point_b)):
             row[column : column + 3] = values[k]
-        return contact_of_row((float(row[DISTANCE]), float(row[BOUND]), row), arguments)
+        quick = float(row[DISTANCE]), float(row[BOUND]), row
+        return contact_of_row(quick, (shape_a, pose_of(x_a), shape_b, pose_of(x_b)))
 
 
 def contacts(
@@ -116,7 +117,7 @@ def contacts(
                 memory, rows[which],
             )  # fmt: skip
         for k in special[begin:end].tolist():
-            poses = (pose_of(x[k if len(x) > 1 else 0]) for x in (x_a, x_b))
+            poses = (_pose(x[k if len(x) > 1 else 0]) for x in (x_a, x_b))
             one = contact(a.of(k), next(poses), b.of(k), next(poses))
             rows[k, DISTANCE], rows[k, BOUND] = one.signed_distance, one.error_bound
             for column, value in ((NORMAL, one.normal), (POINT_A, one.point_a), (POINT_B, one.point_b)):
@@ -126,3 +127,7 @@ def contacts(
     return Contacts(
         rows[:, DISTANCE], rows[:, BOUND], normal, point_a, point_b, pairs, np.arange(count), is_special
     )
+
+
+def _pose(row: Array) -> Pose:
+    return Pose(row[:3], row[3:])

@@ -19,7 +19,7 @@ from collision_monitor.query.arguments import Compound
 from collision_monitor.query.batch_result import Batch, Pairs
 from collision_monitor.query.impact_rows import ImpactTimes, impacts_of_rows, impacts_of_spheres, normalise_states
 from collision_monitor.query.moving_pair import MotionQuery, MovingShape, lay_out_pair, make_moving_shape
-from collision_monitor.query.pair_arrays import PackedShapes, pose_of
+from collision_monitor.query.pair_arrays import PackedShapes
 from collision_monitor.query.time_of_impact import (
     ITERATIONS,
     Impact,
@@ -169,7 +169,7 @@ def _states(poses: ArrayLike, twists: ArrayLike, name: str) -> Array:
 
 def motion_of(state: Array) -> Motion:
     """Motion of a state: pose (7,), twist (6,)."""
-    return Motion(pose_of(state), state[7:10], state[10:13])
+    return Motion(Pose(state[:3], state[3:7]), state[7:10], state[10:13])
 
 
 def _solve(
