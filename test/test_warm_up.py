@@ -37,7 +37,8 @@ poses = np.zeros((300, 7)); poses[:, 6] = 1; poses[:, :3] = rng.uniform(0, 12, (
 twists = rng.uniform(-1, 1, (300, 6))
 first = None
 for step in range(30):
-    result = monitor.step(step * 10_000_000, np.arange(300), poses, twists)
+    stamp = step * 10_000_000
+    result = monitor.step(stamp, np.arange(300), poses, twists, now_ns=stamp + 2_000_000)
     first = first or time.perf_counter() - began
     poses[:, :3] += 0.01 * twists[:, :3]
     twists[rng.integers(0, 300, 3)] *= -1
