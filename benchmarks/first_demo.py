@@ -40,10 +40,10 @@ class Bar(NamedTuple):
 
 
 def start(folder: Path, cores: str) -> tuple[list[Bar], str]:
-    """Run `make demo`. Return its bars and its last line."""
+    """Run `make demo`. Return its bars, and its lines about the steps and the replay."""
     environment = {**os.environ, "PIP_CACHE_DIR": str(folder.parent / "pip"), "PYTHONUNBUFFERED": "1"}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
-    began, bars, last = time.monotonic(), [], ""
+    began, bars, last, steps = time.monotonic(), [], "", ""
     command = ["taskset", "-c", cores, "make", "-s", "demo"]
     with subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout
@@ -56,6 +56,8 @@ def start(folder: Path, cores: str) -> tuple[list[Bar], str]:
             elif "touching" in last and not scene:
                 scene = now
                 bars.append(Bar("start of the demo", set_up, scene))
+            elif last.startswith("steps"):
+                steps = last.removeprefix("steps").strip()
             elif last.startswith("session"):
                 bars.append(Bar("scene", scene, scene + SCENE_S))
                 bars.append(Bar("end and replay", scene + SCENE_S, now))
@@ -64,7 +66,7 @@ def start(folder: Path, cores: str) -> tuple[list[Bar], str]:
     with (folder / "build" / "set_up.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # held by the compilation in the background
     bars.append(Bar("the rest, at low priority", set_up, time.monotonic() - began))
-    return bars, last
+    return bars, f"{steps}; {last}"
 
 
 def steps_of(session: Path) -> str:
@@ -76,7 +78,7 @@ def steps_of(session: Path) -> str:
                 delays.append((message.log_time - message.publish_time) * 1e-6)
             elif channel.topic.endswith(Topic.STATUS.path):
                 lost = decode_status(message.data).messages_lost
-    return f"{len(delays)} steps, {lost} messages lost, at most {max(delays):.1f} ms from a stamp to the node"
+    return f"{len(delays)} states, {lost} messages lost, at most {max(delays):.1f} ms from a stamp to the node"
 
 
 def plot(bars: list[Bar], path: str) -> None:

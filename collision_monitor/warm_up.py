@@ -66,7 +66,8 @@ def _step_certain(monitor: Monitor) -> tuple[Array, Array]:
     twists[:, 2] = -1.0
     twists[0] = (1.0, 0.0, -1.0, 0.5, 0.0, 0.0)
     for step in range(20):
-        monitor.step(step * 100_000_000, np.arange(OBJECTS), poses, twists)
+        stamp = step * 100_000_000
+        monitor.step(stamp, np.arange(OBJECTS), poses, twists, now_ns=stamp + 1_000_000)  # the age has a kernel
         poses[:, :3] += 0.1 * twists[:, :3]
         twists[step, :] *= -1.0  # one object leaves its predicted motion
     monitor.remove(1)

@@ -8,7 +8,9 @@ from typing import Any
 
 import numba
 from numba.core import event
+from numba.core.types.misc import unliteral
 
+from collision_monitor._jit.compilation import Announcement
 from collision_monitor._jit.kernel_cache import KernelCache
 from collision_monitor._jit.libraries import DeviceCompiler, OutlinedCompiler
 
@@ -35,6 +37,7 @@ class _LessCollection(event.Listener):  # type: ignore[misc]
 
 
 event.register("numba:compile", _LessCollection())
+event.register("numba:compile", Announcement())
 
 
 def make_dispatcher(function: Callable[..., Any], options: dict[str, Any], kind: str) -> Any:
@@ -43,6 +46,10 @@ def make_dispatcher(function: Callable[..., Any], options: dict[str, Any], kind:
     if kind in _COMPILERS:
         options |= {"no_cpython_wrapper": True, "pipeline_class": _COMPILERS[kind]}
     dispatcher = numba.njit(**options)(function)
+    if kind in _COMPILERS:
+        # numba would compile f(0) and f(1) apart; LLVM inserts the numbers where it inlines
+        template = dispatcher.get_call_template
+        dispatcher.get_call_template = lambda args, kws: template(tuple(map(unliteral, args)), kws)
     if not numba.config.DISABLE_JIT:
         dispatcher._cache = KernelCache(function, kind)
         # It looks for extensions of numba in all installed packages (20 ms). A compilation looks for them by itself.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import time
 from datetime import datetime
 from pathlib import Path
@@ -123,6 +124,8 @@ def _watch(args: argparse.Namespace, session: Path, stop: StopRequest) -> bool:
                 world.finish()
         monitor.finish()
         viewer.close()
+        if found := re.search(r"\d+ steps, the longest took .*", monitor.words()):  # its log
+            print(f"steps    {found[0]}")
     if args.capture is not None and not stop.received:
         _capture(picture, args.capture)
     return True

@@ -159,7 +159,7 @@ def contact(
         by_kernel = mesh_contact if type(shape_a) is Mesh or type(shape_b) is Mesh else convex_contact
         quick = by_kernel(shape_a, pose_a, shape_b, pose_b)
         if quick is not None:
-            return _of_row(quick, (shape_a, pose_a, shape_b, pose_b))
+            return contact_of_row(quick, (shape_a, pose_a, shape_b, pose_b))
     return _contact(shape_a, pose_a, shape_b, pose_b, model)
 
 
@@ -216,7 +216,9 @@ def _contact(
     return made
 
 
-def _of_row(quick: tuple[float, float | None, Array], arguments: tuple[Compound, Pose, Compound, Pose]) -> Contact:
+def contact_of_row(
+    quick: tuple[float, float | None, Array], arguments: tuple[Compound, Pose, Compound, Pose]
+) -> Contact:
     """Contact of a row. Its arrays are made when they are read, which takes as long as the kernel.
 
     So is a bound that is None, because it takes longer than the distance.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,22 +10,38 @@ from numpy.typing import NDArray
 
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
-from collision_monitor.query.contact import contact
+from collision_monitor.query.batch_result import Batch, Pairs
+from collision_monitor.query.contact import Contact, contact, contact_of_row
 from collision_monitor.query.contact_rows import contact_rows
 from collision_monitor.query.convex_pairs import MEMORY
-from collision_monitor.query.pair_arrays import Progress, Shapes, pack_shapes, pair_count, part, pose_rows, ranges
-from collision_monitor.records import data_frame
+from collision_monitor.query.pair_arrays import (
+    Progress,
+    Shapes,
+    pack_shapes,
+    pair_count,
+    part,
+    pose_of,
+    pose_rows,
+    ranges,
+)
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Contacts:
+class Contacts(Batch[Contact]):
     """Contacts of N pairs in the world frame, with the meaning of the fields of `Contact`; lengths in m.
 
+    `contacts[k]` is the Contact of pair k; a slice, a mask or numbers select several pairs.
+
     >>> import collision_monitor as cm
-    >>> cm.contacts(cm.Sphere(1), cm.Pose(), cm.Sphere(1), [(0, 0, z, 0, 0, 0, 1) for z in (1, 3)]).overlaps
+    >>> found = cm.contacts(cm.Sphere(1), cm.Pose(), cm.Sphere(1), [(0, 0, z, 0, 0, 0, 1) for z in (1, 3)])
+    >>> found.overlaps
     array([ True, False])
+    >>> found[-1]
+    Contact(1 m ± ..., sphere surface – sphere surface)
+    >>> found[found.overlaps]
+    Contacts(1 pairs, 1 overlap, nearest: pair 0, -1 m)
     """
 
     signed_distance: Array  # (N,)
@@ -33,6 +49,9 @@ class Contacts:
     normal: Array  # (N, 3), from A to B
     point_a: Array  # (N, 3)
     point_b: Array  # (N, 3)
+    _pairs: Pairs
+    _number: NDArray[np.intp]  # (N,), in _pairs
+    _is_single: NDArray[np.bool_]  # (N,): made by `contact`
 
     @property
     def overlaps(self) -> NDArray[np.bool_]:
@@ -53,9 +72,16 @@ class Contacts:
             f"nearest: pair {k}, {self.signed_distance[k]:.4g} m)"
         )
 
-    def to_pandas(self) -> Any:
-        """Return a pandas.DataFrame with a row for each pair. Raises ImportError without pandas."""
-        return data_frame({field.name: getattr(self, field.name) for field in fields(self)})
+    def _one(self, k: int) -> Contact:
+        shape_a, x_a, shape_b, x_b = self._pairs.of(self._number[k])
+        if self._is_single[k]:
+            return contact(shape_a, _pose(x_a), shape_b, _pose(x_b))
+        row = np.zeros(CONTACT_SIZE)
+        row[DISTANCE], row[BOUND] = self.signed_distance[k], self.error_bound[k]
+        for column, values in ((NORMAL, self.normal), (POINT_A, self.point_a), (POINT_B, self.point_b)):
+            row[column : column + 3] = values[k]
+        quick = float(row[DISTANCE]), float(row[BOUND]), row
+        return contact_of_row(quick, (shape_a, pose_of(x_a), shape_b, pose_of(x_b)))
 
 
 def contacts(
@@ -78,7 +104,8 @@ def contacts(
     a, b = pack_shapes(shapes_a, "shapes A"), pack_shapes(shapes_b, "shapes B")
     x_a, x_b = pose_rows(poses_a, "poses A"), pose_rows(poses_b, "poses B")
     count = pair_count(shapes_a=len(a), poses_a=len(x_a), shapes_b=len(b), poses_b=len(x_b))
-    special = np.flatnonzero(np.broadcast_to((a.at < 0) | (b.at < 0), (count,)))
+    is_special = np.broadcast_to((a.at < 0) | (b.at < 0), (count,))
+    special = np.flatnonzero(is_special)
     at_a, at_b = np.maximum(a.at, 0), np.maximum(b.at, 0)
     memory = MEMORY.enlarge(a.rows, b.rows)
     rows = np.zeros((count, CONTACT_SIZE))
@@ -95,8 +122,11 @@ def contacts(
             rows[k, DISTANCE], rows[k, BOUND] = one.signed_distance, one.error_bound
             for column, value in ((NORMAL, one.normal), (POINT_A, one.point_a), (POINT_B, one.point_b)):
                 rows[k, column : column + 3] = value
-    vectors = (rows[:, column : column + 3] for column in (NORMAL, POINT_A, POINT_B))
-    return Contacts(rows[:, DISTANCE], rows[:, BOUND], *vectors)
+    normal, point_a, point_b = (rows[:, column : column + 3] for column in (NORMAL, POINT_A, POINT_B))
+    pairs = Pairs(a, x_a, b, x_b)
+    return Contacts(
+        rows[:, DISTANCE], rows[:, BOUND], normal, point_a, point_b, pairs, np.arange(count), is_special
+    )
 
 
 def _pose(row: Array) -> Pose:

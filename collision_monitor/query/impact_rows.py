@@ -5,6 +5,8 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from collision_monitor._jit import device, kernel
 from collision_monitor.prediction.body_impact import Window, body_impact
 from collision_monitor.prediction.impact_record import CLEAR, HIT
@@ -63,6 +65,7 @@ def impacts_of_rows(multibody, states, rows, horizon, queries, memory, times):
     scratch, event = memory
     lower, upper, left = times
     window = Window(0.0, horizon)
+    first, second = np.int32(0), np.int32(1)  # the type of a slot in the other kernels, which thus share the code
     q_a, q_b = state_a[:, 3:7], state_b[:, 3:7]
     for r in range(len(rows)):
         k = rows[r]
@@ -70,7 +73,7 @@ def impacts_of_rows(multibody, states, rows, horizon, queries, memory, times):
         _set_motion(bodies.motion[1], state_b, k)
         quaternion_to_matrix(q_a, k, bodies.motion[0].rotation)
         quaternion_to_matrix(q_b, k, bodies.motion[1].rotation)
-        body_impact(multibody, 0, 1, window, query, scratch, event[0])
+        body_impact(multibody, first, second, window, query, scratch, event[0])
         lower[k] = upper[k] = inf
         left[k] = False
         if event[0].status == CLEAR:
@@ -79,7 +82,7 @@ def impacts_of_rows(multibody, states, rows, horizon, queries, memory, times):
         if event[0].status == HIT and event[0].upper <= horizon:
             upper[k] = event[0].upper
         if lower[k] <= 0.0:
-            body_impact(multibody, 0, 1, window, deep, scratch, event[0])
+            body_impact(multibody, first, second, window, deep, scratch, event[0])
             if event[0].status == HIT and event[0].upper <= 0.0:
                 upper[k] = 0.0
             else:

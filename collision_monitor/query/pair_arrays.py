@@ -83,6 +83,15 @@ def pose_rows(value: Any, name: str) -> Array:
     return rows
 
 
+def pose_of(row: Array) -> Pose:
+    """Pose of a row of `pose_rows` to the bit: normalising its quaternion again could change the last one."""
+    pose = Pose(row[:3])
+    quaternion = row[3:7].copy()
+    quaternion.flags.writeable = False
+    object.__setattr__(pose, "quaternion", quaternion)
+    return pose
+
+
 def number_rows(value: Any, width: int, name: str) -> Array:
     """Copy of an array (N, width) of finite numbers; one row may lack its dimension. Raises InputError, PoseError."""
     try:

@@ -113,7 +113,7 @@ def time_of_impact(
     arguments = shape_a, motion_a, shape_b, motion_b
     quick = quick_impact(*arguments, query)
     if quick is not None:
-        found = _of_times(quick, arguments)
+        found = impact_of_times(quick, arguments)
         if all(shape.surface.certain for shape in (shape_a, shape_b) if type(shape) is Mesh):
             return found
         first = quick_possible_impact(*arguments, query)
@@ -121,7 +121,7 @@ def time_of_impact(
             return found if first >= found.lower else _impact(first, found.upper, found.method, arguments)
     a, b = make_moving_shape(shape_a, motion_a, "A"), make_moving_shape(shape_b, motion_b, "B")
     check_bounded(a, b)
-    found = _first_impact(a, b, query) if quick is None else _of_times(quick, arguments)
+    found = _first_impact(a, b, query) if quick is None else impact_of_times(quick, arguments)
     if all(shape.surface.certain for body in (a, b) for shape, _ in body.shapes if isinstance(shape, Mesh)):
         return found
     possible = _first_possible_impact(a, b, query) if found.lower > 0.0 else 0.0
@@ -172,7 +172,8 @@ def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain:
     return _impact(lower, upper if upper <= query.horizon else math.inf, Method(int(events[0]["method"])), arguments)
 
 
-def _of_times(times: tuple[float, float], arguments: tuple[Any, Any, Any, Any]) -> Impact:
+def impact_of_times(times: tuple[float, float], arguments: tuple[Any, Any, Any, Any]) -> Impact:
+    """Impact of two convex solids or meshes that come together within these times (s); infinite: never."""
     lower, upper = times
     if lower == math.inf:
         return _CLEAR

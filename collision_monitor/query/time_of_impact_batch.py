@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,10 +16,18 @@ from collision_monitor.geometry.shapes import HalfSpace, Mesh, Points
 from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.query.arguments import Compound
+from collision_monitor.query.batch_result import Batch, Pairs
 from collision_monitor.query.impact_rows import ImpactTimes, impacts_of_rows, impacts_of_spheres, normalise_states
 from collision_monitor.query.moving_pair import MotionQuery, MovingShape, lay_out_pair, make_moving_shape
-from collision_monitor.query.time_of_impact import ITERATIONS, check_bounded, check_query, time_of_impact
-from collision_monitor.records import data_frame
+from collision_monitor.query.pair_arrays import PackedShapes
+from collision_monitor.query.time_of_impact import (
+    ITERATIONS,
+    Impact,
+    check_bounded,
+    check_query,
+    impact_of_times,
+    time_of_impact,
+)
 from collision_monitor.tolerances import GJK_TOUCHING, LARGEST_INPUT, UNIT_QUATERNION
 
 Array = NDArray[np.float64]
@@ -28,17 +36,27 @@ _STILL: Final = Motion(Pose())
 
 
 @dataclass(frozen=True, eq=False)
-class Impacts:
+class Impacts(Batch[Impact]):
     """Results for N motions, with the meaning of `Impact`: status (N,) of str, lower and upper (N,) in s.
 
+    `impacts[k]` is the Impact of motion k, with its contact; a slice, a mask or numbers select several motions.
+
     >>> import collision_monitor as cm
-    >>> cm.times_of_impact(cm.Sphere(1), cm.Pose((3, 0, 0)), (-1, 0, 0, 0, 0, 0), cm.Sphere(1), cm.Pose(), [(0,) * 6])
-    Impacts(1 hit, 0 clear, 0 unresolved; first: 0, 1 s)
+    >>> twists = [(-1, 0, 0, 0, 0, 0), (1, 0, 0, 0, 0, 0)]
+    >>> found = cm.times_of_impact(cm.Sphere(1), cm.Pose((3, 0, 0)), twists, cm.Sphere(1), cm.Pose(), (0,) * 6)
+    >>> found
+    Impacts(1 hit, 1 clear, 0 unresolved; first: 0, 1 s)
+    >>> found[0]
+    Impact(hit in 1 to 1 s)
     """
 
     status: NDArray[np.str_]
     lower: Array
     upper: Array
+    _pairs: Pairs
+    _number: NDArray[np.intp]  # (N,), in _pairs
+    _is_single: NDArray[np.bool_]  # (N,): made by `time_of_impact`
+    _query: MotionQuery
 
     def __len__(self) -> int:
         """Number of motions."""
@@ -51,9 +69,12 @@ class Impacts:
             counts += f"; first: {int(self.lower.argmin())}, {self.lower.min():.6g} s"
         return f"Impacts({counts})"
 
-    def to_pandas(self) -> Any:
-        """Return a pandas.DataFrame with a row for each motion. Raises ImportError without pandas."""
-        return data_frame({field.name: getattr(self, field.name) for field in fields(self)})
+    def _one(self, k: int) -> Impact:
+        shape_a, state_a, shape_b, state_b = self._pairs.of(self._number[k])
+        arguments = shape_a, motion_of(state_a), shape_b, motion_of(state_b)
+        if self._is_single[k]:
+            return time_of_impact(*arguments, *self._query)
+        return impact_of_times((float(self.lower[k]), float(self.upper[k])), arguments)
 
 
 def time_of_impact_batch(
@@ -89,9 +110,11 @@ def time_of_impact_batch(
     lower, upper, alone = times
     status = np.where(lower == math.inf, "clear", np.where(upper == math.inf, "unresolved", "hit"))
     for k in np.flatnonzero(alone):
-        one = time_of_impact(a.shapes, _motion(state_a[k]), b.shapes, _motion(state_b[k]), *query)
+        one = time_of_impact(shape_a, motion_of(state_a[k]), shape_b, motion_of(state_b[k]), *query)
         status[k], lower[k], upper[k] = one.status, one.lower, one.upper
-    return Impacts(status, lower, upper)
+    packed = (PackedShapes(np.zeros(0), np.zeros(1, np.int64), [shape]) for shape in (shape_a, shape_b))
+    pairs = Pairs(next(packed), state_a, next(packed), state_b)
+    return Impacts(status, lower, upper, pairs, np.arange(count), alone, query)
 
 
 def _is_special(a: MovingShape, b: MovingShape, state_a: Array, state_b: Array) -> bool:
@@ -144,8 +167,9 @@ def _states(poses: ArrayLike, twists: ArrayLike, name: str) -> Array:
     return state
 
 
-def _motion(state: Array) -> Motion:
-    return Motion(Pose(state[:3], state[3:7]), state[7:10], state[10:])
+def motion_of(state: Array) -> Motion:
+    """Motion of a state: pose (7,), twist (6,)."""
+    return Motion(Pose(state[:3], state[3:7]), state[7:10], state[10:13])
 
 
 def _solve(

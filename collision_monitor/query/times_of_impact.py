@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from collision_monitor.geometry.pose import Motion, Pose
+from collision_monitor.query.batch_result import Pairs
 from collision_monitor.query.convex_pairs import MEMORY
 from collision_monitor.query.pair_arrays import (
     Progress,
@@ -22,7 +22,7 @@ from collision_monitor.query.pair_arrays import (
 )
 from collision_monitor.query.pair_impact_rows import DECIDED, pair_impact_rows
 from collision_monitor.query.time_of_impact import ITERATIONS, check_query, time_of_impact
-from collision_monitor.query.time_of_impact_batch import Impacts
+from collision_monitor.query.time_of_impact_batch import Impacts, motion_of
 
 
 def times_of_impact(
@@ -73,13 +73,10 @@ def times_of_impact(
                 wanted, MEMORY.impact, memory, rows[which],
             )  # fmt: skip
         for k in (which.start + np.flatnonzero(special[which] | (rows[which, 2] != DECIDED))).tolist():
-            motions = [_motion(s[k if len(s) > 1 else 0]) for s in states]
+            motions = [motion_of(s[k if len(s) > 1 else 0]) for s in states]
             one = time_of_impact(a.of(k), motions[0], b.of(k), motions[1], *query)
             rows[k, :2] = one.lower, one.upper
     lower, upper, _ = rows.T
     status = np.where(lower == math.inf, "clear", np.where(upper == math.inf, "unresolved", "hit"))
-    return Impacts(status, lower.copy(), upper.copy())
-
-
-def _motion(state: Any) -> Motion:
-    return Motion(Pose(state[:3], state[3:7]), state[7:10], state[10:13], state[13:])
+    is_single = special | (rows[:, 2] != DECIDED)
+    return Impacts(status, lower.copy(), upper.copy(), Pairs(a, s_a, b, s_b), np.arange(count), is_single, query)

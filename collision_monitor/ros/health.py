@@ -41,6 +41,7 @@ class Facts:
 
     topic: of the states. silence: s since newer states arrived, by the steady clock; None: none arrived yet.
     stale, unseen: the names of such objects. deferred, unresolved: most pairs in one step since the last report.
+    longest, longest_step: duration (s) and number of the longest step since the node was configured.
     outdated: messages that were left out because newer states waited. is_reduced: the effort of the steps is reduced.
     other_nodes: nodes of the same name. sources: the lines of the sources file; None: there is no file.
     """
@@ -56,6 +57,8 @@ class Facts:
     outdated: int
     is_reduced: bool
     other_nodes: int
+    longest: float
+    longest_step: int
     sources: tuple[LineReport, ...] | None = None
 
 
@@ -186,6 +189,8 @@ def _steps(facts: Facts, history: History) -> Report:
         "rate [Hz]": status.rate,
         "latency [s]": status.latency,
         "step_duration_p99 [s]": status.step_duration_p99,
+        "longest step [s]": facts.longest,
+        "longest step number": facts.longest_step,
         "deferred": facts.deferred,
         "unresolved": facts.unresolved,
         "outdated": facts.outdated,

@@ -102,6 +102,7 @@ class Monitoring:
         gc.unfreeze()  # what an earlier configuration kept
         _keep_from_collector()
         resources.callback(self._publish_status)  # the last one of the recording
+        resources.callback(lambda: self._logger.info(str(self._times)))
         if self._sources is not None:
             self._sources.begin()
         self._logger.info(
@@ -347,6 +348,8 @@ class Monitoring:
             outdated=self._keeping_up.outdated,
             is_reduced=self._keeping_up.is_reduced,
             other_nodes=self._name_conflict.others,
+            longest=self._times.longest,
+            longest_step=self._times.longest_step,
             sources=None if self._sources is None else tuple(self._sources.lines()),
         )
 

@@ -16,7 +16,8 @@ CLOCK_TOLERANCE = 1e-3
 class StepTimes:
     """Times of the last steps, in ns: the steady clock for durations and rate, ROS time for the latency.
 
-    latency (s): age of the states of the last step when it ended; NaN: not known.
+    latency (s): age of the states of the last step when it ended; NaN: not known. longest (s): duration of the longest
+    step so far; NaN before the first one. longest_step: its number, from 1.
     """
 
     def __init__(self, longest_latency: float) -> None:
@@ -26,11 +27,22 @@ class StepTimes:
         self._steps = 0
         self._ends: deque[int] = deque()
         self.latency = float("nan")
+        self.longest = float("nan")
+        self.longest_step = 0
+
+    def __str__(self) -> str:
+        """Return the number of steps and the longest one for a person."""
+        if not self._steps:
+            return "no step"
+        return f"{self._steps} steps, the longest took {self.longest * 1e3:.1f} ms (step {self.longest_step})"
 
     def add(self, began: int, ended: int, latency: int) -> None:
         """Add one step."""
-        self._durations[self._steps % WINDOW] = (ended - began) * 1e-9
+        duration = (ended - began) * 1e-9
+        self._durations[self._steps % WINDOW] = duration
         self._steps += 1
+        if not duration <= self.longest:
+            self.longest, self.longest_step = duration, self._steps
         self._ends.append(ended)
         self._forget(ended)
         seconds = latency * 1e-9

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 PROGRAM = """
 from collision_monitor._jit import kernel
@@ -52,3 +55,39 @@ def test_only_a_compilation_is_noticed_and_only_the_first(tmp_path: Path) -> Non
         for _ in range(2)
     ]
     assert outputs == ["compiling\n", ""]
+
+
+TALKING = """
+import logging, sys
+logging.basicConfig(stream=sys.stdout, level=logging.INFO, format="%(name)s")
+from collision_monitor import _jit
+from collision_monitor._jit.compilation import on_first_compilation
+
+def double(x):
+    return 2.0 * x
+
+double.__module__ = "collision_monitor.example"
+double = _jit.kernel(double)
+"""
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        ("double(1.0); double(1)", "collision_monitor"),
+        ("with on_first_compilation(lambda: print('itself')): double(1.0)", "itself"),
+        ("double.py_func(1.0)", ""),
+    ],
+)
+def test_a_terminal_and_the_log_say_once_that_a_kernel_is_compiled(call: str, said: str, tmp_path: Path) -> None:
+    environment = {"PYTHONPATH": ":".join(filter(None, sys.path)), "NUMBA_CACHE_DIR": str(tmp_path)}
+    terminal, its = os.openpty()
+    command = [sys.executable, "-c", f"{TALKING}\n{call}"]
+    done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, stderr=its, text=True)
+    os.write(its, b"end")
+    shown = os.read(terminal, 10_000).decode()
+    os.close(terminal)
+    os.close(its)
+    assert done.returncode == 0, shown
+    assert done.stdout.strip() == said
+    assert shown.count("warm_up` compiles all") == (said == "collision_monitor")

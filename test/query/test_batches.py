@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -99,3 +102,79 @@ def test_no_pairs_are_no_error() -> None:
 def test_other_arguments_are_refused(arguments: tuple[object, ...], words: str) -> None:
     with pytest.raises(cm.CollisionMonitorError, match=words):
         cm.contacts(*arguments)  # type: ignore[arg-type]
+
+
+def same(a: cm.Contact, b: cm.Contact) -> bool:
+    names = ("signed_distance", "error_bound", "normal", "point_a", "point_b", "points_a", "model_a")
+    return all(np.array_equal(getattr(a, name), getattr(b, name)) for name in names)
+
+
+def test_a_number_selects_the_contact_of_the_single_call() -> None:
+    a, b = [SHAPES[k % 3] for k in range(COUNT)], [SHAPES[k // 2 % 3] for k in range(COUNT)]
+    poses_a, poses_b = [pose(row) for row in poses()], [pose(row) for row in poses()]
+    found = cm.contacts(a, poses_a, b, poses_b)
+    for k, one in enumerate(found):
+        direct = cm.contact(a[k], poses_a[k], b[k], poses_b[k])
+        assert same(one, direct) and same(found[k - COUNT], direct)
+        assert one.arguments[::2] == (a[k], b[k])
+
+
+def test_a_selected_contact_has_the_numbers_of_the_batch() -> None:
+    a, b = [SHAPES[k % 5] for k in range(COUNT)], [SHAPES[k // 2 % 6] for k in range(COUNT)]
+    found = cm.contacts(a, poses(), b, poses())
+    for k, one in enumerate(found):
+        for name in ("signed_distance", "error_bound", "normal", "point_a", "point_b"):
+            assert np.array_equal(getattr(one, name), getattr(found, name)[k])
+
+
+@pytest.mark.parametrize(
+    "which",
+    [slice(3, 20, 4), slice(None, None, -1), [5, -1, 5], [], np.array([7, 2]), np.arange(COUNT) % 3 == 0],
+    ids=["slice", "reversed", "list", "empty", "numbers", "mask"],
+)
+def test_several_pairs_are_selected_as_from_an_array(which: Any) -> None:
+    twists = RNG.normal(size=(COUNT, 6))
+    for found in (
+        cm.contacts(SHAPES[0], cm.Pose(), SHAPES[1], poses()),
+        cm.times_of_impact(SHAPES[0], cm.Pose((5, 0, 0)), [-1] + [0] * 5, SHAPES[1], poses(), twists),
+    ):
+        numbers = np.arange(COUNT)[which]
+        part = found[which]
+        assert type(part) is type(found) and len(part) == len(numbers)
+        assert [repr(one) for one in part] == [repr(found[k]) for k in numbers]
+        assert [repr(one) for one in part[1:]] == [repr(found[k]) for k in numbers[1:]]
+
+
+def test_a_number_selects_the_impact_of_the_single_call() -> None:
+    moving = poses() + np.r_[2, np.zeros(6)]
+    twists = RNG.normal(size=(COUNT, 6)) - np.r_[3, np.zeros(5)]
+    for shape in (SHAPES[0], SHAPES[1], SHAPES[3]):
+        still = np.zeros((COUNT, 6))
+        here = np.tile([0.0, 0, 0, 0, 0, 0, 1], (COUNT, 1))
+        for found in (
+            cm.times_of_impact(shape, cm.Pose(), still, SHAPES[1], moving, twists, horizon=3.0),
+            cm.time_of_impact_batch(shape, here, still, SHAPES[1], moving, twists, horizon=3.0),
+        ):
+            for k, one in enumerate(found):
+                assert (one.status, one.lower, one.upper) == (found.status[k], found.lower[k], found.upper[k])
+                motion = cm.Motion(pose(moving[k]), twists[k, :3], twists[k, 3:])
+                direct = cm.time_of_impact(shape, cm.Motion(cm.Pose()), SHAPES[1], motion, horizon=3.0)
+                assert (one.status, one.method) == (direct.status, direct.method)
+                assert one.lower == pytest.approx(direct.lower, abs=1e-9)
+                if direct.contact is not None:
+                    assert one.contact is not None
+                    assert one.contact.signed_distance == pytest.approx(direct.contact.signed_distance, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "which", [COUNT, -COUNT - 1, 1.0, "first", True, None, (0, 1), [[0, 1]], [COUNT], [True, False]], ids=repr
+)
+def test_what_selects_no_pair_raises(which: Any) -> None:
+    found = cm.contacts(SHAPES[0], cm.Pose(), SHAPES[1], poses())
+    with pytest.raises(IndexError):
+        found[which]
+
+
+def test_results_of_a_batch_can_be_pickled() -> None:
+    found = cm.contacts(SHAPES[0], cm.Pose(), SHAPES[1], poses())
+    assert same(pickle.loads(pickle.dumps(found))[3], found[3])

@@ -17,7 +17,7 @@ GOOD = {"step": 9, "objects": 3, "latency": 0.002, "rate": 50.0, "step_duration_
 
 def facts(status: dict[str, Any] | None = None, **changes: Any) -> Facts:
     given = {"silence": 0.01, "stale": "", "unseen": "", "deferred": 0, "unresolved": 0, "other_nodes": 0}
-    given |= {"outdated": 0, "is_reduced": False, **changes}
+    given |= {"outdated": 0, "is_reduced": False, "longest": 0.004, "longest_step": 7, **changes}
     return Facts(status=MonitorStatus(**{**GOOD, **(status or {})}), topic="/states", stale_after=0.5, **given)
 
 
@@ -30,6 +30,8 @@ def test_all_is_well() -> None:
     assert [report.task for report in found] == ["state", "inputs", "steps", "recording"]
     assert {report.level for report in found} == {Level.OK}
     assert [report.text for report in found] == ["active", "3 objects, all up to date", "50 steps/s", "not recording"]
+    values = by_task(found)["steps"].values
+    assert (values["longest step [s]"], values["longest step number"]) == ("0.004", "7")
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,15 @@ def test_duration_rate_and_latency_of_a_steady_stream():
     assert summary["rate"] == pytest.approx(100, abs=1)
 
 
+def test_the_longest_step_stays_known():
+    times = StepTimes(10.0)
+    assert str(times) == "no step"
+    for step in range(3000):
+        times.add(step * 10 * MS, step * 10 * MS + (90 if step in (12, 500) else 2) * MS, MS)
+    assert (times.longest, times.longest_step) == (pytest.approx(0.09), 13)
+    assert str(times) == "3000 steps, the longest took 90.0 ms (step 13)"
+
+
 def test_the_rate_goes_to_zero_when_nothing_comes():
     times = StepTimes(10.0)
     times.add(0, MS, MS)
