@@ -25,9 +25,11 @@ from collision_monitor.prediction.bodies import enlarge
 from collision_monitor.prediction.error_samples import Workspace, make_workspace
 from collision_monitor.prediction.impact_distribution import EARLIEST, MOST_LIKELY, PROBABILITY
 from collision_monitor.prediction.impact_record import holds, ids_of_keys, pair_keys, write_pair
-from collision_monitor.prediction.likely_impacts import LEFT, PlaneMemory, likely_impacts, make_plane_memory
+from collision_monitor.prediction.likely_impacts import LEFT, likely_impacts
+from collision_monitor.prediction.near_pairs import Nearness, find_near
 from collision_monitor.prediction.normal_samples import normal_samples, sample_columns
 from collision_monitor.prediction.pair_impacts import cover_of
+from collision_monitor.prediction.plane_memory import PlaneMemory, make_plane_memory
 from collision_monitor.prediction.spread import Spread, is_uncertain, make_spread, take_spread
 from collision_monitor.prediction.uncertainty import Sampling, find_costly, impact_probabilities
 from collision_monitor.records import PREDICTION, Method, PredictionStatus
@@ -201,11 +203,18 @@ class UncertainPredictions(Stage):
         predictions["status"][~done] = PredictionStatus.UNRESOLVED
         self.add_pairs(step, np.empty((0, 2), np.int32))
         known = pair_keys(predictions["id_a"], predictions["id_b"])
-        entries = _without(self.entries, np.concatenate([known, touching]))
+        entries = _without(self._near(step), np.concatenate([known, touching]))
         possible = self._judge_passing(step, entries, pool, budget)
         if budget is not None:
             budget.stop()
         return _sorted(np.concatenate([predictions, possible]) if len(possible) else predictions)
+
+    def _near(self, step: StepContext) -> Records:
+        """Return the entries of the pairs that could meet within the horizon."""
+        p, found = step.profile, np.empty(len(self.entries), np.int64)
+        nearness = Nearness(sigmas_for(p.min_probability), step.settings.impact.margin, p.horizon, p.stale_acceleration)
+        count = find_near(step.roster.bodies, self.spread, self.entries, step.now, nearness, found)
+        return self.entries[found[:count]]
 
     def _judge_passing(self, step: StepContext, entries: Records, pool: Pool, budget: PairBudget | None) -> Records:
         """Return predictions of the pairs (ENTRY) that are stated to pass, and meet with enough probability."""

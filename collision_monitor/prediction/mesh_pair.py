@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.geometry.shape_table import HALF_SPACE, MESH, POINTS, TREE
 from collision_monitor.meshes.contact import FARTHER, OPEN, tree_contact
 from collision_monitor.meshes.feature import triangle_feature
@@ -99,7 +99,7 @@ def enclosure(table, a, b, pose, scratch):
     return locate(table.blocks, root, (X.x, X.y, X.z), scratch.tree)  # the solid's origin is inside it
 
 
-@device
+@outlined
 def mesh_within(table, a, b, pose, limit, out, scratch):
     """Whether the distance of two shapes with trees, or of one and a solid, is at most `limit` (m); writes the contact.
 

@@ -90,10 +90,12 @@ class SampleColumns(NamedTuple):
 
     points: NDArray[np.float64]  # (DIMENSIONS, n)
     weights: NDArray[np.float64]  # (n,)
+    sums: NDArray[np.float64]
+    """(2, n): sum of the weights up to each sample, and of their squares."""
     pilot: int
     """Number of samples of the coarser lattice."""
     extremes: NDArray[np.int64]
-    """The samples of the coarser lattice that are farthest in some directions of position and velocity."""
+    """The samples of the coarser lattice that are farthest in some directions of position and velocity: axes first."""
 
 
 @lru_cache(maxsize=8)
@@ -106,15 +108,15 @@ def sample_columns(count: int) -> SampleColumns:
     order = np.lexsort((place // stride * _GOLDEN_RATIO % 1.0, coset[place % stride]))
     pilot = -(-count // stride)
     ordered = np.ascontiguousarray(points[order].T)
-    columns = SampleColumns(ordered, weights[order], pilot, _extremes(ordered[:6, :pilot]))
+    sums = np.cumsum([weights[order], weights[order] ** 2], axis=1)
+    columns = SampleColumns(ordered, weights[order], sums, pilot, _extremes(ordered[:6, :pilot]))
     columns.points.flags.writeable = columns.weights.flags.writeable = False
     return columns
 
 
 def _extremes(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Indices of the points (6, n) that are farthest along both ways of each axis, and of diagonals with the first."""
+    """Indices of the points (6, n) that are farthest along both ways of each axis, then of diagonals with the first."""
     axes = np.eye(6)
-    ways = np.concatenate([axes, axes[0] + axes[1:], axes[0] - axes[1:]])
-    reach = np.concatenate([ways, -ways]) @ points
-    found: NDArray[np.int64] = np.unique(reach.argmax(axis=1)).astype(np.int64)
-    return found
+    diagonals = np.concatenate([axes[0] + axes[1:], axes[0] - axes[1:]])
+    reach = np.concatenate([axes, -axes, diagonals, -diagonals]) @ points
+    return np.array(list(dict.fromkeys(reach.argmax(axis=1).tolist())), np.int64)

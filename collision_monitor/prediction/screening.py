@@ -51,7 +51,7 @@ def _tail(beta):
     return TAIL[min(int(beta * _FINENESS), TAIL.size - 1)]
 
 
-@device
+@inlined
 def meeting(table, parts, pair, horizon, margin, tube, work):
     """Interval (s) in which the bounding spheres of a pair of shapes meet within the tube; (inf, -inf): never."""
     A, B, a, b = pair
@@ -115,7 +115,24 @@ def _towards(A, B, t):
     return (x / length, y / length, z / length) if length > 0.0 else (1.0, 0.0, 0.0)
 
 
-@device
+@inlined
+def _set_window(table, parts, pair, window, bend, work, obstacle):
+    """Place the shapes of a pair at both ends of a window. Return how far a gap may bend between them (m)."""
+    length = window.end - window.begin
+    set_nodes(table, parts, pair, window, length, NO_TURNS, False, work.scratch, obstacle)
+    return 0.125 * bend * length * length
+
+
+@inlined
+def _bound(table, pair, n, times, turning, margin, obstacle, work):
+    """`_least_beta` along n (3,) in the window that is set. times: see work.joint, and both ends of the window (s)."""
+    t, begin, end = times
+    first = stated_gap(table, pair, n, obstacle.node[0], margin)
+    last = stated_gap(table, pair, n, obstacle.node[1], margin) if begin < end else first
+    return _least_beta((first, last), n, turning, work.joint, t, Window(begin, end))
+
+
+@inlined
 def design_point(multibody, i, j, tube, turning, bend, sampling, t, obstacle, work):
     """Return (bound, time): a bound on the probability of contact, and the time at which contact is likeliest.
 
@@ -133,40 +150,41 @@ def design_point(multibody, i, j, tube, turning, bend, sampling, t, obstacle, wo
     b = first_b
     while a >= 0:
         pair = ShapePair(A, B, a, b)
-        window = Window(*meeting(table, parts, pair, sampling.horizon, margin, wide, work))
-        begin, status = window.begin, HIT
-        if bend > 0.0 and begin < window.end:
-            tolerance = max(sampling.query.tolerance, ROUGHLY * tube.start)
-            roughly = ImpactQuery(margin, tolerance, sampling.query.iterations)
-            there = Tube(wide.start + wide.growth * begin, wide.growth)
-            status, begin, _, _ = shape_impact(table, parts, pair, window, there, roughly, scratch)
-        window = Window(begin, window.end)
-        if window.begin <= window.end and status != CLEAR:
-            length = window.end - window.begin
-            set_nodes(table, parts, pair, window, length, NO_TURNS, False, scratch, obstacle)
-            bent = 0.125 * bend * length * length
-            at, own = min(max(t, window.begin), window.end), 1.0
-            n = _towards(A, B, at)
-            for step in range(0 if A.radius + B.radius < inf else 1, DESIGN_STEPS + 1):
-                if step > 0:
+        begin, end = meeting(table, parts, pair, sampling.horizon, margin, wide, work)
+        own = 0.0
+        if begin <= end:
+            own = 1.0
+            if A.radius + B.radius < inf:
+                bent = _set_window(table, parts, pair, Window(begin, end), bend, work, obstacle)
+                n = _towards(A, B, min(max(t, begin), end))
+                own = _bound(table, pair, n, (t, begin, end), turning, margin + bent, obstacle, work)[2]
+        if own >= ENOUGH * sampling.min_probability:
+            status = HIT
+            if bend > 0.0 and begin < end:
+                tolerance = max(sampling.query.tolerance, ROUGHLY * tube.start)
+                roughly = ImpactQuery(margin, tolerance, sampling.query.iterations)
+                there = Tube(wide.start + wide.growth * begin, wide.growth)
+                status, begin, _, _ = shape_impact(table, parts, pair, Window(begin, end), there, roughly, scratch)
+            if status == CLEAR or not begin <= end:
+                own = 0.0
+            else:
+                bent = _set_window(table, parts, pair, Window(begin, end), bend, work, obstacle)
+                at = min(max(t, begin), end)
+                for _ in range(DESIGN_STEPS):
                     if separation_at(table, parts, pair, at, NOT_OFF, (NOT_OFF, NOT_OFF), obstacle, scratch) <= margin:
                         own = 1.0
                         break
                     n = (scratch.out[0], scratch.out[1], scratch.out[2])
-                first = stated_gap(table, pair, n, obstacle.node[0], margin + bent)
-                last = stated_gap(table, pair, n, obstacle.node[1], margin + bent) if length > 0.0 else first
-                beta, when, outside = _least_beta((first, last), n, turning, work.joint, t, window)
-                own = min(own, outside)
-                if step == 0:
-                    if own < ENOUGH * sampling.min_probability:
+                    beta, when, outside = _bound(
+                        table, pair, n, (t, begin, end), turning, margin + bent, obstacle, work
+                    )
+                    own = min(own, outside)
+                    if beta < least:
+                        least, likeliest = beta, when
+                        frame[0, 0], frame[0, 1], frame[0, 2] = n
+                    if abs(when - at) <= SAME_TIME * (end - begin):
                         break
-                    continue
-                if beta < least:
-                    least, likeliest = beta, when
-                    frame[0, 0], frame[0, 1], frame[0, 2] = n
-                if abs(when - at) <= SAME_TIME * length:
-                    break
-                at = when
-            bound += own
+                    at = when
+        bound += own
         a, b = next_pair(parts, first_b, a, b)
     return bound, likeliest

@@ -16,8 +16,8 @@ ERRORS: Final = 6
 
 
 @device
-def set_errors(root, frame, t, points, off):
-    """Write the errors of the samples into off (ERRORS, S).
+def set_errors(root, frame, t, points, first, last, off):
+    """Write the errors of the samples first:last into off (ERRORS, S).
 
     root (6, 6): lower Cholesky factor of the covariance of position at time t and velocity along the rows of frame
     (3, 3); points (DIMENSIONS, S): standard normal coordinates.
@@ -38,57 +38,64 @@ def set_errors(root, frame, t, points, off):
             f3 += z * (root[row + 2, 3] - back * root[5, 3])
             f4 += z * (root[row + 2, 4] - back * root[5, 4])
             f5 += z * (root[row + 2, 5] - back * root[5, 5])
-            target = off[3 * part + c]
-            z0, z1, z2, z3, z4, z5 = points[0], points[1], points[2], points[3], points[4], points[5]
+            target = off[3 * part + c, first:last]
+            z0, z1, z2 = points[0, first:last], points[1, first:last], points[2, first:last]
+            z3, z4, z5 = points[3, first:last], points[4, first:last], points[5, first:last]
             for n in range(target.size):
                 target[n] = f0 * z0[n] + f1 * z1[n] + f2 * z2[n] + f3 * z3[n] + f4 * z4[n] + f5 * z5[n]
 
 
 @device
-def enter_sphere(p, v, reach, end, off, times):
-    """Lower the times (S,) of the samples to where they come within `reach` (m) of the origin, until `end`.
+def enter_sphere(p, v, reach, end, off, first, last, times):
+    """Write the times (S,) at which the samples first:last come within `reach` (m) of the origin, until `end`.
 
-    p, v (3,): stated position and velocity of B relative to A.
+    p, v (3,): stated position and velocity of B relative to A. A time is infinite if there is none.
     """
     px, py, pz = p
     vx, vy, vz = v
+    x_off, y_off, z_off = off[0, first:last], off[1, first:last], off[2, first:last]
+    u_off, w_off, q_off = off[3, first:last], off[4, first:last], off[5, first:last]
+    times = times[first:last]
     for n in range(times.size):
-        x, y, z = px + off[0, n], py + off[1, n], pz + off[2, n]
-        u, w, q = vx + off[3, n], vy + off[4, n], vz + off[5, n]
+        x, y, z = px + x_off[n], py + y_off[n], pz + z_off[n]
+        u, w, q = vx + u_off[n], vy + w_off[n], vz + q_off[n]
         c = x * x + y * y + z * z - reach * reach
         b = x * u + y * w + z * q
         d = b * b - (u * u + w * w + q * q) * c
         at = c / (sqrt(d if d > 0.0 else 0.0) - b)
         meets = d >= 0.0 and b < 0.0 and at <= end
-        at = 0.0 if c <= 0.0 else (at if meets else inf)
-        times[n] = at if at < times[n] else times[n]
+        times[n] = 0.0 if c <= 0.0 else (at if meets else inf)
 
 
 @device
-def enter_cylinder(p, v, axis, radius, half, end, off, times):
-    """Lower the times (S,) of the samples to where they enter a cylinder about the origin, until `end`.
+def enter_cylinder(p, v, axis, radius, half, end, off, first, last, times):
+    """Write the times (S,) at which the samples first:last enter a cylinder about the origin, until `end`.
 
     p, v (3,): stated position and velocity of B relative to A. axis (3,): unit vector; radius, half the height (m).
+    A time is infinite if there is none.
     """
     px, py, pz = p
     vx, vy, vz = v
     ax, ay, az = axis
+    x_off, y_off, z_off = off[0, first:last], off[1, first:last], off[2, first:last]
+    u_off, w_off, q_off = off[3, first:last], off[4, first:last], off[5, first:last]
+    times = times[first:last]
     for n in range(times.size):
-        x, y, z = px + off[0, n], py + off[1, n], pz + off[2, n]
-        u, w, q = vx + off[3, n], vy + off[4, n], vz + off[5, n]
+        x, y, z = px + x_off[n], py + y_off[n], pz + z_off[n]
+        u, w, q = vx + u_off[n], vy + w_off[n], vz + q_off[n]
         h, s = x * ax + y * ay + z * az, u * ax + w * ay + q * az + 0.0  # -0.0 becomes 0.0
         a = u * u + w * w + q * q - s * s
         b = x * u + y * w + z * q - h * s
         c = x * x + y * y + z * z - h * h - radius * radius
         d = b * b - a * c
         root = sqrt(d if d > 0.0 else 0.0)
-        # inside of the disc from first to last, between the planes from low to high
-        first = 0.0 if c <= 0.0 else (c / (root - b) if d >= 0.0 and b < 0.0 else inf)
-        last = (root - b) / a if a > 0.0 else inf
+        # inside of the disc from enter to leave, between the planes from low to high
+        enter = 0.0 if c <= 0.0 else (c / (root - b) if d >= 0.0 and b < 0.0 else inf)
+        leave = (root - b) / a if a > 0.0 else inf
         below, above = (-half - h) / s, (half - h) / s
         low, high = (below, above) if s > 0.0 else (above, below)
         low, high = (low, high) if s != 0.0 else (-inf, (inf if abs(h) <= half else -inf))
-        at = low if low > first else first
-        leave = high if high < last else last
+        at = low if low > enter else enter
+        leave = high if high < leave else leave
         leave = end if end < leave else leave
-        times[n] = at if at <= leave and at < times[n] else times[n]
+        times[n] = at if at <= leave else inf

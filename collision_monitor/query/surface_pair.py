@@ -9,21 +9,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.bounded_cache import bounded_cache
-from collision_monitor.geometry.forest import Forest
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shape_table import ShapeTable, ShapeTableBuilder
-from collision_monitor.geometry.shapes import Mesh, Points, Shape
-from collision_monitor.meshes.shape_trees import shape_tree
+from collision_monitor.geometry.shapes import Points, Shape
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE
 from collision_monitor.prediction.body_impact import make_scratch
 from collision_monitor.prediction.mesh_contact import mesh_contacts
+from collision_monitor.query.pair_table import pair_table
 
 Array = NDArray[np.float64]
-
-REMEMBERED: Final = 64 << 20
-"""Bytes of the tables of pairs that are remembered. Less: each query copies the tree, 1 ms for 20,000 points."""
-
 
 _HERE: Final = np.zeros((1, 3))
 
@@ -44,7 +37,8 @@ def surface_contact(a: Shape, X_A: tuple[Array, Array], b: Shape, X_B: tuple[Arr
     X_A, X_B: rotation (3, 3) and position (3,) of each (m).
     """
     row, R = np.empty(CONTACT_SIZE), np.stack([X_A[0], X_B[0]])
-    mesh_contacts(_table(a, b), _HERE, R, X_B[1] - X_A[1], np.inf, np.empty(1, np.bool_), row, _MEMORY.scratch)
+    near, p = np.empty(1, np.bool_), X_B[1] - X_A[1]
+    mesh_contacts(pair_table(a, b, False), _HERE, R, p, np.inf, near, row, _MEMORY.scratch)
     return row
 
 
@@ -54,7 +48,7 @@ def points_near(points: Array, radius: float, pose: Pose, shape: Shape, at: Pose
     R = np.stack([np.eye(3), pose.rotation.T @ at.rotation])
     p = pose.rotation.T @ (at.position - pose.position)
     row = np.empty(CONTACT_SIZE)
-    mesh_contacts(_table(_at_origin(radius), shape), points, R, p, limit, near, row, _MEMORY.scratch)
+    mesh_contacts(pair_table(_at_origin(radius), shape, False), points, R, p, limit, near, row, _MEMORY.scratch)
     return near
 
 
@@ -62,16 +56,3 @@ def points_near(points: Array, radius: float, pose: Pose, shape: Shape, at: Pose
 def _at_origin(radius: float) -> Points:
     """A cloud of one point."""
     return Points(np.zeros((1, 3)), radius)
-
-
-def _bytes(table: ShapeTable, a: Shape, b: Shape) -> int:
-    return int(table.blocks.nbytes)
-
-
-@bounded_cache(REMEMBERED, _bytes)
-def _table(a: Shape, b: Shape) -> ShapeTable:
-    trees = [shape_tree(shape) if isinstance(shape, Mesh | Points) else None for shape in (a, b)]
-    builder = ShapeTableBuilder(slots=2, forest=Forest(sum(len(tree) for tree in trees if tree is not None)))
-    for shape, tree in zip((a, b), trees, strict=True):
-        builder.append(shape, tree=tree)
-    return builder.table

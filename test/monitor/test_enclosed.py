@@ -54,3 +54,15 @@ def test_a_body_inside_of_a_solid_is_a_contact(name: str, swap: bool) -> None:
 @pytest.mark.parametrize("name", SMALL)
 def test_a_body_in_the_hole_of_a_ring_is_apart(name: str) -> None:
     assert len(_step(SMALL[name], 0.0, False).contacts) == 0
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_a_body_that_jumps_into_a_wall_and_out(name: str) -> None:
+    monitor = cm.Monitor()
+    monitor.add(1, RING, static=True, pose=cm.Pose())
+    monitor.add(2, SMALL[name])
+    found = []
+    for step, x in enumerate((0.0, 3.0, 3.0, 0.0)):
+        result = monitor.step(step * 100_000_000, [2], [[x, 0, 0, 0, 0, 0, 1]])
+        found.append((len(result.contacts), len(result.ended)))
+    assert found == [(0, 0), (1, 0), (1, 0), (0, 1)]

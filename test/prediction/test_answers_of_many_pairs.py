@@ -7,8 +7,9 @@ import numpy as np
 import collision_monitor as cm
 from collision_monitor.monitor.uncertain_predictions import sigmas_for
 from collision_monitor.prediction.error_samples import make_workspace
-from collision_monitor.prediction.likely_impacts import likely_impacts, make_plane_memory
+from collision_monitor.prediction.likely_impacts import likely_impacts
 from collision_monitor.prediction.normal_samples import normal_samples, sample_columns
+from collision_monitor.prediction.plane_memory import make_plane_memory
 from collision_monitor.prediction.uncertainty import Sampling
 from collision_monitor.settings.profile import Profile
 from collision_monitor.world import make_scene

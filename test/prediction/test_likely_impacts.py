@@ -12,9 +12,9 @@ import collision_monitor as cm
 from collision_monitor.monitor import uncertain_predictions
 from collision_monitor.monitor.uncertain_predictions import sigmas_for
 from collision_monitor.prediction.error_samples import make_workspace
-from collision_monitor.prediction.likely_impacts import LEFT, likely_impacts, make_plane_memory
+from collision_monitor.prediction.likely_impacts import LEFT, likely_impacts
 from collision_monitor.prediction.normal_samples import normal_samples, sample_columns
-from collision_monitor.prediction.time_order import sort_times
+from collision_monitor.prediction.plane_memory import make_plane_memory
 from collision_monitor.prediction.uncertainty import Sampling, impact_probabilities
 from collision_monitor.records import STATE
 from collision_monitor.settings.profile import Profile
@@ -173,21 +173,6 @@ def test_absurd_errors_have_bounded_answers(stddev: float) -> None:
     told = monitor.step(0, rows).predictions
     assert not np.isnan(told["probability"]).any()
     assert ((told["probability"] >= 0.0) & (told["probability"] <= 1.0)).all()
-
-
-def test_the_order_of_times_is_that_of_a_stable_sort() -> None:
-    rng = np.random.default_rng(0)
-    for times in (
-        rng.normal(1, 0.1, 500).clip(0),
-        np.where(rng.random(300) < 0.5, inf, rng.random(300)),
-        np.zeros(20),
-        np.full(20, inf),
-        np.repeat([3.0, 1e-300, 2.0], 7),
-    ):
-        order, bucket, ends = np.zeros(len(times), int), np.zeros(len(times), int), np.zeros(len(times) + 1, int)
-        finite = sort_times(times, order, bucket, ends)
-        assert finite == np.isfinite(times).sum()
-        np.testing.assert_array_equal(order, np.argsort(times, kind="stable"))
 
 
 def test_the_columns_are_the_same_samples() -> None:

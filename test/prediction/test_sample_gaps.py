@@ -12,10 +12,10 @@ import collision_monitor as cm
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.prediction.body_impact import ShapePair, Window
 from collision_monitor.prediction.error_samples import make_workspace
-from collision_monitor.prediction.likely_impacts import make_plane_memory
 from collision_monitor.prediction.motion import carry_on
 from collision_monitor.prediction.normal_samples import sample_columns
 from collision_monitor.prediction.obstacle_planes import MODE, set_nodes
+from collision_monitor.prediction.plane_memory import make_plane_memory
 from collision_monitor.prediction.sample_gaps import FIRST_ORDER, NOT_TURNED, SERIES, enter_planes, set_samples
 
 Vector = NDArray[np.float64]

@@ -1,0 +1,216 @@
+"""Impacts of the samples of two bodies, from the planes that bound the obstacle of each pair of their shapes."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.shape_table import HALF_SPACE
+from collision_monitor.prediction.bodies import next_pair
+from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
+from collision_monitor.prediction.cutting_planes import (
+    CutSettings,
+    begin_segment,
+    carry_planes,
+    cut_extremes,
+    cut_planes,
+    end_segment,
+)
+from collision_monitor.prediction.impact_record import CLEAR
+from collision_monitor.prediction.obstacle_planes import set_nodes
+from collision_monitor.prediction.pair_errors import TURNED, spin_rate, straight_length, turned_at, turning_order
+from collision_monitor.prediction.sample_count import SURE_SAMPLES, samples_needed
+from collision_monitor.prediction.screening import FURTHEST, meeting
+from collision_monitor.prediction.straight_samples import set_errors
+from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE
+
+FACETS: Final = 0.015
+"""Distance between the planes and the obstacle, in standard deviations of the gap, up to which no plane is added."""
+
+FACETS_IN_PILOT: Final = 0.06
+"""The same for the pilot lattice, which decides how many samples a pair needs, and if only the times matter."""
+
+MOST_PARTS: Final = 2
+SMALL: Final = 0.05
+"""If bodies that turn divide the time into more than MOST_PARTS, and errors exceed SMALL rad, or twice SMALL radii of a
+shape, the pair is left to the exact method unless it surely meets: it needs so many planes that it is no faster."""
+
+SPINS: Final = 4.0
+"""Standard deviations of the angular velocity above which a body counts as one that turns."""
+
+VERIFIED_IN_PILOT: Final = 6
+VERIFIED: Final = 48
+"""Samples of the pilot lattice, and of all, that must need no new plane of a segment."""
+
+SURE_EXTREMES: Final = 6
+"""Number of the extreme samples at which the planes of bodies that surely meet are checked: one for each axis of
+position and velocity."""
+
+TOO_FAST: Final = -1
+"""Number of samples of bodies that turn too fast for planes."""
+
+
+class Search(NamedTuple):
+    """Samples for which planes are sought."""
+
+    points: Any  # (DIMENSIONS, S): see normal_samples.SampleColumns
+    samples: int  # the first ones of these
+    extremes: Any  # indices of those that come first
+    verified: int  # number of others that must need no new plane of a segment
+    fineness: float  # standard deviations of the gap by which errors of orientation may move a surface unnoticed
+    until: float  # s
+
+
+class Laid(NamedTuple):
+    """The planes of a pair of shapes."""
+
+    segments: int
+    settings: CutSettings
+    complete: bool  # whether the segments reach the end
+
+
+@device
+def _lay_planes(table, parts, pair, errors, search, sampling, memory, work):
+    """Bound the obstacle of a pair of shapes (ShapePair) by planes where the samples of the search need them.
+
+    Writes the times of these samples into memory.alone, infinite for those that do not meet.
+    """
+    A, B, a, b = pair
+    scratch, alone, sigma, samples = work.scratch, memory.alone, errors.sigma, search.samples
+    margin = sampling.query.margin
+    tolerance = max(FACETS_IN_PILOT * sigma, sampling.query.tolerance)
+    fine = max(search.fineness * sigma, sampling.query.tolerance)
+    turning = (turning_order(errors, 0, fine), turning_order(errors, 1, fine))
+    flat = table.kind[a] == HALF_SPACE or table.kind[b] == HALF_SPACE
+    follows = (
+        not flat and errors.radius[0] > 0.0 and turning[0] + spin_rate(A) > 0.0,
+        not flat and errors.radius[1] > 0.0 and turning[1] + spin_rate(B) > 0.0,
+    )
+    settings = CutSettings(margin, tolerance, samples, follows, turning)
+    for n in range(samples):
+        alone[n] = inf
+    wide = Tube(FURTHEST * errors.tube.start, FURTHEST * errors.tube.growth)
+    begin, end = meeting(table, parts, pair, sampling.horizon, margin, wide, work)
+    end = min(end, search.until)
+    if not begin < end:
+        return Laid(0, settings, True)
+    length = straight_length(A, B, errors)
+    if length < end - begin:
+        coarse = max(sampling.query.tolerance, SAMPLE_TOLERANCE * sigma)
+        roughly = ImpactQuery(margin, coarse, sampling.query.iterations)
+        there = Tube(wide.start + wide.growth * begin, wide.growth)
+        status, begin, _, _ = shape_impact(table, parts, pair, Window(begin, end), there, roughly, scratch)
+        if status == CLEAR or not begin < end:
+            return Laid(0, settings, True)
+    length = (end - begin) / (1.0 + np.floor((end - begin) / length))
+    window = Window(begin, end)
+    segments = set_nodes(table, parts, pair, window, length, errors.turning, sampling.planar, scratch, memory.obstacle)
+    turned = max(turned_at(errors, 0), turned_at(errors, 1))
+    large = TURNED * turned > SMALL or sigma > 2.0 * SMALL * min(table.radius[a], table.radius[b])
+    spins = spin_rate(A) + spin_rate(B) > SPINS * (errors.turning[0][1] + errors.turning[1][1])
+    is_rough = segments > MOST_PARTS and large and spins
+    if is_rough and not sampling.stated:
+        return Laid(segments, settings, False)
+    left = samples
+    for k in range(segments):
+        begin_segment(table, pair, k, settings, memory, search.points, 0, samples)
+        cut_extremes(table, parts, pair, k, search.extremes, settings, memory, scratch)
+        cut_planes(table, parts, pair, k, samples, search.verified, settings, memory, scratch)
+        left = end_segment(memory.entry, memory.leave, alone, 0, samples)
+        if left == 0:
+            break
+        if k + 1 < segments:
+            carry_planes(table, pair, k, settings, memory)
+    return Laid(segments, settings, left == 0 or (memory.obstacle.node[segments].time >= end and not is_rough))
+
+
+@device
+def _enter_pair(table, parts, pair, laid, points, samples, tolerance, memory, work):
+    """Lower memory.times to the impacts of the first `samples` with the planes that are laid, and some more.
+
+    tolerance (m): see CutSettings.
+    """
+    segments, pilots, _ = laid
+    settings = CutSettings(pilots.margin, tolerance, pilots.pilot, pilots.follows, pilots.turning)
+    alone, times = memory.alone, memory.times
+    for n in range(samples):
+        alone[n] = inf
+    each = max(VERIFIED_IN_PILOT, VERIFIED // max(segments - 3, 1))
+    for k in range(segments):
+        begin_segment(table, pair, k, settings, memory, points, 0, samples)
+        cut_planes(table, parts, pair, k, samples, each, settings, memory, work.scratch)
+        if end_segment(memory.entry, memory.leave, alone, 0, samples) == 0:
+            break
+    _lower(times, alone, samples)
+
+
+@device
+def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
+    """Write the times of the samples' impacts of bodies i and j into memory.times.
+
+    work.joint: root of the covariance of the pair. Returns the number of samples, see `samples_needed`, or TOO_FAST.
+    """
+    table, parts, bodies = multibody
+    A, B = work.motion[0], work.motion[1]
+    times, pilot, end, points = memory.times, lattice.pilot, sampling.horizon, lattice.points
+    first_a, first_b = bodies.first_shape[i], bodies.first_shape[j]
+    single = parts.next[first_a] < 0 and parts.next[first_b] < 0
+    set_errors(work.joint, work.frame, errors.time, points, 0, pilot, memory.off)
+    for n in range(times.size):
+        times[n] = inf
+    search = Search(points, pilot, lattice.extremes, VERIFIED_IN_PILOT, FACETS, end)
+    a, b = first_a, first_b
+    laid = _lay_planes(table, parts, ShapePair(A, B, a, b), errors, search, sampling, memory, work)
+    while True:
+        _lower(times, memory.alone, pilot)
+        if not laid.complete:
+            return TOO_FAST
+        a, b = next_pair(parts, first_b, a, b)
+        if a < 0:
+            break
+        laid = _lay_planes(table, parts, ShapePair(A, B, a, b), errors, search, sampling, memory, work)
+    samples = samples_needed(times, lattice, sampling)
+    if samples == 0:
+        return 0
+    set_errors(work.joint, work.frame, errors.time, points, pilot, samples, memory.off)
+    for n in range(times.size):
+        times[n] = inf
+    tolerance = max(FACETS * errors.sigma, sampling.query.tolerance)
+    a, b = first_a, first_b
+    while a >= 0:
+        pair = ShapePair(A, B, a, b)
+        if not single:
+            laid = _lay_planes(table, parts, pair, errors, search, sampling, memory, work)
+        _enter_pair(table, parts, pair, laid, points, samples, tolerance, memory, work)
+        a, b = next_pair(parts, first_b, a, b)
+    return samples
+
+
+@device
+def enter_surely(multibody, i, j, errors, sampling, lattice, memory, work):
+    """`enter_bodies` for bodies that surely meet until errors.time: only the times of their impacts are sought."""
+    table, parts, bodies = multibody
+    times, points, samples = memory.times, lattice.points, min(SURE_SAMPLES, lattice.weights.size)
+    set_errors(work.joint, work.frame, errors.time, points, 0, samples, memory.off)
+    for n in range(samples):
+        times[n] = inf
+    search = Search(points, samples, lattice.extremes[0:SURE_EXTREMES], 0, FACETS_IN_PILOT, errors.time)
+    a, first_b = bodies.first_shape[i], bodies.first_shape[j]
+    b = first_b
+    while a >= 0:
+        pair = ShapePair(work.motion[0], work.motion[1], a, b)
+        if not _lay_planes(table, parts, pair, errors, search, sampling, memory, work).complete:
+            return TOO_FAST
+        _lower(times, memory.alone, samples)
+        a, b = next_pair(parts, first_b, a, b)
+    return samples
+
+
+@inlined
+def _lower(times, others, count):
+    """Lower the first `count` times to the others."""
+    for n in range(count):
+        times[n] = min(times[n], others[n])

@@ -1,0 +1,48 @@
+"""Scratch memory of one thread for the samples of a pair and the planes that bound its obstacle."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.prediction.impact_histogram import BINS
+from collision_monitor.prediction.obstacle_planes import Obstacle, make_obstacle
+from collision_monitor.prediction.sample_gaps import SampleRows, make_sample_rows
+from collision_monitor.prediction.straight_samples import ERRORS
+
+
+class PlaneMemory(NamedTuple):
+    """Scratch memory of one thread for S samples."""
+
+    obstacle: Obstacle
+    rows: SampleRows
+    off: Any  # (ERRORS, S)
+    times: Any  # (S,): s
+    alone: Any  # (S,): those of one pair of shapes
+    entry: Any  # (S,)
+    leave: Any  # (S,)
+    checked: Any  # (S,)
+    trial: Any  # (2, S)
+    bins: Any  # (BINS,)
+
+
+def make_plane_memory(samples: int) -> PlaneMemory:
+    """Make the scratch memory of one thread."""
+
+    def numbers() -> NDArray[np.float64]:
+        return np.zeros(samples)
+
+    return PlaneMemory(
+        obstacle=make_obstacle(),
+        rows=make_sample_rows(samples),
+        off=np.zeros((ERRORS, samples)),
+        times=numbers(),
+        alone=numbers(),
+        entry=numbers(),
+        leave=numbers(),
+        checked=numbers(),
+        trial=np.zeros((2, samples)),
+        bins=np.zeros(BINS),
+    )

@@ -1,0 +1,33 @@
+"""Number of samples that a pair needs, from the times of those of the coarse lattice, the pilot."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Final
+
+from collision_monitor._jit import device
+
+SURE_SAMPLES: Final = 256
+"""Number of samples of a pair that surely meets, or meets in all of the pilot: they differ only in their times. With
+fewer, the earliest time would have to be that of grown bodies."""
+
+PILOT_PART: Final = 0.3
+"""A pair of shapes that is stated to pass is left out if it meets in the pilot with less than this fraction of
+min_probability."""
+
+
+@device
+def samples_needed(times, lattice, sampling):
+    """Number of samples for bodies with these times (S,) of the pilot's samples; infinite: they do not meet.
+
+    0: the bodies are stated to pass, and hardly meet in the pilot. SURE_SAMPLES: they meet in all of it.
+    """
+    weights, pilot = lattice.weights, lattice.pilot
+    latest = seen = part = 0.0
+    for n in range(pilot):
+        latest = max(latest, times[n])
+        seen += weights[n] if times[n] < inf else 0.0
+        part += weights[n]
+    if seen < part * PILOT_PART * sampling.min_probability and not sampling.stated:
+        return 0
+    return weights.size if latest == inf else min(SURE_SAMPLES, weights.size)
