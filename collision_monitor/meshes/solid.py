@@ -258,16 +258,16 @@ def box_time(blocks: Any, block: int, k: int, solid: MovingSolid) -> float:
 @device
 def leaf_solid_time(
     blocks: Any, block: int, solid: MovingSolid, tolerance: float, enough: float, memory: SolidMemory
-) -> float:
-    """Time until which the triangles of a block stay apart from the solid.
+) -> tuple[float, int]:
+    """Time until which the triangles of a block stay apart from the solid, and how many were examined exactly.
 
-    It is 0 if one is within the tolerance (m) beyond the wanted gap; else the advance aims at half the tolerance. A
-    triangle is examined exactly only if a time of `enough` is not certain by the sphere about it.
+    The time is 0 if one is within the tolerance (m) beyond the wanted gap; else the advance aims at half the
+    tolerance. A triangle is examined exactly only if a time of `enough` is not certain by the sphere about it.
     """
     table, b, pose, X, move = solid
     row = memory.tree[NEAR_A : NEAR_A + CONTACT_SIZE]
     start = move.start - table.margin[b]  # the contact row includes that margin
-    soon = inf
+    soon, examined = inf, 0
     for k in range(WIDTH):
         if repeats(blocks, block, k):
             continue
@@ -278,15 +278,16 @@ def leaf_solid_time(
         turn = size * sqrt(dot(across, across))
         time = _solid_time(table, b, X, n, bound - size - radius - move.start, c, size, turn, move)
         if time < min(soon, enough) and _triangle_contact(table, b, pose, T, radius, inf, row, memory):
+            examined += 1
             gap = row[DISTANCE] - row[BOUND] - start
             if gap <= tolerance:
-                return 0.0
+                return 0.0, examined
             n = rotate_back(pose.R_A, (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2]))
             across = cross(n, move.w_a)
             turn = size * sqrt(dot(across, across))
             time = max(time, _solid_time(table, b, X, n, gap - 0.5 * tolerance, c, size, turn, move))
         soon = min(soon, time)
-    return soon
+    return soon, examined
 
 
 @inlined
