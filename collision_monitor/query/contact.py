@@ -40,8 +40,11 @@ def _missing(contact: object, name: str) -> AttributeError:
     return AttributeError(f"{type(contact).__name__!r} object has no attribute {name!r}", name=name, obj=contact)
 
 
-def _patch(found: NearestPieces, witness: Array) -> Array:
-    """Corners (k, 3) on A of the patch of all pieces that touch in one plane; a floor of triangles is one face."""
+def _patch(found: NearestPieces, origin: Array, witness: Array) -> Array:
+    """Corners (k, 3) on A of the patch of all pieces that touch in one plane; a floor of triangles is one face.
+
+    origin, witness: A's origin and witness point (m).
+    """
     radius = found.table.radius[found.pair]
     tie = FEATURE_TIE * float(radius[np.isfinite(radius)].sum())
     patches = []
@@ -55,8 +58,7 @@ def _patch(found: NearestPieces, witness: Array) -> Array:
     patch = patches[0] if len(patches) == 1 else outline(np.concatenate(patches), best["normal"], tie)
     if len(patch) == 1:
         return witness[None]
-    # from A's origin to the world
-    return np.asarray(patch + (witness - best["point_a"] - found.position[found.pair[0]]))
+    return np.asarray(patch + origin)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -128,7 +130,7 @@ class Contact:
         found = None if self._find is None else self._find()
         if found is None or found.best[DISTANCE] > 0.0 >= self.signed_distance:  # one is in the other: no surfaces meet
             return self.point_a[None]
-        return _patch(found, self.point_a)
+        return _patch(found, self.arguments[1].position, self.point_a)
 
     @cached_property
     def points_b(self) -> Array:
