@@ -68,7 +68,7 @@ def solid_impact(table, parts, pair, window, tube, query, scratch):
         speed = sqrt(dot(move.v, move.v)) + move.growth
         speed += sqrt(move.bend_a) * reach_in(blocks, root) + sqrt(move.bend_b) * own
         if child < 0.0:
-            enough = KEEP * size_of(blocks, i, k) / speed
+            enough = (KEEP * size_of(blocks, i, k) + query.tolerance) / speed  # points have no size
             soon, examined = leaf_solid_time(blocks, block, solid, query.tolerance, enough, memory)
             steps += EXAMINED * examined
             if soon == 0.0:
