@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel, device, inlined, kernel
+from collision_monitor.meshes.box_fit import CONTAINED
 from collision_monitor.meshes.layout import (
     AXES,
     CENTER,
@@ -28,7 +29,6 @@ from collision_monitor.meshes.layout import (
     ROWS,
     WIDTH,
 )
-from collision_monitor.meshes.tree import CONTAINED
 
 Array = NDArray[np.float64]
 

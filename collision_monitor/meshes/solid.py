@@ -231,62 +231,67 @@ def _solid_time(
     return time_until(gap, speed, curvature)
 
 
+class MovingSolid(NamedTuple):
+    """A solid b of a shape table that moves (Approach, in A's axes, `start` with both margins) relative to a tree A.
+
+    pose: of A and b now; X: pose of b in A's frame.
+    """
+
+    table: Any
+    b: Any
+    pose: Any
+    X: Any
+    move: Any
+
+
 @device
-def advance_to_solid(
-    blocks: Any, root: int, table: Any, b: int, pose: PairPose, move: Approach, until: float, tolerance: float,
-    memory: SolidMemory,
-) -> tuple[float, float]:
-    """As `advance_trees`, for a tree A and a solid b; move: in A's axes, its `start` includes both margins."""
-    X = relative(pose.R_A, pose.R_B, pose.p)
-    Y = inverse(X)
-    work, row = memory.tree, memory.tree[NEAR_A : NEAR_A + CONTACT_SIZE]
-    aim = 0.5 * tolerance
+def box_time(blocks: Any, block: int, k: int, solid: MovingSolid) -> float:
+    """Time until which a box of the tree stays apart from the solid."""
+    c = blocks[block, CENTER, k], blocks[block, CENTER + 1, k], blocks[block, CENTER + 2, k]
+    e = half_of(blocks, block, k)
+    bound, n = _distance_along(solid, c)
+    gap, turn = bound - _reach_along(blocks, block, k, n), _reach_along(blocks, block, k, cross(n, solid.move.w_a))
+    X, move = solid.X, solid.move
+    return _solid_time(solid.table, solid.b, X, n, gap - move.start, c, sqrt(dot(e, e)), turn, move)
+
+
+@device
+def leaf_solid_time(
+    blocks: Any, block: int, solid: MovingSolid, tolerance: float, enough: float, memory: SolidMemory
+) -> tuple[float, int]:
+    """Time until which the triangles of a block stay apart from the solid, and how many were examined exactly.
+
+    The time is 0 if one is within the tolerance (m) beyond the wanted gap; else the advance aims at half the
+    tolerance. A triangle is examined exactly only if a time of `enough` is not certain by the sphere about it.
+    """
+    table, b, pose, X, move = solid
+    row = memory.tree[NEAR_A : NEAR_A + CONTACT_SIZE]
     start = move.start - table.margin[b]  # the contact row includes that margin
-    best, least = until, -1.0
-    work[0], work[1] = 0.0, WIDTH * root
-    waiting = 1
-    while waiting > 0:  # terminates: each box is opened once
-        waiting -= 1
-        if not work[2 * waiting] < best:
+    soon, examined = inf, 0
+    for k in range(WIDTH):
+        if repeats(blocks, block, k):
             continue
-        place = int(work[2 * waiting + 1])
-        child = blocks[place // WIDTH, CHILD, place % WIDTH]
-        block, first = root + int(abs(child)), waiting
-        for k in range(WIDTH):
-            if child > 0.0:
-                if blocks[block, CHILD, k] == 0.0:
-                    continue
-                c = blocks[block, CENTER, k], blocks[block, CENTER + 1, k], blocks[block, CENTER + 2, k]
-                e = half_of(blocks, block, k)
-                size = sqrt(dot(e, e))
-            else:
-                if repeats(blocks, block, k):
-                    continue
-                c, size = _middle(triangle_at(blocks, block, k))
-            bound, n, _ = point_distance(table, b, place_point(Y, c))
-            n = opposite(minus(place_point(X, n), (X.x, X.y, X.z)))
-            across = cross(n, move.w_a)
-            if child > 0.0:
-                gap, turn = bound - _reach_along(blocks, block, k, n), _reach_along(blocks, block, k, across)
-            else:
-                turn = size * sqrt(dot(across, across))
-                gap = bound - size - blocks[block, RADIUS, k]
-            time = _solid_time(table, b, X, n, gap - move.start, c, size, turn, move)
-            if not time < best:
-                continue
-            if child > 0.0:
-                _push(work, first, waiting, time, float(WIDTH * block + k))
-                waiting += 1
-                continue
-            T = triangle_at(blocks, block, k)
-            if not _triangle_contact(table, b, pose, T, blocks[block, RADIUS, k], inf, row, memory):
-                continue
+        T, radius = triangle_at(blocks, block, k), blocks[block, RADIUS, k]
+        c, size = _middle(T)
+        bound, n = _distance_along(solid, c)
+        across = cross(n, move.w_a)
+        turn = size * sqrt(dot(across, across))
+        time = _solid_time(table, b, X, n, bound - size - radius - move.start, c, size, turn, move)
+        if time < min(soon, enough) and _triangle_contact(table, b, pose, T, radius, inf, row, memory):
+            examined += 1
             gap = row[DISTANCE] - row[BOUND] - start
             if gap <= tolerance:
-                return 0.0, gap
+                return 0.0, examined
             n = rotate_back(pose.R_A, (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2]))
             across = cross(n, move.w_a)
-            time = _solid_time(table, b, X, n, gap - aim, c, size, size * sqrt(dot(across, across)), move)
-            if time < best:
-                best, least = time, gap
-    return best, least
+            turn = size * sqrt(dot(across, across))
+            time = max(time, _solid_time(table, b, X, n, gap - 0.5 * tolerance, c, size, turn, move))
+        soon = min(soon, time)
+    return soon, examined
+
+
+@inlined
+def _distance_along(solid: MovingSolid, c: Vector) -> tuple[float, Vector]:
+    """Lower bound on the distance (m) of a point of A's frame from the solid, and its direction to the solid."""
+    bound, n, _ = point_distance(solid.table, solid.b, place_point(inverse(solid.X), c))
+    return bound, opposite(minus(place_point(solid.X, n), (solid.X.x, solid.X.y, solid.X.z)))

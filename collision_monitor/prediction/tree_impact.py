@@ -51,7 +51,7 @@ HEAP: Final = 2 * MOST_PAIRS // ENTRY
 
 
 @device
-def _push(heap, count, t, place_a, place_b, pair):
+def push_pair(heap, count, t, place_a, place_b, pair):
     """Add a pair of boxes to the heap, which begins at PAIRS; return its new length."""
     k = count
     while k > 0 and heap[PAIRS + ENTRY * ((k - 1) >> 1)] > t:
@@ -65,7 +65,7 @@ def _push(heap, count, t, place_a, place_b, pair):
 
 
 @device
-def _pop(heap, count):
+def pop_first(heap, count):
     """Remove the pair of boxes with the least time; return the new length."""
     count -= 1
     last = PAIRS + ENTRY * count
@@ -141,16 +141,16 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
     start, most = begin, query.iterations * STEPS
     if spins(pair.A, pair.B, end - begin):
         most //= FEWER_STEPS
-    waiting, steps, later = _push(work, 0, begin, place_a, place_b, -1.0), 0, end
+    waiting, steps, later = push_pair(work, 0, begin, place_a, place_b, -1.0), 0, end
     while True:
         if waiting == 0 or work[PAIRS] >= later:
             if not later < end:
                 return CLEAR, end, 1 + steps // STEPS, 0.0
             place_a, place_b = float(WIDTH * root_a), float(WIDTH * root_b)
-            start, later, waiting = later, end, _push(work, 0, later, place_a, place_b, -1.0)
+            start, later, waiting = later, end, push_pair(work, 0, later, place_a, place_b, -1.0)
         t, place_a, place_b = work[PAIRS], work[PAIRS + 1], work[PAIRS + 2]
         triangles = int(work[PAIRS + 3])
-        waiting = _pop(work, waiting)
+        waiting = pop_first(work, waiting)
         steps += 1
         if steps > most:
             return UNRESOLVED, t, 1 + steps // STEPS, 0.0
@@ -175,7 +175,7 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
             if t + d <= t:  # the time has no finer resolution
                 return UNRESOLVED, t, 1 + steps // STEPS, 0.0
             if t + d < end:
-                waiting = _push(work, waiting, t + d, place_a, place_b, float(triangles))
+                waiting = push_pair(work, waiting, t + d, place_a, place_b, float(triangles))
             continue
         in_b = opens_b(blocks, a, i, child_a, blocks, b, j, child_b)
         if in_b:
@@ -190,14 +190,15 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
                 soon = min(soon, work[BOUNDS + k])
         if soon * speed > KEEP * size:
             if t + soon < end:
-                waiting = _push(work, waiting, t + soon, place_a, place_b, -1.0)
+                waiting = push_pair(work, waiting, t + soon, place_a, place_b, -1.0)
             continue
         for k in range(WIDTH):
             time = t + work[BOUNDS + k]
             if blocks[block, CHILD, k] != 0.0 and time < later:
                 child = float(WIDTH * block + k)
                 if waiting < HEAP:
-                    waiting = _push(work, waiting, time, place_a if in_b else child, child if in_b else place_b, -1.0)
+                    first, second = (place_a, child) if in_b else (child, place_b)
+                    waiting = push_pair(work, waiting, time, first, second, -1.0)
                 else:
                     later = time
                     if not later > start:

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from collision_monitor.geometry.polyhedra import edge_face, locate_in_polyhedron
 from collision_monitor.geometry.shape_table import take, triangle_table
+from collision_monitor.meshes import tree
 from collision_monitor.meshes.extent import extents
 from collision_monitor.meshes.layout import AXES, CENTER, CHILD, FACE, HALF, WIDTH
 from collision_monitor.meshes.nearest import MEMORY, PAIRS, PLACE_A, PLACE_B, answer_row, tree_distance
@@ -185,3 +186,12 @@ def test_a_point_is_inside_a_closed_surface_where_the_exact_test_says_so():
     got = [bool(trees_overlap(tree, np.eye(7)[6:], dot, pose[None], query_memory())) for pose in poses]
     assert got == expected.tolist()
     assert expected.any() and not expected.all()
+
+
+def test_a_tree_does_not_depend_on_the_threads_that_build_it(monkeypatch):
+    corners = np.random.default_rng(5).normal(size=(5000, 3, 3))
+    alone = tree_of(corners)
+    monkeypatch.setattr(tree, "PARALLEL", 100)
+    for cores in (1, 2, 3, 8):
+        monkeypatch.setattr(tree.os, "cpu_count", lambda cores=cores: cores)
+        assert tree_of(corners).tobytes() == alone.tobytes()

@@ -215,3 +215,21 @@ def test_degenerate_clouds_have_a_distance(points):
     cloud = cm.Points(points, 0.5)
     expected = np.linalg.norm(points - (0, 0, 3), axis=1).min() - 1.5
     assert cm.distance(cloud, cm.Pose(), cm.Sphere(1), cm.Pose((0, 0, 3))) == pytest.approx(expected)
+
+
+def test_a_point_meets_solids_within_the_tolerance():
+    """A point has no size that tells how exact to be; the advance ends within the tolerance nevertheless."""
+    rng = np.random.default_rng(7)
+    hits = 0
+    for k in range(20):
+        solid = (cm.Ellipsoid((0.1, 0.2, 0.4)), cm.ConvexHull(0.3 * rng.normal(size=(10, 3))), cm.Cone(0.2, 0.5))[k % 3]
+        p = rng.normal(size=3)
+        p *= 2.0 / np.linalg.norm(p)
+        motions = cm.Motion(cm.Pose(), angular=rng.normal(size=3)), cm.Motion(cm.Pose(p), -p, rng.normal(size=3))
+        found = cm.time_of_impact(cm.Points(np.zeros((1, 3)), 0.0), motions[0], solid, motions[1])
+        if found.status != "clear":
+            hits += 1
+            poses = motions[0].at(found.lower), motions[1].at(found.lower)
+            at = cm.contact(cm.Points(np.zeros((1, 3)), 0.0), poses[0], solid, poses[1])
+            assert found.status == "hit" and abs(at.signed_distance) <= 1.1e-6 + at.error_bound
+    assert hits > 10
