@@ -335,6 +335,7 @@ class Monitor:
             cut=cut,
             refused=refused,
             overtaken=int(is_past.sum()),
+            samples=step.samples,
         )
         return self._answers.finish(result)
 

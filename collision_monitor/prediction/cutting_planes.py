@@ -61,9 +61,9 @@ def _next_sample(entry, leave, checked, samples, briefest, cursor):
 def _cut(table, pair, n, samples, direction, k, settings, memory):
     """Add the plane along the direction that separates sample n. Its normal may turn with a body.
 
-    The gap along a normal is at most that of a straight line between the ends of the segment, and may be much less
-    where another corner comes nearest. So the normal has to shorten the time of sample n inside, and of these the best
-    is the one behind which TRIED samples spend the least time. Returns whether there is one.
+    The gap counts as a straight line between the ends of the segment. Where another corner of a long body comes nearest
+    on the way, it is larger, and the plane separates nothing. So the normal has to shorten the time of sample n inside.
+    Of those that do, the best is the one behind which TRIED samples spend the least time. Returns whether there is one.
     """
     obstacle, rows, entry, leave = memory.obstacle, memory.rows, memory.entry, memory.leave
     tried = min(TRIED, settings.pilot)

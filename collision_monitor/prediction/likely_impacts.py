@@ -48,10 +48,12 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
     sampling: its own samples are not used; lattice: sample_columns. `find_near` comes before it.
     sampling.only_screens: for pairs that are stated to pass, write a time before which bodies grown by safe_sigmas do
     not meet, the likeliest time of contact, and a bound on its probability, LEFT if unknown.
+    Returns the number of samples of all pairs.
     """
     table, parts, bodies = multibody
     query, horizon, stale_acceleration = sampling.query, sampling.horizon, sampling.stale_acceleration
     A, B = work.motion[0], work.motion[1]
+    followed = 0
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
         answers[k, :] = nan
@@ -113,7 +115,9 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
             answers[k, PROBABILITY] = LEFT
             continue
         if samples == 0:
+            followed += lattice.pilot
             continue
+        followed += samples
         answer = answers[k]
         first = summarise_by_bins(memory.times[0:samples], lattice, sampling.confidence, memory, answer)
         if answer[EARLIEST] == NOT_FOUND:
@@ -121,6 +125,7 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
             roughly = ImpactQuery(query.margin, max(query.tolerance, SAMPLE_TOLERANCE * tube.start), query.iterations)
             safe = first_contact(multibody, i, j, Window(0.0, horizon), wide, roughly, work)
             answer[EARLIEST] = min(safe, first)
+    return followed
 
 
 @device

@@ -196,13 +196,14 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
 
     An answer is NaN if neither body has declared an uncertainty, or if the pair is left out. Pairs that are stated to
     pass are left out if they do not meet within `sigmas` standard deviations, or only with a probability far below
-    min_probability.
+    min_probability. Returns the number of samples of all pairs.
     """
     table, parts, bodies = multibody
     query, horizon, stated = sampling.query, sampling.horizon, sampling.stated
     points, weights, stale_acceleration = sampling.points, sampling.weights, sampling.stale_acceleration
     times = np.empty(weights.size)
     A, B = work.motion[0], work.motion[1]
+    followed = 0
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
         answers[k, :] = nan
@@ -257,6 +258,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
             if not likely:
                 break
             for n in range(first, weights.size, stride):
+                followed += 1
                 z = points[n]
                 shift(work, z, t, p, v)
                 if turn_i[0] + turn_i[1] > 0.0:
@@ -277,3 +279,4 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                 seen += weights[n] if times[n] < inf else 0.0
         if likely:
             summarise(times, weights, np.argsort(times), sampling.confidence, safe, answers[k], 1.0)
+    return followed
