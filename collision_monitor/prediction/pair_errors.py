@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
-from collision_monitor._jit import inlined
-from collision_monitor.prediction.error_samples import add_covariance
+from collision_monitor._jit import device, inlined
+from collision_monitor.prediction.error_samples import add_covariance, orientation_spread
 from collision_monitor.prediction.sample_gaps import FIRST_ORDER, NOT_TURNED, SERIES
 
 BENDING: Final = 0.1
@@ -38,6 +38,20 @@ def surface_bend(m, radius):
     """Bound on the acceleration of a body's surface from its rotation (m/s^2)."""
     rate = spin_rate(m)
     return radius * rate * rate if rate > 0.0 else 0.0
+
+
+@device
+def swing_bound(spread, i, radius, age, horizon):
+    """Bound (m now, m/s) on the standard deviation of body i's surface from errors of its orientation.
+
+    It is exact now, and not too low at the horizon and between, because the standard deviation is convex in time.
+    radius (m): the body's, infinite or 0 if rotation moves nothing. age: s since the last state.
+    """
+    if not 0.0 < radius < inf:
+        return 0.0, 0.0
+    now, _ = orientation_spread(spread, i, radius, age, 0.0)
+    _, rate = orientation_spread(spread, i, radius, age, horizon)
+    return radius * now, radius * rate
 
 
 @inlined

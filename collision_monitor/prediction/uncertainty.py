@@ -107,6 +107,21 @@ def _gap_at(multibody, i, j, t, work):
     return best
 
 
+@device
+def likely_contact(multibody, i, j, t, horizon, query, work):
+    """Time (s) from t on at which bodies i and j, which are stated to meet, do so if they are apart at t, else t.
+
+    t: closest approach of their origins. The origin of a long wall may be closest long before it is touched.
+    """
+    gap = _gap_at(multibody, i, j, t, work)
+    if gap <= query.margin:
+        return t
+    first = first_contact(multibody, i, j, Window(t, horizon), Tube(0.0, 0.0), query, work)
+    if first < inf:
+        return first
+    return horizon if _gap_at(multibody, i, j, horizon, work) < gap else t
+
+
 @inlined
 def _is_straight(parts, bodies, i, j, A, B):
     """Whether each body is one shape that moves straight and does not turn, and they are not both spheres."""
@@ -159,6 +174,8 @@ def _lay_along(multibody, i, j, tube, sampling, work):
         vv = vx * vx + vy * vy + vz * vz
         if vv > 0.0:
             t = min(max(-(px * vx + py * vy + pz * vz) / vv, 0.0), horizon)
+        if sampling.stated and not round:
+            t = likely_contact(multibody, i, j, t, horizon, sampling.query, work)
         frame[0, 0], frame[0, 1], frame[0, 2] = px + t * vx, py + t * vy, pz + t * vz
     else:
         least = inf
