@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from collision_monitor.alerts.alerts import Alerts
 from collision_monitor.alerts.rules import Rules
 from collision_monitor.geometry.pose import Motion, Pose
-from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape, Sphere
+from collision_monitor.geometry.shapes import Box, ConvexHull, Cylinder, Mesh, Shape, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.time_critical import TimeCritical
 from collision_monitor.objects.models import containing_model
@@ -137,6 +137,7 @@ def warm_up_functions() -> None:
         overlap(corner, Pose(), corner, at)
         contact(corner, Pose(), corner, at)
         time_of_impact(corner, Motion(Pose()), corner, Motion(at, (-1, 0, 0)))
+    contact(corner, Pose(), Cylinder(0.5, 1), Pose((3, 0, 0)))
 
 
 PARTS: Final = {

@@ -27,8 +27,8 @@ _OPTIONS: dict[str, Any] = {
 }
 
 
-def _compile(function: F, options: dict[str, Any], *, is_device: bool = False) -> F:
-    return cast(F, Function(function, options, is_device=is_device))
+def _compile(function: F, options: dict[str, Any], kind: str = "kernel") -> F:
+    return cast(F, Function(function, options, kind))
 
 
 # Reference counts of array arguments are atomic memory traffic: one pair of spheres costs 300 ns with them and 18 ns
@@ -49,7 +49,7 @@ def allocating_kernel(function: F) -> F:
 
 def device(function: F) -> F:
     """Compile a function that only kernels call; it borrows its arrays and returns numbers."""
-    return _compile(function, _BORROWING, is_device=True)
+    return _compile(function, _BORROWING, "device")
 
 
 def inlined(function: F) -> F:
@@ -58,7 +58,16 @@ def inlined(function: F) -> F:
     numba compiles it once. numba's own `inline="always"` repeats the compilation, before LLVM's, at each call: it took
     two thirds of all compile time.
     """
-    return _compile(function, {**_BORROWING, "forceinline": True}, is_device=True)
+    return _compile(function, {**_BORROWING, "forceinline": True}, "device")
+
+
+def outlined(function: F) -> F:
+    """Compile a device function to machine code of its own, once, which all kernels call.
+
+    For large functions of several kernels that LLVM does not inline anyway: they took three quarters of the time in
+    which LLVM optimised the kernels. They call each other, and must not be recursive.
+    """
+    return _compile(function, _BORROWING, "outlined")
 
 
 def parallel_kernel(function: F) -> F:

@@ -12,13 +12,13 @@ from typing import Any
 
 
 class Function:
-    """A kernel, or a device function if `is_device`; everything but the call is numba's dispatcher."""
+    """A function of the kind "kernel", "device" or "outlined"; everything but the call is numba's dispatcher."""
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any], *, is_device: bool) -> None:
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any], kind: str) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
         self._options = options
-        self._is_device = is_device
+        self.kind = kind
 
     def __call__(self, *args: Any) -> Any:
         """Call the function; the first call with arguments of these types loads or compiles it."""
@@ -26,19 +26,19 @@ class Function:
 
     @functools.cached_property
     def _entry(self) -> Any:
-        """Dispatcher with an entry for Python. A device function has machine code only here, for the tests."""
-        if not self._is_device:
+        """Dispatcher with an entry for Python. Functions that only kernels call have one only here, for the tests."""
+        if self.kind == "kernel":
             return self.dispatcher
         from collision_monitor._jit.compiling import make_dispatcher
 
-        return make_dispatcher(self.py_func, self._options, is_device=False)
+        return make_dispatcher(self.py_func, self._options, "kernel")
 
     @functools.cached_property
     def dispatcher(self) -> Any:
         """Dispatcher that numba meets where other kernels call this function."""
         from collision_monitor._jit.compiling import make_dispatcher
 
-        return make_dispatcher(self.py_func, self._options, is_device=self._is_device)
+        return make_dispatcher(self.py_func, self._options, self.kind)
 
     def __getattr__(self, name: str) -> Any:
         """Let numba, which meets this object as a global of other kernels, and tests see the dispatcher."""

@@ -23,16 +23,16 @@ from numba.core.runtime import _nrt_python
 from numba.core.serialize import dumps
 
 from collision_monitor._jit.cache import folder
-from collision_monitor._jit.libraries import DeviceLibrary, LoadedKernel
+from collision_monitor._jit.libraries import Callee, DeviceLibrary, LoadedKernel, OutlinedLibrary, callees
 
 
 class KernelCache(NullCache):  # type: ignore[misc]
     """Loads and saves the overloads of a function; what cannot be read is compiled again."""
 
-    def __init__(self, function: Callable[..., Any], *, is_device: bool) -> None:
+    def __init__(self, function: Callable[..., Any], kind: str) -> None:
+        self._function, self._kind = function, kind
         self._folder = Path(folder(function.__module__))
         self._name = f"{function.__qualname__.replace('<locals>.', '')}-{function.__code__.co_firstlineno}"
-        self._is_device = is_device
 
     @property
     def cache_path(self) -> str:
@@ -43,7 +43,7 @@ class KernelCache(NullCache):  # type: ignore[misc]
         types = getattr(signature, "args", signature)
         key = repr((tuple(types), target.codegen().magic_tuple()))
         digest = hashlib.blake2b(key.encode(), digest_size=8).hexdigest()
-        return self._folder / f"{self._name}-{digest}.{'device' if self._is_device else 'kernel'}"
+        return self._folder / f"{self._name}-{digest}.{self._kind}"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled function, or None if it has to be compiled."""
@@ -51,17 +51,29 @@ class KernelCache(NullCache):  # type: ignore[misc]
             data = self._file(sig, target_context).read_bytes()
             digest, data = data[:16], data[16:]
             if hashlib.blake2b(data, digest_size=16).digest() == digest:  # not cut off by a full disk
-                return _rebuild(target_context, pickle.loads(data))
+                compiled = _rebuild(target_context, pickle.loads(data))
+                if compiled is not None:
+                    self._identify(sig, compiled)
+                    return compiled
         target_context.refresh()
         return None
 
+    def _identify(self, sig: Any, compiled: Any) -> None:
+        """Note in the library of an outlined function what its callers have to load."""
+        if isinstance(compiled.library, OutlinedLibrary):
+            name, types = self._function.__qualname__, tuple(getattr(sig, "args", sig))
+            compiled.library.itself = Callee(self._function.__module__, name, types, compiled.fndesc.mangled_name)
+
     def save_overload(self, sig: Any, data: Any) -> None:
         """Save a compiled function; a disk without space costs only the next compilation."""
+        self._identify(sig, data)
+        data.library.callees = callees(data.library)
         if data.library.has_dynamic_globals or data.lifted:
             return
         file = self._file(sig, data.target_context)
         data.fndesc.typemap = data.fndesc.calltypes = None  # the types of all variables
-        content = dumps((_code(data.library), data.fndesc, data.environment, data.signature, data.reload_init))
+        parts = (_code(data.library), data.fndesc, data.environment, data.signature, data.reload_init)
+        content = dumps((data.library.callees, *parts))
         with contextlib.suppress(OSError):
             file.parent.mkdir(parents=True, exist_ok=True)
             handle, temporary = tempfile.mkstemp(dir=file.parent, prefix=file.name)
@@ -74,13 +86,13 @@ class KernelCache(NullCache):  # type: ignore[misc]
 
 
 def _code(library: Any) -> tuple[Any, ...]:
-    """The arguments of DeviceLibrary.loaded or of LoadedKernel."""
-    if isinstance(library, DeviceLibrary):
-        return library.serialize_using_object_code()
+    """Return the class that loads the code, and its arguments."""
+    if isinstance(library, DeviceLibrary | OutlinedLibrary):
+        return type(library).loaded, *library.serialize_using_object_code()
     name, _, (code, intermediate) = library.serialize_using_object_code()
     module = library._get_module_for_linking()
     symbols = [each.name for each in (*module.functions, *module.global_variables) if not each.is_declaration]
-    return name, code, intermediate, symbols
+    return LoadedKernel, name, code, intermediate, symbols
 
 
 @functools.cache
@@ -91,18 +103,18 @@ def _add_symbols() -> None:
 
 
 def _rebuild(target: Any, content: tuple[Any, ...]) -> Any:
-    """Make the compile result of a function again, with its own environment only.
+    """Make the compile result of a function again, with its own environment only; None if it calls other code by now.
 
     The environments of the functions inside belong to modules of numba that a compiled kernel does not need.
     """
-    code, fndesc, environment, signature, reload_init = content
+    called, (make, *code), fndesc, environment, signature, reload_init = content
+    if not all([each.load() for each in called]):
+        return None
     for start in reload_init:  # the threads of a parallel kernel
         start()
-    if len(code) == 2:
-        library: Any = DeviceLibrary.loaded(target.codegen(), *code)
-    else:
-        _add_symbols()
-        library = LoadedKernel(target.codegen(), *code)
+    _add_symbols()
+    library = make(target.codegen(), *code)
+    library.callees = called
     return CompileResult(
         target_context=target,
         typing_context=target.typing_context,

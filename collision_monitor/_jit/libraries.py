@@ -1,21 +1,50 @@
-"""The code of cached functions: device functions as LLVM's intermediate code only, kernels as machine code.
+"""The code of cached functions: device functions as LLVM's intermediate code only, the others as machine code.
 
 numba makes machine code of every function, also of those that only kernels call, and optimises it again for each caller
 up to the kernel. The machine code of a device function is never called, because its intermediate code is linked into
 the kernel and optimised there as a whole. So a device function stops after LLVM's passes over single functions.
+
+An outlined function is the opposite: its machine code is made once, and the kernels refer to it by its symbol.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import importlib
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 
+from collision_monitor._jit.cache import folder
 
-class DeviceLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """Intermediate code of a device function and of all that it calls, for linking into kernels."""
+
+class Callee(NamedTuple):
+    """An outlined function whose machine code a library calls."""
+
+    module: str
+    name: str
+    types: tuple[Any, ...]  # of the arguments
+    symbol: str
+
+    def load(self) -> bool:
+        """Load it into this process, or compile it. Return whether it then has the symbol that its callers know."""
+        dispatcher = getattr(importlib.import_module(self.module), self.name).dispatcher
+        dispatcher.compile(self.types)
+        return bool(dispatcher.overloads[self.types].fndesc.mangled_name == self.symbol)
+
+
+def callees(library: Any) -> list[Callee]:
+    """Return the outlined functions that a library calls, also through the device functions inside."""
+    found = dict.fromkeys(getattr(library, "callees", ()))
+    for each in library._linking_libraries:
+        found |= dict.fromkeys([each.itself] if isinstance(each, OutlinedLibrary) else callees(each))
+    return list(found)
+
+
+class _WithoutEntry(JITCodeLibrary):  # type: ignore[misc]
+    """Code of a function that Python cannot call."""
 
     @property
     def codegen(self) -> Any:
@@ -23,11 +52,16 @@ class DeviceLibrary(JITCodeLibrary):  # type: ignore[misc]
         return self
 
     def set_env(self, name: str, environment: Any) -> None:
-        """Without machine code there is no place for the environment."""
+        """There is no entry that needs the environment."""
 
     def get_pointer_to_function(self, name: str) -> int:
-        """Return the null pointer: there is no machine code."""
+        """Return the null pointer: there is no entry."""
+        self._ensure_finalized()
         return 0
+
+
+class DeviceLibrary(_WithoutEntry):
+    """Intermediate code of a device function and of all that it calls, for linking into kernels."""
 
     def _optimize_final_module(self) -> None:
         pass
@@ -49,6 +83,29 @@ class DeviceLibrary(JITCodeLibrary):  # type: ignore[misc]
         return library
 
 
+class OutlinedLibrary(_WithoutEntry):
+    """Machine code of a device function that kernels call by its symbol. Nothing is linked into them."""
+
+    itself: Callee
+
+    def __init__(self, codegen: Any, name: str) -> None:
+        super().__init__(codegen, name)
+        self._shared_module = llvm.parse_assembly(str(codegen._create_empty_module(name)))
+        self.enable_object_caching()
+
+    def serialize_using_object_code(self) -> tuple[str, bytes]:
+        """Serialize the machine code."""
+        return self.name, self._get_compiled_object()
+
+    @classmethod
+    def loaded(cls, codegen: Any, name: str, code: bytes) -> OutlinedLibrary:
+        """Make a library from its serialized form."""
+        library = cls(codegen, name)
+        library._set_compiled_object(code)
+        library._finalize_final_module()
+        return library
+
+
 class DeviceCompiler(CompilerBase):  # type: ignore[misc]
     """Numba's compiler, which writes into a DeviceLibrary."""
 
@@ -56,6 +113,17 @@ class DeviceCompiler(CompilerBase):  # type: ignore[misc]
         """Return numba's own passes; they use the library that they find."""
         state = self.state
         state.library = DeviceLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+
+
+class OutlinedCompiler(CompilerBase):  # type: ignore[misc]
+    """Numba's compiler, which writes into an OutlinedLibrary."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return numba's own passes, for a symbol that is the same in every process with the same source."""
+        state = self.state
+        state.func_id.unique_id = Path(folder(state.func_id.modname)).name
+        state.library = OutlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         return [DefaultPassBuilder.define_nopython_pipeline(state)]
 
 

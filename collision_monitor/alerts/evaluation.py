@@ -17,7 +17,7 @@ from collision_monitor.alerts.selection import Classes, select
 from collision_monitor.alerts.thresholds import APPROACH
 from collision_monitor.alerts.traffic import post_encroachment_time, required_deceleration, time_headway
 from collision_monitor.broad_phase.dense_grid import box_pairs
-from collision_monitor.monitor.candidates import keep_checked
+from collision_monitor.monitor.candidates import filters_of, keep_checked
 from collision_monitor.prediction.impact_record import ids_of_keys, pair_keys
 
 REST_SPEED: Final = 0.05
@@ -82,7 +82,7 @@ def _near(rule: Rule, classes: Classes, scene: Scene) -> tuple[Slots, Slots]:
     half = np.repeat(half[:, None] * REACH, 3, axis=1)
     fewer = first if np.count_nonzero(first) <= np.count_nonzero(second) else second
     pairs = which[box_pairs(scene.position[which], half, fewer[which])].astype(np.int32)
-    pairs = pairs[: keep_checked(scene.roster.bodies, scene.roster.allowed_keys, pairs)]
+    pairs = pairs[: keep_checked(*filters_of(scene.roster.bodies), scene.roster.allowed_keys, pairs)]
     return pairs[:, 0], pairs[:, 1]
 
 

@@ -121,7 +121,7 @@ def tradeoff_command(args: argparse.Namespace) -> int:
         )
     profiles = [Profile.named(name) for name in args.profile or Profile.names()]
     if not args.profile:
-        profiles.sort(key=lambda profile: -profile.impact_tolerance)
+        profiles.sort(key=lambda profile: -profile.position_tolerance)
     inputs = [recorded(args.session)] if args.session else simulated(
         args.scene, objects=args.objects, seed=args.seed, path=args.path, noise=args.noise, duration=args.seconds
     )  # fmt: skip

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit import inlined, kernel, outlined
 from collision_monitor.meshes.inside import INSIDE, UNKNOWN, is_in
 from collision_monitor.meshes.layout import AXES, CENTER, HALF, RADIUS, REACH, WIDTH
 from collision_monitor.meshes.nearest import LEAST, MOST_PAIRS, ON_A, ON_B, PLACE_A, nearest
@@ -45,7 +45,7 @@ def in_root_box(tree: NDArray[np.float64], points: NDArray[np.float64]) -> NDArr
     return np.asarray((np.abs(own) <= tree[0, HALF : HALF + 3, 0]).all(axis=1))
 
 
-@device
+@outlined
 def tree_contact(
     blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, pose: PairPose, limit: float,
     out: Any, answer: Any, work: Any,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
@@ -10,14 +11,15 @@ from collision_monitor.meshes.layout import CENTER, CHILD, CLOSED, FIRST_PART, M
 from collision_monitor.meshes.nearest import BOUNDS, PAIRS, triangle_at
 from collision_monitor.meshes.placing import Placing, place_point, turned_back
 from collision_monitor.meshes.touching import repeats
-from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus
-from collision_monitor.tolerances import EPSILON
+from collision_monitor.narrow_phase.gjk import closest_on_triangle, weighted
+from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus, sum_of_sizes
+from collision_monitor.tolerances import EPSILON, SAT_ROUND_OFF
 
 OUTSIDE, UNKNOWN, INSIDE = 0, 1, 2
 
 MOST_LOCATED: Final = 10_000
-"""Most points of the other surface to locate, 10 to 30 ms. Many disjoint parts near a surface, such as a cloud around a
-robot, need more only if they are near to each other and to the surface."""
+"""Most points and boxes of the other surface to locate, 10 to 30 ms. Many disjoint parts near a surface, such as a
+cloud around a robot, need more only if they are as near to the surface as to each other."""
 
 UNDECIDED: Final = 1 << 62
 """Not a winding number."""
@@ -70,7 +72,7 @@ def is_in(blocks: Any, root: int, other: Any, other_root: int, X: Placing, clear
 def _is_some_in(blocks: Any, root: int, other: Any, other_root: int, X: Placing, clear: float, work: Any) -> int:
     """`is_in` by a corner of each triangle of the other tree that is near the solid.
 
-    Points nearer to each other than to the surface are on the same side, so one of them answers for a small box.
+    One of them answers for a box if no surface is in the sphere about it, because all are on the same side then.
     """
     work[PAIRS] = WIDTH * other_root
     waiting, located, known = 1, 0, OUTSIDE
@@ -87,21 +89,54 @@ def _is_some_in(blocks: Any, root: int, other: Any, other_root: int, X: Placing,
                     continue
                 e = half_of(other, block, k)
                 if 4.0 * dot(e, e) >= clear * clear:
-                    work[PAIRS + waiting] = WIDTH * block + k
-                    waiting += 1
-                    continue
+                    located += 1
+                    c = other[block, CENTER, k], other[block, CENTER + 1, k], other[block, CENTER + 2, k]
+                    if not _is_clear(blocks, root, place_point(X, c), sqrt(dot(e, e)) * (1.0 + 1e-9), work):
+                        work[PAIRS + waiting] = WIDTH * block + k
+                        waiting += 1
+                        continue
                 x = _first_point(other, other_root, block, k)
             elif repeats(other, block, k):
                 continue
             else:
                 x = triangle_at(other, block, k).a
-            if located == MOST_LOCATED:
+            if located >= MOST_LOCATED:
                 return UNKNOWN
             located += 1
             known = max(known, locate(blocks, root, place_point(X, x), work))
             if known == INSIDE:
                 return INSIDE
     return known
+
+
+@device
+def _is_clear(blocks: Any, root: int, x: Vector, radius: float, work: Any) -> bool:
+    """Whether no triangle is in the sphere of a radius (m) about a point."""
+    work[0] = WIDTH * root
+    waiting = 1
+    while waiting > 0:  # terminates: each box is opened once
+        waiting -= 1
+        place = int(work[waiting])
+        child = blocks[place // WIDTH, CHILD, place % WIDTH]
+        block = root + int(abs(child))
+        for k in range(WIDTH):
+            if child > 0.0:
+                if blocks[block, CHILD, k] == 0.0:
+                    continue
+                e = half_of(blocks, block, k)
+                c = blocks[block, CENTER, k], blocks[block, CENTER + 1, k], blocks[block, CENTER + 2, k]
+                y = turned_back(blocks, block, k, minus(x, c))
+                gap = max(abs(y[0]) - e[0], 0.0), max(abs(y[1]) - e[1], 0.0), max(abs(y[2]) - e[2], 0.0)
+                if dot(gap, gap) <= radius * radius:
+                    work[waiting] = WIDTH * block + k
+                    waiting += 1
+            elif not repeats(blocks, block, k):
+                T = triangle_at(blocks, block, k)
+                a, b, c = minus(T.a, x), minus(T.b, x), minus(T.c, x)
+                y = weighted(closest_on_triangle(a, b, c), a, b, c)
+                if sqrt(dot(y, y)) <= radius + SAT_ROUND_OFF * (sum_of_sizes(a) + sum_of_sizes(b) + sum_of_sizes(c)):
+                    return False
+    return True
 
 
 @device

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.meshes.boxes import box_bounds, triangle_bounds
-from collision_monitor.meshes.layout import CHILD, CORNERS, FACE, HALF, RADIUS, WIDTH
+from collision_monitor.meshes.layout import CENTER, CHILD, CORNERS, FACE, HALF, RADIUS, WIDTH
 from collision_monitor.meshes.leaf_bounds import least_of_pairs, raise_bounds
-from collision_monitor.meshes.placing import inverse, place_triangle, relative, turn_back
+from collision_monitor.meshes.placing import inverse, place_point, place_triangle, relative, turn_back
 from collision_monitor.meshes.triangle_pair import Triangle, closest_points
 from collision_monitor.narrow_phase.vector import dot, minus, opposite
 from collision_monitor.tolerances import EPSILON
@@ -124,6 +124,19 @@ def _direction(answer, distance):
 
 
 @inlined
+def _toward(blocks_a, root_a, blocks_b, root_b, X):
+    """Unit vector from the middle of A to that of B; 0 if they are one point."""
+    w = minus(place_point(X, _middle(blocks_b, root_b)), _middle(blocks_a, root_a))
+    return _unit(w) if dot(w, w) > 0.0 else (0.0, 0.0, 0.0)
+
+
+@inlined
+def _middle(blocks, root):
+    """Centre of the box of a whole tree."""
+    return blocks[root, CENTER, 0], blocks[root, CENTER + 1, 0], blocks[root, CENTER + 2, 0]
+
+
+@inlined
 def _least(work, at):
     """Least of eight numbers."""
     least = work[at]
@@ -195,7 +208,7 @@ def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
     Y = inverse(X)
     work[0], work[1], work[2] = 0.0, WIDTH * root_a, WIDTH * root_b
     waiting, leaves = 1, 0
-    n = _direction(answer, found)
+    n = _direction(answer, found) if found < inf else _toward(blocks_a, root_a, blocks_b, root_b, X)
     while waiting > 0 and best > 0.0:  # terminates: each pair of boxes is opened once
         waiting -= 1
         limit = best * best

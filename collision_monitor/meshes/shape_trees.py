@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Final
+from math import inf
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +13,27 @@ from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.convex_pieces import is_concave_mesh
 from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Mesh, Points, Shape, Sphere, Triangle
 from collision_monitor.meshes.cloud_tree import cloud_tree
+from collision_monitor.meshes.contact import reach_of
 from collision_monitor.meshes.tree import tree_of
 
 Array = NDArray[np.float64]
 
-_KEPT: Final = "_tree"
-"""Where a shape keeps its tree, in a tuple, since `array_bytes` counts the arrays of the user."""
-
 CERTAIN, NEVER, UNCERTAIN = range(3)
 """What a tree tells of the inside of its shape: which points are inside; none is certainly inside, because the surface
 has a hole; nothing, also of a cloud."""
+
+
+class KeptTree(NamedTuple):
+    """What a shape keeps as its attribute `kept_tree`: in a tuple, since `array_bytes` counts the arrays of the user.
+
+    tree: None for a shape without one. concave: whether it is a concave mesh. inside: CERTAIN, NEVER or UNCERTAIN.
+    reach: distance of the farthest point from the origin (m), infinite without a tree.
+    """
+
+    tree: Array | None
+    concave: bool
+    inside: int
+    reach: float
 
 
 def shape_tree(shape: Shape) -> Array | None:
@@ -30,19 +42,31 @@ def shape_tree(shape: Shape) -> Array | None:
     A sphere is a point with a radius, a capsule an edge with one; a cloud is its points, without their radius; a box
     and a hull are closed surfaces, unless they are too flat.
     """
-    kept = shape.__dict__.get(_KEPT)
-    if kept is None:
-        kept = _keep(shape)
-    tree: Array | None = kept[0]
-    return tree
+    return kept_tree(shape).tree
 
 
-def _keep(shape: Shape) -> tuple[Array | None, bool, int]:
-    inside = UNCERTAIN if isinstance(shape, Points) else CERTAIN
-    if isinstance(shape, Mesh) and not shape.surface.certain:
-        inside = NEVER if len(shape.surface.hole) else UNCERTAIN
-    kept = shape.__dict__[_KEPT] = (made_tree(shape), is_concave_mesh(shape), inside)
-    return kept
+def kept_tree(shape: Shape) -> KeptTree:
+    """Tree of a shape with what is known of it, made at the first call."""
+    known: KeptTree | None = shape.__dict__.get("kept_tree")
+    if known is None:
+        inside = UNCERTAIN if isinstance(shape, Points) else CERTAIN
+        if isinstance(shape, Mesh) and not shape.surface.certain:
+            inside = NEVER if len(shape.surface.hole) else UNCERTAIN
+        tree = made_tree(shape)
+        known = KeptTree(tree, is_concave_mesh(shape), inside, inf if tree is None else reach_of(tree))
+        shape.__dict__["kept_tree"] = known
+    return known
+
+
+def have_kernels(a: KeptTree, b: KeptTree, most: int) -> bool:
+    """Whether two shapes have trees, one is a concave mesh, and what is inside is as certain as `most` at least."""
+    return (
+        (a.concave or b.concave)
+        and a.inside <= most
+        and b.inside <= most
+        and a.tree is not None
+        and b.tree is not None
+    )
 
 
 def trees_of_pair(a: Shape, b: Shape, surface: bool = False) -> tuple[Array, Array] | None:
@@ -51,12 +75,11 @@ def trees_of_pair(a: Shape, b: Shape, surface: bool = False) -> tuple[Array, Arr
     Also None for a cloud, and if it is not certain what is inside of a mesh. surface: of a mesh with a hole that is the
     surface alone.
     """
-    tree_a, concave_a, inside_a = a.__dict__.get(_KEPT) or _keep(a)
-    tree_b, concave_b, inside_b = b.__dict__.get(_KEPT) or _keep(b)
-    most = NEVER if surface else CERTAIN
-    if tree_a is None or tree_b is None or inside_a > most or inside_b > most or not (concave_a or concave_b):
+    own, other = kept_tree(a), kept_tree(b)
+    if not have_kernels(own, other, NEVER if surface else CERTAIN):
         return None
-    return tree_a, tree_b
+    assert own.tree is not None and other.tree is not None
+    return own.tree, other.tree
 
 
 def _plate(box: Box) -> Array:

@@ -143,14 +143,21 @@ def _triangle_contact(
         return distance <= limit
     if _is_point(T):
         return _point_contact(table, b, pose, T.a, radius, limit, out, memory)
+    middle, length = _middle(T)  # about its own centre, since the error of GJK grows with the corners' distance
     for k in range(LANES):
-        x = T.a if k == 0 else (T.b if k == 1 else T.c)
+        x = minus(T.a if k == 0 else (T.b if k == 1 else T.c), middle)
         memory.triangle[0, k], memory.triangle[1, k], memory.triangle[2, k] = x
     flat = Core(CONVEX_HULL, (0.0, 0.0, 0.0), 0, LANES)
-    size = core_length(table, b) + sqrt(max(dot(T.a, T.a), max(dot(T.b, T.b), dot(T.c, T.c))))
-    radii = radius, rounding(table, b)
-    found = cores_contact(CorePair(flat, core_of(table, b), memory.triangle), radii, size, pose, limit, out, memory.gjk)
-    return found and out[DISTANCE] <= limit
+    cores = CorePair(flat, core_of(table, b), memory.triangle)
+    shift = rotate(pose.R_A, middle)
+    radii, at = (radius, rounding(table, b)), PairPose(pose.R_A, pose.R_B, minus(pose.p, shift))
+    if not cores_contact(cores, radii, core_length(table, b) + length, at, limit, out, memory.gjk):
+        return False
+    for c in range(3):
+        out[POINT_A + c] += shift[c]
+        out[POINT_B + c] += shift[c]
+    out[BOUND] += SAT_ROUND_OFF * (sum_of_sizes(pose.p) + sum_of_sizes(shift))
+    return out[DISTANCE] <= limit
 
 
 @device

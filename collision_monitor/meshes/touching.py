@@ -8,6 +8,7 @@ from typing import Any, Final
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.meshes.boxes import box_separations, triangle_bounds
 from collision_monitor.meshes.layout import CHILD, FACE, RADIUS, WIDTH
+from collision_monitor.meshes.leaf_planes import may_cross
 from collision_monitor.meshes.nearest import (
     BOUNDS,
     NEAR_A,
@@ -66,12 +67,12 @@ def touching(
             for m in range(WIDTH):
                 if work[NEAR_B + m] > 0.0 or repeats(blocks_b, leaf_b, m):
                     continue
-                T = place_triangle(X, triangle_at(blocks_b, leaf_b, m))
+                T, own = place_triangle(X, triangle_at(blocks_b, leaf_b, m)), blocks_b[leaf_b, RADIUS, m]
+                may = may_cross((*T.a, *T.b, *T.c), own, blocks_a, leaf_a)
                 for k in range(WIDTH):
-                    if work[NEAR_A + k] > 0.0 or repeats(blocks_a, leaf_a, k):
+                    if not (may >> k) & 1 or work[NEAR_A + k] > 0.0 or repeats(blocks_a, leaf_a, k):
                         continue
-                    radius = blocks_a[leaf_a, RADIUS, k] + blocks_b[leaf_b, RADIUS, m]
-                    if meet(triangle_at(blocks_a, leaf_a, k), T, radius):
+                    if meet(triangle_at(blocks_a, leaf_a, k), T, own + blocks_a[leaf_a, RADIUS, k]):
                         work[PAIRS + 2 * found], work[PAIRS + 2 * found + 1] = WIDTH * leaf_a + k, WIDTH * leaf_b + m
                         found += 1
                         if found == most:

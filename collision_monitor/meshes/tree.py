@@ -1,6 +1,7 @@
 """Tree of oriented boxes over triangles, eight boxes or triangles in a block.
 
-Triangles are halved at the median along the longest side of their centres' bounds; eight such parts make a block.
+Triangles are halved along the longest side of their centres' bounds; eight such parts make a block. Parts are cut so
+that they fill their blocks.
 (Gottschalk, Lin, Manocha, OBBTree, 1996; Wald, Benthin, Boulos, Getting rid of packets, 2008: wide trees)
 """
 
@@ -107,6 +108,9 @@ def _build(corners, radius, blocks):
                 blocks[block, RADIUS, lane] = radius[k]
             continue
         blocks[parent, CHILD, member] = block
+        unit = WIDTH
+        while end - begin > WIDTH * unit:
+            unit *= WIDTH
         count = 1
         begins[0], ends[0] = begin, end
         while count < WIDTH:
@@ -114,9 +118,9 @@ def _build(corners, radius, blocks):
             for part in range(1, count):
                 if ends[part] - begins[part] > ends[widest] - begins[widest]:
                     widest = part
-            if ends[widest] - begins[widest] <= WIDTH:
+            if ends[widest] - begins[widest] <= unit:
                 break
-            cut = _halve(middle, order, begins[widest], ends[widest])
+            cut = _halve(middle, order, begins[widest], ends[widest], unit)
             begins[count], ends[count] = cut, ends[widest]
             ends[widest] = cut
             count += 1
@@ -128,7 +132,7 @@ def _build(corners, radius, blocks):
 
 
 @device
-def _halve(middle, order, begin, end):
+def _halve(middle, order, begin, end, unit):
     """Sort the order so that its first half lies below the second along the longest side; return where that begins.
 
     The first half fills whole blocks.
@@ -141,8 +145,7 @@ def _halve(middle, order, begin, end):
             low, high = min(low, x), max(high, x)
         if high - low > longest:
             axis, longest = c, high - low
-    leaves = (end - begin + WIDTH - 1) // WIDTH
-    cut = begin + WIDTH * (leaves // 2)
+    cut = begin + unit * ((end - begin + unit - 1) // unit // 2)
     first, last = begin, end - 1
     while first < last:  # quickselect (Hoare, 1961), with the middle one of three as pivot
         a, b, c = middle[order[first], axis], middle[order[(first + last) // 2], axis], middle[order[last], axis]

@@ -12,6 +12,7 @@ from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.monitor.candidates import is_checked
 from collision_monitor.monitor.carried_contacts import CARRIED, Carried, carry_over, no_answers, remember, without
+from collision_monitor.monitor.contact_details import complete_contact
 from collision_monitor.monitor.event_list import NO_EVENTS
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
@@ -39,6 +40,9 @@ PREFETCH_AHEAD: Final = 2
 """How many pairs ahead the bodies are prefetched."""
 
 Rows = NDArray[np.void]
+
+_FIRST: Final = np.zeros(1, np.intp)
+"""Order of a single event."""
 
 _NO_CONTACTS: Final = np.zeros(0, records.CONTACT)
 
@@ -116,8 +120,9 @@ class ActivePairs(Stage):
             self.results = self.results[:0]
             return
         pairs, events = np.empty(room, PAIR), np.empty(room, IMPACT)
-        order = np.argsort(due["key"], kind="stable")
-        n = _unite(step.roster.bodies, self.pairs, self.events, due, order, pairs, events)
+        order = np.argsort(due["key"], kind="stable") if len(due) > 1 else _FIRST[: len(due)]
+        b = step.roster.bodies
+        n = _unite(b.id, b.used, b.version, self.pairs, self.events, due, order, pairs, events)
         self.pairs, self.events, self.results = pairs[:n], events[:n], np.empty((n, RESULT))
 
     def keep(self, kept: NDArray[np.bool_]) -> None:
@@ -186,20 +191,19 @@ class ActivePairs(Stage):
 
 
 @kernel
-def _unite(bodies, pairs, events, due, order, new_pairs, new_events):
+def _unite(ids, used, version, pairs, events, due, order, new_pairs, new_events):
     """Merge the active pairs with those of the due events, by key, into new_pairs; their events into new_events.
 
     A pair leaves the active pairs here if it is marked as leaving, if one of its bodies was removed, or if it does not
-    touch and its motion changed (then it was predicted anew). order (D,): sorts `due` by key. Returns the number of
-    pairs.
+    touch and its motion changed (then it was predicted anew). order (D,): sorts `due` by key. ids, used, version:
+    columns of Bodies. Returns the number of pairs.
     """
     n = k = m = 0
     while k < pairs.size or m < order.size:
         if k < pairs.size:
             i, j = pairs[k].i, pairs[k].j
-            key = pair_key(bodies.id[i], bodies.id[j])
-            gone = not (bodies.used[i] and bodies.used[j]) or key != pairs[k].key
-            changed = not holds(bodies.version, events[k])
+            gone = not (used[i] and used[j]) or pair_key(ids[i], ids[j]) != pairs[k].key
+            changed = not holds(version, events[k])
             if gone or pairs[k].leaving == 1 or (changed and pairs[k].touching == 0):
                 k += 1
                 continue
@@ -265,6 +269,8 @@ def _examine(multibody, active, which, now, queries, scratch, later):
                     n_later += 1
                 else:
                     stays = True
+        if touching:
+            complete_contact(multibody, i, j, now, scratch, results[k])
         if touching and pair.touched == 0:
             pair.since = now
         pair.touching = 1 if touching else 0

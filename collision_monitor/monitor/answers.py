@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 
 from collision_monitor import records
 from collision_monitor._jit import kernel
-from collision_monitor.meshes.nearest import MEMORY
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.active_pairs import ActivePairs
-from collision_monitor.monitor.contact_details import complete_contacts
 from collision_monitor.monitor.event_list import EventList
 from collision_monitor.monitor.patches import with_patches
 from collision_monitor.monitor.result import StepResult, StepStatus
@@ -34,8 +32,8 @@ from collision_monitor.narrow_phase.contact_row import (
 )
 from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, UNSETTLED
 from collision_monitor.prediction.body_impact import CLOSING
-from collision_monitor.prediction.impact_record import BOUND_ONLY, TREE_BOUND, UNRESOLVED, ids_of
-from collision_monitor.records import Phase, PredictionStatus, joined
+from collision_monitor.prediction.impact_record import BOUND_ONLY, HIT, TREE_BOUND, UNRESOLVED, ids_of
+from collision_monitor.records import Phase, joined
 
 PERSIST: Final = int(Phase.PERSIST)
 BEGIN: Final = int(Phase.BEGIN)
@@ -56,13 +54,12 @@ class Answers(Stage):
 
     def contacts(self, step: StepContext, active: ActivePairs) -> Rows:
         """Contacts (records.CONTACT) of the active pairs, sorted by ids, with the END of contacts of removed pairs."""
-        roster, multibody = step.roster, step.roster.multibody
+        multibody = step.roster.multibody
         contacts = np.empty(len(active.pairs), records.CONTACT)
         if len(contacts):
-            scratch = np.empty((1, 4)), np.empty((3, 3, 3))
-            complete_contacts(multibody, active.pairs, active.results, step.now, scratch, np.empty(MEMORY))
-            n = write_contacts(active.pairs, active.results, roster.bodies, roster.parts.index, step.now, contacts)
-            contacts = contacts[:n]
+            b = step.roster.bodies
+            columns = b.model, multibody.parts.index
+            contacts = contacts[: write_contacts(active.pairs, active.results, *columns, step.now, contacts)]
         if step.profile.contact_points > 1:
             contacts = with_patches(contacts, multibody, active.active, step.now, step.profile.contact_points)
         ended = active.take_orphans(step.now)
@@ -135,34 +132,56 @@ def step_status(
     step: StepContext, active: ActivePairs, events: EventList, contacts: Rows, predictions: Rows
 ) -> StepStatus:
     """Count objects, answers and work of the step."""
-    roster = step.roster
-    unresolved = np.count_nonzero(contacts["status"] == UNSETTLED) if len(contacts) else 0
-    unresolved += np.count_nonzero(predictions["status"] == UNRESOLVED) if len(predictions) else 0
-    static, unseen, stale = count_bodies(roster.bodies, roster.top, step.now, step.profile.stale_after)
+    roster, b = step.roster, step.roster.bodies
+    columns = b.used, b.static, b.seen, b.time
+    static, unseen, stale = count_bodies(*columns, roster.top, step.now, step.profile.stale_after)
+    touching, unresolved = count_answers(active.pairs, contacts, predictions)
     return StepStatus(
         objects=len(roster),
         objects_static=int(static),
         objects_unseen=int(unseen),
         objects_stale=int(stale),
-        contacts=int(np.count_nonzero(active.pairs["touching"])) if len(active.pairs) else 0,
+        contacts=touching,
         predictions=len(predictions),
-        unresolved=int(unresolved),
+        unresolved=unresolved,
         events_pending=len(events),
         **vars(step.work),
     )
 
 
-def overtaken(predictions: Rows, age: float) -> NDArray[np.bool_]:
-    """Mask of the certain predictions of collisions that have begun by now, if the states are `age` (s) old."""
-    mask: NDArray[np.bool_] = (predictions["status"] == PredictionStatus.HIT) & (predictions["upper"] < age)
-    return mask
+@kernel
+def mark_overtaken(predictions, age):
+    """Make the certain predictions UNRESOLVED whose collisions have begun by now, if the states are `age` (s) old.
+
+    Returns their number.
+    """
+    n = 0
+    for k in range(predictions.size):
+        if predictions[k].status == HIT and predictions[k].upper < age:
+            predictions[k].status = UNRESOLVED
+            n += 1
+    return n
 
 
 @kernel
-def write_contacts(pairs, results, bodies, shape_index, now, contacts):
+def count_answers(pairs, contacts, predictions):
+    """Count the pairs (PAIR) that touch, and the contacts and predictions that are UNRESOLVED."""
+    touching = unresolved = 0
+    for k in range(pairs.size):
+        touching += pairs[k].touching
+    for k in range(contacts.size):
+        unresolved += contacts[k].status == UNSETTLED
+    for k in range(predictions.size):
+        unresolved += predictions[k].status == UNRESOLVED
+    return touching, unresolved
+
+
+@kernel
+def write_contacts(pairs, results, model, shape_index, now, contacts):
     """Write the contacts (records.CONTACT) of the pairs that touch or have just ended; return their number.
 
-    results (n, RESULT): of the pairs. shape_index (S,): a shape's place in its object's description.
+    results (n, RESULT): of the pairs. model (N,): column of Bodies. shape_index (S,): a shape's place in its object's
+    description.
     """
     n = 0
     for k in range(pairs.size):
@@ -172,7 +191,7 @@ def write_contacts(pairs, results, bodies, shape_index, now, contacts):
         contact = contacts[n]
         contact.id_a, contact.id_b = ids_of(pair.key)
         contact.duration = now - pair.since
-        contact.model_a, contact.model_b = bodies.model[pair.i], bodies.model[pair.j]
+        contact.model_a, contact.model_b = model[pair.i], model[pair.j]
         contact.point_index, contact.point_count = 0, 1
         if pair.touching == 1:
             contact.signed_distance = row[DISTANCE]

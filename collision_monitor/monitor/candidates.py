@@ -21,8 +21,12 @@ from collision_monitor.broad_phase.region import regions_overlap
 from collision_monitor.monitor.roster import FIRST_CAPACITY, Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
+from collision_monitor.prediction.bodies import Bodies
 from collision_monitor.prediction.impact_record import pair_key
 from collision_monitor.prediction.motion import swept_box
+
+MOST_TESTS: Final = 6_000
+"""Up to this number of pairs of a body to predict and any body, each is tested. For more, there are the grids."""
 
 MOST_QUERIES: Final = 0.01
 """Up to this fraction of the bodies, each is queried in the hashed grid. For more, a dense grid is built and swept."""
@@ -52,7 +56,8 @@ class Candidates(Stage):
     def find(self, step: StepContext, which: NDArray[np.int32]) -> Pairs:
         """Find the checked pairs (P, 2) of the bodies in `which` with all bodies whose swept boxes overlap theirs."""
         pairs = self._partners(step, which)
-        pairs = pairs[: keep_checked(step.roster.bodies, step.roster.allowed_keys, pairs)]
+        if len(pairs):
+            pairs = pairs[: keep_checked(*filters_of(step.roster.bodies), step.roster.allowed_keys, pairs)]
         step.work.candidate_pairs = len(pairs)
         return pairs
 
@@ -60,14 +65,18 @@ class Candidates(Stage):
         bodies, top, margin = step.roster.bodies, step.roster.top, step.profile.contact_margin
         is_new = np.zeros(len(self.grid.box), np.bool_)
         is_new[which] = True
-        if len(which) > MOST_QUERIES * top:
+        is_small = len(which) * top <= MOST_TESTS
+        if len(which) > MOST_QUERIES * top and not is_small:
             centre, half = np.empty((2, top, 3))
             read_boxes(self.grid.box, centre, half)
             pairs = box_pairs(centre, half, is_new[:top])
-            return pairs[: keep_new(bodies, self.grid, pairs, is_new, step.now, margin)]
+            return pairs[: keep_new(bodies, self.grid.box, pairs, is_new, step.now, margin)]
         search = Search(which, is_new, np.empty(len(self.grid.box), np.int32))
         while True:  # at most twice: the second time the array is large enough
-            n = int(find_partners(bodies, self.grid, search, step.now, margin, self._found))
+            if is_small:
+                n = int(sweep(bodies, self.grid.box, search, top, step.now, margin, self._found))
+            else:
+                n = int(find_partners(bodies, self.grid, search, step.now, margin, self._found))
             if n <= len(self._found):
                 return self._found[:n]
             self._found = np.zeros((2 * n, 2), np.int32)
@@ -86,11 +95,17 @@ class Candidates(Stage):
 _NONE_ALLOWED: Final = np.zeros(0, np.uint64)
 
 
+def filters_of(bodies: Bodies) -> tuple[Any, Any, Any, Any]:
+    """Columns of the bodies that `keep_checked` reads."""
+    return bodies.static, bodies.group, bodies.mask, bodies.id
+
+
 def is_checked(roster: Roster, i: int, others: NDArray[np.int32]) -> NDArray[np.bool_]:
     """Whether body i and each of these other bodies (n,) have a state and their pair is checked."""
     bodies = roster.bodies
     pairs = np.stack([np.full_like(others, i), others], axis=1)
-    kept = pairs[: keep_checked(bodies, _NONE_ALLOWED, pairs), 1]  # a query of all allowed pairs would sort them anew
+    count = keep_checked(*filters_of(bodies), _NONE_ALLOWED, pairs)  # a query of all allowed pairs would sort them anew
+    kept = pairs[:count, 1]
     allowed = [roster.allows(int(bodies.id[i]), object_id) for object_id in bodies.id[others].tolist()]
     return bodies.seen[i] & bodies.seen[others] & np.isin(others, kept) & ~np.array(allowed, np.bool_)
 
@@ -154,8 +169,44 @@ def find_partners(bodies, grid, search, now, margin, pairs):
     return n
 
 
+@device
+def _reporter(bodies, box, i, j, is_new, now, margin):
+    """The body of a pair with overlapping boxes that reports it in `find_partners`; -1: neither."""
+    if not _finds(bodies, is_new, i, j):
+        i, j = j, i
+        if not _finds(bodies, is_new, i, j):
+            return -1
+    covered = bodies.motion[i].covered
+    if covered > now:  # else its whole box is new
+        swept = swept_box(bodies, i, covered, margin)
+        if not regions_overlap(swept, box[j]):
+            return -1
+    return i
+
+
 @kernel
-def keep_new(bodies, grid, pairs, is_new, now, margin):
+def sweep(bodies, box, search, top, now, margin, pairs):
+    """As `find_partners`, but by a test of each body of the search with all bodies in the first `top` slots.
+
+    box (N,): GRID_BOX. If there are few bodies, this is faster than a grid.
+    """
+    which, is_new, _ = search
+    n = 0
+    for i in which:
+        for j in range(top):
+            if (is_new[j] and j <= i) or box[j].level < 0 or not regions_overlap(box[i], box[j]):
+                continue
+            first = _reporter(bodies, box, i, j, is_new, now, margin)
+            if first < 0:
+                continue
+            if n < pairs.shape[0]:
+                pairs[n, 0], pairs[n, 1] = first, i + j - first
+            n += 1
+    return n
+
+
+@kernel
+def keep_new(bodies, box, pairs, is_new, now, margin):
     """Move the pairs (P, 2) that `find_partners` would find to the front; return their number.
 
     The pairs are those of overlapping boxes with at least one new body, found by one sweep over all boxes. If many
@@ -164,22 +215,15 @@ def keep_new(bodies, grid, pairs, is_new, now, margin):
     n = 0
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
-        if not _finds(bodies, is_new, i, j):
-            i, j = j, i
-            if not _finds(bodies, is_new, i, j):
-                continue
-        covered = bodies.motion[i].covered
-        if covered > now:  # else its whole box is new
-            swept = swept_box(bodies, i, covered, margin)
-            if not regions_overlap(swept, grid.box[j]):
-                continue
-        pairs[n, 0], pairs[n, 1] = i, j
-        n += 1
+        first = _reporter(bodies, box, i, j, is_new, now, margin)
+        if first >= 0:
+            pairs[n, 0], pairs[n, 1] = first, i + j - first
+            n += 1
     return n
 
 
 @kernel
-def keep_checked(bodies, allowed, pairs):
+def keep_checked(static, group, mask, ids, allowed, pairs):
     """Move the pairs (P, 2) that are checked to the front; return their number.
 
     Pairs of two static bodies, pairs whose groups ignore each other and allowed pairs are not checked.
@@ -187,11 +231,11 @@ def keep_checked(bodies, allowed, pairs):
     n = 0
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
-        if bodies.static[i] and bodies.static[j]:
+        if static[i] and static[j]:
             continue
-        if (bodies.group[i] & bodies.mask[j]) == 0 or (bodies.group[j] & bodies.mask[i]) == 0:
+        if (group[i] & mask[j]) == 0 or (group[j] & mask[i]) == 0:
             continue
-        if _allowed(allowed, bodies.id[i], bodies.id[j]):
+        if _allowed(allowed, ids[i], ids[j]):
             continue
         pairs[n, 0], pairs[n, 1] = i, j
         n += 1

@@ -1,10 +1,12 @@
 """Contacts that persist, carried over to the next step while their pair has hardly moved (`distance_tolerance`).
 
-A signed distance of convex shapes changes by at most the distance that the origins move relative to each other, plus
-the angle that each body turns times its radius, because every point of the surfaces moves by no more than that. An
-answer is carried over while this bound is within the tolerance and the pair certainly touches; the bound is added to
-the error of the answer. Its witness points move with the bodies. Contacts of meshes and other concave shapes are
-answered anew in every step, because their depth has no such bound.
+A signed distance of convex shapes grows by at most the distance that the origins move relative to each other, plus
+the angle that each body turns times its radius, because every point of the surfaces moves by no more than that. It is
+at least the gap along the old normal, which changes by the motion along it, minus the same angles times the radii. An
+answer is carried over, to the middle of this range, while half of the range is within the tolerance and the pair
+certainly touches; half of the range is added to the error of the answer. Its witness points move with the bodies.
+Contacts of meshes, compounds and other concave shapes are answered anew in every step, because their distance has no
+such bounds.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import inlined, kernel
 from collision_monitor.monitor.step_context import StepContext
-from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, POINT_A, POINT_B
+from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.prediction.body_contact import RESULT, STATUS, TOUCHING, closing_now, relative_now, widening
 from collision_monitor.prediction.body_impact import CLOSING
 from collision_monitor.prediction.mesh_pair import has_mesh
@@ -29,6 +31,9 @@ TURN_J: Final = RESULT + 7
 CARRIED: Final = RESULT + 11
 """Numbers of a carried row: a result row, whose points are about the bodies' origins and whose bound lacks the widening
 of stale states; the position of j's origin from i's (m); and both quaternions, all at the time of the answer."""
+
+NORMAL_ERROR: Final = 1e-6
+"""Largest error of a normal (rad); those of round surfaces are off by up to 1e-7."""
 
 
 class Carried(NamedTuple):
@@ -109,21 +114,26 @@ def carry(bodies, pairs, carried, now, query, tolerance, results, source, left, 
         relative = relative_now(bodies, i, j, now)
         x, y, z = relative.p[0] - row[RELATIVE], relative.p[1] - row[RELATIVE + 1], relative.p[2] - row[RELATIVE + 2]
         moved = sqrt(x * x + y * y + z * z)
-        if not moved <= tolerance:
+        along = x * row[NORMAL] + y * row[NORMAL + 1] + z * row[NORMAL + 2] - NORMAL_ERROR * moved
+        half = 0.5 * (moved - along)
+        if not half <= tolerance:
             continue
-        _turn_now(bodies, i, now, q)
-        moved += _turned(row, TURN_I, q, bodies.spin_radius[i])
-        _turn_now(bodies, j, now, q)
-        moved += _turned(row, TURN_J, q, bodies.spin_radius[j])
+        turned = 0.0
+        for body, start in ((i, TURN_I), (j, TURN_J)):
+            if bodies.spin_radius[body] > 0.0:
+                _turn_now(bodies, body, now, q)
+                turned += _turned(row, start, q, bodies.spin_radius[body])
+        half += turned
         excess = bodies.excess[i] + bodies.excess[j]
-        if not (moved <= tolerance and row[DISTANCE] + excess + moved <= query.margin):
+        if not (half <= tolerance and row[DISTANCE] + excess + moved + turned <= query.margin):
             continue
         for c in range(RESULT):
             result[c] = row[c]
+        result[DISTANCE] += 0.5 * (moved + along)
         for c in range(3):
             result[POINT_B + c] += relative.p[c]  # `closing_now` takes both points about body i
         result[CLOSING] = closing_now(bodies, i, j, relative, result)
-        result[BOUND] += moved + widening(relative, query.stale_acceleration)
+        result[BOUND] += half + widening(relative, query.stale_acceleration)
         for c in range(3):
             result[POINT_A + c] = row[POINT_A + c] + position_now(bodies, i, relative.age_i, c)
             result[POINT_B + c] = row[POINT_B + c] + position_now(bodies, j, relative.age_j, c)

@@ -1,6 +1,6 @@
 """What the pair tests leave open in the contacts of a step: which features touch, and how deep compounds may overlap.
 
-Only the pairs that are reported need it, so it is computed when the answers are made.
+Only the pairs that touch need it.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Any, Final
 
-from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.shape_table import (
     BOX,
     CONE,
@@ -151,39 +151,34 @@ def _reach_of_body(multibody: Any, i: int, n: Vector, R_body: Any, R_shape: Any,
     return reach
 
 
-@kernel
-def complete_contacts(multibody: Any, pairs: Any, results: Any, now: float, scratch: Any, work: Any) -> None:
-    """Name the features that are UNKNOWN in the results (n, RESULT) of the pairs that touch, and widen their bounds.
+@device
+def complete_contact(multibody: Any, i: int, j: int, now: float, scratch: Any, row: Any) -> None:
+    """Name the features that are UNKNOWN in a result row (RESULT) of bodies i and j, which touch, and widen its bound.
 
     Features are named where the contact is settled and the object is tested exactly.
 
     The depth of compounds and meshes is that of their deepest two pieces. A translation along the normal that parts all
-    of them may be longer, by what is added to the bound. Scratch memory: a quaternion (1, 4) with rotations (3, 3, 3),
-    and work (MEMORY,).
+    of them may be longer, by what is added to the bound. scratch: see `body_impact`.
     """
     table, parts, bodies = multibody
-    quaternion, R = scratch
-    for k in range(pairs.size):
-        if pairs[k].touching == 0:
-            continue
-        i, j, row = pairs[k].i, pairs[k].j, results[k]
-        n = (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2])
-        rotation_now(bodies, i, now, quaternion, R[0])
-        rotation_now(bodies, j, now, quaternion, R[1])
-        for side in range(2):
-            at = FEATURE_TYPE_A if side == 0 else FEATURE_TYPE_B
-            exact = bodies.excess[i if side == 0 else j] == 0.0
-            if row[at] == UNKNOWN and exact and row[STATUS] == TOUCHING:
-                s = int(row[SHAPE_I] if side == 0 else row[SHAPE_J])
-                place_shape(table, parts, s, R[side], R[2])
-                row[at], row[at + FEATURE_INDEX_A - FEATURE_TYPE_A] = feature_along(
-                    table, s, rotate_back(R[2], n if side == 0 else opposite(n))
-                )
-        several = parts.next[bodies.first_shape[i]] >= 0 or parts.next[bodies.first_shape[j]] >= 0
-        several = several or has_mesh(table, bodies.first_shape[i], bodies.first_shape[j])
-        if several and row[DISTANCE] <= 0.0:
-            if table.kind[int(row[SHAPE_I])] == HALF_SPACE or table.kind[int(row[SHAPE_J])] == HALF_SPACE:
-                continue  # the only way out is along its normal
-            reach = _reach_of_body(multibody, i, n, R[0], R[2], work)
-            reach += _reach_of_body(multibody, j, opposite(n), R[1], R[2], work)
-            row[BOUND] += max(reach - dot(n, relative_now(bodies, i, j, now).p) + row[DISTANCE], 0.0)
+    quaternion, R = scratch.quaternion, scratch.rotation
+    n = (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2])
+    rotation_now(bodies, i, now, quaternion, R[0])
+    rotation_now(bodies, j, now, quaternion, R[1])
+    for side in range(2):
+        at = FEATURE_TYPE_A if side == 0 else FEATURE_TYPE_B
+        exact = bodies.excess[i if side == 0 else j] == 0.0
+        if row[at] == UNKNOWN and exact and row[STATUS] == TOUCHING:
+            s = int(row[SHAPE_I] if side == 0 else row[SHAPE_J])
+            place_shape(table, parts, s, R[side], R[2])
+            row[at], row[at + FEATURE_INDEX_A - FEATURE_TYPE_A] = feature_along(
+                table, s, rotate_back(R[2], n if side == 0 else opposite(n))
+            )
+    several = parts.next[bodies.first_shape[i]] >= 0 or parts.next[bodies.first_shape[j]] >= 0
+    several = several or has_mesh(table, bodies.first_shape[i], bodies.first_shape[j])
+    if several and row[DISTANCE] <= 0.0:
+        if table.kind[int(row[SHAPE_I])] == HALF_SPACE or table.kind[int(row[SHAPE_J])] == HALF_SPACE:
+            return  # the only way out is along its normal
+        reach = _reach_of_body(multibody, i, n, R[0], R[2], scratch.tree)
+        reach += _reach_of_body(multibody, j, opposite(n), R[1], R[2], scratch.tree)
+        row[BOUND] += max(reach - dot(n, relative_now(bodies, i, j, now).p) + row[DISTANCE], 0.0)

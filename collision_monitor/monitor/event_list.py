@@ -218,6 +218,8 @@ class EventList(Stage):
         (PAIR), which every step examines; then the new event is dropped. If the earlier pending one is UNRESOLVED and
         the new one is a HIT, the pending one keeps its lower end and takes everything else from the new one.
         """
+        if not len(new):
+            return new
         room = np.empty(4 << (2 * len(new)).bit_length(), np.int32)
         return new[: keep_first(new, bodies, self.events, active, room, np.ones(len(new), np.bool_))]
 

@@ -14,7 +14,7 @@ from collision_monitor.errors import InputError, Refusal, RefusalWarning
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.monitor.active_pairs import ActivePairs
-from collision_monitor.monitor.answers import Answers, overtaken, step_status
+from collision_monitor.monitor.answers import Answers, mark_overtaken, step_status
 from collision_monitor.monitor.budget import PairBudget, StepClock
 from collision_monitor.monitor.candidates import Candidates
 from collision_monitor.monitor.crowding import MOST_PAIRS, crowded
@@ -32,7 +32,7 @@ from collision_monitor.monitor.tracking import Tracking
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled, monitored_model, parse_model, shape_class
-from collision_monitor.records import Model, PredictionStatus
+from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
 
 FACTS = "monitor"
@@ -324,8 +324,8 @@ class Monitor:
         self._examine_due(step, new, budget)
         contacts = self._answers.contacts(step, self._active_pairs)
         predictions = self._predictions(step, budget)
-        is_past = overtaken(predictions, self._age(now_ns))
-        predictions["status"][is_past] = PredictionStatus.UNRESOLVED
+        age = self._age(now_ns)
+        past = mark_overtaken(predictions, age) if age > 0.0 else 0
         status = step_status(step, self._active_pairs, self._events, contacts, predictions)
         self._time_critical.end_step(step)
         cut = budget.done if budget is not None and step.work.deferred else None
@@ -334,7 +334,7 @@ class Monitor:
             *(timeline.now_ns, step.number, contacts, predictions, status),
             cut=cut,
             refused=refused,
-            overtaken=int(is_past.sum()),
+            overtaken=past,
             samples=step.samples,
         )
         return self._answers.finish(result)
@@ -382,8 +382,10 @@ class Monitor:
         self._tracking.restart(step, moved, ending, self._uncertain, self._candidates.grid)
         pairs = self._leave_out_crowds(step, self._candidates.find(step, which))
         self._uncertain.add_pairs(step, pairs)
-        new = self._first_impacts.bound(step, pairs) if bounds_only else self._first_impacts.predict(step, pairs)
-        new = self._events.first_of_pairs(new, step.roster.bodies, self._active_pairs.pairs)
+        new = NO_EVENTS
+        if len(pairs):
+            new = self._first_impacts.bound(step, pairs) if bounds_only else self._first_impacts.predict(step, pairs)
+            new = self._events.first_of_pairs(new, step.roster.bodies, self._active_pairs.pairs)
         self._tracking.remember_cover(step, which)
         return new
 

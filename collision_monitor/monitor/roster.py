@@ -395,15 +395,15 @@ def _check_chains(bodies: Bodies, parts: Parts, kind: NDArray[Any]) -> None:
 
 
 @kernel
-def count_bodies(bodies, count, now, stale_after):
-    """Count the static, the unseen and the stale bodies in the first `count` slots.
+def count_bodies(used, static, seen, time, count, now, stale_after):
+    """Count the static, the unseen and the stale bodies in the first `count` slots of these columns of Bodies.
 
     Unseen: without any state. Stale: not static, and the last state is older than stale_after (s).
     """
-    static = unseen = stale = 0
+    resting = unseen = stale = 0
     for i in range(count):
-        if bodies.used[i]:
-            static += bodies.static[i]
-            unseen += not bodies.seen[i]
-            stale += bodies.seen[i] and not bodies.static[i] and now - bodies.time[i] > stale_after
-    return static, unseen, stale
+        if used[i]:
+            resting += static[i]
+            unseen += not seen[i]
+            stale += seen[i] and not static[i] and now - time[i] > stale_after
+    return resting, unseen, stale

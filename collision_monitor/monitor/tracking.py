@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, kernel
+from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, put_box, remove_boxes
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
@@ -34,9 +34,13 @@ ROOM: Final = 2.0
 within the tolerances, because the next deviation of a noisy state may be larger."""
 
 FUTILE_STEPS: Final = 4.0
-PATIENCE: Final = 16.0
+PATIENCE: Final = 128.0
 """A body with half of the tolerances or more that leaves its motion within FUTILE_STEPS steps turns or accelerates. Its
-tolerances are NARROWEST for its next PATIENCE motions; its width is minus the number of those that are left."""
+tolerances are NARROWEST for its next PATIENCE motions; its width is minus the number of those that are left. A body
+with the NARROWEST tolerances that kept its motion for longer has no noise, and keeps them."""
+
+WIDEST: Final = 0.4
+"""Widest adaptive tube at the end of the horizon, in radii of its body. Larger: it meets more pairs than it saves."""
 
 WIDER: Final = 1.1
 """Factor on the spread of a box, because standard deviations vary a little from state to state."""
@@ -59,12 +63,13 @@ class Tracking(Stage):
     """Compares the bodies' states with their predicted motions, and starts the bodies anew that left them."""
 
     SAVED = ("_outside", "_width", "_before")
-    CACHES = ("_columns",)
+    CACHES = ("_columns", "_futile")
 
     def __init__(self) -> None:
         self._outside: NDArray[np.bool_] = np.zeros(0, np.bool_)  # by slot: outside of the region
         self._width: NDArray[np.float64] = np.zeros(0)  # by slot: part of the tolerances that the body uses
         self._before = 0.0  # time of the step before (s)
+        self._futile = 0.0  # duration of FUTILE_STEPS steps (s)
         self._columns = make_columns()
 
     @property
@@ -114,13 +119,8 @@ class Tracking(Stage):
         found = np.empty((2, roster.top), np.int32)
         uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
         n, m = find_moved(roster.bodies, uncertainty, roster.top, step.now, step.settings.motion, self._columns, found)
-        moved, ending = found[0, :n], found[1, :m]
-        if step.profile.adaptive_tolerances and n + m:
-            self._make_room(roster.capacity)
-            futile = FUTILE_STEPS * (step.now - self._before)
-            fit_widths(roster.bodies, moved, ending, step.now, futile, step.settings.motion, self._width)
-        self._before = step.now
-        return moved, ending
+        self._futile, self._before = FUTILE_STEPS * (step.now - self._before), step.now
+        return found[0, :n], found[1, :m]
 
     def _make_room(self, capacity: int) -> None:
         if len(self._width) < capacity:
@@ -130,17 +130,14 @@ class Tracking(Stage):
         self, step: StepContext, moved: Slots, ending: Slots, uncertain: UncertainPredictions, grid: HashedGrid
     ) -> None:
         """Start `moved` anew from their last states, and predict `ending` further. Update their boxes in the grid."""
-        bodies = step.roster.bodies
+        bodies, settings = step.roster.bodies, step.settings.motion
         uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
-        if len(moved):
-            self._make_room(step.roster.capacity)
-            restart_motion(bodies, uncertainty, grid, moved, step.now, step.settings.motion, self._width)
-        if len(ending):
-            continue_motion(bodies, uncertainty, grid, ending, step.now, step.settings.motion)
+        self._make_room(step.roster.capacity)
+        renew_motions(bodies, uncertainty, grid, moved, ending, step.now, self._futile, settings, self._width)
 
     def remember_cover(self, step: StepContext, which: Slots) -> None:
         """Record that the bodies `which` have been predicted until their cover times."""
-        remember_cover(step.roster.bodies, which)
+        remember_cover(step.roster.bodies.motion, which)
 
     def save(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
@@ -244,10 +241,10 @@ def _is_wide_without_need(bodies, i, age, settings):
 
 
 @kernel
-def remember_cover(bodies, which):
-    """Record that the bodies `which` (M,) have been predicted until their cover times, by this motion."""
+def remember_cover(motion, which):
+    """Record that the bodies `which` (M,) have been predicted until their cover times, by this motion (MOTION)."""
     for i in which:
-        bodies.motion[i].covered = bodies.motion[i].cover
+        motion[i].covered = motion[i].cover
 
 
 @device
@@ -297,56 +294,70 @@ def _cover(bodies, i, now, horizon):
     m.cover = now + horizon + bodies.slack[i] * share
 
 
-@kernel
-def fit_widths(bodies, moved, ending, now, futile, settings, width):
-    """Fit the widths (N,) of bodies that leave their motion (`moved`), and of those that kept it to its end.
+@inlined
+def _widest_tube(bodies, i, settings):
+    """Deviation (m) and drift (m/s) that the tolerances allow body i. Adaptive ones depend on its size."""
+    r, radius = bodies.spin_radius[i], bodies.motion[i].radius
+    tube_0 = settings.position_tolerance + r * settings.orientation_tolerance
+    tube_1 = settings.velocity_tolerance + r * settings.angular_velocity_tolerance
+    if settings.adaptive:
+        tube_1 = min(tube_1, WIDEST * radius / max(settings.horizon, 1e-9))
+    return tube_0, tube_1
+
+
+@device
+def _fit_width(bodies, i, now, futile, settings, width):
+    """Fit the width (N,) of body i, which leaves its motion.
 
     A body that deviates within the tolerances is noisy: its next tube has ROOM for more than this deviation. One that
-    deviates further has changed its motion; one that kept it may need less. Both halve their width. futile: s, see
-    FUTILE_STEPS.
+    deviates further has changed its motion, and halves its width. futile: s, see FUTILE_STEPS.
     """
-    for i in moved:
-        m = bodies.motion[i]
-        if width[i] < 0.0:
-            width[i] = width[i] + 1.0 if width[i] < -1.0 else NARROWEST
-            continue
-        if width[i] >= 0.5 and now - m.time <= futile:
-            width[i] = -PATIENCE
-            continue
-        r = bodies.spin_radius[i]
-        tube_0 = settings.position_tolerance + r * settings.orientation_tolerance
-        tube_1 = settings.velocity_tolerance + r * settings.angular_velocity_tolerance
-        since = now - m.time
-        apart = drift = off = 0.0
-        p = (m.x + m.vx * since, m.y + m.vy * since, m.z + m.vz * since)
-        v, w = (m.vx, m.vy, m.vz), (m.wx, m.wy, m.wz)
-        for c in range(3):
-            apart += (bodies.position[i, c] - p[c]) ** 2
-            drift += (bodies.linear[i, c] - v[c]) ** 2
-            off += (bodies.angular[i, c] - w[c]) ** 2
-        used = max(sqrt(apart) / max(tube_0, 1e-300), (sqrt(drift) + r * sqrt(off)) / max(tube_1, 1e-300))
-        if bodies.slack[i] == 0.0:
-            width[i] = NARROWEST
-        elif used <= 1.0:
-            width[i] = min(max(ROOM * used, width[i] * ROOM), 1.0)
-        else:
-            width[i] = max(0.5 * width[i], NARROWEST)
-    for i in ending:
-        width[i] = max(0.5 * width[i], NARROWEST)  # also one that was given up
+    m = bodies.motion[i]
+    w, since = width[i], now - m.time
+    if w < 0.0:
+        width[i] = w + 1.0 if w < -1.0 else NARROWEST
+        return
+    if w >= 0.5 and since <= futile:
+        width[i] = -PATIENCE
+        return
+    if bodies.slack[i] == 0.0 or (w <= NARROWEST and since > futile):
+        width[i] = NARROWEST
+        return
+    r = bodies.spin_radius[i]
+    tube_0, tube_1 = _widest_tube(bodies, i, settings)
+    apart = drift = off = 0.0
+    p = (m.x + m.vx * since, m.y + m.vy * since, m.z + m.vz * since)
+    v, w_m = (m.vx, m.vy, m.vz), (m.wx, m.wy, m.wz)
+    for c in range(3):
+        apart += (bodies.position[i, c] - p[c]) ** 2
+        drift += (bodies.linear[i, c] - v[c]) ** 2
+        off += (bodies.angular[i, c] - w_m[c]) ** 2
+    used = max(sqrt(apart) / max(tube_0, 1e-300), (sqrt(drift) + r * sqrt(off)) / max(tube_1, 1e-300))
+    width[i] = min(max(ROOM * used, w * ROOM), 1.0) if used <= 1.0 else max(0.5 * w, NARROWEST)
 
 
 @kernel
-def restart_motion(bodies, uncertainty, grid, which, now, settings, width):
+def renew_motions(bodies, uncertainty, grid, moved, ending, now, futile, settings, width):
+    """`restart_motion` of the bodies `moved` (M,), then `continue_motion` of those in `ending`."""
+    restart_motion(bodies, uncertainty, grid, moved, now, futile, settings, width)
+    continue_motion(bodies, uncertainty, grid, ending, now, settings, width)
+
+
+@device
+def restart_motion(bodies, uncertainty, grid, which, now, futile, settings, width):
     """Make the last state of each body in `which` (M,) its reference motion, and put its swept box into the grid.
 
     The version of the body changes, so that its pairs leave the event list. A stale object widens its bounds here: its
     tube grows by what it may deviate, at stale_acceleration, until the age of its last state has doubled.
-    width (N,): part of the tolerances that a body uses if they are adaptive.
+    width (N,): part of the tolerances that a body uses if they are adaptive. futile: s, see FUTILE_STEPS.
     """
     stale_acceleration = settings.stale_acceleration
     for k in range(which.size):
         i = which[k]
-        part = max(width[i], NARROWEST) if settings.adaptive else 1.0
+        part = 1.0
+        if settings.adaptive:
+            _fit_width(bodies, i, now, futile, settings, width)
+            part = max(width[i], NARROWEST)
         m = bodies.motion[i]
         bodies.version[i] += np.uint32(1)
         age = age_of(bodies, i, now)
@@ -364,9 +375,8 @@ def restart_motion(bodies, uncertainty, grid, which, now, settings, width):
         m.tube_0 = m.tube_1 = 0.0
         _cover(bodies, i, now, settings.horizon)
         if not bodies.static[i]:
-            r = bodies.spin_radius[i]
-            m.tube_0 = part * (settings.position_tolerance + r * settings.orientation_tolerance)
-            m.tube_1 = part * (settings.velocity_tolerance + r * settings.angular_velocity_tolerance)
+            tube_0, tube_1 = _widest_tube(bodies, i, settings)
+            m.tube_0, m.tube_1 = part * tube_0, part * tube_1
             if age > 0.0:
                 m.tube_0 += 2.0 * stale_acceleration * age * age
                 m.tube_1 += 2.0 * stale_acceleration * age
@@ -374,14 +384,16 @@ def restart_motion(bodies, uncertainty, grid, which, now, settings, width):
         put_box(grid, i, swept_box(bodies, i, now, settings.margin))
 
 
-@kernel
-def continue_motion(bodies, uncertainty, grid, which, now, settings):
+@device
+def continue_motion(bodies, uncertainty, grid, which, now, settings, width):
     """Predict each body in `which` (M,), which kept its reference motion, further; put its swept box into the grid.
 
-    The body is known to be within tube_0 of its reference at `now`, so its tube widens from `now` on.
+    The body is known to be within tube_0 of its reference at `now`, so its tube widens from `now` on. Its next motion
+    may need narrower tolerances: its width (N,) is halved.
     """
     for k in range(which.size):
         i = which[k]
+        width[i] = max(0.5 * width[i], NARROWEST)  # also that of a body that was given up
         m = bodies.motion[i]
         allowed = (m.spread_0 + m.spread_1 * (now - m.tube_time), m.spread_1)
         m.tube_time = now

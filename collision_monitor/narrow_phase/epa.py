@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Any, Final
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.narrow_phase.core import CorePair
 from collision_monitor.narrow_phase.gjk import closest_on_triangle, point_on_a, simplex_point, weighted
 from collision_monitor.narrow_phase.support_point import support_difference
@@ -276,7 +276,7 @@ def _witness(work: Any, faces: int, exit_point: Vector, reach: float) -> Vector:
     return point_a
 
 
-@device
+@outlined
 def epa(
     cores: CorePair, work: Any, size: float, count: int, tolerance: float, most: int
 ) -> tuple[float, float, Vector, Vector]:

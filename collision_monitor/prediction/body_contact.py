@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.bodies import next_pair, place_shape
@@ -80,7 +80,7 @@ def closing_now(bodies, i, j, now, row):
     return closing_speed(now.v, wa, wb, now.p, row)
 
 
-@device
+@outlined
 def body_contact(multibody, i, j, time, query, scratch, result):
     """Write the deepest contact of bodies i and j at `time` (s), from their last states, into a result row.
 

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import device, inlined, outlined
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.meshes.nearest import MEMORY, PLACE_A, PLACE_B, answer_row
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
@@ -121,7 +121,7 @@ def _turning(before, n, elapsed):
 # 115 noisy objects).
 
 
-@device
+@outlined
 def shape_impact(table, parts, pair, window, tube, query, scratch):
     """Find the first time in the window at which the gap between the shapes of a pair (ShapePair) is the wanted one.
 
@@ -190,7 +190,7 @@ def contact_at(table, parts, pair, t, scratch):
     return _contact_at(table, parts, pair, t, NO_PLACES, scratch)
 
 
-@device
+@outlined
 def _contact_at(table, parts, pair, t, places, scratch):
     """`contact_at`, or if there are places of two triangles (mesh_pair.py), the contact of these."""
     A, B, a, b = pair

@@ -5,21 +5,38 @@ from __future__ import annotations
 from math import inf
 
 from collision_monitor._jit import device
+from collision_monitor.meshes.inside import INSIDE, OUTSIDE
+from collision_monitor.meshes.nearest import PLACE_A
 from collision_monitor.meshes.solid import SolidMemory, advance_to_solid
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.impact_record import CLEAR, HIT, UNRESOLVED
-from collision_monitor.prediction.mesh_pair import have_trees, is_mesh, root_of
+from collision_monitor.prediction.mesh_pair import enclosure, have_trees, is_mesh, root_of
 from collision_monitor.prediction.tree_impact import approach_at, tree_impact
 
 
 @device
 def mesh_impact(table, parts, pair, window, tube, query, scratch):
-    """`shape_impact` of a pair (ShapePair) with a mesh or a cloud."""
+    """`shape_impact` of a pair (ShapePair) with a mesh or a cloud; one that is in the other has its impact at once."""
     if have_trees(table, pair.a, pair.b):
-        return tree_impact(table, parts, pair, window, tube, query, scratch)
-    if is_mesh(table, pair.a):
-        return _solid_impact(table, parts, pair, window, tube, query, scratch)
-    return _solid_impact(table, parts, (pair.B, pair.A, pair.b, pair.a), window, tube, query, scratch)
+        status, t, queries, guess = tree_impact(table, parts, pair, window, tube, query, scratch)
+    elif is_mesh(table, pair.a):
+        status, t, queries, guess = _solid_impact(table, parts, pair, window, tube, query, scratch)
+    else:
+        swapped = (pair.B, pair.A, pair.b, pair.a)
+        status, t, queries, guess = _solid_impact(table, parts, swapped, window, tube, query, scratch)
+    if t > window.begin or status == CLEAR:
+        where = _enclosure_at(table, parts, pair, window.begin, scratch)
+        if where != OUTSIDE:
+            scratch.answer[PLACE_A] = -1.0  # no triangles meet
+            return HIT if where == INSIDE else UNRESOLVED, window.begin, queries, 0.0
+    return status, t, queries, guess
+
+
+@device
+def _enclosure_at(table, parts, pair, t, scratch):
+    """`enclosure` of a pair at time t (s)."""
+    p, _ = approach_at(table, parts, pair, t, 0.0, 0.0, t, scratch)
+    return enclosure(table, pair.a, pair.b, PairPose(scratch.rotation[2], scratch.rotation[3], p), scratch)
 
 
 @device

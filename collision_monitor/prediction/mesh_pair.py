@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.geometry.shape_table import HALF_SPACE, MESH, POINTS, TREE
 from collision_monitor.meshes.contact import FARTHER, OPEN, tree_contact
 from collision_monitor.meshes.feature import triangle_feature
-from collision_monitor.meshes.layout import FACE, WIDTH
-from collision_monitor.meshes.nearest import PLACE_A, PLACE_B
-from collision_monitor.meshes.placing import relative
+from collision_monitor.meshes.inside import INSIDE, OUTSIDE, is_in, locate
+from collision_monitor.meshes.layout import CLOSED, FACE, MOST_PARTS, PARTS, WIDTH
+from collision_monitor.meshes.nearest import PLACE_A, PLACE_B, nearest
+from collision_monitor.meshes.placing import inverse, relative
 from collision_monitor.meshes.solid import SolidMemory, solid_contact
 from collision_monitor.meshes.touching import contact_of_places
 from collision_monitor.narrow_phase.contact_row import (
@@ -63,7 +64,42 @@ def root_of(table, s):
     return int(table.size[s, TREE]) - 1
 
 
+@inlined
+def _may_hold_many(table, a, b):
+    """Whether shape a has an inside, and b so many parts that their number decides what it costs to locate them."""
+    first, second = root_of(table, a), root_of(table, b)
+    return table.blocks[first, CLOSED, 1] != 0.0 and table.blocks[second, PARTS, 1] > MOST_PARTS
+
+
 @device
+def enclosure(table, a, b, pose, scratch):
+    """INSIDE if one shape is in the solid that the other one, a mesh, bounds; UNKNOWN if round-off leaves it open.
+
+    No surfaces meet. pose: as for every pair test, of two shapes with a mesh or a cloud among them.
+    """
+    X = relative(pose.R_A, pose.R_B, pose.p)
+    if have_trees(table, a, b):
+        blocks, answer, work = table.blocks, scratch.answer, scratch.tree
+        first, second, clear = root_of(table, a), root_of(table, b), 0.0
+        if _may_hold_many(table, a, b) or _may_hold_many(table, b, a):
+            place_a, place_b = answer[PLACE_A], answer[PLACE_B]
+            answer[PLACE_A] = answer[PLACE_B] = -1.0
+            clear = nearest(blocks, first, blocks, second, X, inf, answer, work)
+            answer[PLACE_A], answer[PLACE_B] = place_a, place_b
+        found = is_in(blocks, first, blocks, second, X, clear, work)
+        if found != INSIDE:
+            found = max(found, is_in(blocks, second, blocks, first, inverse(X), clear, work))
+        return found
+    mesh, solid = (a, b) if is_mesh(table, a) else (b, a)
+    root = root_of(table, mesh)
+    if table.kind[solid] == HALF_SPACE or table.blocks[root, CLOSED, 1] == 0.0:  # a cloud encloses nothing
+        return OUTSIDE
+    if mesh != a:
+        X = inverse(X)
+    return locate(table.blocks, root, (X.x, X.y, X.z), scratch.tree)  # the solid's origin is inside it
+
+
+@outlined
 def mesh_within(table, a, b, pose, limit, out, scratch):
     """Whether the distance of two shapes with trees, or of one and a solid, is at most `limit` (m); writes the contact.
 
@@ -97,7 +133,18 @@ def mesh_within(table, a, b, pose, limit, out, scratch):
         _name_feature(table, b, answer[PLACE_B], rotate_back(pose.R_B, opposite(n)), out, 1)
     else:
         memory = SolidMemory(scratch.triangle, scratch.work, scratch.tree)
-        if not solid_contact(table.blocks, root_of(table, a), table.margin[a], table, b, pose, limit, out, memory):
+        found = solid_contact(table.blocks, root_of(table, a), table.margin[a], table, b, pose, limit, out, memory)
+        where = OUTSIDE if found and out[DISTANCE] <= 0.0 else enclosure(table, a, b, pose, scratch)
+        if where != OUTSIDE:
+            if not found:
+                solid_contact(table.blocks, root_of(table, a), table.margin[a], table, b, pose, inf, out, memory)
+            if where == INSIDE:
+                out[DISTANCE] = -out[DISTANCE]
+                for c in range(3):
+                    out[NORMAL + c] = -out[NORMAL + c]
+            else:
+                out[BOUND] += table.radius[a] + table.radius[b] + sqrt(dot(p, p))
+        elif not found:
             return False
     if is_swapped:
         for c in range(3):

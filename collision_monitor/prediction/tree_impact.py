@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Final
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.geometry.shape_table import TREE
 from collision_monitor.meshes.approach import Approach, seen_from_b
 from collision_monitor.meshes.box_times import box_times
@@ -131,7 +131,7 @@ def spins(A, B, duration):
     return (rate_a + rate_b) * duration > MOST_TURNED or swept * duration > MOST_SWEPT * smaller
 
 
-@device
+@outlined
 def tree_impact(table, parts, pair, window, tube, query, scratch):
     """`shape_impact` of two shapes with trees; scratch.answer then has the places of the triangles that meet."""
     begin, end = window

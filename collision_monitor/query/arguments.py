@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,9 @@ import numpy as np
 from collision_monitor.errors import InputError, PoseError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Shape
+
+Compound = Shape | Sequence[tuple[Shape, Pose]]
+"""A shape, or several with their poses in the object's frame."""
 
 
 def finite_number(name: str, value: Any, positive: bool = False) -> float:

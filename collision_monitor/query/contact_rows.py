@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collision_monitor._jit import device, kernel
+from collision_monitor._jit import kernel, outlined
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.dispatch import pair_contact
 from collision_monitor.narrow_phase.pair_pose import PairPose
@@ -12,7 +12,7 @@ from collision_monitor.prediction.motion import quaternion_to_matrix
 from collision_monitor.query.packed import fits, load_pair
 
 
-@device
+@outlined
 def write_contact(a, at_a, x_a, i, b, at_b, x_b, j, memory, row):
     """Write the contact of the pair at a[at_a], with pose x_a[i], and b[at_b], with pose x_b[j]."""
     table, R, work = load_pair(memory, a, at_a, b, at_b)

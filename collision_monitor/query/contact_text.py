@@ -11,7 +11,8 @@ from collision_monitor.query.features import feature_of
 
 if TYPE_CHECKING:
     from collision_monitor.geometry.coordinates import Array
-    from collision_monitor.query.contact import Compound, Contact
+    from collision_monitor.query.arguments import Compound
+    from collision_monitor.query.contact import Contact
 
 
 def contact_text(contact: Contact) -> str:

@@ -11,8 +11,7 @@ from collision_monitor.geometry.containment import TESTS, inside
 from collision_monitor.geometry.coordinates import Booleans, coordinates
 from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.query.arguments import checked_pose
-from collision_monitor.query.contact import Compound
+from collision_monitor.query.arguments import Compound, checked_pose
 
 
 def contains(shape: Compound, pose: Pose, points: ArrayLike, test: str = "closed form") -> Booleans:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.query.contact import Compound, contact
+from collision_monitor.query.arguments import Compound
+from collision_monitor.query.contact import contact
 from collision_monitor.query.convex_pairs import convex_contact
 
 

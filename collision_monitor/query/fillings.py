@@ -8,14 +8,14 @@ least the smaller of the distances from the mesh and from the box.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from collision_monitor.geometry.bounded_cache import bounded_cache
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Mesh, Shape, array_bytes
+from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape, array_bytes
 from collision_monitor.tolerances import ROUNDED_UP
 
 LEAST_THICKNESS: Final = 1e-6
@@ -48,3 +48,23 @@ def _filling(mesh: Mesh) -> tuple[tuple[Box, Pose], ...]:
     size = np.maximum(size, LEAST_THICKNESS * size.max())
     pose = Pose(box.center, Rotation.from_matrix(box.rotation).as_quat())
     return ((Box(size + ROUNDED_UP * size.max()), pose),)
+
+
+class FilledBox(NamedTuple):
+    """The box around the hole of a mesh as a hull in the mesh's frame, and whether it contains the whole mesh."""
+
+    hull: ConvexHull
+    contains: bool
+
+
+def filled_box(mesh: Mesh) -> FilledBox | None:
+    """Box around the hole of a mesh; None for a closed one."""
+    return _filled_box(mesh) if len(mesh.surface.hole) else None
+
+
+@bounded_cache(REMEMBERED_FILLINGS, lambda found, mesh: FILLING_BYTES + array_bytes(mesh))
+def _filled_box(mesh: Mesh) -> FilledBox:
+    ((box, pose),) = _filling(mesh)
+    own = np.abs((mesh.vertices - pose.position) @ pose.rotation)
+    hull = ConvexHull(box.corners @ pose.rotation.T + pose.position)
+    return FilledBox(hull, bool((own <= 0.5 * np.asarray(box.size)).all()))

@@ -11,7 +11,8 @@ import numpy as np
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.pose import Motion
 from collision_monitor.geometry.shapes import HalfSpace
-from collision_monitor.query.contact import Compound, contact
+from collision_monitor.query.arguments import Compound
+from collision_monitor.query.contact import contact
 from collision_monitor.query.impact_methods import METHODS, bisection, end_of_step, swept_bounds
 from collision_monitor.query.moving_pair import MotionQuery, lay_out_pair, make_moving_shape
 from collision_monitor.query.time_of_impact import Impact

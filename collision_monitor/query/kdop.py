@@ -10,7 +10,7 @@ from collision_monitor.geometry.compound import shape_pairs
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.objects.models import containing_kdop
-from collision_monitor.query.contact import Compound
+from collision_monitor.query.arguments import Compound
 
 
 class Enclosure(NamedTuple):

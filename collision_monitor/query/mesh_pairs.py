@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from math import inf
+from math import dist, inf
 from typing import Any, Final
 
 import numpy as np
@@ -13,62 +13,86 @@ from collision_monitor._jit import inlined, kernel
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.meshes.contact import APART, tree_contact
 from collision_monitor.meshes.inside import OUTSIDE, is_in
-from collision_monitor.meshes.nearest import MEMORY, PLACE_A, PLACE_B, answer_row
+from collision_monitor.meshes.nearest import ANSWER, MEMORY, PLACE_A, PLACE_B
 from collision_monitor.meshes.placing import inverse, relative
-from collision_monitor.meshes.shape_trees import trees_of_pair
+from collision_monitor.meshes.shape_trees import CERTAIN, NEVER, KeptTree, have_kernels, kept_tree
 from collision_monitor.meshes.touching import touching
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.motion import quaternion_to_matrix
 from collision_monitor.query.packed import packed_pose
+from collision_monitor.tolerances import EPSILON
 
 Array = NDArray[np.float64]
+
+
+_ROTATIONS: Final = MEMORY
+_ANSWER: Final = _ROTATIONS + 18
+_MEMORY: Final = _ANSWER + ANSWER
+"""Parts of the scratch memory: that of a query, both rotations (2, 3, 3) to world axes, and the answer of `nearest`."""
+
+_ROUNDED_UP: Final = 1.0 + 8.0 * EPSILON
+
+
+def query_memory() -> Array:
+    """Make scratch memory for the kernels of this module."""
+    return np.empty(_MEMORY)
 
 
 class _Memory(threading.local):
     """Scratch memory of each thread."""
 
     def __init__(self) -> None:
-        self.rotation = np.zeros((2, 3, 3))
-        self.answer = answer_row()
-        self.work = np.empty(MEMORY)
+        self.work = query_memory()
 
 
-_MEMORY: Final = _Memory()
+_OWN: Final = _Memory()
 
 
-def _trees_and_poses(shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any) -> tuple[Array, Array, Array, Array] | None:
+def _packed(
+    shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any
+) -> tuple[KeptTree, Array, KeptTree, Array] | None:
     """Trees and packed poses of two shapes, of an open mesh its surface; None for others."""
-    if not (isinstance(shape_a, Shape) and isinstance(shape_b, Shape)):
-        return None
-    trees = trees_of_pair(shape_a, shape_b, surface=True)
-    if trees is None:
-        return None
     try:
-        return trees[0], pose_a.packed_pose, trees[1], pose_b.packed_pose
+        a, x_a, b, x_b = shape_a.kept_tree, pose_a.packed_pose, shape_b.kept_tree, pose_b.packed_pose
     except AttributeError:
+        if not (isinstance(shape_a, Shape) and isinstance(shape_b, Shape)):
+            return None
+        a, b = kept_tree(shape_a), kept_tree(shape_b)
         x_a, x_b = packed_pose(pose_a), packed_pose(pose_b)
-        return None if x_a is None or x_b is None else (trees[0], x_a, trees[1], x_b)
+        if x_a is None or x_b is None:
+            return None
+    return (a, x_a, b, x_b) if have_kernels(a, b, NEVER) else None
 
 
 def mesh_overlap(shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any) -> bool | None:
     """Whether two shapes overlap or touch; of an open mesh its surface. None for a pair without trees or a mesh."""
-    found = _trees_and_poses(shape_a, pose_a, shape_b, pose_b)
-    return None if found is None else trees_overlap(*found, _MEMORY.rotation, _MEMORY.work)
-
-
-def mesh_contact(shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any) -> tuple[float, float, Array] | None:
-    """Distance of two surfaces that are apart, its round-off (m), and their contact row, with points in the world.
-
-    None for other pairs than `mesh_overlap` takes, and for those that may overlap.
-    """
-    found = _trees_and_poses(shape_a, pose_a, shape_b, pose_b)
+    found = _packed(shape_a, pose_a, shape_b, pose_b)
     if found is None:
         return None
-    row = np.empty(CONTACT_SIZE)
-    if trees_contact(*found, _MEMORY.rotation, _MEMORY.answer, _MEMORY.work, row) != APART:
+    a, x_a, b, x_b = found
+    if dist(pose_a.point, pose_b.point) > (a.reach + b.reach) * _ROUNDED_UP:
+        return False
+    return trees_overlap(a.tree, x_a, b.tree, x_b, _OWN.work)
+
+
+def mesh_contact(
+    shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any
+) -> tuple[float, float | None, Array] | None:
+    """Distance of two surfaces that are apart, its bound (m), and their contact row, with points in the world.
+
+    The bound is None if the inside of a mesh is not certain. The result is None for other pairs than `mesh_overlap`
+    takes, and for those that may overlap.
+    """
+    found = _packed(shape_a, pose_a, shape_b, pose_b)
+    if found is None:
         return None
-    return float(row[DISTANCE]), float(row[BOUND]), row
+    a, x_a, b, x_b = found
+    row = np.empty(CONTACT_SIZE)
+    distance, bound = trees_contact(a.tree, x_a, b.tree, x_b, _OWN.work, row)
+    if bound < 0.0:
+        return None
+    return distance, bound if a.inside == b.inside == CERTAIN else None, row
 
 
 @inlined
@@ -80,29 +104,34 @@ def _place(pose_a: Any, pose_b: Any, R: Any) -> tuple[float, float, float]:
 
 
 @kernel
-def trees_overlap(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, R: Any, work: Any) -> bool:
+def trees_overlap(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: Any) -> bool:
     """Whether two trees have a point in common, on a surface or in a solid, or may have one if it takes too long.
 
-    pose_a, pose_b (1, 7): position (m) and unit quaternion (x, y, z, w). Scratch memory: R (2, 3, 3), work (MEMORY,).
+    pose_a, pose_b (1, 7): position (m) and unit quaternion (x, y, z, w). memory: of `query_memory`.
     """
+    R = memory[_ROTATIONS:_ANSWER].reshape((2, 3, 3))
     p = _place(pose_a, pose_b, R)
     X = relative(R[0], R[1], p)
-    if not touching(tree_a, 0, tree_b, 0, X, 1, work)[1]:
+    if not touching(tree_a, 0, tree_b, 0, X, 1, memory)[1]:
         return True
-    if is_in(tree_a, 0, tree_b, 0, X, 0.0, work) != OUTSIDE:
+    if is_in(tree_a, 0, tree_b, 0, X, 0.0, memory) != OUTSIDE:
         return True
-    return is_in(tree_b, 0, tree_a, 0, inverse(X), 0.0, work) != OUTSIDE
+    return is_in(tree_b, 0, tree_a, 0, inverse(X), 0.0, memory) != OUTSIDE
 
 
 @kernel
 def trees_contact(
-    tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, R: Any, answer: Any, work: Any, row: Any
-) -> int:
-    """`tree_contact` of two trees placed as in `trees_overlap`, with points in the world. answer (ANSWER,)."""
+    tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: Any, row: Any
+) -> tuple[float, float]:
+    """`tree_contact` of two trees placed as in `trees_overlap`, with points in the world.
+
+    Return the distance and its bound (m), a bound below 0 if they are not certainly apart.
+    """
+    R, answer = memory[_ROTATIONS:_ANSWER].reshape((2, 3, 3)), memory[_ANSWER:]
     p = _place(pose_a, pose_b, R)
     answer[PLACE_A] = answer[PLACE_B] = -1.0
-    known = tree_contact(tree_a, 0, tree_b, 0, PairPose(R[0], R[1], p), inf, row, answer, work)
+    known = tree_contact(tree_a, 0, tree_b, 0, PairPose(R[0], R[1], p), inf, row, answer, memory)
     for c in range(3):
         row[POINT_A + c] += pose_a[0, c]
         row[POINT_B + c] += pose_a[0, c]
-    return known
+    return row[DISTANCE], row[BOUND] if known == APART else -1.0

@@ -24,8 +24,8 @@ from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.body_layout import lay_out_body
 from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.prediction.pair_impacts import predict_pairs
-from collision_monitor.query.cloud_pair import points_near
-from collision_monitor.query.contact import Compound
+from collision_monitor.query.arguments import Compound
+from collision_monitor.query.surface_pair import points_near
 
 MOST_NEAR: Final = 500
 """Most points of a cloud that touch the other object and are followed one by one, 1 ms each."""

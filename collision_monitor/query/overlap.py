@@ -15,8 +15,8 @@ from collision_monitor.geometry.polyhedron_sat import sat_3d
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Polygon, Shape
 from collision_monitor.geometry.triangulation import convex_parts
-from collision_monitor.query.arguments import checked_pose
-from collision_monitor.query.contact import Compound, contact
+from collision_monitor.query.arguments import Compound, checked_pose
+from collision_monitor.query.contact import contact
 from collision_monitor.query.convex_pairs import convex_contact
 from collision_monitor.query.mesh_pairs import mesh_overlap
 

@@ -67,12 +67,13 @@ def packed_shape(shape: Any) -> Array | None:
 def packed_pose(pose: Any) -> Array | None:
     """Position and quaternion (1, 7) of a Pose, kept as its attribute `packed_pose`; else None.
 
-    The pose's own arrays are read-only, which is another type for numba.
+    The pose's own arrays are read-only, which is another type for numba. Its attribute `point` is the position as three
+    numbers.
     """
     if type(pose) is not Pose:
         return None
     row: Array = np.concatenate([pose.position, pose.quaternion])[None]
-    vars(pose)["packed_pose"] = row
+    vars(pose).update(packed_pose=row, point=tuple(row[0, :3].tolist()))
     return row
 
 

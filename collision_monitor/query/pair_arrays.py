@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from collision_monitor.errors import InputError, PoseError, ShapeError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Shape
-from collision_monitor.query.contact import Compound
+from collision_monitor.query.arguments import Compound
 from collision_monitor.query.packed import packed_shape
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 

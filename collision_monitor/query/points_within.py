@@ -11,9 +11,8 @@ from collision_monitor.geometry.planar import is_planar
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Points
 from collision_monitor.objects.models import exact_model
-from collision_monitor.query.arguments import finite_number
-from collision_monitor.query.cloud_pair import points_near
-from collision_monitor.query.contact import Compound
+from collision_monitor.query.arguments import Compound, finite_number
+from collision_monitor.query.surface_pair import points_near
 
 
 def points_within(

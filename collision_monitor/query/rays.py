@@ -13,8 +13,7 @@ from collision_monitor.geometry.coordinates import Array, Booleans, coordinates
 from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.ray_casting import first_hits
-from collision_monitor.query.arguments import checked_pose
-from collision_monitor.query.contact import Compound
+from collision_monitor.query.arguments import Compound, checked_pose
 
 
 class RayHits(NamedTuple):

@@ -10,14 +10,12 @@ import numpy as np
 
 from collision_monitor.errors import TooCostlyError, UnsupportedError
 from collision_monitor.geometry.pose import Motion
-from collision_monitor.geometry.shapes import HalfSpace, Mesh, Shape, Sphere
+from collision_monitor.geometry.shapes import HalfSpace, Mesh, Sphere
 from collision_monitor.prediction.bodies import Multibody
 from collision_monitor.prediction.impact_record import HIT
-from collision_monitor.query.arguments import finite_number, whole_number
-from collision_monitor.query.contact import Compound, Contact, contact, least_gap
-from collision_monitor.query.convex_pairs import convex_impact
+from collision_monitor.query.arguments import Compound, finite_number, whole_number
+from collision_monitor.query.contact import Contact, contact
 from collision_monitor.query.fillings import fillings
-from collision_monitor.query.mesh_impact import mesh_impact
 from collision_monitor.query.moving_pair import (
     MotionQuery,
     MovingShape,
@@ -26,6 +24,8 @@ from collision_monitor.query.moving_pair import (
     lay_out_pair,
     make_moving_shape,
 )
+from collision_monitor.query.open_gap import least_gap
+from collision_monitor.query.quick_impact import quick_impact, quick_possible_impact
 from collision_monitor.query.touching import follow
 from collision_monitor.records import Method
 from collision_monitor.tolerances import GJK_TOUCHING
@@ -111,10 +111,14 @@ def time_of_impact(
         duration = finite_number("step", step, positive=True)
         return impact_by_method(shape_a, motion_a, shape_b, motion_b, query, method, duration)
     arguments = shape_a, motion_a, shape_b, motion_b
-    quick = _quick_impact(*arguments, query)
-    meshes = [shape for shape in (shape_a, shape_b) if type(shape) is Mesh]
-    if quick is not None and all(mesh.surface.certain for mesh in meshes):
-        return _of_times(quick, arguments)
+    quick = quick_impact(*arguments, query)
+    if quick is not None:
+        found = _of_times(quick, arguments)
+        if all(shape.surface.certain for shape in (shape_a, shape_b) if type(shape) is Mesh):
+            return found
+        first = quick_possible_impact(*arguments, query)
+        if first is not None:
+            return found if first >= found.lower else _impact(first, found.upper, found.method, arguments)
     a, b = make_moving_shape(shape_a, motion_a, "A"), make_moving_shape(shape_b, motion_b, "B")
     check_bounded(a, b)
     found = _first_impact(a, b, query) if quick is None else _of_times(quick, arguments)
@@ -122,17 +126,6 @@ def time_of_impact(
         return found
     possible = _first_possible_impact(a, b, query) if found.lower > 0.0 else 0.0
     return found if possible >= found.lower else _impact(possible, found.upper, found.method, arguments)
-
-
-def _quick_impact(
-    shape_a: Compound, motion_a: Motion, shape_b: Compound, motion_b: Motion, query: MotionQuery
-) -> tuple[float, float] | None:
-    """Lower and upper end for two convex solids, or a mesh and a shape with a tree; None for others."""
-    if type(shape_a) is not Mesh and type(shape_b) is not Mesh:
-        return convex_impact(shape_a, motion_a, shape_b, motion_b, query)
-    if isinstance(shape_a, Shape) and isinstance(shape_b, Shape):
-        return mesh_impact(shape_a, motion_a, shape_b, motion_b, query)
-    return None
 
 
 def _round_off(multibody: Multibody) -> float:

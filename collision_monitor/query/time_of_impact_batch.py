@@ -15,7 +15,7 @@ from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Points
 from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.impact_record import IMPACT
-from collision_monitor.query.contact import Compound
+from collision_monitor.query.arguments import Compound
 from collision_monitor.query.impact_rows import ImpactTimes, impacts_of_rows, impacts_of_spheres, normalise_states
 from collision_monitor.query.moving_pair import MotionQuery, MovingShape, lay_out_pair, make_moving_shape
 from collision_monitor.query.time_of_impact import ITERATIONS, check_bounded, check_query, time_of_impact

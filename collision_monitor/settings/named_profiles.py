@@ -28,14 +28,14 @@ NAMED_PROFILES: Final[dict[str, dict[str, Any]]] = {
         **_EVERYTHING_EXACT,
     },
     "fast": {
-        "impact_tolerance": 1e-3,
+        "impact_tolerance": 1e-4,
         "impact_iterations": 64,
         "uncertainty": False,  # sampling takes by far the longest of all parts of a step
         "uncertainty_samples": 128,
         "position_tolerance": 5e-2,
         "orientation_tolerance": 5e-2,
-        "velocity_tolerance": 4e-2,
-        "angular_velocity_tolerance": 4e-2,
+        "velocity_tolerance": 0.2,
+        "angular_velocity_tolerance": 0.2,
         "adaptive_tolerances": True,
         "distance_tolerance": 0.0,
         "model_mesh": "convex_hull",

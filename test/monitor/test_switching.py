@@ -104,7 +104,9 @@ def test_every_setting_can_change_and_holds_from_then_on(setting: Any) -> None:
 
 def test_predictions_are_as_exact_as_the_new_profile() -> None:
     scene = make_scene("clutter")
-    monitor, fresh = Monitor(Profile.named("fast").replace(adaptive_tolerances=False)), Monitor("exact")
+    wide = {"velocity_tolerance": 0.04, "angular_velocity_tolerance": 0.04}
+    monitor = Monitor(Profile.named("fast").replace(adaptive_tolerances=False, **wide))
+    fresh = Monitor("exact")
     for description in scene.descriptions:
         monitor.describe(description)
         fresh.describe(description)

@@ -10,6 +10,9 @@ from hypothesis import strategies as st
 
 import collision_monitor as cm
 from collision_monitor import Motion, Pose
+from collision_monitor.query.moving_pair import make_moving_shape
+from collision_monitor.query.quick_impact import quick_possible_impact
+from collision_monitor.query.time_of_impact import _first_possible_impact, check_query
 
 CUBE = trimesh.creation.box((2, 2, 2))
 TORUS = trimesh.creation.torus(1.0, 0.4, major_sections=12, minor_sections=8)
@@ -116,3 +119,44 @@ def test_parts_that_overlap_are_one_solid():
     both = soup(trimesh.util.concatenate([CUBE, apart]))
     c = cm.contact(both, Pose(), cm.Sphere(0.1), Pose((0.5, 0, 0)))
     assert c.overlaps and c.signed_distance == pytest.approx(-0.4)
+
+
+CUP = trimesh.creation.box((1, 1, 1))
+CUP.update_faces(CUP.triangles_center[:, 2] < 0.4)  # the box around its hole does not contain it
+
+
+def scattered(rng):
+    corners = 0.4 * rng.normal(size=(40, 1, 3)) + 0.1 * rng.normal(size=(40, 3, 3))
+    return cm.Mesh(corners.reshape(-1, 3), np.arange(120).reshape(-1, 3))
+
+
+PAIRS = [("soup", "soup"), ("soup", "cup"), ("cup", "cup"), ("cup", "solid"), ("soup", "solid")]
+
+
+@pytest.mark.parametrize(("a", "b"), PAIRS)
+def test_the_impact_of_what_open_meshes_may_be_is_the_same_with_and_without_the_kernels(a, b):
+    rng = np.random.default_rng(len(a) + 7 * len(b))
+    query = check_query(2.0, 1e-6, 0.0, 1000)
+    make = {
+        "soup": scattered,
+        "cup": lambda rng: cm.Mesh(rng.choice([0.3, 1.0]) * CUP.vertices, CUP.faces),
+        "solid": lambda rng: cm.Box((0.3, 0.2, 0.4)),
+    }
+    compared = 0
+    for k in range(40):
+        A, B = make[a](rng), make[b](rng)
+        start = random_pose(rng, 0.1 if k % 4 == 0 else 2.0)  # one in the other, or beside it
+        motions = (
+            Motion(random_pose(rng, 0.0), angular=rng.normal(size=3)),
+            Motion(start, -start.position, rng.normal(size=3)),
+        )
+        quick = quick_possible_impact(A, motions[0], B, motions[1], query)
+        if quick is not None:
+            compared += 1
+            slow = _first_possible_impact(
+                make_moving_shape(A, motions[0], "A"), make_moving_shape(B, motions[1], "B"), query
+            )
+            surfaces = cm.time_of_impact(A, motions[0], B, motions[1]).upper
+            # the surfaces count besides; steps of advancement end within the tolerance
+            assert min(quick, surfaces) == pytest.approx(min(slow, surfaces), abs=1e-5), k
+    assert compared > 10

@@ -1,0 +1,59 @@
+"""Which triangles of a leaf may cross another triangle: those that no plane of either separates, eight at once.
+
+The first step of two triangles' test (Moeller, 1997), with the operations of `crossing_point` in their order, so that
+both agree to the last bit.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from collision_monitor._jit.lanes import Lanes
+from collision_monitor.meshes.boxes import Block, inner
+from collision_monitor.meshes.layout import CORNERS, RADIUS, WIDTH
+
+_POINT = list[Lanes]
+
+
+def _minus(a: _POINT, b: _POINT) -> _POINT:
+    return [a[k] - b[k] for k in range(3)]
+
+
+def _normal(corners: list[_POINT]) -> _POINT:
+    a, b = _minus(corners[1], corners[0]), _minus(corners[2], corners[0])
+    return [a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3] for k in range(3)]
+
+
+def _crossed(builder: Any, S: list[_POINT], T: list[_POINT]) -> Any:
+    """Lanes in which not all corners of S are on one side of T's plane."""
+    n, zero = _normal(T), Lanes.constant(builder, 0.0).value
+    x, y, z = (inner(_minus(corner, T[0]), n) for corner in S)
+    above = builder.fcmp_ordered(">", x.least(y).least(z).value, zero)
+    below = builder.fcmp_ordered("<", x.largest(y).largest(z).value, zero)
+    return builder.not_(builder.or_(above, below))
+
+
+@intrinsic
+def may_cross(typing_context, triangle, radius, blocks, block):
+    """Bit k for each triangle k of a block that no plane separates from a triangle, or if there is a radius.
+
+    triangle: its nine coordinates in the frame of the block's tree (m). radius (m): by which it is enlarged.
+    """
+    signature = types.int64(triangle, radius, blocks, types.int64)
+
+    def codegen(context, builder, signature, arguments):
+        numbers = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
+        members = Block(context, builder, signature.args[2], arguments[2], arguments[3])
+        S = [members.vector(CORNERS + 3 * i) for i in range(3)]
+        T = [numbers[3 * i : 3 * i + 3] for i in range(3)]
+        radii = members.row(RADIUS) + Lanes.constant(builder, arguments[1])
+        found = builder.and_(_crossed(builder, S, T), _crossed(builder, T, S))
+        found = builder.or_(found, builder.fcmp_ordered(">", radii.value, Lanes.constant(builder, 0.0).value))
+        return builder.zext(builder.bitcast(found, ir.IntType(WIDTH)), ir.IntType(64))
+
+    return signature, codegen

@@ -1,0 +1,73 @@
+"""The first impact of two shapes in one call of a kernel, and that of the solids which open meshes may belong to."""
+
+from __future__ import annotations
+
+from itertools import product
+from math import dist, inf
+
+from collision_monitor.geometry.pose import Motion, Pose
+from collision_monitor.geometry.shapes import Mesh, Shape
+from collision_monitor.meshes.shape_trees import kept_tree
+from collision_monitor.query.arguments import Compound
+from collision_monitor.query.convex_pairs import convex_contact, convex_impact
+from collision_monitor.query.fillings import filled_box
+from collision_monitor.query.mesh_impact import mesh_impact
+from collision_monitor.query.moving_pair import MotionQuery
+from collision_monitor.query.open_gap import may_be_inside
+from collision_monitor.tolerances import GJK_TOUCHING
+
+
+def quick_impact(
+    shape_a: Compound, motion_a: Motion, shape_b: Compound, motion_b: Motion, query: MotionQuery
+) -> tuple[float, float] | None:
+    """Lower and upper end (s) for two convex solids, or a mesh and a shape with a tree; None for others.
+
+    Of an open mesh it is that of the surface.
+    """
+    if type(shape_a) is not Mesh and type(shape_b) is not Mesh:
+        return convex_impact(shape_a, motion_a, shape_b, motion_b, query)
+    if isinstance(shape_a, Shape) and isinstance(shape_b, Shape):
+        return mesh_impact(shape_a, motion_a, shape_b, motion_b, query)
+    return None
+
+
+def quick_possible_impact(
+    shape_a: Compound, motion_a: Motion, shape_b: Compound, motion_b: Motion, query: MotionQuery
+) -> float | None:
+    """First time (s) at which the boxes that fill an open mesh (fillings.py) may meet the other shape, or its boxes.
+
+    None for a pair that kernels do not answer, and if it is not certain that the boxes are apart, or overlap, now.
+    """
+    if not (isinstance(shape_a, Shape) and isinstance(shape_b, Shape)):
+        return None
+    boxes = [filled_box(shape) if isinstance(shape, Mesh) else None for shape in (shape_a, shape_b)]
+    # the solid is in the hull of its surface, so that a box around the surface replaces it
+    parts_a, parts_b = (
+        [part for part in (box and box.hull, None if box and box.contains else shape) if part is not None]
+        for box, shape in zip(boxes, (shape_a, shape_b), strict=True)
+    )
+    first = inf
+    for a, b in product(parts_a, parts_b):
+        if a is shape_a and b is shape_b:
+            continue
+        times = quick_impact(a, motion_a, b, motion_b, query)
+        if times is None:
+            return 0.0 if _overlap(a, motion_a, b, motion_b, query) else None
+        first = min(first, times[0])
+    pose_a, pose_b = motion_a.pose, motion_b.pose
+    own, other = [(shape_a, Pose())], [(shape_b, Pose())]
+    if dist(pose_a.position, pose_b.position) <= kept_tree(shape_a).reach + kept_tree(shape_b).reach and (
+        (shape_b in parts_b and may_be_inside(own, pose_a, other, pose_b))
+        or (shape_a in parts_a and may_be_inside(other, pose_b, own, pose_a))
+    ):
+        return 0.0
+    return first
+
+
+def _overlap(a: Shape, motion_a: Motion, b: Shape, motion_b: Motion, query: MotionQuery) -> bool:
+    """Whether two convex solids certainly are within the separation now."""
+    if isinstance(a, Mesh) or isinstance(b, Mesh):
+        return False
+    found = convex_contact(a, motion_a.pose, b, motion_b.pose)
+    touching = GJK_TOUCHING * (kept_tree(a).reach + kept_tree(b).reach)
+    return found is not None and found[0] + found[1] < query.separation - touching
