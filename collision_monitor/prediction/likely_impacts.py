@@ -105,10 +105,11 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         set_frame(work.frame, B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
         set_gap_covariance(multibody, spread, i, j, ages, t, sampling, work)
         pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
-        sure = sampling.stated and surely_meet(table, parts, pair, work.joint, turning, t, query.margin, work.scratch)
+        far_i, far_j = r_i if r_i < inf else 0.0, r_j if r_j < inf else 0.0  # a half-space does not turn
+        swing = (far_i * (turn_i[0] + turn_i[1] * t), far_j * (turn_j[0] + turn_j[1] * t))
+        sure = sampling.stated and surely_meet(table, parts, pair, work.joint, swing, t, query.margin, work.scratch)
         take_root(work.joint)
         _clear_upper(work.joint)
-        far_i, far_j = r_i if r_i < inf else 0.0, r_j if r_j < inf else 0.0  # a half-space does not turn
         errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, (far_i, far_j))
         if are_round(table, parts, pair, errors, query.margin, work):
             samples = enter_round_bodies(table, parts, pair, errors, sampling, lattice, memory, work)

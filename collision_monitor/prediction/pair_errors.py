@@ -5,9 +5,10 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
-from collision_monitor._jit import device, inlined
-from collision_monitor.prediction.error_samples import add_covariance, orientation_spread
+from collision_monitor._jit import inlined
+from collision_monitor.prediction.error_samples import add_covariance
 from collision_monitor.prediction.sample_gaps import FIRST_ORDER, NOT_TURNED, SERIES
+from collision_monitor.prediction.spread import unknown_acceleration
 
 BENDING: Final = 0.1
 """Largest deviation of a gap from a straight line in a segment, in standard deviations of the gap."""
@@ -40,18 +41,19 @@ def surface_bend(m, radius):
     return radius * rate * rate if rate > 0.0 else 0.0
 
 
-@device
+@inlined
 def swing_bound(spread, i, radius, age, horizon):
     """Bound (m now, m/s) on the standard deviation of body i's surface from errors of its orientation.
 
-    It is exact now, and not too low at the horizon and between, because the standard deviation is convex in time.
-    radius (m): the body's, infinite or 0 if rotation moves nothing. age: s since the last state.
+    The parts are added instead of their squares, as in `surface_spread`. radius (m): the body's, infinite or 0 if
+    rotation moves nothing. age: s since the last state.
     """
     if not 0.0 < radius < inf:
         return 0.0, 0.0
-    now, _ = orientation_spread(spread, i, radius, age, 0.0)
-    _, rate = orientation_spread(spread, i, radius, age, horizon)
-    return radius * now, radius * rate
+    orientation, rate = spread.stddev[i, 1], spread.stddev[i, 3]
+    turning = unknown_acceleration(spread, i, False, 1, 0.0)
+    now = orientation + rate * age + 0.5 * turning * age * age
+    return radius * now, radius * (rate + turning * (age + 0.5 * horizon))
 
 
 @inlined
