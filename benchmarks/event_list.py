@@ -1,9 +1,11 @@
 """Measure the gain of the event list over plain recomputation of every prediction.
 
-    python benchmarks/event_list.py                    # 10,000 boxes at 100 Hz, five kinds of motion
+    python benchmarks/event_list.py                    # 10,000 boxes at 100 Hz, six kinds of motion
     python benchmarks/event_list.py --objects 1000 --seconds 60 --every 1   # compared at every step of a minute
-    python benchmarks/event_list.py --distance-tolerance 0.001 --moves steady,slow   # keeps contacts that hardly move
+    python benchmarks/event_list.py --distance-tolerance 0.001 --moves rest,slow     # keeps contacts that hardly move
+    python benchmarks/event_list.py --shape sphere --objects 100,1000,10000,100000 --moves steady,turns   # growth
 
+CPU ms: median of the processor time, which depends less on the load of the machine; growth: its ratio to the row above.
 Both monitors get the same states in one run. At every --every th step the reference monitor recomputes everything, and
 the answers are compared: no collision may be missed, late or invented, within the stated bounds.
 """
@@ -15,6 +17,7 @@ import json
 import os
 import sys
 import time
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +25,15 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from collision_monitor import Box, Monitor, records
+from collision_monitor import Box, Monitor, Sphere, records
 from collision_monitor.accuracy.reference_monitor import ReferenceMonitor, disagreements
 from collision_monitor.geometry.pose import from_rotation_vector, multiply
 from collision_monitor.settings.profile import Profile
 
 RATE = 100.0
-MOVES = ("steady", "turns", "noise", "jumps", "slow")
+MOVES = ("steady", "turns", "noise", "jumps", "slow", "rest")
+SPEEDS = {"slow": 0.01, "rest": 0.0}
+"""Kinds of motion that are slower than the others, as a part of their speeds."""
 
 
 class Boxes:
@@ -73,27 +78,28 @@ class Boxes:
         self.linear[out] *= -1
 
 
-def run(move: str, args: argparse.Namespace) -> dict[str, object]:
+def run(move: str, objects: int, args: argparse.Namespace) -> dict[str, Any]:
     """Measure one kind of motion; returns the row of the table."""
-    boxes = Boxes(args.objects, args.seed)
+    boxes = Boxes(objects, args.seed)
     profile = Profile(threads=args.threads, distance_tolerance=args.distance_tolerance)
-    if move == "slow":
-        boxes.linear, boxes.angular = 0.01 * boxes.linear, 0.01 * boxes.angular
+    boxes.linear, boxes.angular = SPEEDS.get(move, 1.0) * boxes.linear, SPEEDS.get(move, 1.0) * boxes.angular
     # half of the declared tolerances, so that two noisy states stay within them
     noise = 0.49 * profile.position_tolerance if move == "noise" else 0.0
     turning = {"turns": 0.01, "jumps": 1.0}.get(move, 0.0)
     mine, plain = Monitor(profile), ReferenceMonitor(profile.replace(distance_tolerance=0.0))
     for monitor in (mine, plain):
         for i, size in enumerate(boxes.size):
-            monitor.add(i, Box(size))
+            monitor.add(i, Box(size) if args.shape == "box" else Sphere(0.5 * size.mean()))
     spent: dict[str, list[float]] = {"event list": [], "plain": []}
+    cpu: list[float] = []
     wrong: list[str] = []
     moved = compared = 0
     steps = int(args.seconds * RATE)
     for step in track(range(steps), description=f"{move:8}", console=Console(stderr=True), transient=True):
         states, stamp = boxes.states(noise), round(step * 1e9 / RATE)
-        began = time.perf_counter()
+        began, used = time.perf_counter(), time.thread_time()
         answer = mine.step(stamp, states)
+        cpu.append(time.thread_time() - used)
         spent["event list"].append(time.perf_counter() - began)
         moved += answer.status.objects_moved
         if step % args.every == 0:
@@ -103,16 +109,18 @@ def run(move: str, args: argparse.Namespace) -> dict[str, object]:
             wrong += [f"step {step}: {text}" for text in disagreements(answer, truth, profile.horizon)]
             compared += 1
         boxes.move(1 / RATE, turning)
-        if move not in ("steady", "slow"):
+        if move not in ("steady", *SPEEDS):
             boxes.walls()
     warm = min(10, steps // 4)
     own, full = 1e3 * np.array(spent["event list"][warm:]), 1e3 * np.array(spent["plain"][1:] or spent["plain"])
     return {
         "move": move,
-        "objects": args.objects,
+        "objects": objects,
         "threads": args.threads,
         "mean_ms": own.mean(),
         "median_ms": float(np.median(own)),
+        "best_ms": float(own.min()),
+        "cpu_ms": 1e3 * float(np.median(cpu[warm:])),
         "p99_ms": float(np.percentile(own, 99)),
         "plain_ms": float(np.median(full)),
         "ratio": float(np.median(full) / own.mean()),
@@ -128,7 +136,8 @@ def run(move: str, args: argparse.Namespace) -> dict[str, object]:
 def main() -> int:
     """Return exit code 3 if the two monitors disagree."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--objects", type=int, default=10_000)
+    parser.add_argument("--objects", default="10000", help="number of objects, or several: 100,1000,10000")
+    parser.add_argument("--shape", choices=("box", "sphere"), default="box")
     parser.add_argument("--seconds", type=float, default=5.0, help="simulated time at 100 Hz")
     parser.add_argument("--every", type=int, default=25, help="compare with recomputation at every K-th step")
     parser.add_argument("--distance-tolerance", type=float, default=0.0, help="distance_tolerance of the profile (m)")
@@ -137,17 +146,22 @@ def main() -> int:
     parser.add_argument("--moves", default=",".join(MOVES), help=f"kinds of motion: {', '.join(MOVES)}")
     parser.add_argument("--json", action="store_true", help="print one JSON line instead of a table")
     args = parser.parse_args()
-    rows = [run(move, args) for move in args.moves.split(",")]
+    rows = [run(move, int(n), args) for move in args.moves.split(",") for n in args.objects.split(",")]
     if args.json:
         print(json.dumps({"load": os.getloadavg()[0], "rows": rows}))
     else:
-        table = Table(title=f"{args.objects} boxes at {RATE:.0f} Hz, contacts and all predictions within 2 s")
-        for name in ("move", "mean ms", "p99 ms", "plain ms", "plain / mean", "moved/step", "compared", "wrong"):
+        table = Table(title=f"{args.shape}, {RATE:.0f} Hz, contacts and all predictions within 2 s")
+        names = ("best ms", "CPU ms", "median ms", "mean ms", "p99 ms", "plain ms", "plain / mean", "moved/step")
+        for name in ("move", "objects", *names, "growth", "compared", "wrong"):
             table.add_column(name, justify="left" if name == "move" else "right")
-        for row in rows:
-            numbers = [f"{row[key]:.2f}" for key in ("mean_ms", "p99_ms", "plain_ms", "ratio", "moved_per_step")]
-            table.add_row(str(row["move"]), *numbers, str(row["compared_steps"]), str(row["disagreements"]))
-        Console().print(table)
+        keys = ("best_ms", "cpu_ms", "median_ms", "mean_ms", "p99_ms", "plain_ms", "ratio", "moved_per_step")
+        for row, last in zip(rows, [None, *rows], strict=False):
+            numbers = [f"{row[key]:.2f}" for key in keys]
+            grows = last is not None and last["move"] == row["move"]
+            numbers.append(f"×{row['cpu_ms'] / last['cpu_ms']:.1f}" if last and grows else "")
+            ends = str(row["compared_steps"]), str(row["disagreements"])
+            table.add_row(str(row["move"]), str(row["objects"]), *numbers, *ends)
+        Console(width=None if sys.stdout.isatty() else 160).print(table)
         for row in rows:
             if row["first_disagreement"]:
                 print(f"{row['move']}: {row['first_disagreement']}", file=sys.stderr)

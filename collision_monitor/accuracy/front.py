@@ -61,6 +61,15 @@ class Front:
         )
 
 
+def summaries(rows: Sequence[Measurement]) -> list[str]:
+    """Return `Front.summary` of each scene whose rows have a fixed part, in order."""
+    scenes: dict[str, list[Measurement]] = {}
+    for row in rows:
+        if row.fixed_us == row.fixed_us:
+            scenes.setdefault(row.label, []).append(row)
+    return [Front(found, found[0].fixed_us).summary() for found in scenes.values()]
+
+
 def error_of(row: Measurement, which: str) -> float:
     """Return the 99th percentile of the errors of a row: "time" (s) or "distance" (m). NaN: no answers."""
     return row.ttc_error_s.p99 if which == "time" else row.distance_error_p99_m

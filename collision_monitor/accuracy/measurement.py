@@ -70,6 +70,8 @@ class Measurement:
     """Largest error of the distance of models, divided by the size of the smaller object."""
     noise: float = 0.0
     """Noise of the scene's states (m, rad, m/s and rad/s), see `world.measured`."""
+    fixed_us: float = np.nan
+    """Median time (µs) of the part of the scene's steps that no profile changes (`front.fixed_part`)."""
 
     @property
     def label(self) -> str:

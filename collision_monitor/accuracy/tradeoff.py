@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 
 from collision_monitor.accuracy.default_scenes import MESH_SCENE
+from collision_monitor.accuracy.front import fixed_part
 from collision_monitor.accuracy.inputs import Workload
 from collision_monitor.accuracy.measurement import Measurement
 from collision_monitor.accuracy.model_tradeoff import COMPARED_STEPS, MODELS, model_tradeoff
@@ -33,5 +34,7 @@ def tradeoff(
         else:
             with progress_bar(name, 2 * len(steps) * len(profiles)) as progress:
                 found = profile_tradeoff(name, descriptions, steps, profiles, progress)
+            fixed = fixed_part(Workload(name, descriptions, steps))
+            found = [replace(row, fixed_us=fixed) for row in found]
         rows += [replace(row, noise=noise) for row in found]
     return rows

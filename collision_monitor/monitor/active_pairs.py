@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from collision_monitor import records
 from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.prefetch import prefetch
+from collision_monitor.errors import InputError
 from collision_monitor.monitor.candidates import is_checked
-from collision_monitor.monitor.carried_contacts import CARRIED, Carried, carry_over, no_answers, remember, without
+from collision_monitor.monitor.carried_contacts import CARRIED, carry, keep, no_answers
 from collision_monitor.monitor.contact_details import complete_contact
 from collision_monitor.monitor.event_list import NO_EVENTS
 from collision_monitor.monitor.roster import Roster
@@ -53,6 +54,7 @@ class Active(NamedTuple):
     pairs: Any  # PAIR
     events: Any  # IMPACT: its last predicted impact
     results: Any  # (n, RESULT): its contact in this step
+    carried: Any  # (n, CARRIED): its last answer; (0, CARRIED) without a `distance_tolerance`
 
 
 class ActivePairs(Stage):
@@ -66,12 +68,12 @@ class ActivePairs(Stage):
         self.events: Rows = np.zeros(0, IMPACT)
         self.results = np.empty((0, RESULT))
         self._orphans: list[tuple[int, float]] = []  # contacts (key, since) of removed pairs
-        self._carried = no_answers()  # of contacts that may persist, with a `distance_tolerance`
+        self._carried = no_answers()
 
     @property
     def active(self) -> Active:
         """The pairs as the kernels read them."""
-        return Active(self.pairs, self.events, self.results)
+        return Active(self.pairs, self.events, self.results, self._carried)
 
     @property
     def touching_keys(self) -> NDArray[np.uint64]:
@@ -92,12 +94,15 @@ class ActivePairs(Stage):
                 self._orphans.append((int(pair["key"]), float(pair["since"])))
         self.pairs = np.delete(self.pairs, indices)
         self.events = np.delete(self.events, indices)
+        if len(self._carried):
+            self._carried = np.delete(self._carried, indices, axis=0)
 
     def end_unchecked(self, roster: Roster, i: int) -> None:
         """Remove the pairs of body i, which was described, that are no longer checked."""
-        self._carried = without(self._carried, int(roster.bodies.id[i]))
         of_body = self.of_body(i)
         if len(of_body):
+            if len(self._carried):
+                self._carried[of_body] = np.nan  # of the shapes before
             pairs = self.pairs[of_body]
             others = np.where(pairs["i"] == i, pairs["j"], pairs["i"])
             self.end(of_body[~is_checked(roster, i, others)])
@@ -117,41 +122,34 @@ class ActivePairs(Stage):
         """Add the pairs of the events (IMPACT) that are due. Drop the pairs that ended, or whose motion changed."""
         room = len(self.pairs) + len(due)
         if not room:
-            self.results = self.results[:0]
+            self.results, self._carried = self.results[:0], no_answers()
             return
         pairs, events = np.empty(room, PAIR), np.empty(room, IMPACT)
         order = np.argsort(due["key"], kind="stable") if len(due) > 1 else _FIRST[: len(due)]
         b = step.roster.bodies
-        n = _unite(b.id, b.used, b.version, self.pairs, self.events, due, order, pairs, events)
+        columns = b.id, b.used, b.version
+        carried = np.empty((room if step.profile.distance_tolerance else 0, CARRIED))
+        n = _unite(*columns, self.pairs, self.events, self._carried, due, order, pairs, events, carried)
         self.pairs, self.events, self.results = pairs[:n], events[:n], np.empty((n, RESULT))
+        self._carried = carried[:n]
 
     def keep(self, kept: NDArray[np.bool_]) -> None:
         """Keep the marked pairs and drop the others. kept (n,)."""
         self.pairs, self.events = self.pairs.compress(kept), self.events.compress(kept)
         self.results = self.results[: len(self.pairs)]
+        if len(self._carried):
+            self._carried = self._carried.compress(kept, axis=0)
 
     def examine_all(self, step: StepContext, scratch: Scratch) -> Rows:
         """Examine every pair. Return the events (IMPACT) of pairs that are certified apart for a while."""
         if not len(self.pairs):
-            self._carried = no_answers()
             return NO_EVENTS
         later = np.empty(len(self.pairs), IMPACT)
-        if not step.profile.distance_tolerance:
-            return later[: self.examine(step, np.arange(len(self.pairs)), scratch, later)]
-        if len(self._carried.keys):
-            left, source = carry_over(step, self._carried, self.pairs, self.results)
-        else:
-            left, source = np.arange(len(self.pairs)), np.full(len(self.pairs), -1, np.int32)
-        count = self.examine(step, left, scratch, later) if len(left) else 0
-        if self.pairs["touching"].any():
-            self._carried = remember(step, self._carried, self.pairs, self.results, source)
-        else:
-            self._carried = no_answers()
-        return later[:count]
+        return later[: self.examine(step, np.arange(len(self.pairs)), scratch, later)]
 
     def examine(self, step: StepContext, which: NDArray[np.intp], scratch: Scratch, later: Rows) -> int:
         """Examine the pairs `which` (M,). Write the events of pairs certified apart to `later`; return how many."""
-        queries = step.settings.impact, step.settings.contact
+        queries = step.settings.impact, step.settings.contact, step.profile.distance_tolerance
         n, tests, made = _examine(step.roster.multibody, self.active, which, step.now, queries, scratch, later)
         step.work.narrow_phase_tests += tests
         step.work.impact_queries += made
@@ -176,7 +174,7 @@ class ActivePairs(Stage):
     def save(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
         snapshot.arrays.update(pairs=self.pairs.copy(), pair_events=self.events.copy())
-        snapshot.arrays.update(carried_keys=self._carried.keys.copy(), carried=self._carried.rows.copy())
+        snapshot.arrays["carried"] = self._carried.copy()
         facts["orphans"] = list(self._orphans)
 
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
@@ -185,14 +183,17 @@ class ActivePairs(Stage):
         self.events = snapshot.array("pair_events", np.empty(0, IMPACT), len(self.pairs))
         snapshot.check_slots("pairs", self.pairs)
         snapshot.check_slots("pair_events", self.events)
-        keys = snapshot.array("carried_keys", np.zeros(0, np.uint64))
-        self._carried = Carried(keys, snapshot.array("carried", np.zeros((0, CARRIED)), len(keys)))
+        self._carried = snapshot.array("carried", no_answers())
+        if len(self._carried) not in (0, len(self.pairs)):
+            raise InputError(f"snapshot, carried: expected {len(self.pairs)} rows or none, got {len(self._carried)}")
         self._orphans = [(key, since) for key, since in facts["orphans"]]
 
 
 @kernel
-def _unite(ids, used, version, pairs, events, due, order, new_pairs, new_events):
+def _unite(ids, used, version, pairs, events, carried, due, order, new_pairs, new_events, new_carried):
     """Merge the active pairs with those of the due events, by key, into new_pairs; their events into new_events.
+
+    Those that touched take their carried rows along into new_carried, if both arrays have rows.
 
     A pair leaves the active pairs here if it is marked as leaving, if one of its bodies was removed, or if it does not
     touch and its motion changed (then it was predicted anew). order (D,): sorts `due` by key. ids, used, version:
@@ -207,7 +208,12 @@ def _unite(ids, used, version, pairs, events, due, order, new_pairs, new_events)
             if gone or pairs[k].leaving == 1 or (changed and pairs[k].touching == 0):
                 k += 1
                 continue
+        for c in range(CARRIED if new_carried.shape[0] > 0 else 0):
+            new_carried[n, c] = np.nan
         if k < pairs.size and (m >= order.size or pairs[k].key <= due[order[m]].key):
+            takes_along = pairs[k].touching == 1 and carried.shape[0] > 0 and new_carried.shape[0] > 0
+            for c in range(CARRIED if takes_along else 0):
+                new_carried[n, c] = carried[k, c]
             new_pairs[n] = pairs[k]
             new_pairs[n].touched = pairs[k].touching
             new_events[n] = events[k]
@@ -243,12 +249,14 @@ def _examine(multibody, active, which, now, queries, scratch, later):
 
     The pairs keep their indices. A pair that does not touch and is certified apart for a while returns to the event
     list: it is marked as leaving, and its event goes into `later` (IMPACT). A pair without a further impact, or one
-    that this step predicted anew, is marked as leaving too. queries: an ImpactQuery and a ContactQuery.
+    that this step predicted anew, is marked as leaving too. queries: an ImpactQuery, a ContactQuery and the tolerance
+    (m) within which contacts are carried over.
     Returns (number of events in `later`, narrow-phase tests, impact queries).
     """
     table, bodies = multibody.table, multibody.bodies
-    pairs, events, results = active
-    impact, contact = queries
+    pairs, events, results, carried = active
+    impact, contact, tolerance = queries
+    q = scratch.quaternion[0]
     n_later = tests = made = 0
     for at in range(which.size):
         if at + PREFETCH_AHEAD < which.size:
@@ -257,6 +265,10 @@ def _examine(multibody, active, which, now, queries, scratch, later):
         k = which[at]
         pair, event = pairs[k], events[k]
         i, j = pair.i, pair.j
+        may_carry = tolerance > 0.0 and pair.touched == 1
+        if may_carry and carry(bodies, i, j, now, contact, tolerance, q, carried[k], results[k]):
+            pair.touching, pair.leaving = 1, 0
+            continue
         touching, count = body_contact(multibody, i, j, now, contact, scratch, results[k])
         tests += count
         stays = touching
@@ -271,6 +283,8 @@ def _examine(multibody, active, which, now, queries, scratch, later):
                     stays = True
         if touching:
             complete_contact(multibody, i, j, now, scratch, results[k])
+        if tolerance > 0.0:
+            keep(multibody, i, j, touching, now, contact, q, results[k], carried[k])
         if touching and pair.touched == 0:
             pair.since = now
         pair.touching = 1 if touching else 0

@@ -45,7 +45,7 @@ def _shape_pairs(multibody, active, now, scratch, found):
     scratch: a quaternion (1, 4) and rotations (4, 3, 3).
     """
     table, parts, bodies = multibody
-    pairs, _, results = active
+    pairs, _, results, _ = active
     q, R = scratch
     n = 0
     for k in range(pairs.size):
@@ -105,7 +105,7 @@ class _Points(NamedTuple):
 @allocating_kernel
 def _join(bodies, active, now, patches, most, points, work):
     """Join the patches of the shapes of each active pair into its points, at most `most` of them."""
-    pairs, _, results = active
+    pairs, _, results, _ = active
     of, tie = patches.of, patches.tie
     corners = np.empty((CORNERS, 3))
     out = np.empty(CONTACT_SIZE)

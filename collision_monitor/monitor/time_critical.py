@@ -207,7 +207,7 @@ def leave(bodies, active, which, now, query, later):
     meet from now on, UNRESOLVED. If the bounding spheres are apart, the contact ends, and the pair returns to the event
     list or is dropped. query: ContactQuery. Returns the number of events in `later`.
     """
-    pairs, events, results = active
+    pairs, events, results, _ = active
     n_later = 0
     for at in range(which.size):
         k = which[at]

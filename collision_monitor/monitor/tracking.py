@@ -28,16 +28,23 @@ SHORTEST_SLACK: Final = 0.0625
 LONGEST_SLACK: Final = 1.0
 """Slack: how far beyond the horizon a body is predicted, in horizons; initial, smallest and largest value."""
 
-NARROWEST: Final = 2.0**-20
+NARROWEST: Final = 2.0**-26
+ONCE: Final = 2.0**-25
 ROOM: Final = 2.0
-"""Width: the part of the tolerances that a body uses. Smallest value; and its ratio to the last deviation, if that was
-within the tolerances, because the next deviation of a noisy state may be larger."""
+"""Width: the part of the tolerances that a body uses. Smallest value; that of a body which left
+its motion within FUTILE_STEPS steps once; and its ratio to the last deviation, if that was within the tolerances,
+because the next deviation of a noisy state may be larger."""
 
 FUTILE_STEPS: Final = 4.0
 PATIENCE: Final = 128.0
 """A body with half of the tolerances or more that leaves its motion within FUTILE_STEPS steps turns or accelerates. Its
 tolerances are NARROWEST for its next PATIENCE motions; its width is minus the number of those that are left. A body
-with the NARROWEST tolerances that kept its motion for longer has no noise, and keeps them."""
+with the NARROWEST tolerances has noise only if it leaves its motion so soon twice in a row; one that bounces has none.
+"""
+
+FEW_BODIES: Final = 32
+"""Up to this number of moving bodies keep the NARROWEST adaptive tolerances, because to predict them anew takes less
+time than to examine the pairs that wider tolerances leave UNRESOLVED."""
 
 WIDEST: Final = 0.4
 """Widest adaptive tube at the end of the horizon, in radii of its body. Larger: it meets more pairs than it saves."""
@@ -63,13 +70,14 @@ class Tracking(Stage):
     """Compares the bodies' states with their predicted motions, and starts the bodies anew that left them."""
 
     SAVED = ("_outside", "_width", "_before")
-    CACHES = ("_columns", "_futile")
+    CACHES = ("_columns", "_futile", "_are_few")
 
     def __init__(self) -> None:
         self._outside: NDArray[np.bool_] = np.zeros(0, np.bool_)  # by slot: outside of the region
         self._width: NDArray[np.float64] = np.zeros(0)  # by slot: part of the tolerances that the body uses
         self._before = 0.0  # time of the step before (s)
         self._futile = 0.0  # duration of FUTILE_STEPS steps (s)
+        self._are_few = False  # whether the scene has at most FEW_BODIES
         self._columns = make_columns()
 
     @property
@@ -118,8 +126,10 @@ class Tracking(Stage):
         roster = step.roster
         found = np.empty((2, roster.top), np.int32)
         uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
-        n, m = find_moved(roster.bodies, uncertainty, roster.top, step.now, step.settings.motion, self._columns, found)
+        settings, columns = step.settings.motion, self._columns
+        n, m, moving = find_moved(roster.bodies, uncertainty, roster.top, step.now, settings, columns, found)
         self._futile, self._before = FUTILE_STEPS * (step.now - self._before), step.now
+        self._are_few = moving <= FEW_BODIES
         return found[0, :n], found[1, :m]
 
     def _make_room(self, capacity: int) -> None:
@@ -133,7 +143,8 @@ class Tracking(Stage):
         bodies, settings = step.roster.bodies, step.settings.motion
         uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
         self._make_room(step.roster.capacity)
-        renew_motions(bodies, uncertainty, grid, moved, ending, step.now, self._futile, settings, self._width)
+        limits = self._futile, self._are_few
+        renew_motions(bodies, uncertainty, grid, moved, ending, step.now, limits, settings, self._width)
 
     def remember_cover(self, step: StepContext, which: Slots) -> None:
         """Record that the bodies `which` have been predicted until their cover times."""
@@ -167,22 +178,24 @@ def find_moved(bodies, uncertainty, count, now, settings, columns, found):
     """Find the bodies among the first `count` slots whose predictions no longer hold at `now`, or end too soon.
 
     The slots of the former are written into found[0], those of the latter, which end within the horizon, into found[1];
-    returns both numbers. A prediction holds while the body's surface is within tube_0 (m) of its reference motion and
-    drifts from it by at most tube_1 (m/s), and while its uncertainty fits into its box. A stale object widens its
-    bounds here: deviation and drift include what it may have accelerated since its last state.
+    returns both numbers, and that of all bodies that move. A prediction holds while the body's surface is within tube_0
+    (m) of its reference motion and drifts from it by at most tube_1 (m/s), and while its uncertainty fits into its box.
+    A stale object widens its bounds here: deviation and drift include what it may have accelerated since its last
+    state.
     The slack of a body is halved when it leaves its motion, and doubled when the motion held to the end: a body that
     often changes its motion is not predicted far. columns: scratch, of `make_columns`.
     """
     sigmas = uncertainty.sigmas
     horizon, stale_acceleration = settings.horizon, settings.stale_acceleration
     moved, ending = found[0], found[1]
-    n = n_ending = 0
+    n = n_ending = moving = 0
     angles = columns[COLUMNS]
     for i in range(count):
         if i % BLOCK == 0:
             _turned_away(bodies, i, min(BLOCK, count - i), columns, angles)
         if not bodies.used[i] or not bodies.seen[i] or bodies.static[i]:
             continue
+        moving += 1
         m = bodies.motion[i]
         age = now - bodies.time[i]
         since = now - m.time
@@ -225,7 +238,7 @@ def find_moved(bodies, uncertainty, count, now, settings, columns, found):
             bodies.slack[i] = min(2.0 * bodies.slack[i], LONGEST_SLACK * horizon)
             ending[n_ending] = i
             n_ending += 1
-    return n, n_ending
+    return n, n_ending, moving
 
 
 @device
@@ -306,22 +319,27 @@ def _widest_tube(bodies, i, settings):
 
 
 @device
-def _fit_width(bodies, i, now, futile, settings, width):
+def _fit_width(bodies, i, now, limits, settings, width):
     """Fit the width (N,) of body i, which leaves its motion.
 
     A body that deviates within the tolerances is noisy: its next tube has ROOM for more than this deviation. One that
-    deviates further has changed its motion, and halves its width. futile: s, see FUTILE_STEPS.
+    deviates further has changed its motion, and halves its width. limits: duration of FUTILE_STEPS steps (s), and
+    whether there are only FEW_BODIES.
     """
+    futile, are_few = limits
     m = bodies.motion[i]
     w, since = width[i], now - m.time
+    if are_few or bodies.slack[i] == 0.0:  # 0: the body is new
+        width[i] = NARROWEST
+        return
     if w < 0.0:
         width[i] = w + 1.0 if w < -1.0 else NARROWEST
         return
     if w >= 0.5 and since <= futile:
         width[i] = -PATIENCE
         return
-    if bodies.slack[i] == 0.0 or (w <= NARROWEST and since > futile):
-        width[i] = NARROWEST
+    if w <= NARROWEST or (w <= ONCE and since > futile):
+        width[i] = ONCE if since <= futile else NARROWEST
         return
     r = bodies.spin_radius[i]
     tube_0, tube_1 = _widest_tube(bodies, i, settings)
@@ -337,26 +355,26 @@ def _fit_width(bodies, i, now, futile, settings, width):
 
 
 @kernel
-def renew_motions(bodies, uncertainty, grid, moved, ending, now, futile, settings, width):
+def renew_motions(bodies, uncertainty, grid, moved, ending, now, limits, settings, width):
     """`restart_motion` of the bodies `moved` (M,), then `continue_motion` of those in `ending`."""
-    restart_motion(bodies, uncertainty, grid, moved, now, futile, settings, width)
+    restart_motion(bodies, uncertainty, grid, moved, now, limits, settings, width)
     continue_motion(bodies, uncertainty, grid, ending, now, settings, width)
 
 
 @device
-def restart_motion(bodies, uncertainty, grid, which, now, futile, settings, width):
+def restart_motion(bodies, uncertainty, grid, which, now, limits, settings, width):
     """Make the last state of each body in `which` (M,) its reference motion, and put its swept box into the grid.
 
     The version of the body changes, so that its pairs leave the event list. A stale object widens its bounds here: its
     tube grows by what it may deviate, at stale_acceleration, until the age of its last state has doubled.
-    width (N,): part of the tolerances that a body uses if they are adaptive. futile: s, see FUTILE_STEPS.
+    width (N,): part of the tolerances that a body uses if they are adaptive. limits: see `_fit_width`.
     """
     stale_acceleration = settings.stale_acceleration
     for k in range(which.size):
         i = which[k]
         part = 1.0
         if settings.adaptive:
-            _fit_width(bodies, i, now, futile, settings, width)
+            _fit_width(bodies, i, now, limits, settings, width)
             part = max(width[i], NARROWEST)
         m = bodies.motion[i]
         bodies.version[i] += np.uint32(1)

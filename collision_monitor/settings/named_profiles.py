@@ -37,7 +37,7 @@ NAMED_PROFILES: Final[dict[str, dict[str, Any]]] = {
         "velocity_tolerance": 0.2,
         "angular_velocity_tolerance": 0.2,
         "adaptive_tolerances": True,
-        "distance_tolerance": 0.0,
+        "distance_tolerance": 5e-2,
         "model_mesh": "convex_hull",
         "model_error": 0.1,
     },

@@ -49,3 +49,9 @@ def test_the_command_draws_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert main([*arguments, "--model", "obb"]) == 1
     assert "goes without" in capsys.readouterr().err
+
+
+def test_a_table_of_profiles_ends_with_what_there_is_to_trade(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["tradeoff", "--scene", "crossing", "--seconds", "0.4", "--profile", "fast", "--profile", "exact"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last.startswith("crossing: ") and "to trade" in last and "µs are fixed" in last

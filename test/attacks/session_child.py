@@ -9,6 +9,7 @@ from __future__ import annotations
 import faulthandler
 import json
 import os
+import shutil
 import sys
 import time
 import traceback
@@ -97,10 +98,13 @@ def attempt(path: Path, base: float) -> dict[str, Any]:
 
 
 def main() -> None:
-    warm = Path(sys.argv[1])
+    # a copy of its own, because several processes salvage beside the file
+    warm = Path(shutil.copy(sys.argv[1], f"{sys.argv[1]}.{os.getpid()}.mcap"))
     answers, sys.stdout = sys.stdout, sys.stderr
     for way in WAYS:
         way(warm)
+    _out(warm).unlink(missing_ok=True)
+    warm.unlink()
     reset()
     base = resident()
     for line in sys.stdin:

@@ -1,4 +1,4 @@
-"""Candidates of bodies with a new or extended prediction: queries of single bodies and one sweep find the same."""
+"""Candidates of bodies with a new or extended prediction: tests of all bodies, and both grids, find the same."""
 
 from __future__ import annotations
 
@@ -15,17 +15,19 @@ from collision_monitor.world import make_scene
 
 
 @pytest.mark.parametrize("scene", ["clutter", "fleet"])
-def test_one_sweep_finds_the_pairs_that_looking_up_finds(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_both_grids_find_the_pairs_that_tests_of_all_bodies_find(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
     both: list[tuple[int, int]] = []
     find = Candidates._partners
 
     def compare(self: Candidates, step: StepContext, which: Any) -> Any:
-        monkeypatch.setattr(candidates, "MOST_QUERIES", 2.0)
-        looked_up = {tuple(sorted(pair)) for pair in find(self, step, which).tolist()}
-        monkeypatch.setattr(candidates, "MOST_QUERIES", -1.0)
-        swept = find(self, step, which)
-        assert {tuple(sorted(pair)) for pair in swept.tolist()} == looked_up
-        assert len(swept) == len(looked_up)
+        monkeypatch.setattr(candidates, "MOST_TESTS", 10**9)
+        tested = {tuple(sorted(pair)) for pair in find(self, step, which).tolist()}
+        monkeypatch.setattr(candidates, "MOST_TESTS", -1)
+        for most_queries in (2.0, -1.0):
+            monkeypatch.setattr(candidates, "MOST_QUERIES", most_queries)
+            swept = find(self, step, which)
+            assert {tuple(sorted(pair)) for pair in swept.tolist()} == tested
+            assert len(swept) == len(tested)
         both.append((len(which), len(swept)))
         return swept
 

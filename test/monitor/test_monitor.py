@@ -174,7 +174,7 @@ def test_disagreements_are_noticed() -> None:
 
 def test_contacts_are_those_of_looking_at_every_pair() -> None:
     swarm = Swarm(48, seed=5)
-    monitor = Monitor("fast")
+    monitor = Monitor(Profile.named("fast").replace(distance_tolerance=0.0))
     swarm.describe(monitor)
     table, parts, bodies = monitor._roster.multibody
     owner = {}

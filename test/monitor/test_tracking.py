@@ -60,7 +60,7 @@ def test_a_publisher_that_is_slower_than_others_is_not_predicted_anew_at_each_st
 
 
 def _moved_per_step(profile: Profile, noise: float) -> list[int]:
-    scene = make_scene("fleet", objects=20, noise=noise)
+    scene = make_scene("fleet", objects=40, noise=noise)
     monitor = Monitor(profile)
     for description in scene.descriptions:
         monitor.describe(description)
@@ -71,7 +71,7 @@ def test_adaptive_tolerances_are_as_narrow_as_the_noise_allows() -> None:
     """With exact states predictions are as tight as without tolerance; with noise most objects keep theirs."""
     wide = Profile.named("fast")
     fixed = wide.replace(adaptive_tolerances=False)
-    assert sum(_moved_per_step(wide, 0.005)[20:]) < 0.5 * 20 * 40
+    assert sum(_moved_per_step(wide, 0.005)[20:]) < 0.5 * 40 * 40
     scene = make_scene("clutter")
     unresolved = []
     for profile in (wide, fixed):
@@ -83,8 +83,21 @@ def test_adaptive_tolerances_are_as_narrow_as_the_noise_allows() -> None:
     assert unresolved[0] < 0.1 * unresolved[1]
 
 
+def test_few_objects_keep_the_narrowest_tolerances() -> None:
+    """Predicting some objects anew is faster than examining what wider tolerances leave open."""
+    scene = make_scene("billiards")
+    monitors = [Monitor(Profile.named(name).replace(uncertainty=False)) for name in ("fast", "exact")]
+    for monitor in monitors:
+        for description in scene.descriptions:
+            monitor.describe(description)
+    for k in range(60):
+        states = scene.step(0.02)
+        fast, exact = (monitor.step(round(k * 2e7), states.copy()).status for monitor in monitors)
+        assert (fast.predictions, fast.unresolved) == (exact.predictions, exact.unresolved)
+
+
 def test_adaptive_tolerances_survive_a_snapshot() -> None:
-    scene = make_scene("fleet", objects=20, noise=0.005)
+    scene = make_scene("fleet", objects=40, noise=0.005)
     monitor = Monitor("fast")
     for description in scene.descriptions:
         monitor.describe(description)
