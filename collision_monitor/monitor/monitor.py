@@ -335,6 +335,7 @@ class Monitor:
             cut=cut,
             refused=refused,
             overtaken=past,
+            samples=step.samples,
         )
         return self._answers.finish(result)
 

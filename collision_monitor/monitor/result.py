@@ -73,6 +73,7 @@ class StepResult:
     accepted: False if the step was refused because of its stamp; there are no answers then, and stamp_ns, step and
     status are those of the last accepted step. cut: number of pairs that were examined before the budget ran out;
     None: all pairs were examined. overtaken: number of predictions that are UNRESOLVED because of the states' age.
+    samples: number of samples of uncertain states that were followed for the times and probabilities of all pairs.
 
     >>> import collision_monitor as cm
     >>> monitor = cm.Monitor()
@@ -90,6 +91,7 @@ class StepResult:
     cut: int | None = None
     refused: tuple[Refused, ...] = ()
     overtaken: int = 0
+    samples: int = 0
 
     @cached_property
     def contacts(self) -> NDArray[np.void]:

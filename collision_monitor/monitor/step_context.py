@@ -63,3 +63,4 @@ class StepContext:
     now: float  # s after the timeline's origin
     number: int  # of the step, from 1
     work: Work = field(default_factory=Work)
+    samples: int = 0  # of the states of uncertain pairs, see StepResult

@@ -298,34 +298,40 @@ class UncertainPredictions(Stage):
         fewer = sampling._replace(**normal_samples(max(p.uncertainty_samples // 8, FEWEST_SAMPLES))._asdict())
         lattice, multibody = sample_columns(p.uncertainty_samples), step.roster.multibody
 
-        def part(slots: Pairs, work: Workspaces) -> NDArray[np.float64]:
-            answers = np.full((len(slots), len(ANSWERS)), LEFT)
+        def part(slots: Pairs, work: Workspaces) -> tuple[NDArray[np.float64], int]:
+            answers, followed = np.full((len(slots), len(ANSWERS)), LEFT), 0
             costly = np.empty(len(slots), bool)
             find_costly(multibody, slots, p.horizon, costly)
 
-            def follow(some: NDArray[np.bool_], samples: Sampling) -> None:
-                """Follow each sample of some of the pairs exactly."""
-                if some.any():
-                    found = np.empty((np.count_nonzero(some), len(ANSWERS)))
-                    impact_probabilities(multibody, self.spread, slots[some], step.now, samples, work.exact, found)
-                    answers[some] = found
+            def follow(some: NDArray[np.bool_], samples: Sampling) -> int:
+                """Follow each sample of some of the pairs exactly. Return the number of samples."""
+                if not some.any():
+                    return 0
+                found = np.empty((np.count_nonzero(some), len(ANSWERS)))
+                count = impact_probabilities(multibody, self.spread, slots[some], step.now, samples, work.exact, found)
+                answers[some] = found
+                return int(count)
 
             if p.impact_tolerance >= FINEST_WITH_PLANES:
                 exact, planes = work
-                likely_impacts(multibody, self.spread, slots, step.now, sampling, lattice, planes, exact, answers)
+                followed = likely_impacts(
+                    multibody, self.spread, slots, step.now, sampling, lattice, planes, exact, answers
+                )
             left = answers[:, PROBABILITY] == LEFT
-            follow(left & costly, fewer)
-            follow(left & ~costly, sampling)
-            return answers
+            return answers, followed + follow(left & costly, fewer) + follow(left & ~costly, sampling)
 
         if len(self._workspaces[0].planes.times) != p.uncertainty_samples:
             self._workspaces = [make_workspaces(p.uncertainty_samples)]
         if pool is None or len(slots) < FEWEST_SAMPLED_PAIRS_FOR_THREADS:
-            return part(slots, self._workspaces[0])
+            answers, followed = part(slots, self._workspaces[0])
+            step.samples += followed
+            return answers
         while len(self._workspaces) < p.threads:
             self._workspaces.append(make_workspaces(p.uncertainty_samples))
         workspaces = self._workspaces[: p.threads]
-        return np.concatenate(list(pool.map(part, np.array_split(slots, len(workspaces)), workspaces)))
+        parts = list(pool.map(part, np.array_split(slots, len(workspaces)), workspaces))
+        step.samples += sum(followed for _, followed in parts)
+        return np.concatenate([answers for answers, _ in parts])
 
     # ------------------------------------------------------------------ snapshots
 

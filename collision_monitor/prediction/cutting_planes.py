@@ -61,33 +61,42 @@ def _next_sample(entry, leave, checked, samples, briefest, cursor):
 def _cut(table, pair, n, samples, direction, k, settings, memory):
     """Add the plane along the direction that separates sample n. Its normal may turn with a body.
 
-    The best is the one behind which TRIED samples spend the least time. Returns whether that is less for sample n.
+    The gap counts as a straight line between the ends of the segment. Where another corner of a long body comes nearest
+    on the way, it is larger, and the plane separates nothing. So the normal has to shorten the time of sample n inside.
+    Of those that do, the best is the one behind which TRIED samples spend the least time. Returns whether there is one.
     """
     obstacle, rows, entry, leave = memory.obstacle, memory.rows, memory.entry, memory.leave
     tried = min(TRIED, settings.pilot)
     count, nodes = obstacle.count[k], obstacle.node[k : k + 2]
     planes, margin, before = obstacle.planes[k, count : count + 1], plane_margin(settings), leave[n] - entry[n]
+    best, latest, span = -1, -inf, nodes[1].time - nodes[0].time
+    trial_entry, trial_leave, turning = memory.trial[0], memory.trial[1], settings.turning
+    for mode in (AT_REST, 0, 1):
+        if mode != AT_REST and not settings.follows[mode]:
+            continue
+        set_plane(direction, mode, obstacle, planes[0])
+        trial_entry[n], trial_leave[n] = entry[n], leave[n]
+        enter_planes(table, pair, planes, margin, turning, nodes, n, n + 1, rows, trial_entry, trial_leave)
+        if not trial_leave[n] - trial_entry[n] < before:
+            continue
+        if not (settings.follows[0] or settings.follows[1]):
+            best = mode
+            break
+        for m in range(tried):
+            trial_entry[m] = entry[m]
+            trial_leave[m] = leave[m]
+        enter_planes(table, pair, planes, margin, turning, nodes, 0, tried, rows, trial_entry, trial_leave)
+        total = 0.0
+        for m in range(tried):
+            total += min(max(trial_entry[m] - trial_leave[m], -span), span)
+        if total > latest:
+            best, latest = mode, total
+    if best < 0:
+        return False
     obstacle.count[k] += 1
-    best, latest, span = AT_REST, -inf, nodes[1].time - nodes[0].time
-    if settings.follows[0] or settings.follows[1]:
-        trial_entry, trial_leave = memory.trial[0], memory.trial[1]
-        for mode in (AT_REST, 0, 1):
-            if mode == AT_REST or settings.follows[mode]:
-                set_plane(direction, mode, obstacle, planes[0])
-                for m in range(tried):
-                    trial_entry[m] = entry[m]
-                    trial_leave[m] = leave[m]
-                enter_planes(
-                    table, pair, planes, margin, settings.turning, nodes, 0, tried, rows, trial_entry, trial_leave
-                )
-                total = 0.0
-                for m in range(tried):
-                    total += min(max(trial_entry[m] - trial_leave[m], -span), span)
-                if total > latest:
-                    best, latest = mode, total
     set_plane(direction, best, obstacle, planes[0])
-    enter_planes(table, pair, planes, margin, settings.turning, nodes, 0, samples, rows, entry, leave)
-    return leave[n] - entry[n] < before
+    enter_planes(table, pair, planes, margin, turning, nodes, 0, samples, rows, entry, leave)
+    return True
 
 
 @device

@@ -16,7 +16,7 @@ from collision_monitor.prediction.error_samples import orientation_spread, set_f
 from collision_monitor.prediction.impact_distribution import EARLIEST, MOST_LIKELY, PROBABILITY
 from collision_monitor.prediction.impact_histogram import NOT_FOUND, summarise_by_bins
 from collision_monitor.prediction.motion import carry_on, half_acceleration
-from collision_monitor.prediction.pair_errors import PairErrors, set_gap_covariance, surface_bend
+from collision_monitor.prediction.pair_errors import PairErrors, set_gap_covariance, surface_bend, swing_bound
 from collision_monitor.prediction.plane_impacts import enter_bodies, enter_surely
 from collision_monitor.prediction.round_impacts import are_round, enter_round_bodies
 from collision_monitor.prediction.sample_gaps import TURNED_FARTHEST
@@ -24,7 +24,7 @@ from collision_monitor.prediction.screening import design_point
 from collision_monitor.prediction.sphere_interval import sphere_interval
 from collision_monitor.prediction.spread import is_uncertain, surface_spread
 from collision_monitor.prediction.sure_contact import surely_meet
-from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE, body_has_mesh, first_contact
+from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE, body_has_mesh, first_contact, likely_contact
 
 LEFT: Final = -1.0
 """Probability of a pair that this method does not answer: very fast rotation, large errors of orientation, a mesh."""
@@ -48,10 +48,12 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
     sampling: its own samples are not used; lattice: sample_columns. `find_near` comes before it.
     sampling.only_screens: for pairs that are stated to pass, write a time before which bodies grown by safe_sigmas do
     not meet, the likeliest time of contact, and a bound on its probability, LEFT if unknown.
+    Returns the number of samples of all pairs.
     """
     table, parts, bodies = multibody
     query, horizon, stale_acceleration = sampling.query, sampling.horizon, sampling.stale_acceleration
     A, B = work.motion[0], work.motion[1]
+    followed = 0
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
         answers[k, :] = nan
@@ -65,10 +67,9 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         now_j, growth_j = surface_spread(spread, j, r_j, ages[1], horizon, stale_acceleration)
         tube = Tube(now_i + now_j, growth_i + growth_j)
         bend = surface_bend(A, r_i) + surface_bend(B, r_j) + 2.0 * half_acceleration(A, B)
-        t = _approach(A, B, horizon) if A.radius + B.radius < inf else 0.0
-        turn_i, turn_j = orientation_spread(spread, i, r_i, ages[0], t), orientation_spread(spread, j, r_j, ages[1], t)
-        far_i, far_j = r_i if r_i < inf else 0.0, r_j if r_j < inf else 0.0  # a half-space does not turn
-        turning = (far_i * turn_i[0] + far_j * turn_j[0], far_i * turn_i[1] + far_j * turn_j[1])
+        t = closest = _approach(A, B, horizon) if A.radius + B.radius < inf else 0.0
+        swing_i, swing_j = swing_bound(spread, i, r_i, ages[0], horizon), swing_bound(spread, j, r_j, ages[1], horizon)
+        turning = (swing_i[0] + swing_j[0], swing_i[1] + swing_j[1])
         flat = not (r_i < inf and r_j < inf)
         if not sampling.stated:
             _set_axes(work.frame)
@@ -87,7 +88,12 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
             if sampling.only_screens:
                 answer[MOST_LIKELY], answer[PROBABILITY] = t, min(bound, 1.0)
                 continue
-        most = max(turn_i[0] + turn_i[1] * t, turn_j[0] + turn_j[1] * t)
+        elif not has_mesh:
+            t = likely_contact(multibody, i, j, t, horizon, query, work)
+        late = max(t, closest)  # when errors of orientation, which grow, count most
+        turn_i = orientation_spread(spread, i, r_i, ages[0], late)
+        turn_j = orientation_spread(spread, j, r_j, ages[1], late)
+        most = max(turn_i[0] + turn_i[1] * late, turn_j[0] + turn_j[1] * late)
         if has_mesh or most > TURNED_FARTHEST or (flat and most > 0.0):
             answers[k, PROBABILITY] = LEFT
             continue
@@ -99,7 +105,9 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         set_frame(work.frame, B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
         set_gap_covariance(multibody, spread, i, j, ages, t, sampling, work)
         pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
-        sure = sampling.stated and surely_meet(table, parts, pair, work.joint, turning, t, query.margin, work.scratch)
+        far_i, far_j = r_i if r_i < inf else 0.0, r_j if r_j < inf else 0.0  # a half-space does not turn
+        swing = (far_i * (turn_i[0] + turn_i[1] * t), far_j * (turn_j[0] + turn_j[1] * t))
+        sure = sampling.stated and surely_meet(table, parts, pair, work.joint, swing, t, query.margin, work.scratch)
         take_root(work.joint)
         _clear_upper(work.joint)
         errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, (far_i, far_j))
@@ -113,7 +121,9 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
             answers[k, PROBABILITY] = LEFT
             continue
         if samples == 0:
+            followed += lattice.pilot
             continue
+        followed += samples
         answer = answers[k]
         first = summarise_by_bins(memory.times[0:samples], lattice, sampling.confidence, memory, answer)
         if answer[EARLIEST] == NOT_FOUND:
@@ -121,6 +131,7 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
             roughly = ImpactQuery(query.margin, max(query.tolerance, SAMPLE_TOLERANCE * tube.start), query.iterations)
             safe = first_contact(multibody, i, j, Window(0.0, horizon), wide, roughly, work)
             answer[EARLIEST] = min(safe, first)
+    return followed
 
 
 @device

@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 from collision_monitor._jit import inlined
 from collision_monitor.prediction.error_samples import add_covariance
 from collision_monitor.prediction.sample_gaps import FIRST_ORDER, NOT_TURNED, SERIES
+from collision_monitor.prediction.spread import unknown_acceleration
 
 BENDING: Final = 0.1
 """Largest deviation of a gap from a straight line in a segment, in standard deviations of the gap."""
@@ -38,6 +39,21 @@ def surface_bend(m, radius):
     """Bound on the acceleration of a body's surface from its rotation (m/s^2)."""
     rate = spin_rate(m)
     return radius * rate * rate if rate > 0.0 else 0.0
+
+
+@inlined
+def swing_bound(spread, i, radius, age, horizon):
+    """Bound (m now, m/s) on the standard deviation of body i's surface from errors of its orientation.
+
+    The parts are added instead of their squares, as in `surface_spread`. radius (m): the body's, infinite or 0 if
+    rotation moves nothing. age: s since the last state.
+    """
+    if not 0.0 < radius < inf:
+        return 0.0, 0.0
+    orientation, rate = spread.stddev[i, 1], spread.stddev[i, 3]
+    turning = unknown_acceleration(spread, i, False, 1, 0.0)
+    now = orientation + rate * age + 0.5 * turning * age * age
+    return radius * now, radius * (rate + turning * (age + 0.5 * horizon))
 
 
 @inlined

@@ -12,12 +12,12 @@ from collision_monitor.prediction.screening import FURTHEST
 
 
 @device
-def surely_meet(table, parts, pair, joint, turning, t, margin, scratch):
+def surely_meet(table, parts, pair, joint, swing, t, margin, scratch):
     """Whether bodies with these first shapes (ShapePair) meet until time t with a probability above 0.9998.
 
-    Two of their shapes overlap at t. To separate them, the error of their relative position, joint (6, 6) at t, or
-    that of their surfaces, with the turning (m, m/s) of both, must be longer than the overlap. It is longer than
-    FURTHEST standard deviations along its worst axis with a probability of 1.5e-4.
+    Two of their shapes overlap at t. To separate them, the errors of their relative position, joint (6, 6) at t, and of
+    their orientation, which move their surfaces by swing (m, m), one standard deviation, must be longer than the
+    overlap. They are longer than FURTHEST standard deviations along the worst axis with a probability of 1.5e-4.
     """
     variance = 0.0
     for r in range(3):  # no eigenvalue is larger than the largest sum of a row (Gershgorin)
@@ -25,8 +25,7 @@ def surely_meet(table, parts, pair, joint, turning, t, margin, scratch):
         for c in range(3):
             row += abs(joint[min(r, c), max(r, c)]) if c != r else 0.0
         variance = max(variance, row)
-    off = turning[0] + turning[1] * t
-    least = -FURTHEST * sqrt(variance + off * off)
+    least = -FURTHEST * sqrt(variance + swing[0] * swing[0] + swing[1] * swing[1])
     a, b = pair.a, pair.b
     while a >= 0:
         some = ShapePair(pair.A, pair.B, a, b)

@@ -107,6 +107,21 @@ def _gap_at(multibody, i, j, t, work):
     return best
 
 
+@device
+def likely_contact(multibody, i, j, t, horizon, query, work):
+    """Time (s) from t on at which bodies i and j, which are stated to meet, do so if they are apart at t, else t.
+
+    t: closest approach of their origins. The origin of a long wall may be closest long before it is touched.
+    """
+    gap = _gap_at(multibody, i, j, t, work)
+    if gap <= query.margin:
+        return t
+    first = first_contact(multibody, i, j, Window(t, horizon), Tube(0.0, 0.0), query, work)
+    if first < inf:
+        return first
+    return horizon if _gap_at(multibody, i, j, horizon, work) < gap else t
+
+
 @inlined
 def _is_straight(parts, bodies, i, j, A, B):
     """Whether each body is one shape that moves straight and does not turn, and they are not both spheres."""
@@ -159,6 +174,8 @@ def _lay_along(multibody, i, j, tube, sampling, work):
         vv = vx * vx + vy * vy + vz * vz
         if vv > 0.0:
             t = min(max(-(px * vx + py * vy + pz * vz) / vv, 0.0), horizon)
+        if sampling.stated and not round:
+            t = likely_contact(multibody, i, j, t, horizon, sampling.query, work)
         frame[0, 0], frame[0, 1], frame[0, 2] = px + t * vx, py + t * vy, pz + t * vz
     else:
         least = inf
@@ -196,13 +213,14 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
 
     An answer is NaN if neither body has declared an uncertainty, or if the pair is left out. Pairs that are stated to
     pass are left out if they do not meet within `sigmas` standard deviations, or only with a probability far below
-    min_probability.
+    min_probability. Returns the number of samples of all pairs.
     """
     table, parts, bodies = multibody
     query, horizon, stated = sampling.query, sampling.horizon, sampling.stated
     points, weights, stale_acceleration = sampling.points, sampling.weights, sampling.stale_acceleration
     times = np.empty(weights.size)
     A, B = work.motion[0], work.motion[1]
+    followed = 0
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
         answers[k, :] = nan
@@ -257,6 +275,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
             if not likely:
                 break
             for n in range(first, weights.size, stride):
+                followed += 1
                 z = points[n]
                 shift(work, z, t, p, v)
                 if turn_i[0] + turn_i[1] > 0.0:
@@ -277,3 +296,4 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                 seen += weights[n] if times[n] < inf else 0.0
         if likely:
             summarise(times, weights, np.argsort(times), sampling.confidence, safe, answers[k], 1.0)
+    return followed

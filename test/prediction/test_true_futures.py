@@ -1,0 +1,54 @@
+"""Pairs whose probability was off once, against their true futures: errors are drawn anew and followed exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import collision_monitor as cm
+from collision_monitor.geometry.pose import from_rotation_vector, multiply
+from collision_monitor.records import STATE
+
+HORIZON = 2.0
+NAMES = ("position", "orientation", "velocity", "angular_velocity")
+
+
+def told_and_true(shapes: tuple[cm.Shape, cm.Shape], rows: NDArray[np.void], futures: int) -> tuple[float, float]:
+    """Stated probability of contact of two objects with the states `rows`, and that of their futures."""
+    monitor = cm.Monitor(cm.Profile.named("balanced").replace(horizon=HORIZON))
+    motions, rng = [], np.random.default_rng(0)
+    for k, row in enumerate(rows):
+        monitor.add(k, shapes[k])
+        off = [row[f"{name}_stddev"] * rng.normal(size=(futures, 3)) for name in NAMES]
+        turned = multiply(from_rotation_vector(off[1]), np.tile(row["quaternion"], (futures, 1)))
+        poses = np.column_stack([row["position"] + off[0], turned])
+        motions.append((poses, np.column_stack([row["linear"] + off[2], row["angular"] + off[3]])))
+    told = monitor.step(0, rows).predictions
+    true = cm.time_of_impact_batch(shapes[0], *motions[0], shapes[1], *motions[1], HORIZON, tolerance=1e-5)
+    return float(told["probability"][0]), float(np.mean(true.status != "clear"))
+
+
+def test_a_rod_that_turns_past_a_box() -> None:
+    """Its nearest corner changes on the way, so that planes at rest do not separate the samples that miss."""
+    rows = np.zeros(2, STATE)
+    rows["id"] = 0, 1
+    rows["position"][1], rows["linear"][1] = (0.764, -2.248, -0.661), (-0.666, 1.505, -0.082)
+    rows["quaternion"] = (-0.883, 0.3516, 0.2895, -0.1133), (-0.0716, -0.8202, -0.1004, 0.5587)
+    rows["quaternion"] /= np.linalg.norm(rows["quaternion"], axis=1, keepdims=True)
+    rows["angular"] = (-1.293, 0.926, -0.433), (0.081, 0.866, -0.181)
+    for name, both in zip(NAMES, ((0.039, 0.030), (0.022, 0.012), (0.008, 0.041), (0.007, 0.005)), strict=True):
+        rows[f"{name}_stddev"] = both
+    told, true = told_and_true((cm.Cylinder(0.24, 1.75), cm.Box((0.58, 1.2, 0.99))), rows, 20_000)
+    assert told == pytest.approx(true, abs=0.015)
+
+
+def test_a_person_that_reaches_a_long_wall_at_the_horizon() -> None:
+    """The origins are closest now, but the errors of orientation count when the person is at the wall."""
+    rows = np.zeros(2, STATE)
+    rows["id"], rows["quaternion"][:, 3] = (0, 1), 1.0
+    rows["position"][1], rows["linear"][0] = (2.893, 78.49, 1.13), (1.264, -0.15, 0.0)
+    for name in NAMES:
+        rows[f"{name}_stddev"][0] = 0.005
+    told, true = told_and_true((cm.Cylinder(0.25, 1.25), cm.Box((0.2, 219.4, 4.0))), rows, 20_000)
+    assert told == pytest.approx(true, abs=0.02)
