@@ -6,7 +6,7 @@ from math import inf
 from typing import NamedTuple
 
 from collision_monitor._jit import inlined, kernel
-from collision_monitor.prediction.motion import age_of, relative_position_now, relative_velocity_now
+from collision_monitor.prediction.body_contact import relative_now
 from collision_monitor.prediction.sphere_interval import sphere_interval
 from collision_monitor.prediction.spread import is_uncertain, surface_spread
 
@@ -39,22 +39,12 @@ def find_near(bodies, spread, entries, now, nearness, found):
 def _could_meet(bodies, spread, i, j, now, nearness):
     """Whether the grown bounding spheres of bodies i and j meet. Accelerations count as growth."""
     sigmas, margin, horizon, stale_acceleration = nearness
-    age_i, age_j = age_of(bodies, i, now), age_of(bodies, j, now)
     reach = bodies.motion[i].radius + bodies.motion[j].radius + margin
     if not reach < inf:
         return True
+    p, v, age_i, age_j = relative_now(bodies, i, j, now)
     start_i, growth_i = surface_spread(spread, i, bodies.spin_radius[i], age_i, horizon, stale_acceleration)
     start_j, growth_j = surface_spread(spread, j, bodies.spin_radius[j], age_j, horizon, stale_acceleration)
-    p = (
-        relative_position_now(bodies, i, age_i, j, age_j, 0),
-        relative_position_now(bodies, i, age_i, j, age_j, 1),
-        relative_position_now(bodies, i, age_i, j, age_j, 2),
-    )
-    v = (
-        relative_velocity_now(bodies, i, age_i, j, age_j, 0),
-        relative_velocity_now(bodies, i, age_i, j, age_j, 1),
-        relative_velocity_now(bodies, i, age_i, j, age_j, 2),
-    )
     bent = 0.0
     for c in range(3):
         bent += abs(bodies.acceleration[j, c] - bodies.acceleration[i, c])
