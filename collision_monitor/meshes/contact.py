@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import inlined, kernel, outlined
-from collision_monitor.meshes.inside import INSIDE, UNKNOWN, is_in
+from collision_monitor.meshes.inside import INSIDE, UNKNOWN, is_either_in
 from collision_monitor.meshes.layout import AXES, CENTER, HALF, RADIUS, REACH, WIDTH
 from collision_monitor.meshes.nearest import LEAST, MOST_PAIRS, ON_A, ON_B, PLACE_A, nearest
-from collision_monitor.meshes.placing import inverse, relative
+from collision_monitor.meshes.placing import relative
 from collision_monitor.meshes.touching import deepest, touching
 from collision_monitor.narrow_phase.contact_row import write
 from collision_monitor.narrow_phase.pair_pose import PairPose
@@ -68,9 +68,7 @@ def tree_contact(
         write(out, -depth, rotate(pose.R_A, n), rotate(pose.R_A, on_a), round_off)
         return TOUCHING
     known, clear = APART, max(min(distance, limit), 0.0)
-    inside = is_in(blocks_a, root_a, blocks_b, root_b, X, clear, work)
-    if inside != INSIDE:
-        inside = max(inside, is_in(blocks_b, root_b, blocks_a, root_a, inverse(X), clear, work))
+    inside = is_either_in(blocks_a, root_a, blocks_b, root_b, X, clear, work)
     if inside == INSIDE:
         known = ENCLOSED
     elif inside == UNKNOWN:

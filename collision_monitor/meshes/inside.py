@@ -9,7 +9,7 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.meshes.boxes import box_bounds, half_of
 from collision_monitor.meshes.layout import CENTER, CHILD, CLOSED, FIRST_PART, MOST_PARTS, PARTS, WIDTH
 from collision_monitor.meshes.nearest import BOUNDS, PAIRS, triangle_at
-from collision_monitor.meshes.placing import Placing, place_point, turned_back
+from collision_monitor.meshes.placing import Placing, inverse, place_point, turned_back
 from collision_monitor.meshes.touching import repeats
 from collision_monitor.narrow_phase.gjk import closest_on_triangle, weighted
 from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus, sum_of_sizes
@@ -65,6 +65,15 @@ def is_in(blocks: Any, root: int, other: Any, other_root: int, X: Placing, clear
         known = max(known, locate(blocks, root, x, work))
         if known == INSIDE:
             return INSIDE
+    return known
+
+
+@device
+def is_either_in(blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, X: Placing, clear: float, work: Any) -> int:
+    """The larger of `is_in` of B in A, and of A in B. X: pose of B in A's frame."""
+    known: int = is_in(blocks_a, root_a, blocks_b, root_b, X, clear, work)
+    if known != INSIDE:
+        known = max(known, is_in(blocks_b, root_b, blocks_a, root_a, inverse(X), clear, work))
     return known
 
 

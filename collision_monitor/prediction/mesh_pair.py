@@ -8,7 +8,7 @@ from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.geometry.shape_table import HALF_SPACE, MESH, POINTS, TREE
 from collision_monitor.meshes.contact import FARTHER, OPEN, tree_contact
 from collision_monitor.meshes.feature import triangle_feature
-from collision_monitor.meshes.inside import INSIDE, OUTSIDE, is_in, locate
+from collision_monitor.meshes.inside import INSIDE, OUTSIDE, is_either_in, locate
 from collision_monitor.meshes.layout import CLOSED, FACE, MOST_PARTS, PARTS, WIDTH
 from collision_monitor.meshes.nearest import PLACE_A, PLACE_B, nearest
 from collision_monitor.meshes.placing import inverse, relative
@@ -86,10 +86,7 @@ def enclosure(table, a, b, pose, scratch):
             answer[PLACE_A] = answer[PLACE_B] = -1.0
             clear = nearest(blocks, first, blocks, second, X, inf, answer, work)
             answer[PLACE_A], answer[PLACE_B] = place_a, place_b
-        found = is_in(blocks, first, blocks, second, X, clear, work)
-        if found != INSIDE:
-            found = max(found, is_in(blocks, second, blocks, first, inverse(X), clear, work))
-        return found
+        return is_either_in(blocks, first, blocks, second, X, clear, work)
     mesh, solid = (a, b) if is_mesh(table, a) else (b, a)
     root = root_of(table, mesh)
     if table.kind[solid] == HALF_SPACE or table.blocks[root, CLOSED, 1] == 0.0:  # a cloud encloses nothing

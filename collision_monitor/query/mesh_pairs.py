@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from collision_monitor._jit import inlined, kernel
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.meshes.contact import APART, tree_contact
-from collision_monitor.meshes.inside import OUTSIDE, is_in
+from collision_monitor.meshes.inside import OUTSIDE, is_either_in
 from collision_monitor.meshes.nearest import ANSWER, MEMORY, PLACE_A, PLACE_B
-from collision_monitor.meshes.placing import inverse, relative
+from collision_monitor.meshes.placing import relative
 from collision_monitor.meshes.shape_trees import CERTAIN, NEVER, KeptTree, have_kernels, kept_tree
 from collision_monitor.meshes.touching import touching
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, POINT_A, POINT_B
@@ -114,9 +114,7 @@ def trees_overlap(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: An
     X = relative(R[0], R[1], p)
     if not touching(tree_a, 0, tree_b, 0, X, 1, memory)[1]:
         return True
-    if is_in(tree_a, 0, tree_b, 0, X, 0.0, memory) != OUTSIDE:
-        return True
-    return is_in(tree_b, 0, tree_a, 0, inverse(X), 0.0, memory) != OUTSIDE
+    return is_either_in(tree_a, 0, tree_b, 0, X, 0.0, memory) != OUTSIDE
 
 
 @kernel
