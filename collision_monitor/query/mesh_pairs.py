@@ -67,12 +67,16 @@ def _packed(
 
 def mesh_overlap(shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any) -> bool | None:
     """Whether two shapes overlap or touch; of an open mesh its surface. None for a pair without trees or a mesh."""
+    try:
+        far = (shape_a.kept_tree.reach + shape_b.kept_tree.reach) * _ROUNDED_UP
+        if dist(pose_a.point, pose_b.point) > far:
+            return False
+    except AttributeError:  # of shapes without a tree yet
+        pass
     found = _packed(shape_a, pose_a, shape_b, pose_b)
     if found is None:
         return None
     a, x_a, b, x_b = found
-    if dist(pose_a.point, pose_b.point) > (a.reach + b.reach) * _ROUNDED_UP:
-        return False
     return trees_overlap(a.tree, x_a, b.tree, x_b, _OWN.work)
 
 
