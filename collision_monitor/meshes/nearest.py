@@ -51,8 +51,8 @@ ANSWER: Final = 10
 triangles, WIDTH * block + member, which serve as a hint for a later query, and a lower bound on the distance (m)."""
 
 CLOSER: Final = 1.0 - 32.0 * EPSILON
-"""Factor to the best squared distance below which another one counts. Less: distances are less exact. 1: round-off makes
-all triangles of a mesh that is very far away equally near, and nothing is pruned."""
+"""Factor to the best squared distance below which another one counts. Less: distances are less exact. 1: round-off
+makes all triangles of a mesh that is very far away equally near, and nothing is pruned."""
 
 MOST_LEAVES: Final = 50_000
 """Most pairs of leaves to examine, up to 0.7 s. Hostile meshes, such as a million triangles in a point, need more; the

@@ -52,7 +52,6 @@ from collision_monitor.narrow_phase.vector import (
 )
 from collision_monitor.tolerances import SAT_ROUND_OFF
 
-
 MOST_EXAMINED: Final = 20_000
 """Most triangles or points to examine exactly, 0.2 s. A million slivers in one line need more; the error bound then
 extends to the boxes that are left."""
@@ -210,7 +209,8 @@ def solid_contact(
                 continue
             examined += 1
             within = inf if examined > MOST_EXAMINED and not found else best
-            if _triangle_contact(table, b, pose, T, radius, within, row, memory) and (not found or row[DISTANCE] < best):
+            is_near = _triangle_contact(table, b, pose, T, radius, within, row, memory)
+            if is_near and (not found or row[DISTANCE] < best):
                 best, found, enough = row[DISTANCE], True, row[DISTANCE] - row[BOUND]
                 for i in range(CONTACT_SIZE):
                     out[i] = row[i]

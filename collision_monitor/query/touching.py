@@ -91,7 +91,9 @@ def follow(a: MovingShape, b: MovingShape, query: MotionQuery, round_off: float)
             later += [_interval(event) for event in again]
     if not later:
         return ImpactInterval(math.inf, math.inf)
-    return ImpactInterval(min(e.lower for e in later), min(e.upper for e in later))
+    lower, upper = min(e.lower for e in later), min(e.upper for e in later)
+    # what slides over a surface is near its next triangle for long, and a later one may certainly be deep
+    return ImpactInterval(lower, upper if upper < math.inf else _sampled_depth(a, b, query, _wanted(query, round_off)))
 
 
 def _pairs(
@@ -182,11 +184,21 @@ def _deep_by(
     a: MovingShape, b: MovingShape, multibody: Multibody, pairs: NDArray[np.int32], query: MotionQuery, round_off: float
 ) -> float:
     """Return a time (s) at which they are certainly deeper than `round_off` (m), an early one if easy, or infinity."""
-    wanted = query.separation - 2.0 * round_off
+    wanted = _wanted(query, round_off)
     events = first_impacts(multibody, pairs, 0.0, query, wanted)
     sure = [float(e["upper"]) for e in events if e["status"] == HIT and e["upper"] <= query.horizon]
     if sure:
         return min(sure)
+    return _sampled_depth(a, b, query, wanted)
+
+
+def _wanted(query: MotionQuery, round_off: float) -> float:
+    """Distance (m) below which they are certainly deeper than round-off."""
+    return query.separation - 2.0 * round_off
+
+
+def _sampled_depth(a: MovingShape, b: MovingShape, query: MotionQuery, wanted: float) -> float:
+    """Return an early one of some times (s) at which they are nearer than `wanted` (m), or infinity."""
     found = math.inf
     step = 1 if len(a.pieces) + len(b.pieces) < MANY_PIECES else 5
     for t in query.horizon * 0.5 ** np.arange(0, DEEPENING_TIMES, step):

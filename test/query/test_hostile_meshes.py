@@ -11,7 +11,7 @@ from collision_monitor.geometry.inside import UNKNOWN
 from collision_monitor.meshes.nearest import LEAST, MEMORY, answer_row, tree_distance
 from collision_monitor.meshes.shape_trees import kept_tree
 from collision_monitor.meshes.solid import MOST_EXAMINED
-from collision_monitor.query import deepest, touching
+from collision_monitor.query import deepest, moving_pair, touching
 from collision_monitor.query.posed import Posed
 
 RNG = np.random.default_rng(3)
@@ -79,3 +79,35 @@ def test_points_are_not_located_in_a_soup_beyond_a_number_of_tests(monkeypatch: 
     side = Posed([(mesh, Pose())], Pose(), [(mesh, Pose())])
     assert deepest.locate(side, side, np.zeros(3)) == UNKNOWN
     assert sum(map(len, located)) * len(mesh.faces) <= 4_000
+
+
+def terrain(count: int) -> cm.Mesh:
+    """A square of 10 m, flat about its middle and waves of 0.1 m around that."""
+    x, y = np.meshgrid(*[np.linspace(-5, 5, count)] * 2, indexing="ij")
+    z = np.where(np.hypot(x, y) < 2, 0, 0.1 * np.sin(3 * x) ** 2)
+    k = np.arange(count * count).reshape(count, count)
+    quads = np.stack([k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]], axis=-1).reshape(-1, 4)
+    return cm.Mesh(np.stack([x, y, z], -1).reshape(-1, 3), quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3))
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.5, 0.0, 0.0)], ids=str)
+@pytest.mark.parametrize("other", [cm.Box((0.5, 0.4, 0.3)), cm.Cylinder(0.3, 0.3), terrain(12)], ids=repr)
+def test_only_triangles_near_a_body_on_a_terrain_are_followed_one_by_one(
+    other: cm.Shape, velocity: tuple[float, float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ground = terrain(32)
+    height = 0.0 if isinstance(other, cm.Mesh) else 0.15
+    a, b = Motion(Pose()), Motion(Pose((0.3, 0.2, height)), velocity)
+    whole = cm.time_of_impact(ground, a, other, b)
+    counts = []
+    follow = moving_pair.in_convex_pieces
+    monkeypatch.setattr(
+        "collision_monitor.query.time_of_impact.in_convex_pieces",
+        lambda *arguments: counts.append(follow(*arguments)) or counts[-1],
+    )
+    monkeypatch.setattr(moving_pair, "MANY_FACES", 100)
+    found = cm.time_of_impact(ground, a, other, b)
+    assert found.lower == pytest.approx(whole.lower, abs=1e-5)
+    assert (found.status == "clear") == (whole.status == "clear")
+    if not isinstance(other, cm.Mesh):
+        assert len(counts[0].pieces) < len(ground.faces) / 10
