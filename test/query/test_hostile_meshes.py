@@ -11,6 +11,9 @@ from collision_monitor.geometry.inside import UNKNOWN
 from collision_monitor.meshes.nearest import LEAST, MEMORY, answer_row, tree_distance
 from collision_monitor.meshes.shape_trees import kept_tree
 from collision_monitor.meshes.solid import MOST_EXAMINED
+from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
+from collision_monitor.prediction.impact_record import IMPACT
+from collision_monitor.prediction.pair_impacts import predict_pairs
 from collision_monitor.query import deepest, moving_pair, touching
 from collision_monitor.query.posed import Posed
 
@@ -111,3 +114,17 @@ def test_only_triangles_near_a_body_on_a_terrain_are_followed_one_by_one(
     assert (found.status == "clear") == (whole.status == "clear")
     if not isinstance(other, cm.Mesh):
         assert len(counts[0].pieces) < len(ground.faces) / 10
+
+
+@pytest.mark.parametrize("other", [soup(200), cm.Cylinder(0.5, 1.0)], ids=["mesh", "solid"])
+def test_the_search_ends_where_the_time_has_no_finer_resolution(other: cm.Shape) -> None:
+    """At 1e18 m/s the boxes take steps that do not change the time; 1,000 steps count as one distance query."""
+    a = Motion(Pose(), angular=(0.3, 0.5, 0.7))
+    b = Motion(Pose((3.0, 0.2, 1e18)), (0.6, -0.2, -1e18), (0.1, -0.4, 0.9))
+    moving = [moving_pair.make_moving_shape(shape, motion, "") for shape, motion in ((soup(500), a), (other, b))]
+    multibody = moving_pair.lay_out_pair(*moving, 2.0)
+    events = np.zeros(2, IMPACT)
+    search = ImpactQuery(0.0, 1e-6, 1000)
+    found, queries = predict_pairs(multibody, np.array([[0, 1]], np.int32), 0.0, search, events, make_scratch())
+    assert queries <= 2
+    assert found == 1 and events[0]["lower"] == pytest.approx(1.0)
