@@ -28,7 +28,7 @@ def test_pairs_that_are_left_out_meet_too_rarely(name: str, noise: float) -> Non
     entries, found = np.zeros(len(pairs), ENTRY), np.empty(len(pairs), np.int64)
     entries["i"], entries["j"] = pairs.T
     nearness = Nearness(sigmas_for(p.min_probability), p.contact_margin, p.horizon, p.stale_acceleration)
-    count = find_near(roster.bodies, spread, entries, 0.0, nearness, found)
+    count = find_near(roster.multibody, spread, entries, 0.0, nearness, found)
     far = np.setdiff1d(np.arange(len(pairs)), found[:count])
     assert 0 < count < len(pairs)
     some = np.random.default_rng(0).choice(far, min(len(far), 300), replace=False)
