@@ -45,6 +45,7 @@ def is_linear(table, s):
 
 @inlined
 def _cross(a, b):
+    """Cross product of two vectors (3,)."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 

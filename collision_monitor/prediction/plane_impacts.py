@@ -58,13 +58,13 @@ VERIFIED: Final = 48
 
 SURE_EXTREMES: Final = 4
 """Number of the extreme samples at which the planes of bodies that surely meet are checked: one for each axis of the
-position, and one for the velocity across the path."""
+position, and one for the velocity along the miss."""
 
 LONGEST: Final = 1.4
-"""Factor by which segments may be longer than that if MOST_SEGMENTS would not suffice: gaps bend twice as much."""
+"""Factor by which segments may exceed `straight_length` if MOST_SEGMENTS do not suffice: gaps bend twice as much."""
 
 SURE_BENDING: Final = 0.3
-"""In place of BENDING for bodies that surely meet."""
+"""In place of BENDING for bodies that surely meet, because only their times are sought."""
 
 TOO_FAST: Final = -1
 """Number of samples of bodies that turn too fast for planes."""

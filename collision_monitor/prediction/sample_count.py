@@ -8,8 +8,8 @@ from typing import Final
 from collision_monitor._jit import device, inlined
 
 SURE_SAMPLES: Final = 256
-"""Number of samples of a pair that surely meets, or meets in all of the pilot: they differ only in their times. With
-fewer, the earliest time would have to be that of grown bodies."""
+"""Number of samples of a pair that meets in all of the pilot: they differ only in their times. With fewer, because of
+their weights, the earliest time would have to be that of grown bodies."""
 
 PILOT_PART: Final = 0.3
 """A pair of shapes that is stated to pass is left out if it meets in the pilot with less than this fraction of
