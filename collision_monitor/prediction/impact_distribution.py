@@ -22,6 +22,9 @@ PROBABILITY: Final = 3
 OUTWARD: Final = 2.0
 """Standard errors by which the earliest and the latest time lie outside of the quantiles of the samples."""
 
+EVENLY_OUTWARD: Final = 1.5
+"""The same for samples of equal weight: a part of them that up to six errors select deviates by 0.7 standard errors."""
+
 
 @device
 def summarise(times, weights, order, confidence, safe, answer, whole):

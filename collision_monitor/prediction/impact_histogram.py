@@ -10,7 +10,7 @@ from math import inf, sqrt
 from typing import Final
 
 from collision_monitor._jit import device
-from collision_monitor.prediction.impact_distribution import EARLIEST, LATEST, MOST_LIKELY, OUTWARD, PROBABILITY
+from collision_monitor.prediction.impact_distribution import EARLIEST, LATEST, MOST_LIKELY, PROBABILITY
 
 BINS: Final = 256
 """Number of bins between the first and the last impact of a sample."""
@@ -20,11 +20,11 @@ NOT_FOUND: Final = -1.0
 
 
 @device
-def summarise_by_bins(times, weights, sums, confidence, memory, answer):
+def summarise_by_bins(times, weights, sums, outward, confidence, memory, answer):
     """Write earliest, most likely and latest time (s) and probability into answer (4,); see `summarise`.
 
     times (n,): of the first samples of a lattice; inf: no impact. weights, sums: those of the lattice, see
-    SampleColumns. Returns the first impact (s).
+    SampleColumns. outward: standard errors by which both quantiles are moved outward. Returns the first impact (s).
     """
     met, weight, bins = memory.trial[0], memory.trial[1], memory.bins
     hits = 0
@@ -53,8 +53,8 @@ def summarise_by_bins(times, weights, sums, confidence, memory, answer):
         bins[k] = total
     whole, all_squares = sums[0, times.size - 1], sums[1, times.size - 1]
     variance = (1.0 - confidence) * confidence
-    few = (1.0 - confidence) * total - OUTWARD * sqrt(variance * squares)
-    most = confidence * whole + OUTWARD * sqrt(variance * all_squares)
+    few = (1.0 - confidence) * total - outward * sqrt(variance * squares)
+    most = confidence * whole + outward * sqrt(variance * all_squares)
     answer[PROBABILITY] = min(total / whole, 1.0)
     first = 0
     while bins[first] <= few:

@@ -13,7 +13,13 @@ from typing import Final
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window
 from collision_monitor.prediction.error_samples import orientation_spread, set_frame, take_root
-from collision_monitor.prediction.impact_distribution import EARLIEST, MOST_LIKELY, PROBABILITY
+from collision_monitor.prediction.impact_distribution import (
+    EARLIEST,
+    EVENLY_OUTWARD,
+    MOST_LIKELY,
+    OUTWARD,
+    PROBABILITY,
+)
 from collision_monitor.prediction.impact_histogram import NOT_FOUND, summarise_by_bins
 from collision_monitor.prediction.motion import carry_on, half_acceleration
 from collision_monitor.prediction.pair_errors import PairErrors, set_gap_covariance, surface_bend, swing_bound
@@ -128,7 +134,8 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         followed += samples
         answer = answers[k]
         weights, sums = (lattice.even, lattice.even_sums) if is_even else (lattice.weights, lattice.sums)
-        first = summarise_by_bins(memory.times[0:samples], weights, sums, sampling.confidence, memory, answer)
+        outward = EVENLY_OUTWARD if is_even else OUTWARD
+        first = summarise_by_bins(memory.times[0:samples], weights, sums, outward, sampling.confidence, memory, answer)
         if answer[EARLIEST] == NOT_FOUND:
             wide = Tube(sampling.safe_sigmas * tube.start, sampling.safe_sigmas * tube.growth)
             roughly = ImpactQuery(query.margin, max(query.tolerance, SAMPLE_TOLERANCE * tube.start), query.iterations)

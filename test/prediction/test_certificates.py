@@ -85,6 +85,6 @@ def test_a_pair_that_surely_meets_has_the_times_of_the_normal_distribution(offse
     assert told["probability"] == pytest.approx(1.0 if certain else 0.994, abs=1e-9 if certain else 0.005)
     if certain:
         spread, middle = sigma / 1.5, 2.0 / 1.5
-        assert middle - 2.5 * spread < told["earliest"] < middle - 1.645 * spread
-        assert middle + 1.645 * spread < told["latest"] < middle + 2.5 * spread
+        assert middle - 2.4 * spread < told["earliest"] < middle - 1.645 * spread
+        assert middle + 1.645 * spread < told["latest"] < middle + 2.4 * spread
         assert told["most_likely"] == pytest.approx(middle, abs=0.2 * spread)

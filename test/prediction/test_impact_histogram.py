@@ -7,9 +7,17 @@ from math import inf
 import numpy as np
 import pytest
 
-from collision_monitor.prediction.impact_distribution import EARLIEST, LATEST, MOST_LIKELY, PROBABILITY, summarise
+from collision_monitor.prediction.impact_distribution import (
+    EARLIEST,
+    EVENLY_OUTWARD,
+    LATEST,
+    MOST_LIKELY,
+    OUTWARD,
+    PROBABILITY,
+    summarise,
+)
 from collision_monitor.prediction.impact_histogram import BINS, NOT_FOUND, summarise_by_bins
-from collision_monitor.prediction.normal_samples import sample_columns
+from collision_monitor.prediction.normal_samples import WIDENED, sample_columns
 from collision_monitor.prediction.plane_memory import make_plane_memory
 
 LATTICE = sample_columns(512)
@@ -20,7 +28,7 @@ def both(times: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     weights = LATTICE.weights[: len(times)]
     by_order, by_bins = np.empty(4), np.empty(4)
     summarise(times, weights, np.argsort(times, kind="stable"), 0.95, 0.0, by_order, weights.sum())
-    first = summarise_by_bins(times, LATTICE.weights, LATTICE.sums, 0.95, make_plane_memory(512), by_bins)
+    first = summarise_by_bins(times, LATTICE.weights, LATTICE.sums, OUTWARD, 0.95, make_plane_memory(512), by_bins)
     return by_order, by_bins, first
 
 
@@ -71,3 +79,15 @@ def test_equal_times_and_none() -> None:
     _, answer, _ = both(np.where(np.arange(128) == 5, 0.25, inf))
     assert answer[EARLIEST] == NOT_FOUND
     assert answer[MOST_LIKELY] == 0.25
+
+
+def test_parts_of_even_samples_deviate_less_than_those_of_independent_ones() -> None:
+    """The part beyond a plane in the space of the first six errors, against that of the normal distribution."""
+    rng, points = np.random.default_rng(0), LATTICE.points[:6, : LATTICE.pilot].copy()
+    points[0] /= WIDENED
+    for dimensions in (1, 2, 3, 6):
+        n = np.zeros((20_000, 6))
+        n[:, :dimensions] = rng.normal(size=(20_000, dimensions))
+        n /= np.linalg.norm(n, axis=1)[:, None]
+        part = (n @ points < -1.6448536269514729).mean(axis=1)
+        assert np.sqrt(np.mean((part - 0.05) ** 2)) < EVENLY_OUTWARD / OUTWARD * np.sqrt(0.05 * 0.95 / LATTICE.pilot)
