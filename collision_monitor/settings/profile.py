@@ -15,8 +15,18 @@ from typing import Any, Final
 
 from collision_monitor.errors import ProfileError
 from collision_monitor.records import MOST_POINTS, Model
+from collision_monitor.settings.by_name import classes_of
 from collision_monitor.settings.named_profiles import NAMED_PROFILES, profile_changes
-from collision_monitor.settings.setting import EVERYWHERE, Setting, choice, number, settings_of, switch, vector
+from collision_monitor.settings.setting import (
+    EVERYWHERE,
+    Setting,
+    by_name,
+    choice,
+    number,
+    settings_of,
+    switch,
+    vector,
+)
 
 NO_BUDGET: Final = 1e6
 """ms, a quarter of an hour: with this value a step has no time limit and does not read the clock."""
@@ -46,6 +56,19 @@ class Profile:
         "s",
         "Time ahead for which collisions are predicted. With 0, only contacts are reported.",
         predictions=True,
+    )
+    horizon_by_name: str = by_name(
+        0.0,
+        1e6,
+        "s",
+        "Shorter horizons of classes of objects, such as 'pallet*=1, box_?=0.5'. That of a pair is the shorter one.",
+        predictions=True,
+    )
+    rate_by_name: str = by_name(
+        1e-3,
+        1e6,
+        "Hz",
+        "Largest rate at which states of classes of objects are used, such as 'pallet*=2'. The others are left out.",
     )
     contact_margin: float = number(0.0, 0.0, 1e6, "m", "Gap up to which a pair counts as touching.", predictions=True)
     contact_points: int = number(
@@ -221,6 +244,12 @@ class Profile:
             raise ProfileError(f"profile, name: expected at most {MOST_NAME} characters, got {len(self.name)}")
         for setting in self.fields():
             object.__setattr__(self, setting.name, setting.checked(getattr(self, setting.name)))
+        for pattern, value in classes_of("horizon_by_name", self.horizon_by_name):
+            if value > self.horizon:
+                raise ProfileError(
+                    f"horizon_by_name, {pattern}: expected at most the horizon, {self.horizon:g} s, got {value:g}; "
+                    "raise the horizon, and name the classes with a shorter one"
+                )
         for axis, low, high in zip("xyz", self.region_min, self.region_max, strict=True):
             if not low <= high:
                 raise ProfileError(

@@ -22,6 +22,8 @@ from collision_monitor.world import make_scene
 SECOND = 1_000_000_000
 OTHER: dict[str, Any] = {
     "horizon": 3.5,
+    "horizon_by_name": "*1=0.5",
+    "rate_by_name": "*2=5",
     "contact_margin": 0.05,
     "contact_points": 4,
     "distance_tolerance": 1e-3,
