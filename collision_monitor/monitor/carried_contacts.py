@@ -11,7 +11,7 @@ concave shapes are answered anew in every step.
 
 from __future__ import annotations
 
-from math import inf, nan, sqrt
+from math import nan, sqrt
 from typing import Final
 
 import numpy as np
@@ -19,13 +19,11 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.monitor.carried_triangles import (
-    DEEPEST,
     NO_MESH,
     NONE,
     PLACE_I,
     PLACE_J,
     carry_triangles,
-    largest_depth,
     meets_by_trees,
 )
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
@@ -37,7 +35,7 @@ from collision_monitor.prediction.motion import age_of, chord_angle, position_no
 RELATIVE: Final = RESULT
 TURN_I: Final = RESULT + 3
 TURN_J: Final = RESULT + 7
-CARRIED: Final = DEEPEST + 1
+CARRIED: Final = PLACE_J + 1
 """Numbers of a carried row: a result row, whose points are about the bodies' origins and whose bound lacks the widening
 of stale states; the position of j's origin from i's (m); both quaternions, all at the time of the answer; and what
 carried_triangles.py keeps. Its distance is NaN if there is no answer to carry."""
@@ -120,21 +118,17 @@ def _is_convex(multibody, i):
 @device
 def keep(multibody, i, j, touching, now, query, scratch, result, row):
     """Write the carried row of bodies i and j from their result row, if that may be carried."""
-    is_new = not row[DISTANCE] <= inf
     row[DISTANCE] = nan
-    if not touching:
+    if not (touching and result[STATUS] == TOUCHING):
         return
     bodies, q = multibody.bodies, scratch.quaternion[0]
     by_trees = result[DISTANCE] <= 0.0 and meets_by_trees(multibody, i, j)
-    are_convex = result[STATUS] == TOUCHING and _is_convex(multibody, i) and _is_convex(multibody, j)
-    if not (by_trees or are_convex):
+    if not (by_trees or (_is_convex(multibody, i) and _is_convex(multibody, j))):
         return
     relative = relative_now(bodies, i, j, now)
     for c in range(RESULT):
         row[c] = result[c]
     row[PLACE_I] = row[PLACE_J] = NONE if by_trees else NO_MESH
-    if by_trees and is_new:
-        row[DEEPEST] = largest_depth(multibody.table, bodies.first_shape[i], bodies.first_shape[j], scratch)
     row[BOUND] -= widening(relative, query.stale_acceleration)
     for c in range(3):
         row[POINT_A + c] -= position_now(bodies, i, relative.age_i, c)

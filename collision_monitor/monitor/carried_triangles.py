@@ -1,15 +1,13 @@
 """Contacts of meshes that persist, carried over by a pair of triangles that still meets (`distance_tolerance`).
 
-The depth of two meshes is that of their deepest pair of triangles. It is at least the depth of any pair of triangles.
-The depth of one pair, and thus the largest one, changes by at most the distance that the origins move relative to each
-other, plus the angle that each body turns times its radius. So one pair of triangles that meets proves the contact, and
-bounds the distance from above; the last full answer and the longest edges bound it from below. The middle of this range
-is reported.
+The depth of two solids changes by at most the distance that the origins move relative to each other, plus the angle
+that each body turns times its radius. It is at least the depth of any pair of their triangles. So one pair of triangles
+that meets proves the contact, and bounds the distance from above; the last full answer bounds it from both sides. The
+middle of this range is reported. A full answer finds all pairs of triangles that meet, which takes much longer.
 """
 
 from __future__ import annotations
 
-from math import inf
 from typing import Final
 
 from collision_monitor._jit import device, inlined
@@ -17,7 +15,6 @@ from collision_monitor.meshes.layout import WIDTH
 from collision_monitor.meshes.nearest import PAIRS
 from collision_monitor.meshes.placing import relative
 from collision_monitor.meshes.touching import touching
-from collision_monitor.monitor.longest_edge import longest_edge
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.bodies import place_shape
@@ -27,7 +24,6 @@ from collision_monitor.prediction.body_contact import (
     SHAPE_J,
     STATUS,
     TOUCHING,
-    UNSETTLED,
     closing_now,
     widening,
 )
@@ -40,9 +36,6 @@ PLACE_J: Final = RESULT + 12
 """Columns of a carried row: places of two triangles that met, WIDTH * block + member relative to the roots of their
 trees, which a snapshot does not keep in place. NONE: not known; NO_MESH: the pair has no trees."""
 
-DEEPEST: Final = RESULT + 13
-"""Column of a carried row with the largest depth of two of its triangles (m)."""
-
 NONE: Final = -1.0
 NO_MESH: Final = -2.0
 
@@ -54,22 +47,12 @@ def _has_one_shape(multibody, i):
 
 @inlined
 def meets_by_trees(multibody, i, j):
-    """Whether bodies i and j are one shape each that meet by trees, one of them a mesh or a cloud."""
+    """Whether bodies i and j are one shape each, no models of objects, that meet by trees, one of them a mesh."""
     table, bodies = multibody.table, multibody.bodies
     a, b = bodies.first_shape[i], bodies.first_shape[j]
     if not (_has_one_shape(multibody, i) and _has_one_shape(multibody, j) and has_mesh(table, a, b)):
         return False
-    return have_trees(table, a, b)
-
-
-@device
-def largest_depth(table, a, b, scratch):
-    """Largest depth (m) of two triangles of shapes with trees; infinite if it is unknown."""
-    edge_a = longest_edge(table.blocks, root_of(table, a), scratch.tree)
-    edge_b = longest_edge(table.blocks, root_of(table, b), scratch.tree)
-    if edge_a == inf or edge_b == inf:
-        return inf
-    return 0.5 * min(edge_a, edge_b) + table.margin[a] + table.margin[b]
+    return have_trees(table, a, b) and bodies.excess[i] + bodies.excess[j] == 0.0
 
 
 @device
@@ -109,8 +92,8 @@ def carry_triangles(multibody, i, j, now, there, moved, query, tolerance, scratc
     if not _meet(table, a, b, pose, row, scratch):
         return False
     out = scratch.out
-    least = max(row[DISTANCE] - moved, -row[DEEPEST])
-    half = max(0.5 * (out[DISTANCE] - least), 0.0)
+    most, least = min(out[DISTANCE], row[DISTANCE] + moved), row[DISTANCE] - moved
+    half = max(0.5 * (most - least), 0.0)
     if not half <= tolerance:
         return False
     for c in range(CONTACT_SIZE):
@@ -119,14 +102,9 @@ def carry_triangles(multibody, i, j, now, there, moved, query, tolerance, scratc
         result[POINT_A + c] += oa[c]
         result[POINT_B + c] += oa[c]
     result[CLOSING] = closing_now(bodies, i, j, there, result)
-    result[DISTANCE] -= half
-    excess = bodies.excess[i] + bodies.excess[j]
-    is_hollow = excess > 0.0 and (bodies.concave[i] or bodies.concave[j])
-    # models that overlap say of objects with a hollow only that these are within the excess
-    result[BOUND] += excess - result[DISTANCE] if is_hollow else excess + half
-    result[BOUND] += out[BOUND] + widening(there, query.stale_acceleration)  # twice: of the answer before too
-    certain = (excess if is_hollow else out[DISTANCE] + excess) <= query.margin
-    result[STATUS] = TOUCHING if certain else UNSETTLED
+    result[DISTANCE] = most - half
+    result[BOUND] += row[BOUND] + half + widening(there, query.stale_acceleration)
+    result[STATUS] = TOUCHING
     result[SHAPE_I], result[SHAPE_J] = a, b
     for c in range(3):
         at = position_now(bodies, i, there.age_i, c)

@@ -134,7 +134,7 @@ class Profile:
         predictions=True,
     )
     adaptive_tolerances: bool = switch(
-        False,
+        True,
         "Whether the tolerances of an object follow how far it leaves its motion; the set ones are then the widest.",
         predictions=True,
     )

@@ -33,7 +33,7 @@ OTHER: dict[str, Any] = {
     "orientation_tolerance": 1e-2,
     "velocity_tolerance": 1e-2,
     "angular_velocity_tolerance": 1e-2,
-    "adaptive_tolerances": True,
+    "adaptive_tolerances": False,
     "stale_after": 0.1,
     "stale_acceleration": 2.0,
     "uncertainty": False,
