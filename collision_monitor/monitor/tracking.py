@@ -36,7 +36,7 @@ its motion within FUTILE_STEPS steps once; and its ratio to the last deviation, 
 because the next deviation of a noisy state may be larger."""
 
 FUTILE_STEPS: Final = 4.0
-PATIENCE: Final = 128.0
+PATIENCE: Final = 512.0
 """A body with half of the tolerances or more that leaves its motion within FUTILE_STEPS steps turns or accelerates. Its
 tolerances are NARROWEST for its next PATIENCE motions; its width is minus the number of those that are left. A body
 with the NARROWEST tolerances has noise only if it leaves its motion so soon twice in a row; one that bounces has none.
