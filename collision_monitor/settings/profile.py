@@ -37,6 +37,9 @@ MOST_NAME: Final = 4096
 NO_LIMIT: Final = 1_000_000_000
 """Pairs in a step: more than fit into memory, so no limit."""
 
+_BEFORE: Final[dict[str, Any]] = {"adaptive_tolerances": False}
+"""What a program did that did not have the setting yet, where the default is another. Its sessions do not name it."""
+
 _MODELS: Final = [model.name.lower() for model in Model if model is not Model.EXACT]
 
 
@@ -295,12 +298,15 @@ class Profile:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Profile:
-        """Return the profile of `to_dict`, with defaults for missing settings. Raises ProfileError for unknown ones."""
+        """Return the profile of `to_dict`, with values for missing settings. Raises ProfileError for unknown ones.
+
+        These are the defaults, or for sessions that are older than a setting what the program did then.
+        """
         known = {f.name for f in dataclasses.fields(cls)}
         for name in values:
             if name not in known:
                 raise ProfileError(f"profile: expected settings among {', '.join(sorted(known))}, got {name!r}")
-        return cls(**values)
+        return cls(**(_BEFORE | dict(values)))
 
     def replace(self, **changes: Any) -> Profile:
         """Return a copy with some settings changed. Raises ProfileError."""
