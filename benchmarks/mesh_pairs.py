@@ -61,8 +61,9 @@ def surfaces() -> dict[str, Surface]:
     found[f"scan {len(scan)}"] = Surface(np.stack([x, y, z], axis=-1).reshape(-1, 3), scan)
     half = ring.faces[ring.triangles_center[:, 0] > 0]
     found[f"open {len(half)}"] = Surface(ring.vertices, half)
-    soup = rng.normal(size=(2000, 1, 3)) * 0.4 + 0.05 * rng.normal(size=(2000, 3, 3))
-    found["soup 2000"] = Surface(soup.reshape(-1, 3), np.arange(6000).reshape(-1, 3))
+    for name, count, size in (("soup", 2000, 0.05), ("soup", 20_000, 0.05), ("dense soup", 2000, 0.15)):
+        soup = rng.normal(size=(count, 1, 3)) * 0.4 + size * rng.normal(size=(count, 3, 3))
+        found[f"{name} {count}"] = Surface(soup.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3))
     return found
 
 

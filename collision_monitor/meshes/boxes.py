@@ -1,8 +1,8 @@
 """Lower bounds on the distances of a box from eight boxes, or from eight triangles, of a block at once.
 
 In the axes of either box, the other one has an axis-aligned bound; the gaps of the two along the axes give a lower
-bound on the distance. Further bounds are the gap along the line of the two centres, which the former already contain,
-and the gap along a given direction, such as that between the nearest points so far.
+bound on the distance. Further bounds are the gap along the line of the two centres, and the gap along a given
+direction, such as that between the nearest points so far.
 LLVM does not vectorise these loops, so the formulas are written in vectors (`_jit.lanes`).
 """
 
@@ -68,7 +68,7 @@ class Block:
 
 
 def inner(a: list[Lanes], b: list[Lanes]) -> Lanes:
-    """Dot products of eight pairs of vectors, with each rounded three times."""
+    """Dot products of eight pairs of vectors, with one rounding for each term."""
     return (a[0] * b[0]).plus_product(a[1], b[1]).plus_product(a[2], b[2])
 
 

@@ -173,8 +173,9 @@ class UncertainPredictions(Stage):
         renewed = np.empty(len(self.entries) + len(pairs), ENTRY)
         entries = renewed[: renew(self.entries, pairs, step.roster.bodies, self.spread, step.now, renewed)]
         if len(pairs):
-            entries = entries[np.lexsort((entries["until"], entries["key"]))]
-            entries = entries[np.append(entries["key"][1:] != entries["key"][:-1], True)[: len(entries)]]
+            order = np.argsort(entries["key"], kind="stable")  # an entry that is found again holds longer
+            keys = entries["key"][order]
+            entries = entries[order[np.append(keys[1:] != keys[:-1], True)[: len(keys)]]]
         self.entries = entries
 
     def complete(
@@ -213,7 +214,7 @@ class UncertainPredictions(Stage):
         """Return the entries of the pairs that could meet within the horizon."""
         p, found = step.profile, np.empty(len(self.entries), np.int64)
         nearness = Nearness(sigmas_for(p.min_probability), step.settings.impact.margin, p.horizon, p.stale_acceleration)
-        count = find_near(step.roster.bodies, self.spread, self.entries, step.now, nearness, found)
+        count = find_near(step.roster.multibody, self.spread, self.entries, step.now, nearness, found)
         return self.entries[found[:count]]
 
     def _judge_passing(self, step: StepContext, entries: Records, pool: Pool, budget: PairBudget | None) -> Records:
@@ -295,13 +296,10 @@ class UncertainPredictions(Stage):
     def _judge(self, step: StepContext, slots: Pairs, stated: bool, pool: Pool) -> NDArray[np.float64]:
         """Compute the answers (n, 4) for pairs of body slots (n, 2) on all threads; their number changes no answer."""
         p, sampling = step.profile, self._sampling(step, stated)
-        fewer = sampling._replace(**normal_samples(max(p.uncertainty_samples // 8, FEWEST_SAMPLES))._asdict())
         lattice, multibody = sample_columns(p.uncertainty_samples), step.roster.multibody
 
         def part(slots: Pairs, work: Workspaces) -> tuple[NDArray[np.float64], int]:
             answers, followed = np.full((len(slots), len(ANSWERS)), LEFT), 0
-            costly = np.empty(len(slots), bool)
-            find_costly(multibody, slots, p.horizon, costly)
 
             def follow(some: NDArray[np.bool_], samples: Sampling) -> int:
                 """Follow each sample of some of the pairs exactly. Return the number of samples."""
@@ -318,7 +316,13 @@ class UncertainPredictions(Stage):
                     multibody, self.spread, slots, step.now, sampling, lattice, planes, exact, answers
                 )
             left = answers[:, PROBABILITY] == LEFT
-            return answers, followed + follow(left & costly, fewer) + follow(left & ~costly, sampling)
+            if left.any():
+                fewer = normal_samples(max(p.uncertainty_samples // 8, FEWEST_SAMPLES))
+                costly = np.empty(len(slots), bool)
+                find_costly(multibody, slots, p.horizon, costly)
+                followed += follow(left & costly, sampling._replace(**fewer._asdict()))
+                followed += follow(left & ~costly, sampling)
+            return answers, followed
 
         if len(self._workspaces[0].planes.times) != p.uncertainty_samples:
             self._workspaces = [make_workspaces(p.uncertainty_samples)]

@@ -20,15 +20,16 @@ NOT_FOUND: Final = -1.0
 
 
 @device
-def summarise_by_bins(times, lattice, confidence, memory, answer):
+def summarise_by_bins(times, weights, sums, confidence, memory, answer):
     """Write earliest, most likely and latest time (s) and probability into answer (4,); see `summarise`.
 
-    times (n,): of the first samples of the lattice (SampleColumns); inf: no impact. Returns the first impact (s).
+    times (n,): of the first samples of a lattice; inf: no impact. weights, sums: those of the lattice, see
+    SampleColumns. Returns the first impact (s).
     """
     met, weight, bins = memory.trial[0], memory.trial[1], memory.bins
     hits = 0
     for n in range(times.size):  # without a branch, because no processor predicts which samples meet
-        met[hits], weight[hits] = times[n], lattice.weights[n]
+        met[hits], weight[hits] = times[n], weights[n]
         hits += 1 if times[n] < inf else 0
     answer[PROBABILITY] = 0.0
     answer[EARLIEST] = answer[MOST_LIKELY] = answer[LATEST] = inf
@@ -50,7 +51,7 @@ def summarise_by_bins(times, lattice, confidence, memory, answer):
     for k in range(BINS):
         total += bins[k]
         bins[k] = total
-    whole, all_squares = lattice.sums[0, times.size - 1], lattice.sums[1, times.size - 1]
+    whole, all_squares = sums[0, times.size - 1], sums[1, times.size - 1]
     variance = (1.0 - confidence) * confidence
     few = (1.0 - confidence) * total - OUTWARD * sqrt(variance * squares)
     most = confidence * whole + OUTWARD * sqrt(variance * all_squares)

@@ -111,9 +111,11 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         take_root(work.joint)
         _clear_upper(work.joint)
         errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, (far_i, far_j))
+        is_even = False
         if are_round(table, parts, pair, errors, query.margin, work):
             samples = enter_round_bodies(table, parts, pair, errors, sampling, lattice, memory, work)
         elif sure:
+            is_even = True
             samples = enter_surely(multibody, i, j, errors, sampling, lattice, memory, work)
         else:
             samples = enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work)
@@ -125,7 +127,8 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
             continue
         followed += samples
         answer = answers[k]
-        first = summarise_by_bins(memory.times[0:samples], lattice, sampling.confidence, memory, answer)
+        weights, sums = (lattice.even, lattice.even_sums) if is_even else (lattice.weights, lattice.sums)
+        first = summarise_by_bins(memory.times[0:samples], weights, sums, sampling.confidence, memory, answer)
         if answer[EARLIEST] == NOT_FOUND:
             wide = Tube(sampling.safe_sigmas * tube.start, sampling.safe_sigmas * tube.growth)
             roughly = ImpactQuery(query.margin, max(query.tolerance, SAMPLE_TOLERANCE * tube.start), query.iterations)

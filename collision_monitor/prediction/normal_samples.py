@@ -22,6 +22,9 @@ DIMENSIONS: Final = 12
 WIDENED: Final = 1.5
 """Factor by which the first coordinate is drawn wider. Larger: rarer events are found, common ones less exact."""
 
+FURTHEST: Final = 4.5
+"""Standard deviations beyond which errors are neglected; 7 of a million are larger."""
+
 _GOLDEN_RATIO: Final = 0.6180339887498949
 
 
@@ -92,6 +95,10 @@ class SampleColumns(NamedTuple):
     weights: NDArray[np.float64]  # (n,)
     sums: NDArray[np.float64]
     """(2, n): sum of the weights up to each sample, and of their squares."""
+    even: NDArray[np.float64]
+    """(n,): equal weights, for a first coordinate that is not drawn wider."""
+    even_sums: NDArray[np.float64]
+    """(2, n): their sums, and of their squares."""
     pilot: int
     """Number of samples of the coarser lattice."""
     extremes: NDArray[np.int64]
@@ -109,7 +116,9 @@ def sample_columns(count: int) -> SampleColumns:
     pilot = -(-count // stride)
     ordered = np.ascontiguousarray(points[order].T)
     sums = np.cumsum([weights[order], weights[order] ** 2], axis=1)
-    columns = SampleColumns(ordered, weights[order], sums, pilot, _extremes(ordered[:6, :pilot]))
+    even = np.full(count, 1.0 / count)
+    even_sums = np.cumsum([even, even**2], axis=1)
+    columns = SampleColumns(ordered, weights[order], sums, even, even_sums, pilot, _extremes(ordered[:6, :pilot]))
     columns.points.flags.writeable = columns.weights.flags.writeable = False
     return columns
 

@@ -72,8 +72,8 @@ def turning_order(errors, body, tolerance):
 
 
 @inlined
-def straight_length(A, B, errors):
-    """Length (s) of a part of the time in which the gaps are straight enough.
+def straight_length(A, B, errors, bending):
+    """Length (s) of a part of the time in which gaps deviate by less than `bending` stddevs from a straight line.
 
     A normal that turns while the bodies pass each other bends the gap like an acceleration of the surfaces.
     """
@@ -82,7 +82,7 @@ def straight_length(A, B, errors):
     rate += spin_rate(B) if errors.radius[1] > 0.0 else 0.0
     rate += TURNED * (errors.turning[0][1] + errors.turning[1][1])
     bend = errors.bend + speed * rate
-    return sqrt(8.0 * BENDING * max(errors.sigma, 1e-300) / bend) if bend > 0.0 else inf
+    return sqrt(8.0 * bending * max(errors.sigma, 1e-300) / bend) if bend > 0.0 else inf
 
 
 @inlined

@@ -20,10 +20,18 @@ from collision_monitor.prediction.cutting_planes import (
     end_segment,
 )
 from collision_monitor.prediction.impact_record import CLEAR
-from collision_monitor.prediction.obstacle_planes import set_nodes
-from collision_monitor.prediction.pair_errors import TURNED, spin_rate, straight_length, turned_at, turning_order
-from collision_monitor.prediction.sample_count import SURE_SAMPLES, samples_needed
-from collision_monitor.prediction.screening import FURTHEST, meeting
+from collision_monitor.prediction.normal_samples import FURTHEST, WIDENED
+from collision_monitor.prediction.obstacle_planes import MOST_SEGMENTS, set_nodes
+from collision_monitor.prediction.pair_errors import (
+    BENDING,
+    TURNED,
+    spin_rate,
+    straight_length,
+    turned_at,
+    turning_order,
+)
+from collision_monitor.prediction.sample_count import latest, samples_needed
+from collision_monitor.prediction.screening import meeting
 from collision_monitor.prediction.straight_samples import set_errors
 from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE
 
@@ -33,8 +41,11 @@ FACETS: Final = 0.015
 FACETS_IN_PILOT: Final = 0.06
 """The same for the pilot lattice, which decides how many samples a pair needs, and if only the times matter."""
 
+TURNED_FACETS: Final = 0.04
+"""Distance by which errors of orientation of TURNED standard deviations may move a surface beyond the first order."""
+
 MOST_PARTS: Final = 2
-SMALL: Final = 0.05
+SMALL: Final = 0.1
 """If bodies that turn divide the time into more than MOST_PARTS, and errors exceed SMALL rad, or twice SMALL radii of a
 shape, the pair is left to the exact method unless it surely meets: it needs so many planes that it is no faster."""
 
@@ -45,9 +56,15 @@ VERIFIED_IN_PILOT: Final = 6
 VERIFIED: Final = 48
 """Samples of the pilot lattice, and of all, that must need no new plane of a segment."""
 
-SURE_EXTREMES: Final = 6
-"""Number of the extreme samples at which the planes of bodies that surely meet are checked: one for each axis of
-position and velocity."""
+SURE_EXTREMES: Final = 4
+"""Number of the extreme samples at which the planes of bodies that surely meet are checked: one for each axis of the
+position, and one for the velocity along the miss."""
+
+LONGEST: Final = 1.4
+"""Factor by which segments may exceed `straight_length` if MOST_SEGMENTS do not suffice: gaps bend twice as much."""
+
+SURE_BENDING: Final = 0.3
+"""In place of BENDING for bodies that surely meet, because only their times are sought."""
 
 TOO_FAST: Final = -1
 """Number of samples of bodies that turn too fast for planes."""
@@ -61,7 +78,7 @@ class Search(NamedTuple):
     extremes: Any  # indices of those that come first
     verified: int  # number of others that must need no new plane of a segment
     fineness: float  # standard deviations of the gap by which errors of orientation may move a surface unnoticed
-    until: float  # s
+    bending: float  # standard deviations by which a gap may deviate from a straight line in a segment
 
 
 class Laid(NamedTuple):
@@ -73,10 +90,11 @@ class Laid(NamedTuple):
 
 
 @device
-def _lay_planes(table, parts, pair, errors, search, sampling, memory, work):
+def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, work):
     """Bound the obstacle of a pair of shapes (ShapePair) by planes where the samples of the search need them.
 
-    Writes the times of these samples into memory.alone, infinite for those that do not meet.
+    Writes the times of these samples into memory.alone, infinite for those that do not meet. until: s; later impacts do
+    not count.
     """
     A, B, a, b = pair
     scratch, alone, sigma, samples = work.scratch, memory.alone, errors.sigma, search.samples
@@ -94,10 +112,10 @@ def _lay_planes(table, parts, pair, errors, search, sampling, memory, work):
         alone[n] = inf
     wide = Tube(FURTHEST * errors.tube.start, FURTHEST * errors.tube.growth)
     begin, end = meeting(table, parts, pair, sampling.horizon, margin, wide, work)
-    end = min(end, search.until)
+    end = min(end, until)
     if not begin < end:
         return Laid(0, settings, True)
-    length = straight_length(A, B, errors)
+    length = straight_length(A, B, errors, search.bending)
     if length < end - begin:
         coarse = max(sampling.query.tolerance, SAMPLE_TOLERANCE * sigma)
         roughly = ImpactQuery(margin, coarse, sampling.query.iterations)
@@ -105,6 +123,7 @@ def _lay_planes(table, parts, pair, errors, search, sampling, memory, work):
         status, begin, _, _ = shape_impact(table, parts, pair, Window(begin, end), there, roughly, scratch)
         if status == CLEAR or not begin < end:
             return Laid(0, settings, True)
+    length = max(length, min((end - begin) / MOST_SEGMENTS, LONGEST * length))
     length = (end - begin) / (1.0 + np.floor((end - begin) / length))
     window = Window(begin, end)
     segments = set_nodes(table, parts, pair, window, length, errors.turning, sampling.planar, scratch, memory.obstacle)
@@ -128,17 +147,17 @@ def _lay_planes(table, parts, pair, errors, search, sampling, memory, work):
 
 
 @device
-def _enter_pair(table, parts, pair, laid, points, samples, tolerance, memory, work):
+def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work):
     """Lower memory.times to the impacts of the first `samples` with the planes that are laid, and some more.
 
-    tolerance (m): see CutSettings.
+    verified: number of samples of all that must need no new plane; tolerance (m): see CutSettings.
     """
     segments, pilots, _ = laid
     settings = CutSettings(pilots.margin, tolerance, pilots.pilot, pilots.follows, pilots.turning)
     alone, times = memory.alone, memory.times
     for n in range(samples):
         alone[n] = inf
-    each = max(VERIFIED_IN_PILOT, VERIFIED // max(segments - 3, 1))
+    each = max(VERIFIED_IN_PILOT, verified // max(segments - 3, 1))
     for k in range(segments):
         begin_segment(table, pair, k, settings, memory, points, 0, samples)
         cut_planes(table, parts, pair, k, samples, each, settings, memory, work.scratch)
@@ -157,13 +176,13 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
     A, B = work.motion[0], work.motion[1]
     times, pilot, end, points = memory.times, lattice.pilot, sampling.horizon, lattice.points
     first_a, first_b = bodies.first_shape[i], bodies.first_shape[j]
-    single = parts.next[first_a] < 0 and parts.next[first_b] < 0
     set_errors(work.joint, work.frame, errors.time, points, 0, pilot, memory.off)
     for n in range(times.size):
         times[n] = inf
-    search = Search(points, pilot, lattice.extremes, VERIFIED_IN_PILOT, FACETS, end)
+    search = Search(points, pilot, lattice.extremes, VERIFIED_IN_PILOT, TURNED_FACETS, BENDING)
     a, b = first_a, first_b
-    laid = _lay_planes(table, parts, ShapePair(A, B, a, b), errors, search, sampling, memory, work)
+    pair = ShapePair(A, B, a, b)
+    laid = _lay_planes(table, parts, pair, errors, search, end, sampling, memory, work)
     while True:
         _lower(times, memory.alone, pilot)
         if not laid.complete:
@@ -171,38 +190,48 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
         a, b = next_pair(parts, first_b, a, b)
         if a < 0:
             break
-        laid = _lay_planes(table, parts, ShapePair(A, B, a, b), errors, search, sampling, memory, work)
-    samples = samples_needed(times, lattice, sampling)
+        pair = ShapePair(A, B, a, b)
+        until = min(end, latest(times, pilot))
+        laid = _lay_planes(table, parts, pair, errors, search, until, sampling, memory, work)
+    samples, until = samples_needed(times, lattice, sampling), latest(times, pilot)
     if samples == 0:
         return 0
     set_errors(work.joint, work.frame, errors.time, points, pilot, samples, memory.off)
     for n in range(times.size):
         times[n] = inf
-    tolerance = max(FACETS * errors.sigma, sampling.query.tolerance)
+    verified = VERIFIED_IN_PILOT if until < inf else VERIFIED
+    tolerance = max((FACETS_IN_PILOT if until < inf else FACETS) * errors.sigma, sampling.query.tolerance)
+    _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work)
+    last_a, last_b = pair.a, pair.b  # its planes are still there; those of the others are laid again
     a, b = first_a, first_b
-    while a >= 0:
+    while a != last_a or b != last_b:
         pair = ShapePair(A, B, a, b)
-        if not single:
-            laid = _lay_planes(table, parts, pair, errors, search, sampling, memory, work)
-        _enter_pair(table, parts, pair, laid, points, samples, tolerance, memory, work)
+        laid = _lay_planes(table, parts, pair, errors, search, min(end, until), sampling, memory, work)
+        _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work)
         a, b = next_pair(parts, first_b, a, b)
     return samples
 
 
 @device
 def enter_surely(multibody, i, j, errors, sampling, lattice, memory, work):
-    """`enter_bodies` for bodies that surely meet until errors.time: only the times of their impacts are sought."""
+    """`enter_bodies` for bodies that surely meet until errors.time: only the times of their impacts are sought.
+
+    The samples are those of the pilot, with equal weights, because no error matters more than the others.
+    """
     table, parts, bodies = multibody
-    times, points, samples = memory.times, lattice.points, min(SURE_SAMPLES, lattice.weights.size)
+    times, points, samples = memory.times, lattice.points, lattice.pilot
+    for r in range(6):
+        work.joint[r, 0] /= WIDENED
     set_errors(work.joint, work.frame, errors.time, points, 0, samples, memory.off)
     for n in range(samples):
         times[n] = inf
-    search = Search(points, samples, lattice.extremes[0:SURE_EXTREMES], 0, FACETS_IN_PILOT, errors.time)
+    search = Search(points, samples, lattice.extremes[0:SURE_EXTREMES], 0, FACETS_IN_PILOT, SURE_BENDING)
     a, first_b = bodies.first_shape[i], bodies.first_shape[j]
     b = first_b
     while a >= 0:
         pair = ShapePair(work.motion[0], work.motion[1], a, b)
-        if not _lay_planes(table, parts, pair, errors, search, sampling, memory, work).complete:
+        until = min(errors.time, latest(times, samples))
+        if not _lay_planes(table, parts, pair, errors, search, until, sampling, memory, work).complete:
             return TOO_FAST
         _lower(times, memory.alone, samples)
         a, b = next_pair(parts, first_b, a, b)

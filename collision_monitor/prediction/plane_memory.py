@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.prediction.impact_histogram import BINS
 from collision_monitor.prediction.obstacle_planes import Obstacle, make_obstacle
-from collision_monitor.prediction.sample_gaps import SampleRows, make_sample_rows
+from collision_monitor.prediction.sample_gaps import APART, SampleRows, make_sample_rows
 from collision_monitor.prediction.straight_samples import ERRORS
 
 
@@ -37,7 +37,7 @@ def make_plane_memory(samples: int) -> PlaneMemory:
     return PlaneMemory(
         obstacle=make_obstacle(),
         rows=make_sample_rows(samples),
-        off=np.zeros((ERRORS, samples)),
+        off=np.zeros((ERRORS, samples + APART)),
         times=numbers(),
         alone=numbers(),
         entry=numbers(),

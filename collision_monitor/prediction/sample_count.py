@@ -5,15 +5,24 @@ from __future__ import annotations
 from math import inf
 from typing import Final
 
-from collision_monitor._jit import device
+from collision_monitor._jit import device, inlined
 
 SURE_SAMPLES: Final = 256
-"""Number of samples of a pair that surely meets, or meets in all of the pilot: they differ only in their times. With
-fewer, the earliest time would have to be that of grown bodies."""
+"""Number of samples of a pair that meets in all of the pilot: they differ only in their times. With fewer, because of
+their weights, the earliest time would have to be that of grown bodies."""
 
 PILOT_PART: Final = 0.3
 """A pair of shapes that is stated to pass is left out if it meets in the pilot with less than this fraction of
 min_probability."""
+
+
+@inlined
+def latest(times, count):
+    """Latest of the first `count` times (s); infinite if one of the samples does not meet."""
+    last = 0.0
+    for n in range(count):
+        last = times[n] if times[n] > last else last
+    return last
 
 
 @device
@@ -23,11 +32,12 @@ def samples_needed(times, lattice, sampling):
     0: the bodies are stated to pass, and hardly meet in the pilot. SURE_SAMPLES: they meet in all of it.
     """
     weights, pilot = lattice.weights, lattice.pilot
-    latest = seen = part = 0.0
+    seen = part = 0.0
     for n in range(pilot):
-        latest = max(latest, times[n])
         seen += weights[n] if times[n] < inf else 0.0
         part += weights[n]
     if seen < part * PILOT_PART * sampling.min_probability and not sampling.stated:
         return 0
-    return weights.size if latest == inf else min(SURE_SAMPLES, weights.size)
+    if latest(times, pilot) < inf:
+        return min(SURE_SAMPLES, weights.size)
+    return weights.size

@@ -27,6 +27,14 @@ from collision_monitor.geometry.shape_table import (
 )
 from collision_monitor.narrow_phase.core import rounding
 from collision_monitor.narrow_phase.support_value import core_support
+from collision_monitor.prediction.linear_gaps import (
+    LINEAR,
+    add_reach,
+    begin_term,
+    is_linear,
+    make_terms,
+    sum_terms,
+)
 from collision_monitor.prediction.obstacle_planes import AT_REST, MODE, from_plane
 
 TURNED_FARTHEST: Final = 0.7
@@ -38,6 +46,9 @@ NOT_TURNED, FIRST_ORDER, SERIES = 0, 1, 2
 STATE: Final = 9
 """Rows of the samples at a node: position of B relative to A (m), rotation vectors of the errors of A and B (rad)."""
 
+APART: Final = 8
+"""Unused numbers at the end of each row, because rows of exactly 1024 samples share the same few lines of the cache."""
+
 
 class SampleRows(NamedTuple):
     """Samples at both ends of a segment; scratch memory of one thread for S samples."""
@@ -46,15 +57,18 @@ class SampleRows(NamedTuple):
     normal: Any  # (3, S)
     local: Any  # (3, S): directions in the axes of a shape
     gap: Any  # (3, S): gaps at both ends (m), and support values
+    terms: Any  # (TERMS, COLUMNS): see linear_gaps
 
 
 def make_sample_rows(samples: int) -> SampleRows:
     """Make the scratch memory of one thread."""
+    length = samples + APART
     return SampleRows(
-        np.zeros((2, STATE, samples)),
-        np.zeros((3, samples)),
-        np.zeros((3, samples)),
-        np.zeros((3, samples)),
+        np.zeros((2, STATE, length)),
+        np.zeros((3, length)),
+        np.zeros((3, length)),
+        np.zeros((3, length)),
+        make_terms(),
     )
 
 
@@ -191,7 +205,6 @@ def _gaps_at(table, pair, plane, node, margin, turning, first, last, state, rows
     n = from_plane(plane, R)
     nx, ny, nz = n
     reach = rounding(table, a) + rounding(table, b) + margin
-    x, y, z = state[0, first:last], state[1, first:last], state[2, first:last]
     turned = mode < AT_REST and turning[mode] != NOT_TURNED
     varies_a = mode != 0 and (turning[0] != NOT_TURNED or turned)
     varies_b = mode != 1 and (turning[1] != NOT_TURNED or turned)
@@ -199,9 +212,21 @@ def _gaps_at(table, pair, plane, node, margin, turning, first, last, state, rows
         reach += reach_of(table, a, R[0], o[0], n)
     if not varies_b:
         reach += reach_of(table, b, R[1], o[1], (-nx, -ny, -nz))
+    x, y, z = state[0, first:last], state[1, first:last], state[2, first:last]
     if turning[0] == NOT_TURNED and turning[1] == NOT_TURNED:
         for k in range(gap.size):
             gap[k] = nx * x[k] + ny * y[k] + nz * z[k] - reach
+        return
+    if max(turning[0], turning[1]) == FIRST_ORDER and is_linear(table, a) and is_linear(table, b):
+        terms, count = rows.terms, 1
+        begin_term(terms[LINEAR], -reach, 0.0)
+        for body in range(2):
+            if varies_b if body else varies_a:
+                of = (turning[body] != NOT_TURNED, mode, turned)
+                count = add_reach(
+                    table, b if body else a, body, R[body], o[body], n, of, node.turn, terms, count
+                )
+        sum_terms(n, mode, turned, terms, count, state, first, last, rows.local, gap)
         return
     u, v, w = rows.normal[0, first:last], rows.normal[1, first:last], rows.normal[2, first:last]
     for k in range(gap.size):

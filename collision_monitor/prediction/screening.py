@@ -17,12 +17,10 @@ from collision_monitor.prediction.bodies import next_pair, place_shape
 from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
 from collision_monitor.prediction.impact_record import CLEAR, HIT
 from collision_monitor.prediction.motion import half_acceleration, relative_position
+from collision_monitor.prediction.normal_samples import FURTHEST
 from collision_monitor.prediction.obstacle_planes import NO_TURNS, NOT_OFF, separation_at, set_nodes
 from collision_monitor.prediction.sample_gaps import stated_gap
 from collision_monitor.prediction.sphere_interval import sphere_interval
-
-FURTHEST: Final = 4.5
-"""Standard deviations beyond which errors are neglected; 7 of a million are larger."""
 
 ROUGHLY: Final = 0.1
 """Tolerance (standard deviations) of the time from which bodies that turn may meet within FURTHEST."""

@@ -8,7 +8,7 @@ from collision_monitor._jit import device
 from collision_monitor.narrow_phase.contact_row import BOUND
 from collision_monitor.prediction.bodies import next_pair
 from collision_monitor.prediction.body_impact import ShapePair, contact_at
-from collision_monitor.prediction.screening import FURTHEST
+from collision_monitor.prediction.normal_samples import FURTHEST
 
 
 @device

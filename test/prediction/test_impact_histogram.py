@@ -20,7 +20,7 @@ def both(times: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     weights = LATTICE.weights[: len(times)]
     by_order, by_bins = np.empty(4), np.empty(4)
     summarise(times, weights, np.argsort(times, kind="stable"), 0.95, 0.0, by_order, weights.sum())
-    first = summarise_by_bins(times, LATTICE, 0.95, make_plane_memory(512), by_bins)
+    first = summarise_by_bins(times, LATTICE.weights, LATTICE.sums, 0.95, make_plane_memory(512), by_bins)
     return by_order, by_bins, first
 
 

@@ -67,9 +67,11 @@ def turn(v: Vector) -> Vector:
     return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K)
 
 
+@pytest.mark.parametrize("axis", [None, 0, 2], ids=["any normal", "face", "end"])
 @pytest.mark.parametrize("mode", [0, 1, 2])
 @pytest.mark.parametrize("order", [NOT_TURNED, FIRST_ORDER, SERIES])
-def test_gaps_are_those_of_the_turned_shapes(order: int, mode: int) -> None:
+def test_gaps_are_those_of_the_turned_shapes(order: int, mode: int, axis: int | None) -> None:
+    """axis: along it, in the axes of a shape, errors of orientation change the corner that is farthest."""
     rng = np.random.default_rng(10 * order + mode)
     spread = {NOT_TURNED: 0.0, FIRST_ORDER: 0.003, SERIES: 0.3}[order]
     for name_a, name_b in zip(SHAPES, [*list(SHAPES)[1:], "box"], strict=True):
@@ -92,6 +94,8 @@ def test_gaps_are_those_of_the_turned_shapes(order: int, mode: int) -> None:
         orders = (order, order)
         set_samples(obstacle, 0, memory.off, points, orders, 0, SAMPLES, rows)
         n = rng.normal(size=3)
+        if axis is not None:
+            n = np.eye(3)[axis] if mode < 2 else obstacle.node[0]["rotation"][0][:, axis]
         planes = obstacle.planes[0, :1]
         planes[0, :3], planes[0, MODE] = n / np.linalg.norm(n), mode
         enter_planes(
