@@ -256,7 +256,6 @@ def _examine(multibody, active, which, now, queries, scratch, later):
     table, bodies = multibody.table, multibody.bodies
     pairs, events, results, carried = active
     impact, contact, tolerance = queries
-    q = scratch.quaternion[0]
     n_later = tests = made = 0
     for at in range(which.size):
         if at + PREFETCH_AHEAD < which.size:
@@ -266,7 +265,7 @@ def _examine(multibody, active, which, now, queries, scratch, later):
         pair, event = pairs[k], events[k]
         i, j = pair.i, pair.j
         may_carry = tolerance > 0.0 and pair.touched == 1
-        if may_carry and carry(bodies, i, j, now, contact, tolerance, q, carried[k], results[k]):
+        if may_carry and carry(multibody, i, j, now, contact, tolerance, scratch, carried[k], results[k]):
             pair.touching, pair.leaving = 1, 0
             continue
         touching, count = body_contact(multibody, i, j, now, contact, scratch, results[k])
@@ -284,7 +283,7 @@ def _examine(multibody, active, which, now, queries, scratch, later):
         if touching:
             complete_contact(multibody, i, j, now, scratch, results[k])
         if tolerance > 0.0:
-            keep(multibody, i, j, touching, now, contact, q, results[k], carried[k])
+            keep(multibody, i, j, touching, now, contact, scratch, results[k], carried[k])
         if touching and pair.touched == 0:
             pair.since = now
         pair.touching = 1 if touching else 0

@@ -85,14 +85,17 @@ class Answers(Stage):
     def filtered(self, step: StepContext, predictions: Rows) -> Rows:
         """Drop the predictions that the profile's filters exclude."""
         p = step.profile
-        if not (p.min_closing_speed > 0.0 or p.ignore_separating):
+        if not (p.min_closing_speed > 0.0 or p.ignore_separating or p.horizon_by_name):
             return predictions
         kept = np.ones(len(predictions), np.bool_)
         if p.min_closing_speed > 0.0:
             kept &= filters.closes_fast(predictions, p.min_closing_speed)
-        if p.ignore_separating:
+        if p.ignore_separating or p.horizon_by_name:
             i, j = (step.roster.find_slots(predictions[name]) for name in ("id_a", "id_b"))
+        if p.ignore_separating:
             kept &= filters.approaches(step.roster.bodies, i, j, step.now)
+        if p.horizon_by_name:
+            kept &= predictions["lower"] <= np.minimum(step.horizons[i], step.horizons[j])
         return predictions[kept]
 
     def finish(self, result: StepResult) -> StepResult:

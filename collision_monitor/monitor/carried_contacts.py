@@ -5,8 +5,8 @@ the angle that each body turns times its radius, because every point of the surf
 at least the gap along the old normal, which changes by the motion along it, minus the same angles times the radii. An
 answer is carried over, to the middle of this range, while half of the range is within the tolerance and the pair
 certainly touches; half of the range is added to the error of the answer. Its witness points move with the bodies.
-Contacts of meshes, compounds and other concave shapes are answered anew in every step, because their distance has no
-such bounds.
+Contacts of two meshes are carried over by their triangles (carried_triangles.py). Those of compounds and of other
+concave shapes are answered anew in every step.
 """
 
 from __future__ import annotations
@@ -18,6 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.monitor.carried_triangles import (
+    NO_MESH,
+    NONE,
+    PLACE_I,
+    PLACE_J,
+    carry_triangles,
+    meets_by_trees,
+)
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.prediction.body_contact import RESULT, STATUS, TOUCHING, closing_now, relative_now, widening
 from collision_monitor.prediction.body_impact import CLOSING
@@ -27,10 +35,10 @@ from collision_monitor.prediction.motion import age_of, chord_angle, position_no
 RELATIVE: Final = RESULT
 TURN_I: Final = RESULT + 3
 TURN_J: Final = RESULT + 7
-CARRIED: Final = RESULT + 11
+CARRIED: Final = PLACE_J + 1
 """Numbers of a carried row: a result row, whose points are about the bodies' origins and whose bound lacks the widening
-of stale states; the position of j's origin from i's (m); and both quaternions, all at the time of the answer. Its
-distance is NaN if there is no answer to carry."""
+of stale states; the position of j's origin from i's (m); both quaternions, all at the time of the answer; and what
+carried_triangles.py keeps. Its distance is NaN if there is no answer to carry."""
 
 NORMAL_ERROR: Final = 1e-6
 """Largest error of a normal (rad); those of round surfaces are off by up to 1e-7."""
@@ -59,14 +67,20 @@ def _turned(bodies, i, now, row, at, q):
 
 
 @device
-def carry(bodies, i, j, now, query, tolerance, q, row, result):
+def carry(multibody, i, j, now, query, tolerance, scratch, row, result):
     """Write the contact of bodies i and j into a result row, from their carried row, if that still holds.
 
-    query: ContactQuery. tolerance: largest error (m) that this may add. q (4,): scratch. Returns whether it holds.
+    query: ContactQuery. tolerance: largest error (m) that this may add. Returns whether it holds.
     """
+    if not row[DISTANCE] <= query.margin:
+        return False
+    bodies, q = multibody.bodies, scratch.quaternion[0]
     relative = relative_now(bodies, i, j, now)
     x, y, z = relative.p[0] - row[RELATIVE], relative.p[1] - row[RELATIVE + 1], relative.p[2] - row[RELATIVE + 2]
     moved = sqrt(x * x + y * y + z * z)
+    if row[PLACE_I] != NO_MESH:
+        moved += _turned(bodies, i, now, row, TURN_I, q) + _turned(bodies, j, now, row, TURN_J, q)
+        return carry_triangles(multibody, i, j, now, relative, moved, query, tolerance, scratch, row, result)
     along = x * row[NORMAL] + y * row[NORMAL + 1] + z * row[NORMAL + 2] - NORMAL_ERROR * moved
     half = 0.5 * (moved - along)
     if not half <= tolerance:
@@ -102,15 +116,19 @@ def _is_convex(multibody, i):
 
 
 @device
-def keep(multibody, i, j, touching, now, query, q, result, row):
-    """Write the carried row of bodies i and j from their result row, if that may be carried. q (4,): scratch."""
-    bodies = multibody.bodies
+def keep(multibody, i, j, touching, now, query, scratch, result, row):
+    """Write the carried row of bodies i and j from their result row, if that may be carried."""
     row[DISTANCE] = nan
-    if not (touching and result[STATUS] == TOUCHING and _is_convex(multibody, i) and _is_convex(multibody, j)):
+    if not (touching and result[STATUS] == TOUCHING):
+        return
+    bodies, q = multibody.bodies, scratch.quaternion[0]
+    by_trees = result[DISTANCE] <= 0.0 and meets_by_trees(multibody, i, j)
+    if not (by_trees or (_is_convex(multibody, i) and _is_convex(multibody, j))):
         return
     relative = relative_now(bodies, i, j, now)
     for c in range(RESULT):
         row[c] = result[c]
+    row[PLACE_I] = row[PLACE_J] = NONE if by_trees else NO_MESH
     row[BOUND] -= widening(relative, query.stale_acceleration)
     for c in range(3):
         row[POINT_A + c] -= position_now(bodies, i, relative.age_i, c)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 from typing import Any, Final
 
 import numpy as np
@@ -19,6 +19,7 @@ from collision_monitor.monitor.timeline import Order
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.prediction.spread import worst_stddevs
 from collision_monitor.records import StateFlag
+from collision_monitor.settings.by_name import classes_of
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 
 ACCEPTED: Final = 0
@@ -26,6 +27,7 @@ UNKNOWN_ID: Final = 1
 NON_FINITE: Final = 2
 QUATERNION: Final = 3
 OLD: Final = 4
+LEFT_OUT: Final = 5
 
 MOST_REFUSAL_TEXT: Final = 1000
 """Longest text of a refusal that is kept (characters), because a text may quote a string of a message, and every status
@@ -33,6 +35,9 @@ repeats the last one."""
 
 STATE_NUMBERS: Final = 20
 """float64 numbers at the front of a records.STATE; id and flags follow."""
+
+EARLY: Final = 0.999
+"""Part of the period of a class after which its next state is used, since the stamps of a publisher vary a little."""
 
 _POSITION_STDDEV: Final = 16
 _ORIENTATION_STDDEV: Final = 17
@@ -141,8 +146,12 @@ class Intake(Stage):
         time: float,
         roster: Roster,
         uncertain: UncertainPredictions,
+        rate_by_name: str = "",
     ) -> None:
-        """Store usable states as their bodies' last ones at `time` (s), with their uncertainties. Refuse the others."""
+        """Store usable states as their bodies' last ones at `time` (s), with their uncertainties. Refuse the others.
+
+        rate_by_name: the setting. States of a class that come sooner are left out, without a refusal.
+        """
         if len(states) == 0:
             return
         slots = roster.slots_of(states["id"])
@@ -150,7 +159,8 @@ class Intake(Stage):
         numbers = used.view(np.float64).reshape(len(states), -1)
         verdicts = np.empty(len(states), np.uint8)
         flags = np.ascontiguousarray(states["flags"])
-        accepted, is_uncertain = take_states(roster.bodies, slots, numbers, flags, time, verdicts)
+        rates = roster.values_by_name(classes_of("rate_by_name", rate_by_name), np.inf)
+        accepted, is_uncertain = take_states(roster.bodies, slots, numbers, flags, time, rates, verdicts)
         if is_uncertain or uncertain.active:
             taken = np.where(verdicts == ACCEPTED, slots, np.int32(-1))
             uncertain.take(taken, numbers, covariances, roster.planar)
@@ -221,12 +231,13 @@ def _states(ids: NDArray[Any], poses: Any, twists: Any) -> States:
 
 
 @kernel
-def take_states(bodies, slots, numbers, flags, time, verdicts):
+def take_states(bodies, slots, numbers, flags, time, rates, verdicts):
     """Store states as the bodies' last ones.
 
     slots (M,) int32, -1: unknown id. numbers (M, 21) float64: the rows of records.STATE; where the twist is estimated,
-    its standard deviations are written into them. flags (M,) uint32. time: of all states (s).
-    verdicts (M,) uint8, written: ACCEPTED or the reason of the refusal.
+    its standard deviations are written into them. flags (M,) uint32. time: of all states (s). rates (N,): largest rate
+    (Hz) at which states of a body are used; after a discontinuity, the next one always is.
+    verdicts (M,) uint8, written: ACCEPTED, LEFT_OUT or the reason of the refusal.
     Returns (number of accepted states, whether any of them is uncertain).
     """
     accepted = 0
@@ -255,6 +266,10 @@ def take_states(bodies, slots, numbers, flags, time, verdicts):
             continue
         if bodies.static[i] or (bodies.seen[i] and time <= bodies.time[i]):
             verdicts[k] = OLD
+            continue
+        is_soon = bodies.seen[i] and (time - bodies.time[i]) * rates[i] < EARLY and rates[i] < inf
+        if is_soon and (flags[k] & _DISCONTINUITY) == 0:
+            verdicts[k] = LEFT_OUT
             continue
         x, y, z, w = x / norm, y / norm, z / norm, w / norm
         if known_twist:

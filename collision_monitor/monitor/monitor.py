@@ -104,7 +104,7 @@ class Monitor:
         self._profile, self._settings = new, KernelSettings.of(new)
         if Profile.changes_predictions(changed):
             self._roster.renew_all()
-        if "horizon" in changed:
+        if changed & {"horizon", "horizon_by_name"}:
             self._roster.bodies.slack[:] = 0.0  # its limits are multiples of the horizon
         if "threads" in changed:
             self._first_impacts.use_threads(new.threads)
@@ -317,7 +317,8 @@ class Monitor:
         if not self._advance(stamp_ns, states):
             return replace(self._answers.none(), refused=tuple(self._intake.of_step.values()))
         roster, timeline = self._roster, self._timeline
-        self._intake.take(states, covariances, timeline.seconds(stamp_ns), roster, self._uncertain)
+        rates = self._profile.rate_by_name
+        self._intake.take(states, covariances, timeline.seconds(stamp_ns), roster, self._uncertain, rates)
         step = StepContext(roster, self._profile, self._settings, timeline.now, self._answers.step_count + 1)
         budget = self._time_critical.budget(self._profile)
         new = self._predict_moved(step, bounds_only=budget is not None)

@@ -24,6 +24,7 @@ from collision_monitor.prediction.bodies import Bodies, Multibody, Parts, enlarg
 from collision_monitor.prediction.body_layout import lay_out_body
 from collision_monitor.prediction.impact_record import pair_keys
 from collision_monitor.records import Model, ShapeType
+from collision_monitor.settings.by_name import Classes, value_of
 
 FIRST_CAPACITY = 64
 """Initial number of body slots; it is doubled when all are used."""
@@ -66,7 +67,7 @@ class Roster(Stage):
         *("bodies", "parts", "top", "planar", "renewed"),
         *("_shapes", "_slots", "_names", "_memory", "_free", "_allowed"),
     )
-    CACHES = ("_last_ids", "_last_slots", "_allowed_keys", "_all_memory")
+    CACHES = ("_last_ids", "_last_slots", "_allowed_keys", "_all_memory", "_by_name")
 
     def __init__(self) -> None:
         self.bodies: Bodies = make_bodies(FIRST_CAPACITY)
@@ -83,6 +84,7 @@ class Roster(Stage):
         self._allowed: dict[int, frozenset[int]] = {}
         self._allowed_keys: NDArray[np.uint64] | None = None  # None after a change
         self._last_ids, self._last_slots = np.zeros(0, np.uint32), np.zeros(0, np.int32)
+        self._by_name: dict[tuple[Classes, float], NDArray[np.float64]] = {}  # of the names now
 
     # ------------------------------------------------------------------ reading
 
@@ -151,6 +153,15 @@ class Roster(Stage):
         at[at == len(known)] = 0
         found = known[at] == ids if len(known) else np.zeros(len(ids), bool)
         return np.where(found, slot_of[at] if len(known) else -1, -1).astype(np.int32)
+
+    def values_by_name(self, classes: Classes, otherwise: float) -> NDArray[np.float64]:
+        """Value of the class of each body (N,), by slot, and `otherwise` without a class. Cached."""
+        values = self._by_name.get((classes, otherwise))
+        if values is None or len(values) != self.capacity:
+            values = self._by_name[classes, otherwise] = np.full(self.capacity, otherwise)
+            for object_id, slot in self._slots.items() if classes else ():
+                values[slot] = value_of(classes, self._names[object_id], otherwise)
+        return values
 
     def used(self) -> NDArray[np.intp]:
         """Slots of all described objects, ascending."""
@@ -295,6 +306,7 @@ class Roster(Stage):
         self._allowed_keys = None
 
     def _forget_ids(self) -> None:
+        self._by_name = {}
         self._last_ids = np.zeros(0, np.uint32)
 
     # ------------------------------------------------------------------ snapshots
@@ -348,6 +360,7 @@ class Roster(Stage):
         for object_id, others in facts["allowed"].items():
             self._allow(int(object_id), frozenset(others))
         self.planar = facts["planar"]
+        self._forget_ids()
         self._free, self.renewed = list(facts["free"]), set(facts["renewed"])
         if sorted([*self._free, *used.tolist()]) != list(range(top)) or not self.renewed <= set(used.tolist()):
             raise InputError("snapshot: expected every slot of a body to be either used or free, got others")

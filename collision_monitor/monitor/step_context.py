@@ -5,10 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
 from collision_monitor.monitor.result import Work
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.prediction.body_contact import ContactQuery
 from collision_monitor.prediction.body_impact import ImpactQuery
+from collision_monitor.settings.by_name import classes_of
 from collision_monitor.settings.profile import Profile
 
 
@@ -64,3 +68,9 @@ class StepContext:
     number: int  # of the step, from 1
     work: Work = field(default_factory=Work)
     samples: int = 0  # of the states of uncertain pairs, see StepResult
+
+    @property
+    def horizons(self) -> NDArray[np.float64]:
+        """Horizon of each body (N,), by slot (s)."""
+        p = self.profile
+        return self.roster.values_by_name(classes_of("horizon_by_name", p.horizon_by_name), p.horizon)

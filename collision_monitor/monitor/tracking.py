@@ -36,7 +36,7 @@ its motion within FUTILE_STEPS steps once; and its ratio to the last deviation, 
 because the next deviation of a noisy state may be larger."""
 
 FUTILE_STEPS: Final = 4.0
-PATIENCE: Final = 128.0
+PATIENCE: Final = 512.0
 """A body with half of the tolerances or more that leaves its motion within FUTILE_STEPS steps turns or accelerates. Its
 tolerances are NARROWEST for its next PATIENCE motions; its width is minus the number of those that are left. A body
 with the NARROWEST tolerances has noise only if it leaves its motion so soon twice in a row; one that bounces has none.
@@ -127,7 +127,8 @@ class Tracking(Stage):
         found = np.empty((2, roster.top), np.int32)
         uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
         settings, columns = step.settings.motion, self._columns
-        n, m, moving = find_moved(roster.bodies, uncertainty, roster.top, step.now, settings, columns, found)
+        seconds = step.now, step.horizons
+        n, m, moving = find_moved(roster.bodies, uncertainty, roster.top, seconds, settings, columns, found)
         self._futile, self._before = FUTILE_STEPS * (step.now - self._before), step.now
         self._are_few = moving <= FEW_BODIES
         return found[0, :n], found[1, :m]
@@ -144,7 +145,8 @@ class Tracking(Stage):
         uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
         self._make_room(step.roster.capacity)
         limits = self._futile, self._are_few
-        renew_motions(bodies, uncertainty, grid, moved, ending, step.now, limits, settings, self._width)
+        seconds = step.now, step.horizons
+        renew_motions(bodies, uncertainty, grid, moved, ending, seconds, limits, settings, self._width)
 
     def remember_cover(self, step: StepContext, which: Slots) -> None:
         """Record that the bodies `which` have been predicted until their cover times."""
@@ -174,7 +176,7 @@ def _turned_away(bodies, start, count, columns, angles):
 
 
 @kernel
-def find_moved(bodies, uncertainty, count, now, settings, columns, found):
+def find_moved(bodies, uncertainty, count, seconds, settings, columns, found):
     """Find the bodies among the first `count` slots whose predictions no longer hold at `now`, or end too soon.
 
     The slots of the former are written into found[0], those of the latter, which end within the horizon, into found[1];
@@ -183,10 +185,12 @@ def find_moved(bodies, uncertainty, count, now, settings, columns, found):
     A stale object widens its bounds here: deviation and drift include what it may have accelerated since its last
     state.
     The slack of a body is halved when it leaves its motion, and doubled when the motion held to the end: a body that
-    often changes its motion is not predicted far. columns: scratch, of `make_columns`.
+    often changes its motion is not predicted far. seconds: now, and the horizon of each body (N,). columns: scratch, of
+    `make_columns`.
     """
+    now, horizons = seconds
     sigmas = uncertainty.sigmas
-    horizon, stale_acceleration = settings.horizon, settings.stale_acceleration
+    stale_acceleration = settings.stale_acceleration
     moved, ending = found[0], found[1]
     n = n_ending = moving = 0
     angles = columns[COLUMNS]
@@ -196,7 +200,7 @@ def find_moved(bodies, uncertainty, count, now, settings, columns, found):
         if not bodies.used[i] or not bodies.seen[i] or bodies.static[i]:
             continue
         moving += 1
-        m = bodies.motion[i]
+        m, horizon = bodies.motion[i], horizons[i]
         age = now - bodies.time[i]
         since = now - m.time
         dx = bodies.position[i, 0] - m.x + (bodies.linear[i, 0] * age - m.vx * since)
@@ -230,7 +234,7 @@ def find_moved(bodies, uncertainty, count, now, settings, columns, found):
             moved[n] = i
             n += 1
         elif _is_wide_without_need(bodies, i, age, settings) or (
-            sigmas > 0.0 and not _is_covered(bodies, uncertainty, i, now, settings)
+            sigmas > 0.0 and not _is_covered(bodies, uncertainty, i, now, horizon, stale_acceleration)
         ):
             moved[n] = i
             n += 1
@@ -261,13 +265,13 @@ def remember_cover(motion, which):
 
 
 @device
-def _is_covered(bodies, uncertainty, i, now, settings):
+def _is_covered(bodies, uncertainty, i, now, horizon, stale_acceleration):
     """Whether the box of body i is wide enough for its uncertainty."""
     spread, sigmas = uncertainty
     m = bodies.motion[i]
     age = now - bodies.time[i]
     radius = bodies.spin_radius[i]
-    off, growth = surface_spread(spread, i, radius, age, settings.horizon, settings.stale_acceleration)
+    off, growth = surface_spread(spread, i, radius, age, horizon, stale_acceleration)
     return sigmas * off <= m.spread_0 + m.spread_1 * (now - m.tube_time) and sigmas * growth <= m.spread_1
 
 
@@ -355,20 +359,24 @@ def _fit_width(bodies, i, now, limits, settings, width):
 
 
 @kernel
-def renew_motions(bodies, uncertainty, grid, moved, ending, now, limits, settings, width):
-    """`restart_motion` of the bodies `moved` (M,), then `continue_motion` of those in `ending`."""
-    restart_motion(bodies, uncertainty, grid, moved, now, limits, settings, width)
-    continue_motion(bodies, uncertainty, grid, ending, now, settings, width)
+def renew_motions(bodies, uncertainty, grid, moved, ending, seconds, limits, settings, width):
+    """`restart_motion` of the bodies `moved` (M,), then `continue_motion` of those in `ending`.
+
+    seconds: now, and the horizon of each body (N,).
+    """
+    restart_motion(bodies, uncertainty, grid, moved, seconds, limits, settings, width)
+    continue_motion(bodies, uncertainty, grid, ending, seconds, settings, width)
 
 
 @device
-def restart_motion(bodies, uncertainty, grid, which, now, limits, settings, width):
+def restart_motion(bodies, uncertainty, grid, which, seconds, limits, settings, width):
     """Make the last state of each body in `which` (M,) its reference motion, and put its swept box into the grid.
 
     The version of the body changes, so that its pairs leave the event list. A stale object widens its bounds here: its
     tube grows by what it may deviate, at stale_acceleration, until the age of its last state has doubled.
     width (N,): part of the tolerances that a body uses if they are adaptive. limits: see `_fit_width`.
     """
+    now, horizons = seconds
     stale_acceleration = settings.stale_acceleration
     for k in range(which.size):
         i = which[k]
@@ -391,7 +399,7 @@ def restart_motion(bodies, uncertainty, grid, which, now, limits, settings, widt
         m.time = m.tube_time = now
         m.covered = -np.inf
         m.tube_0 = m.tube_1 = 0.0
-        _cover(bodies, i, now, settings.horizon)
+        _cover(bodies, i, now, horizons[i])
         if not bodies.static[i]:
             tube_0, tube_1 = _widest_tube(bodies, i, settings)
             m.tube_0, m.tube_1 = part * tube_0, part * tube_1
@@ -403,12 +411,13 @@ def restart_motion(bodies, uncertainty, grid, which, now, limits, settings, widt
 
 
 @device
-def continue_motion(bodies, uncertainty, grid, which, now, settings, width):
+def continue_motion(bodies, uncertainty, grid, which, seconds, settings, width):
     """Predict each body in `which` (M,), which kept its reference motion, further; put its swept box into the grid.
 
     The body is known to be within tube_0 of its reference at `now`, so its tube widens from `now` on. Its next motion
     may need narrower tolerances: its width (N,) is halved.
     """
+    now, horizons = seconds
     for k in range(which.size):
         i = which[k]
         width[i] = max(0.5 * width[i], NARROWEST)  # also that of a body that was given up
@@ -416,7 +425,7 @@ def continue_motion(bodies, uncertainty, grid, which, now, settings, width):
         allowed = (m.spread_0 + m.spread_1 * (now - m.tube_time), m.spread_1)
         m.tube_time = now
         m.covered = m.cover
-        _cover(bodies, i, now, settings.horizon)
+        _cover(bodies, i, now, horizons[i])
         # no wider than before, because the candidates until `covered` were found with that width
         _cover_spread(bodies, uncertainty, i, now, allowed, settings.stale_acceleration)
         put_box(grid, i, swept_box(bodies, i, now, settings.margin))

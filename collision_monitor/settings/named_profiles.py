@@ -13,7 +13,8 @@ BASED_ON: Final = "based_on"
 
 _TOLERANCES: Final = ("position_tolerance", "orientation_tolerance", "velocity_tolerance", "angular_velocity_tolerance")
 
-_EVERYTHING_EXACT: Final[dict[str, Any]] = {"adaptive_tolerances": False, "distance_tolerance": 0.0} | {
+_EVERYTHING_EXACT: Final[dict[str, Any]] = {
+    "distance_tolerance": 0.0,
     "model_mesh": "auto",
     "model_error": 1e6,
 }
@@ -25,6 +26,7 @@ NAMED_PROFILES: Final[dict[str, dict[str, Any]]] = {
         "uncertainty": True,
         "uncertainty_samples": 1024,
         **dict.fromkeys(_TOLERANCES, 1e-3),
+        "adaptive_tolerances": True,  # wider tubes than needed leave near misses open, which every step examines
         **_EVERYTHING_EXACT,
     },
     "fast": {
@@ -47,6 +49,7 @@ NAMED_PROFILES: Final[dict[str, dict[str, Any]]] = {
         "uncertainty": True,
         "uncertainty_samples": 2048,
         **dict.fromkeys(_TOLERANCES, 1e-9),
+        "adaptive_tolerances": False,
         **_EVERYTHING_EXACT,
     },
 }

@@ -15,8 +15,18 @@ from typing import Any, Final
 
 from collision_monitor.errors import ProfileError
 from collision_monitor.records import MOST_POINTS, Model
+from collision_monitor.settings.by_name import classes_of
 from collision_monitor.settings.named_profiles import NAMED_PROFILES, profile_changes
-from collision_monitor.settings.setting import EVERYWHERE, Setting, choice, number, settings_of, switch, vector
+from collision_monitor.settings.setting import (
+    EVERYWHERE,
+    Setting,
+    by_name,
+    choice,
+    number,
+    settings_of,
+    switch,
+    vector,
+)
 
 NO_BUDGET: Final = 1e6
 """ms, a quarter of an hour: with this value a step has no time limit and does not read the clock."""
@@ -26,6 +36,9 @@ MOST_NAME: Final = 4096
 
 NO_LIMIT: Final = 1_000_000_000
 """Pairs in a step: more than fit into memory, so no limit."""
+
+_BEFORE: Final[dict[str, Any]] = {"adaptive_tolerances": False}
+"""What a program did that did not have the setting yet, where the default is another. Its sessions do not name it."""
 
 _MODELS: Final = [model.name.lower() for model in Model if model is not Model.EXACT]
 
@@ -46,6 +59,19 @@ class Profile:
         "s",
         "Time ahead for which collisions are predicted. With 0, only contacts are reported.",
         predictions=True,
+    )
+    horizon_by_name: str = by_name(
+        0.0,
+        1e6,
+        "s",
+        "Shorter horizons of classes of objects, such as 'pallet*=1, box_?=0.5'. That of a pair is the shorter one.",
+        predictions=True,
+    )
+    rate_by_name: str = by_name(
+        1e-3,
+        1e6,
+        "Hz",
+        "Largest rate at which states of classes of objects are used, such as 'pallet*=2'. The others are left out.",
     )
     contact_margin: float = number(0.0, 0.0, 1e6, "m", "Gap up to which a pair counts as touching.", predictions=True)
     contact_points: int = number(
@@ -111,7 +137,7 @@ class Profile:
         predictions=True,
     )
     adaptive_tolerances: bool = switch(
-        False,
+        True,
         "Whether the tolerances of an object follow how far it leaves its motion; the set ones are then the widest.",
         predictions=True,
     )
@@ -221,6 +247,12 @@ class Profile:
             raise ProfileError(f"profile, name: expected at most {MOST_NAME} characters, got {len(self.name)}")
         for setting in self.fields():
             object.__setattr__(self, setting.name, setting.checked(getattr(self, setting.name)))
+        for pattern, value in classes_of("horizon_by_name", self.horizon_by_name):
+            if value > self.horizon:
+                raise ProfileError(
+                    f"horizon_by_name, {pattern}: expected at most the horizon, {self.horizon:g} s, got {value:g}; "
+                    "raise the horizon, and name the classes with a shorter one"
+                )
         for axis, low, high in zip("xyz", self.region_min, self.region_max, strict=True):
             if not low <= high:
                 raise ProfileError(
@@ -266,12 +298,15 @@ class Profile:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Profile:
-        """Return the profile of `to_dict`, with defaults for missing settings. Raises ProfileError for unknown ones."""
+        """Return the profile of `to_dict`, with values for missing settings. Raises ProfileError for unknown ones.
+
+        These are the defaults, or for sessions that are older than a setting what the program did then.
+        """
         known = {f.name for f in dataclasses.fields(cls)}
         for name in values:
             if name not in known:
                 raise ProfileError(f"profile: expected settings among {', '.join(sorted(known))}, got {name!r}")
-        return cls(**values)
+        return cls(**(_BEFORE | dict(values)))
 
     def replace(self, **changes: Any) -> Profile:
         """Return a copy with some settings changed. Raises ProfileError."""

@@ -11,6 +11,7 @@ from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, Final
 
 from collision_monitor.errors import ProfileError
+from collision_monitor.settings.by_name import checked_classes
 from collision_monitor.tolerances import LARGEST_INPUT
 
 Vector = tuple[float, float, float]
@@ -53,6 +54,12 @@ def choice(choices: Iterable[str], description: str) -> Any:
     return field(default=words[0], metadata={"choices": words, "description": description})
 
 
+def by_name(minimum: float, maximum: float, unit: str, description: str, *, predictions: bool = False) -> Any:
+    """Return a field of a profile: numbers for classes of objects, by patterns of their names; empty by default."""
+    metadata = {"minimum": minimum, "maximum": maximum, "unit": unit, "description": description}
+    return field(default="", metadata={**metadata, "predictions": predictions})
+
+
 @dataclass(frozen=True)
 class Setting:
     """One field of a profile, for parameter declarations and checks. minimum and maximum apply to numbers only.
@@ -78,6 +85,8 @@ class Setting:
             return str(value)
         if self.type is tuple:
             return self._checked_vector(value)
+        if self.type is str:
+            return checked_classes(self.name, value, self.minimum, self.maximum, self.unit)
         whole = isinstance(value, int) and not isinstance(value, bool)
         fits = {bool: isinstance(value, bool), int: whole, float: whole or isinstance(value, float)}[self.type]
         if not fits:

@@ -22,6 +22,8 @@ from collision_monitor.world import make_scene
 SECOND = 1_000_000_000
 OTHER: dict[str, Any] = {
     "horizon": 3.5,
+    "horizon_by_name": "*1=0.5",
+    "rate_by_name": "*2=5",
     "contact_margin": 0.05,
     "contact_points": 4,
     "distance_tolerance": 1e-3,
@@ -31,7 +33,7 @@ OTHER: dict[str, Any] = {
     "orientation_tolerance": 1e-2,
     "velocity_tolerance": 1e-2,
     "angular_velocity_tolerance": 1e-2,
-    "adaptive_tolerances": True,
+    "adaptive_tolerances": False,
     "stale_after": 0.1,
     "stale_acceleration": 2.0,
     "uncertainty": False,

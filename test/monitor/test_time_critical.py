@@ -120,7 +120,7 @@ def test_a_budget_that_is_enough_changes_no_answer(mode: str) -> None:
 
 def test_what_was_left_is_caught_up_with_when_there_is_time() -> None:
     scene = make_scene("clutter", objects=120)
-    monitor, plain = Monitor(Profile(pairs_per_step=20)), ReferenceMonitor()
+    monitor, plain = Monitor(Profile(pairs_per_step=20, adaptive_tolerances=False)), ReferenceMonitor()
     for description in scene.descriptions:
         monitor.describe(description)
         plain.describe(description)

@@ -1,0 +1,113 @@
+"""Contacts of meshes that persist, carried over by a pair of triangles that still meets (`distance_tolerance`).
+
+The depth of two solids changes by at most the distance that the origins move relative to each other, plus the angle
+that each body turns times its radius. It is at least the depth of any pair of their triangles. So one pair of triangles
+that meets proves the contact, and bounds the distance from above; the last full answer bounds it from both sides. The
+middle of this range is reported. A full answer finds all pairs of triangles that meet, which takes much longer.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from collision_monitor._jit import device, inlined
+from collision_monitor.meshes.layout import WIDTH
+from collision_monitor.meshes.nearest import PAIRS
+from collision_monitor.meshes.placing import relative
+from collision_monitor.meshes.touching import touching
+from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, POINT_A, POINT_B
+from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.prediction.bodies import place_shape
+from collision_monitor.prediction.body_contact import (
+    RESULT,
+    SHAPE_I,
+    SHAPE_J,
+    STATUS,
+    TOUCHING,
+    closing_now,
+    widening,
+)
+from collision_monitor.prediction.body_impact import CLOSING
+from collision_monitor.prediction.mesh_pair import has_mesh, have_trees, root_of, triangles_contact
+from collision_monitor.prediction.motion import position_now, rotation_now
+
+PLACE_I: Final = RESULT + 11
+PLACE_J: Final = RESULT + 12
+"""Columns of a carried row: places of two triangles that met, WIDTH * block + member relative to the roots of their
+trees, which a snapshot does not keep in place. NONE: not known; NO_MESH: the pair has no trees."""
+
+NONE: Final = -1.0
+NO_MESH: Final = -2.0
+
+
+@inlined
+def _has_one_shape(multibody, i):
+    return multibody.parts.next[multibody.bodies.first_shape[i]] < 0
+
+
+@inlined
+def meets_by_trees(multibody, i, j):
+    """Whether bodies i and j are one shape each, no models of objects, that meet by trees, one of them a mesh."""
+    table, bodies = multibody.table, multibody.bodies
+    a, b = bodies.first_shape[i], bodies.first_shape[j]
+    if not (_has_one_shape(multibody, i) and _has_one_shape(multibody, j) and has_mesh(table, a, b)):
+        return False
+    return have_trees(table, a, b) and bodies.excess[i] + bodies.excess[j] == 0.0
+
+
+@device
+def _meet(table, a, b, pose, row, scratch):
+    """Write the contact of two triangles that meet into scratch.out: those of the row, or others, noted there.
+
+    Returns whether there are any.
+    """
+    first, second = WIDTH * root_of(table, a), WIDTH * root_of(table, b)
+    if row[PLACE_I] >= 0.0:
+        triangles_contact(table, a, b, pose, (first + int(row[PLACE_I]), second + int(row[PLACE_J])), scratch.out)
+        if scratch.out[DISTANCE] <= 0.0:
+            return True
+    X, work = relative(pose.R_A, pose.R_B, pose.p), scratch.tree
+    found, _ = touching(table.blocks, root_of(table, a), table.blocks, root_of(table, b), X, 1, work)
+    if found == 0:
+        return False
+    row[PLACE_I], row[PLACE_J] = work[PAIRS] - first, work[PAIRS + 1] - second
+    triangles_contact(table, a, b, pose, (int(work[PAIRS]), int(work[PAIRS + 1])), scratch.out)
+    return scratch.out[DISTANCE] <= 0.0
+
+
+@device
+def carry_triangles(multibody, i, j, now, there, moved, query, tolerance, scratch, row, result):
+    """Write the contact of bodies i and j at `now` (s) into a result row, from their carried row, if triangles meet.
+
+    there: the bodies (Now). moved (m): how far a surface can have moved relative to the other since the answer.
+    query: ContactQuery. tolerance: largest error (m) that this may add. Returns whether that suffices.
+    """
+    table, parts, bodies = multibody
+    a, b = bodies.first_shape[i], bodies.first_shape[j]
+    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
+    rotation_now(bodies, i, now, scratch.quaternion, R_i)
+    rotation_now(bodies, j, now, scratch.quaternion, R_j)
+    oa, ob, p = place_shape(table, parts, a, R_i, R_a), place_shape(table, parts, b, R_j, R_b), there.p
+    pose = PairPose(R_a, R_b, (p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]))
+    if not _meet(table, a, b, pose, row, scratch):
+        return False
+    out = scratch.out
+    most, least = min(out[DISTANCE], row[DISTANCE] + moved), row[DISTANCE] - moved
+    half = max(0.5 * (most - least), 0.0)
+    if not half <= tolerance:
+        return False
+    for c in range(CONTACT_SIZE):
+        result[c] = out[c]
+    for c in range(3):
+        result[POINT_A + c] += oa[c]
+        result[POINT_B + c] += oa[c]
+    result[CLOSING] = closing_now(bodies, i, j, there, result)
+    result[DISTANCE] = most - half
+    result[BOUND] += row[BOUND] + half + widening(there, query.stale_acceleration)
+    result[STATUS] = TOUCHING
+    result[SHAPE_I], result[SHAPE_J] = a, b
+    for c in range(3):
+        at = position_now(bodies, i, there.age_i, c)
+        result[POINT_A + c] += at
+        result[POINT_B + c] += at
+    return True
