@@ -12,12 +12,13 @@ from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.candidates import is_checked
-from collision_monitor.monitor.carried_contacts import CARRIED, carry, keep, no_answers
+from collision_monitor.monitor.carried_contacts import CARRIED, Carrying, carry, has_answer, keep, no_answers, saved
 from collision_monitor.monitor.contact_details import complete_contact
 from collision_monitor.monitor.event_list import NO_EVENTS
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
+from collision_monitor.narrow_phase.contact_row import DISTANCE
 from collision_monitor.prediction.body_contact import RESULT, body_contact
 from collision_monitor.prediction.body_impact import Scratch, Window, body_impact
 from collision_monitor.prediction.impact_record import CLEAR, IMPACT, holds, ids_of_keys, pair_key
@@ -149,7 +150,8 @@ class ActivePairs(Stage):
 
     def examine(self, step: StepContext, which: NDArray[np.intp], scratch: Scratch, later: Rows) -> int:
         """Examine the pairs `which` (M,). Write the events of pairs certified apart to `later`; return how many."""
-        queries = step.settings.impact, step.settings.contact, step.profile.distance_tolerance
+        carrying = Carrying(step.profile.distance_tolerance, step.period)
+        queries = step.settings.impact, step.settings.contact, carrying
         n, tests, made = _examine(step.roster.multibody, self.active, which, step.now, queries, scratch, later)
         step.work.narrow_phase_tests += tests
         step.work.impact_queries += made
@@ -174,7 +176,7 @@ class ActivePairs(Stage):
     def save(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
         snapshot.arrays.update(pairs=self.pairs.copy(), pair_events=self.events.copy())
-        snapshot.arrays["carried"] = self._carried.copy()
+        snapshot.arrays["carried"] = saved(self._carried)
         facts["orphans"] = list(self._orphans)
 
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
@@ -208,12 +210,13 @@ def _unite(ids, used, version, pairs, events, carried, due, order, new_pairs, ne
             if gone or pairs[k].leaving == 1 or (changed and pairs[k].touching == 0):
                 k += 1
                 continue
-        for c in range(CARRIED if new_carried.shape[0] > 0 else 0):
-            new_carried[n, c] = np.nan
+        if new_carried.shape[0] > 0:
+            new_carried[n, DISTANCE] = np.nan
         if k < pairs.size and (m >= order.size or pairs[k].key <= due[order[m]].key):
-            takes_along = pairs[k].touching == 1 and carried.shape[0] > 0 and new_carried.shape[0] > 0
-            for c in range(CARRIED if takes_along else 0):
-                new_carried[n, c] = carried[k, c]
+            may_carry = pairs[k].touching == 1 and carried.shape[0] > 0 and new_carried.shape[0] > 0
+            if may_carry and has_answer(carried[k]):
+                for c in range(CARRIED):
+                    new_carried[n, c] = carried[k, c]
             new_pairs[n] = pairs[k]
             new_pairs[n].touched = pairs[k].touching
             new_events[n] = events[k]
@@ -233,14 +236,36 @@ def _unite(ids, used, version, pairs, events, carried, due, order, new_pairs, ne
 
 
 @inlined
-def _ask_for(table, bodies, i):
+def _ask_for_body(table, parts, bodies, i):
     row = np.intp(i)
     prefetch(bodies.position, row)
     prefetch(bodies.quaternion, row)
     prefetch(bodies.linear, row)
     prefetch(bodies.angular, row)
+    prefetch(bodies.acceleration, row)
+    prefetch(bodies.time, row)
+    prefetch(bodies.excess, row)
     prefetch(bodies.motion, row)
-    prefetch(table.size, np.intp(bodies.first_shape[i]))
+    shape = np.intp(bodies.first_shape[i])
+    prefetch(table.size, shape)
+    prefetch(table.margin, shape)
+    prefetch(table.kind, shape)
+    prefetch(parts.next, shape)
+    prefetch(parts.placed, shape)
+
+
+@inlined
+def _ask_for(multibody, pairs, which, at):
+    """Prefetch the data of the pairs that `_examine` visits after the pair at index `at` of `which`."""
+    table, parts, bodies = multibody
+    if at + 2 * PREFETCH_AHEAD < which.size:
+        far = pairs[which[at + 2 * PREFETCH_AHEAD]]
+        prefetch(bodies.first_shape, np.intp(far.i))
+        prefetch(bodies.first_shape, np.intp(far.j))
+    if at + PREFETCH_AHEAD < which.size:
+        near = pairs[which[at + PREFETCH_AHEAD]]
+        _ask_for_body(table, parts, bodies, near.i)
+        _ask_for_body(table, parts, bodies, near.j)
 
 
 @kernel
@@ -249,24 +274,21 @@ def _examine(multibody, active, which, now, queries, scratch, later):
 
     The pairs keep their indices. A pair that does not touch and is certified apart for a while returns to the event
     list: it is marked as leaving, and its event goes into `later` (IMPACT). A pair without a further impact, or one
-    that this step predicted anew, is marked as leaving too. queries: an ImpactQuery, a ContactQuery and the tolerance
-    (m) within which contacts are carried over.
+    that this step predicted anew, is marked as leaving too. queries: ImpactQuery, ContactQuery, Carrying.
     Returns (number of events in `later`, narrow-phase tests, impact queries).
     """
-    table, bodies = multibody.table, multibody.bodies
+    bodies = multibody.bodies
     pairs, events, results, carried = active
-    impact, contact, tolerance = queries
+    impact, contact, carrying = queries
     q = scratch.quaternion[0]
     n_later = tests = made = 0
     for at in range(which.size):
-        if at + PREFETCH_AHEAD < which.size:
-            _ask_for(table, bodies, pairs[which[at + PREFETCH_AHEAD]].i)
-            _ask_for(table, bodies, pairs[which[at + PREFETCH_AHEAD]].j)
+        _ask_for(multibody, pairs, which, at)
         k = which[at]
         pair, event = pairs[k], events[k]
         i, j = pair.i, pair.j
-        may_carry = tolerance > 0.0 and pair.touched == 1
-        if may_carry and carry(bodies, i, j, now, contact, tolerance, q, carried[k], results[k]):
+        may_carry = carrying.tolerance > 0.0 and pair.touched == 1
+        if may_carry and carry(bodies, i, j, now, contact, carrying.tolerance, q, carried[k], results[k]):
             pair.touching, pair.leaving = 1, 0
             continue
         touching, count = body_contact(multibody, i, j, now, contact, scratch, results[k])
@@ -283,8 +305,8 @@ def _examine(multibody, active, which, now, queries, scratch, later):
                     stays = True
         if touching:
             complete_contact(multibody, i, j, now, scratch, results[k])
-        if tolerance > 0.0:
-            keep(multibody, i, j, touching, now, contact, q, results[k], carried[k])
+        if carrying.tolerance > 0.0:
+            keep(multibody, i, j, touching, now, contact, carrying, q, results[k], carried[k])
         if touching and pair.touched == 0:
             pair.since = now
         pair.touching = 1 if touching else 0
