@@ -13,6 +13,7 @@ from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.candidates import is_checked
 from collision_monitor.monitor.carried_contacts import CARRIED, Carrying, carry, has_answer, keep, no_answers, saved
+from collision_monitor.monitor.contact_depth import depth_of_boxes
 from collision_monitor.monitor.contact_details import complete_contact
 from collision_monitor.monitor.event_list import NO_EVENTS
 from collision_monitor.monitor.roster import Roster
@@ -151,7 +152,7 @@ class ActivePairs(Stage):
     def examine(self, step: StepContext, which: NDArray[np.intp], scratch: Scratch, later: Rows) -> int:
         """Examine the pairs `which` (M,). Write the events of pairs certified apart to `later`; return how many."""
         carrying = Carrying(step.profile.distance_tolerance, step.period)
-        queries = step.settings.impact, step.settings.contact, carrying
+        queries = step.settings.impact, step.settings.contact, carrying, step.profile.contact_details
         n, tests, made = _examine(step.roster.multibody, self.active, which, step.now, queries, scratch, later)
         step.work.narrow_phase_tests += tests
         step.work.impact_queries += made
@@ -274,12 +275,13 @@ def _examine(multibody, active, which, now, queries, scratch, later):
 
     The pairs keep their indices. A pair that does not touch and is certified apart for a while returns to the event
     list: it is marked as leaving, and its event goes into `later` (IMPACT). A pair without a further impact, or one
-    that this step predicted anew, is marked as leaving too. queries: ImpactQuery, ContactQuery, Carrying.
+    that this step predicted anew, is marked as leaving too. queries: ImpactQuery, ContactQuery, Carrying, and
+    whether contacts have details.
     Returns (number of events in `later`, narrow-phase tests, impact queries).
     """
     bodies = multibody.bodies
     pairs, events, results, carried = active
-    impact, contact, carrying = queries
+    impact, contact, carrying, has_details = queries
     q = scratch.quaternion[0]
     n_later = tests = made = 0
     for at in range(which.size):
@@ -291,7 +293,10 @@ def _examine(multibody, active, which, now, queries, scratch, later):
         if may_carry and carry(bodies, i, j, now, contact, carrying.tolerance, q, carried[k], results[k]):
             pair.touching, pair.leaving = 1, 0
             continue
-        touching, count = body_contact(multibody, i, j, now, contact, scratch, results[k])
+        is_complete = not has_details and depth_of_boxes(multibody, i, j, now, contact, scratch, results[k])
+        touching, count = True, 1
+        if not is_complete:
+            touching, count = body_contact(multibody, i, j, now, contact, scratch, results[k])
         tests += count
         stays = touching
         if not touching and not is_predicted_anew(bodies, i, j, now, event):
@@ -303,7 +308,7 @@ def _examine(multibody, active, which, now, queries, scratch, later):
                     n_later += 1
                 else:
                     stays = True
-        if touching:
+        if touching and not is_complete:
             complete_contact(multibody, i, j, now, scratch, results[k])
         if carrying.tolerance > 0.0:
             keep(multibody, i, j, touching, now, contact, carrying, q, results[k], carried[k])

@@ -59,7 +59,10 @@ class Answers(Stage):
         if len(contacts):
             b = step.roster.bodies
             columns = b.model, multibody.parts.index
-            contacts = contacts[: write_contacts(active.pairs, active.results, *columns, step.now, contacts)]
+            n = write_contacts(active.pairs, active.results, *columns, step.now, contacts)
+            contacts = contacts[:n]
+            if not step.profile.contact_details:
+                leave_out_details(contacts)
         if step.profile.contact_points > 1:
             contacts = with_patches(contacts, multibody, active.active, step.now, step.profile.contact_points)
         ended = active.take_orphans(step.now)
@@ -215,6 +218,17 @@ def write_contacts(pairs, results, model, shape_index, now, contacts):
             contact.phase, contact.status = END, 0
         n += 1
     return n
+
+
+@kernel
+def leave_out_details(contacts):
+    """Make the witness points and the closing speeds of contacts (records.CONTACT) NaN and their features UNKNOWN."""
+    for k in range(contacts.size):
+        contact = contacts[k]
+        for c in range(3):
+            contact.point_a[c] = contact.point_b[c] = nan
+        contact.closing_speed = nan
+        contact.feature_type_a = contact.feature_index_a = contact.feature_type_b = contact.feature_index_b = 0
 
 
 class Predicted(NamedTuple):
