@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor import records
-from collision_monitor._jit import kernel
+from collision_monitor._jit import inlined, kernel
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.active_pairs import ActivePairs
 from collision_monitor.monitor.event_list import EventList
@@ -59,10 +59,9 @@ class Answers(Stage):
         if len(contacts):
             b = step.roster.bodies
             columns = b.model, multibody.parts.index
-            n = write_contacts(active.pairs, active.results, *columns, step.now, contacts)
+            details = step.profile.contact_details
+            n = write_contacts(active.pairs, active.results, *columns, step.now, details, contacts)
             contacts = contacts[:n]
-            if not step.profile.contact_details:
-                leave_out_details(contacts)
         if step.profile.contact_points > 1:
             contacts = with_patches(contacts, multibody, active.active, step.now, step.profile.contact_points)
         ended = active.take_orphans(step.now)
@@ -179,12 +178,20 @@ def count_answers(pairs, contacts, predictions):
     return touching, unresolved
 
 
+@inlined
+def _leave_out_details(contact):
+    for c in range(3):
+        contact.point_a[c] = contact.point_b[c] = nan
+    contact.closing_speed = nan
+    contact.feature_type_a = contact.feature_index_a = contact.feature_type_b = contact.feature_index_b = 0
+
+
 @kernel
-def write_contacts(pairs, results, model, shape_index, now, contacts):
+def write_contacts(pairs, results, model, shape_index, now, has_details, contacts):
     """Write the contacts (records.CONTACT) of the pairs that touch or have just ended; return their number.
 
     results (n, RESULT): of the pairs. model (N,): column of Bodies. shape_index (S,): a shape's place in its object's
-    description.
+    description. has_details: whether there are witness points, features and closing speeds.
     """
     n = 0
     for k in range(pairs.size):
@@ -209,6 +216,8 @@ def write_contacts(pairs, results, model, shape_index, now, contacts):
             contact.feature_type_b, contact.feature_index_b = int(row[FEATURE_TYPE_B]), int(row[FEATURE_INDEX_B])
             contact.phase = PERSIST if pair.touched == 1 else BEGIN
             contact.status = int(row[STATUS])
+            if not has_details:
+                _leave_out_details(contact)
         else:
             contact.signed_distance = contact.error_bound = contact.closing_speed = nan
             for c in range(3):
@@ -218,17 +227,6 @@ def write_contacts(pairs, results, model, shape_index, now, contacts):
             contact.phase, contact.status = END, 0
         n += 1
     return n
-
-
-@kernel
-def leave_out_details(contacts):
-    """Make the witness points and the closing speeds of contacts (records.CONTACT) NaN and their features UNKNOWN."""
-    for k in range(contacts.size):
-        contact = contacts[k]
-        for c in range(3):
-            contact.point_a[c] = contact.point_b[c] = nan
-        contact.closing_speed = nan
-        contact.feature_type_a = contact.feature_index_a = contact.feature_type_b = contact.feature_index_b = 0
 
 
 class Predicted(NamedTuple):

@@ -24,6 +24,7 @@ OTHER: dict[str, Any] = {
     "horizon": 3.5,
     "contact_margin": 0.05,
     "contact_points": 4,
+    "contact_details": False,
     "distance_tolerance": 1e-3,
     "impact_tolerance": 1e-6,
     "impact_iterations": 200,
