@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel, device, inlined, kernel
-from collision_monitor._jit.prefetch import CACHE_LINE
+from collision_monitor._jit.alignment import aligned_zeros
 from collision_monitor.broad_phase.region import Region, regions_overlap
 
 GRID_LEVELS: Final = 128
@@ -91,18 +91,11 @@ def make_hashed_grid(capacity: int) -> HashedGrid:
     box["level"] = -1
     return HashedGrid(
         box=box,
-        node=_aligned(capacity),
+        node=aligned_zeros(capacity, GRID_NODE),  # so that none is in two cache lines
         head=np.full(buckets, -1, np.int32),
         level_head=np.full(GRID_LEVELS, -1, np.int32),
         level_count=np.zeros(GRID_LEVELS, np.int32),
     )
-
-
-def _aligned(capacity: int) -> NDArray[np.void]:
-    """Allocate nodes none of which crosses the end of a cache line."""
-    memory = np.zeros(capacity * GRID_NODE.itemsize + CACHE_LINE, np.uint8)
-    start = -memory.ctypes.data % CACHE_LINE
-    return memory[start : start + capacity * GRID_NODE.itemsize].view(GRID_NODE)
 
 
 def regridded(box: NDArray[np.void], capacity: int) -> HashedGrid:
@@ -183,14 +176,10 @@ def _write_bounds(node, box):
 @inlined
 def _may_overlap(low, high, node):
     """Whether the bounds of a node meet the corners `low` and `high` (m) of a box; True if the boxes overlap."""
-    return (
-        low[0] <= node.high_x
-        and node.low_x <= high[0]
-        and low[1] <= node.high_y
-        and node.low_y <= high[1]
-        and low[2] <= node.high_z
-        and node.low_z <= high[2]
-    )
+    # no branches: each would be taken at random
+    along_x = (low[0] <= node.high_x) & (node.low_x <= high[0])
+    along_y = (low[1] <= node.high_y) & (node.low_y <= high[1])
+    return along_x & along_y & (low[2] <= node.high_z) & (node.low_z <= high[2])
 
 
 @device

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from collision_monitor import records
 from collision_monitor._jit import inlined, kernel
+from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.active_pairs import ActivePairs
 from collision_monitor.monitor.event_list import EventList
@@ -34,6 +35,9 @@ from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, 
 from collision_monitor.prediction.body_impact import CLOSING
 from collision_monitor.prediction.impact_record import BOUND_ONLY, HIT, TREE_BOUND, UNRESOLVED, ids_of
 from collision_monitor.records import Phase, joined
+
+PREFETCH_AHEAD: Final = 8
+"""How many predictions ahead the bodies are prefetched."""
 
 PERSIST: Final = int(Phase.PERSIST)
 BEGIN: Final = int(Phase.BEGIN)
@@ -264,6 +268,13 @@ def write_predictions(predicted, bodies, shape_index, times, predictions, slots)
             event = pending[k - pairs.size]
             if event.lower > now + horizon:
                 break
+            ahead = pending[min(k - pairs.size + PREFETCH_AHEAD, pending.size - 1)]
+            prefetch(bodies.time, np.intp(ahead.i))
+            prefetch(bodies.time, np.intp(ahead.j))
+            prefetch(bodies.excess, np.intp(ahead.i))
+            prefetch(bodies.excess, np.intp(ahead.j))
+            prefetch(shape_index, np.intp(ahead.shape_i))
+            prefetch(shape_index, np.intp(ahead.shape_j))
         i, j = event.i, event.j
         slots[n, 0], slots[n, 1] = i, j
         row = predictions[n]
