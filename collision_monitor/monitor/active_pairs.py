@@ -42,6 +42,9 @@ PAIR = np.dtype(
 PREFETCH_AHEAD: Final = 2
 """How many pairs ahead the bodies are prefetched."""
 
+UNITE_AHEAD: Final = 16
+"""The same in `_unite`, which does little with each pair."""
+
 Rows = NDArray[np.void]
 
 _FIRST: Final = np.zeros(1, np.intp)
@@ -205,6 +208,10 @@ def _unite(ids, used, version, pairs, events, carried, due, order, new_pairs, ne
     n = k = m = 0
     while k < pairs.size or m < order.size:
         if k < pairs.size:
+            ahead = pairs[min(k + UNITE_AHEAD, pairs.size - 1)]
+            prefetch(version, np.intp(ahead.i))
+            prefetch(version, np.intp(ahead.j))
+            prefetch(ids, np.intp(ahead.j))
             i, j = pairs[k].i, pairs[k].j
             gone = not (used[i] and used[j]) or pair_key(ids[i], ids[j]) != pairs[k].key
             changed = not holds(version, events[k])

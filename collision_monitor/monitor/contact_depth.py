@@ -21,7 +21,7 @@ from collision_monitor.tolerances import FACE_PREFERENCE, SAT_ROUND_OFF
 
 
 @inlined
-def _is_plain_box(multibody, i):
+def _is_plain_box(multibody: Any, i: int) -> Any:
     """Whether body i is one box at its origin, without margin, which is the object itself."""
     table, parts, bodies = multibody
     s = bodies.first_shape[i]
