@@ -41,24 +41,29 @@ class Lanes:
         """Quotient."""
         return Lanes(self.builder, self.builder.fdiv(self.value, other.value))
 
+    def plus_product(self, a: Lanes, b: Lanes) -> Lanes:
+        """The sum of this number and a product, rounded once."""
+        return self._applied("fma", a, b, self)
+
     def __abs__(self) -> Lanes:
         """Absolute value."""
-        return self._applied("fabs")
+        return self._applied("fabs", self)
 
     def root(self) -> Lanes:
         """Square root."""
-        return self._applied("sqrt")
+        return self._applied("sqrt", self)
 
     def where(self, condition: Lanes, other: Lanes) -> Lanes:
         """The number itself where the condition is above 0, else the other's."""
         yes = self.builder.fcmp_ordered(">", condition.value, ir.Constant(DOUBLES, [0.0] * LANES))
         return Lanes(self.builder, self.builder.select(yes, self.value, other.value))
 
-    def _applied(self, function: str) -> Lanes:
+    def _applied(self, function: str, *numbers: Lanes) -> Lanes:
         name = f"llvm.{function}.v{LANES}f64"
         known = self.builder.module.globals.get(name)
-        intrinsic = known or ir.Function(self.builder.module, ir.FunctionType(DOUBLES, [DOUBLES]), name)
-        return Lanes(self.builder, self.builder.call(intrinsic, [self.value]))
+        types = ir.FunctionType(DOUBLES, [DOUBLES] * len(numbers))
+        intrinsic = known or ir.Function(self.builder.module, types, name)
+        return Lanes(self.builder, self.builder.call(intrinsic, [each.value for each in numbers]))
 
     def largest(self, other: Lanes) -> Lanes:
         """The larger of each two numbers."""

@@ -114,8 +114,14 @@ def _box_times(typing_context, half, M, center, move, blocks, block, out, at):
         h = [inner(R[r], h) for r in range(3)]
         better = inner(g, g) - inner(h, h)
         w = [g[k].where(better, h[k]) for k in range(3)]
-        gap = norm(w)
-        n = [each / gap.largest(Lanes.constant(builder, 1e-300)) for each in w]
+        length, far, tiny = norm(w), norm(x), Lanes.constant(builder, 1e-300)
+        n = [each / length.largest(tiny) for each in w]
+        gap = inner(n, x) - inner([abs(each) for each in n], e)
+        gap = gap - inner([abs(inner(column, n)) for column in columns], f)
+        # the line of both centres is often better, and takes little more
+        wide = far - (inner([abs(each) for each in x], e) + inner([abs(each) for each in y], f)) / far.largest(tiny)
+        n = [(x[k] / far.largest(tiny)).where(wide - gap, n[k]) for k in range(3)]
+        gap = wide.largest(gap)
         unit = [[one if r == c else zero for r in range(3)] for c in range(3)]
         a, b = _Reach(zero, [own], e, unit), _Reach(zero, [arm], f, columns)
         time = _Motion(builder, arguments[3]).times(n, gap, a, b)

@@ -1,7 +1,8 @@
 """Lower bounds on the distances of a box from eight boxes, or from eight triangles, of a block at once.
 
 In the axes of either box, the other one has an axis-aligned bound; the gaps of the two along the axes give a lower
-bound on the distance. A third bound is the gap along a given direction, such as that between the nearest points so far.
+bound on the distance. Further bounds are the gap along the line of the two centres, which the former already contain,
+and the gap along a given direction, such as that between the nearest points so far.
 LLVM does not vectorise these loops, so the formulas are written in vectors (`_jit.lanes`).
 """
 
@@ -67,8 +68,8 @@ class Block:
 
 
 def inner(a: list[Lanes], b: list[Lanes]) -> Lanes:
-    """Dot products of eight pairs of vectors."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    """Dot products of eight pairs of vectors, with each rounded three times."""
+    return (a[0] * b[0]).plus_product(a[1], b[1]).plus_product(a[2], b[2])
 
 
 def _column(m: list[list[Lanes]], k: int) -> list[Lanes]:
@@ -79,6 +80,13 @@ def _gaps(x: list[Lanes], own: list[Lanes], shadow: list[Lanes], zero: Lanes) ->
     """Squared distance of two axis-aligned boxes, x apart, with these half extents."""
     gap = [(abs(x[k]) - own[k] - shadow[k]).largest(zero) for k in range(3)]
     return inner(gap, gap)
+
+
+def _between_centers(x: list[Lanes], y: list[Lanes], e: list[Lanes], f: list[Lanes], zero: Lanes) -> Lanes:
+    """Squared gap of two boxes along the line of their centres, which is x in the axes of one and y in the other's."""
+    xx = inner(x, x)
+    gap = xx - inner([abs(each) for each in x], e) - inner([abs(each) for each in y], f)
+    return (gap * (gap / xx)).where(gap, zero)
 
 
 @intrinsic
@@ -100,6 +108,7 @@ def _bounds(typing_context, half, M, n, blocks, block, out, at):
         bound = _gaps(x, e, [inner(size[r], f) for r in range(3)], zero)
         y = [inner(_column(R, c), x) for c in range(3)]
         bound = bound.largest(_gaps(y, f, [inner(_column(size, c), e) for c in range(3)], zero))
+        bound = bound.largest(_between_centers(x, y, e, f, zero))
         along = [abs(inner(_column(R, c), n)) for c in range(3)]
         gap = (inner(n, x) - inner([abs(each) for each in n], e) - inner(along, f)).largest(zero)
         store(context, builder, bound.largest(gap * gap), signature.args[5], arguments[5], arguments[6])

@@ -14,10 +14,14 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from collision_monitor._jit.lanes import Lanes
-from collision_monitor.meshes.boxes import Block, inner
+from collision_monitor.meshes.boxes import Block
 from collision_monitor.meshes.layout import CORNERS, RADIUS, WIDTH
 
 _POINT = list[Lanes]
+
+
+def _dot(a: _POINT, b: _POINT) -> Lanes:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _minus(a: _POINT, b: _POINT) -> _POINT:
@@ -32,7 +36,7 @@ def _normal(corners: list[_POINT]) -> _POINT:
 def _crossed(builder: Any, S: list[_POINT], T: list[_POINT]) -> Any:
     """Lanes in which not all corners of S are on one side of T's plane."""
     n, zero = _normal(T), Lanes.constant(builder, 0.0).value
-    x, y, z = (inner(_minus(corner, T[0]), n) for corner in S)
+    x, y, z = (_dot(_minus(corner, T[0]), n) for corner in S)
     above = builder.fcmp_ordered(">", x.least(y).least(z).value, zero)
     below = builder.fcmp_ordered("<", x.largest(y).largest(z).value, zero)
     return builder.not_(builder.or_(above, below))

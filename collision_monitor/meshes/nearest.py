@@ -50,8 +50,12 @@ ANSWER: Final = 10
 """Numbers of an answer: distance of the surfaces (m), closest points on both in A's frame (m), the places of the two
 triangles, WIDTH * block + member, which serve as a hint for a later query, and a lower bound on the distance (m)."""
 
-MOST_LEAVES: Final = 100_000
-"""Most pairs of leaves to examine, up to 1 s. Hostile meshes, such as a million triangles in a point, need more; the
+CLOSER: Final = 1.0 - 32.0 * EPSILON
+"""Factor to the best squared distance below which another one counts. Less: distances are less exact. 1: round-off
+makes all triangles of a mesh that is very far away equally near, and nothing is pruned."""
+
+MOST_LEAVES: Final = 50_000
+"""Most pairs of leaves to examine, up to 0.7 s. Hostile meshes, such as a million triangles in a point, need more; the
 lower bound then is that of the boxes."""
 
 
@@ -211,7 +215,7 @@ def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
     n = _direction(answer, found) if found < inf else _toward(blocks_a, root_a, blocks_b, root_b, X)
     while waiting > 0 and best > 0.0:  # terminates: each pair of boxes is opened once
         waiting -= 1
-        limit = best * best
+        limit = CLOSER * best * best
         if not work[3 * waiting] < limit:
             continue
         place_a, place_b = int(work[3 * waiting + 1]), int(work[3 * waiting + 2])

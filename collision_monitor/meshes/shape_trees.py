@@ -52,8 +52,8 @@ def kept_tree(shape: Shape) -> KeptTree:
         inside = UNCERTAIN if isinstance(shape, Points) else CERTAIN
         if isinstance(shape, Mesh) and not shape.surface.certain:
             inside = NEVER if len(shape.surface.hole) else UNCERTAIN
-        tree = made_tree(shape)
-        known = KeptTree(tree, is_concave_mesh(shape), inside, inf if tree is None else reach_of(tree))
+        tree, radius = made_tree(shape), shape.radius if isinstance(shape, Points) else 0.0
+        known = KeptTree(tree, is_concave_mesh(shape), inside, inf if tree is None else reach_of(tree) + radius)
         shape.__dict__["kept_tree"] = known
     return known
 

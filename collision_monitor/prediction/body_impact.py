@@ -247,7 +247,10 @@ def _certain_overlap(multibody, pair, start, guess, places, window, tube, query,
             return t
         speed = scratch.out[CLOSING] - tube.growth
         if speed > 0.0 and t < end:
-            t = min(end, t + 1.001 * (excess + query.tolerance) / speed)
+            later = min(end, t + 1.001 * (excess + query.tolerance) / speed)
+            if later == t:  # the time has no finer resolution
+                return inf
+            t = later
         elif guessed:
             t = start
         else:

@@ -81,7 +81,7 @@ def solid_impact(table, parts, pair, window, tube, query, scratch):
                 if blocks[block, CHILD, m] != 0.0:
                     work[BOUNDS + m] = box_time(blocks, block, m, solid)
                     soon = min(soon, work[BOUNDS + m])
-        if child < 0.0 or soon * speed > KEEP * size_of(blocks, i, k):
+        if child < 0.0 or (soon * speed > KEEP * size_of(blocks, i, k) and t + soon > t):
             if t + soon < end:
                 waiting = push_pair(work, waiting, t + soon, place, 0.0, 0.0)
             continue

@@ -188,7 +188,7 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
         for k in range(WIDTH):
             if blocks[block, CHILD, k] != 0.0:
                 soon = min(soon, work[BOUNDS + k])
-        if soon * speed > KEEP * size:
+        if soon * speed > KEEP * size and t + soon > t:  # else the time has no finer resolution
             if t + soon < end:
                 waiting = push_pair(work, waiting, t + soon, place_a, place_b, -1.0)
             continue

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import inlined, kernel
+from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Shape
+from collision_monitor.meshes.boxes import box_separations
 from collision_monitor.meshes.contact import APART, tree_contact
 from collision_monitor.meshes.inside import OUTSIDE, is_either_in
-from collision_monitor.meshes.nearest import ANSWER, MEMORY, PLACE_A, PLACE_B
+from collision_monitor.meshes.nearest import ANSWER, BOUNDS, MEMORY, PLACE_A, PLACE_B
 from collision_monitor.meshes.placing import relative
 from collision_monitor.meshes.shape_trees import CERTAIN, NEVER, KeptTree, have_kernels, kept_tree
 from collision_monitor.meshes.touching import touching
@@ -67,13 +69,26 @@ def _packed(
 
 def mesh_overlap(shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any) -> bool | None:
     """Whether two shapes overlap or touch; of an open mesh its surface. None for a pair without trees or a mesh."""
+    try:
+        far = (shape_a.kept_tree.reach + shape_b.kept_tree.reach) * _ROUNDED_UP
+        if dist(pose_a.point, pose_b.point) > far:
+            return False
+    except AttributeError:  # of shapes without a tree yet
+        pass
     found = _packed(shape_a, pose_a, shape_b, pose_b)
     if found is None:
         return None
     a, x_a, b, x_b = found
-    if dist(pose_a.point, pose_b.point) > (a.reach + b.reach) * _ROUNDED_UP:
-        return False
     return trees_overlap(a.tree, x_a, b.tree, x_b, _OWN.work)
+
+
+def boxes_apart(shape_a: Shape, pose_a: Pose, shape_b: Shape, pose_b: Pose) -> bool:
+    """Whether the boxes around two shapes with trees are certainly apart. False for shapes without a tree."""
+    a, b = kept_tree(shape_a).tree, kept_tree(shape_b).tree
+    x_a, x_b = packed_pose(pose_a), packed_pose(pose_b)
+    if a is None or b is None or x_a is None or x_b is None:
+        return False
+    return bool(roots_apart(a, x_a, b, x_b, _OWN.work))
 
 
 def mesh_contact(
@@ -101,6 +116,15 @@ def _place(pose_a: Any, pose_b: Any, R: Any) -> tuple[float, float, float]:
     quaternion_to_matrix(pose_a[:, 3:], 0, R[0])
     quaternion_to_matrix(pose_b[:, 3:], 0, R[1])
     return pose_b[0, 0] - pose_a[0, 0], pose_b[0, 1] - pose_a[0, 1], pose_b[0, 2] - pose_a[0, 2]
+
+
+@kernel
+def roots_apart(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: Any) -> bool:
+    """Whether the boxes of two whole trees, placed as in `trees_overlap`, are apart."""
+    R = memory[_ROTATIONS:_ANSWER].reshape((2, 3, 3))
+    p = _place(pose_a, pose_b, R)
+    box_separations(tree_a, 0, 0, tree_b, 0, relative(R[0], R[1], p), memory, BOUNDS)
+    return memory[BOUNDS] > 0.0
 
 
 @kernel

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from collision_monitor.errors import PoseError, TooCostlyError, UnsupportedError
 from collision_monitor.geometry.bounded_cache import bounded_cache
 from collision_monitor.geometry.compound import shape_pairs
+from collision_monitor.geometry.convex_pieces import is_concave_mesh
 from collision_monitor.geometry.forest import Forest
 from collision_monitor.geometry.planar import flat_pose, is_planar
 from collision_monitor.geometry.pose import Motion, Pose
+from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shape_table import ShapeTableBuilder
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Points, Shape, Sphere, Triangle
 from collision_monitor.meshes.shape_trees import shape_tree
@@ -26,6 +28,12 @@ from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.prediction.pair_impacts import predict_pairs
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.surface_pair import points_near
+
+MANY_FACES: Final = 2_000
+"""Faces of a mesh from which on only those near the other object are followed one by one, and the rest as one mesh."""
+
+MOST_FACES: Final = 10_000
+"""Most faces that are followed one by one, 1 s."""
 
 MOST_NEAR: Final = 500
 """Most points of a cloud that touch the other object and are followed one by one, 1 ms each."""
@@ -72,15 +80,18 @@ def make_moving_shape(shape: Compound, motion: Motion, name: str) -> MovingShape
 
 
 def in_convex_pieces(moving: MovingShape, other: MovingShape, near: float) -> MovingShape:
-    """The same object with the triangles of a concave mesh, and the points of a cloud near the other, as own pieces.
+    """The same object with the triangles of a concave mesh, and the points of a cloud, as own pieces.
 
-    near (m): at most this far from the other's shapes now.
+    Of clouds and of large meshes only those at most `near` (m) from the other object now, which may touch it. Raises
+    TooCostlyError for more than MOST_NEAR points or MOST_FACES triangles.
     """
     pieces: PosedShapes = []
     shape_of = []
     for k, (shape, pose) in enumerate(moving.shapes):
         if isinstance(shape, Points):
             own = [(part, pose @ at) for part, at in _near_points(shape, moving.motion.pose @ pose, other, near)]
+        elif isinstance(shape, Mesh) and len(shape.faces) > MANY_FACES and is_concave_mesh(shape):
+            own = [(part, pose @ at) for part, at in _near_faces(shape, moving.motion.pose @ pose, other, near)]
         else:
             own = containing_model([(shape, pose)], "exact").pieces
         pieces += own
@@ -100,6 +111,25 @@ def _near_points(cloud: Points, pose: Pose, other: MovingShape, near: float) -> 
         for point in cloud.points[is_near]
     ]
     return balls if is_near.all() else [*balls, (Points(cloud.points[~is_near], cloud.radius), Pose())]
+
+
+def _near_faces(mesh: Mesh, pose: Pose, other: MovingShape, near: float) -> PosedShapes:
+    """Each triangle in the box around the other object, and in front of its half-spaces; and the mesh of the others."""
+    at = other.motion.pose
+    normals = [pose.rotation @ shape.normal for shape, pose in other.pieces if isinstance(shape, HalfSpace)]
+    own = np.concatenate([np.eye(3), -np.eye(3), np.reshape(normals, (-1, 3))])
+    directions = own @ at.rotation.T
+    far = reach(other.pieces, own) + directions @ (at.position - pose.position) + near
+    is_near = np.ones(len(mesh.faces), np.bool_)
+    for d, end in zip(directions @ pose.rotation, far, strict=True):
+        is_near &= (mesh.vertices @ d)[mesh.faces].min(axis=1) <= end
+    count = np.count_nonzero(is_near)
+    if count > MOST_FACES:
+        raise TooCostlyError(f"expected at most {MOST_FACES} triangles that may touch, got {count}")
+    corners = mesh.vertices[mesh.faces[is_near]]
+    centres = corners.mean(axis=1)
+    pieces: PosedShapes = [(Triangle(c - m), Pose(m)) for c, m in zip(corners, centres, strict=True)]
+    return pieces if is_near.all() else [*pieces, (Mesh(mesh.vertices, mesh.faces[~is_near]), Pose())]
 
 
 def _bytes(forest: Forest, pieces: tuple[Shape, ...]) -> int:

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from itertools import product
 from math import dist, inf
+from typing import Final
 
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import Mesh, Shape
 from collision_monitor.meshes.shape_trees import kept_tree
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.convex_pairs import convex_contact, convex_impact
-from collision_monitor.query.fillings import filled_box
+from collision_monitor.query.fillings import filled_box, filled_mesh
 from collision_monitor.query.mesh_impact import mesh_impact
+from collision_monitor.query.mesh_pairs import boxes_apart
 from collision_monitor.query.moving_pair import MotionQuery
 from collision_monitor.query.open_gap import may_be_inside
 from collision_monitor.tolerances import GJK_TOUCHING
+
+_HERE: Final = Pose()
 
 
 def quick_impact(
@@ -40,6 +44,11 @@ def quick_possible_impact(
     """
     if not (isinstance(shape_a, Shape) and isinstance(shape_b, Shape)):
         return None
+    whole_a, whole_b = _with_filling(shape_a), _with_filling(shape_b)
+    if whole_a and whole_b and boxes_apart(whole_a, motion_a.pose, whole_b, motion_b.pose):  # neither is in the other
+        times = quick_impact(whole_a, motion_a, whole_b, motion_b, query)
+        if times is not None:
+            return times[0]
     boxes = [filled_box(shape) if isinstance(shape, Mesh) else None for shape in (shape_a, shape_b)]
     # the solid is in the hull of its surface, so that a box around the surface replaces it
     parts_a, parts_b = (
@@ -55,13 +64,20 @@ def quick_possible_impact(
             return 0.0 if _overlap(a, motion_a, b, motion_b, query) else None
         first = min(first, times[0])
     pose_a, pose_b = motion_a.pose, motion_b.pose
-    own, other = [(shape_a, Pose())], [(shape_b, Pose())]
+    own, other = [(shape_a, _HERE)], [(shape_b, _HERE)]
     if dist(pose_a.position, pose_b.position) <= kept_tree(shape_a).reach + kept_tree(shape_b).reach and (
         (shape_b in parts_b and may_be_inside(own, pose_a, other, pose_b))
         or (shape_a in parts_a and may_be_inside(other, pose_b, own, pose_a))
     ):
         return 0.0
     return first
+
+
+def _with_filling(shape: Shape) -> Shape | None:
+    """A shape as one with the box around its hole; None for a mesh that is too large."""
+    if not isinstance(shape, Mesh) or (box := filled_box(shape)) is None:
+        return shape
+    return box.hull if box.contains else filled_mesh(shape)
 
 
 def _overlap(a: Shape, motion_a: Motion, b: Shape, motion_b: Motion, query: MotionQuery) -> bool:

@@ -33,8 +33,19 @@ PARTING_TIMES: Final = 80
 MOST_PAIRS: Final = 1_000_000
 """Most pairs of pieces to follow, 2 s. Two meshes that coincide have more, and all of them touch."""
 
+AT_ONCE: Final = 10_000
+"""Pairs of pieces whose first impacts are computed together."""
+
+MOST_TRIES: Final = 4_000
+"""Most directions to try for the pairs of pieces that touch, 1 s. Thousands of slivers in one line need more."""
+
 DEEPENING_TIMES: Final = 40
 """Number of times tried for their penetration, a distance query each: down to 1e-12 of the horizon."""
+
+MANY_PIECES: Final = 10_000
+"""Pieces of two objects from which on a distance query takes so long that every fifth of these times is tried."""
+
+_HERE: Final = Pose()
 
 ALIGNED: Final = 1e-12
 """Sine of an angle that counts as zero. It changes a support value by this part of the size, less than GJK_TOUCHING.
@@ -55,16 +66,20 @@ def _interval(event: np.void) -> ImpactInterval:
 def follow(a: MovingShape, b: MovingShape, query: MotionQuery, round_off: float) -> ImpactInterval:
     """First impact of two bodies that touch at the start: the time at which they are deeper than `round_off` (m).
 
-    Raises TooCostlyError for more than MOST_PAIRS pairs of pieces.
+    Raises TooCostlyError for more than MOST_PAIRS pairs of pieces, or MOST_TRIES directions.
     """
     if len(a.pieces) * len(b.pieces) > MOST_PAIRS:
         raise TooCostlyError(f"expected at most {MOST_PAIRS} pairs of pieces, got {len(a.pieces) * len(b.pieces)}")
     multibody = lay_out_pair(a, b, query.horizon, apart=True)
     touching, later = _pairs(a, b, multibody, query)
-    directions = [normal for _, _, normal in touching]
+    directions = list({normal.tobytes(): normal for _, _, normal in touching}.values())
+    tries = 0
     for i, j, normal in touching:
         parted = -math.inf
         for n in chain([normal], directions):
+            tries += 1
+            if tries > MOST_TRIES:
+                raise TooCostlyError(f"expected at most {MOST_TRIES} directions in which touching pieces part")
             parted = max(parted, _parting_time(_Piece(a, i), _Piece(b, j), n, query, round_off))
             if parted > 0.0:
                 break
@@ -76,7 +91,9 @@ def follow(a: MovingShape, b: MovingShape, query: MotionQuery, round_off: float)
             later += [_interval(event) for event in again]
     if not later:
         return ImpactInterval(math.inf, math.inf)
-    return ImpactInterval(min(e.lower for e in later), min(e.upper for e in later))
+    lower, upper = min(e.lower for e in later), min(e.upper for e in later)
+    # what slides over a surface is near its next triangle for long, and a later one may certainly be deep
+    return ImpactInterval(lower, upper if upper < math.inf else _sampled_depth(a, b, query, _wanted(query, round_off)))
 
 
 def _pairs(
@@ -90,12 +107,13 @@ def _pairs(
     position[n:] += offset
     touching: list[tuple[int, int, Array]] = []
     later: list[ImpactInterval] = []
-    for i in range(n):
-        events = first_impacts(multibody, np.array([(i, n + j) for j in range(m)], np.int32), 0.0, query)
+    pairs = np.stack(np.meshgrid(np.arange(n), np.arange(n, n + m), indexing="ij"), axis=-1).reshape(-1, 2)
+    for first in range(0, n * m, AT_ONCE):
+        events = first_impacts(multibody, pairs[first : first + AT_ONCE].astype(np.int32), 0.0, query)
         later += [_interval(event) for event in events if event["lower"] > 0.0]
         at_once = np.array([(e["i"], e["j"]) for e in events if e["lower"] <= 0.0], np.int32).reshape(-1, 2)
         normals = as_contacts(contact_batch(multibody.table, position, rotation, at_once))["normal"]
-        touching += [(i, int(j) - n, normal) for (_, j), normal in zip(at_once, normals, strict=True)]
+        touching += [(int(i), int(j) - n, normal) for (i, j), normal in zip(at_once, normals, strict=True)]
     return touching, later
 
 
@@ -112,14 +130,14 @@ class _Piece:
         axes = np.concatenate([np.eye(3), -np.eye(3)])
         unbounded = self.rate == 0.0
         self.radius = (
-            0.0 if unbounded else float(np.linalg.norm(reach([(self.shape, Pose())], axes).reshape(2, 3).max(0)))
+            0.0 if unbounded else float(np.linalg.norm(reach([(self.shape, _HERE)], axes).reshape(2, 3).max(0)))
         )
 
     def support(self, directions: Array) -> Array:
         """Return max d . x (n,) over its points x about its own origin, for directions d (n, 3) of any length."""
         length = np.linalg.norm(directions, axis=1)
         unit = directions / length[:, None]
-        return np.asarray(length * reach([(self.shape, Pose())], unit @ self.rotation))
+        return np.asarray(length * reach([(self.shape, _HERE)], unit @ self.rotation))
 
     def advance(self, n: Array, times: Array) -> Array:
         """Return upper bounds (T,) on the growth (m) of its reach along n (3,) by its rotation in the times (T,)."""
@@ -166,13 +184,24 @@ def _deep_by(
     a: MovingShape, b: MovingShape, multibody: Multibody, pairs: NDArray[np.int32], query: MotionQuery, round_off: float
 ) -> float:
     """Return a time (s) at which they are certainly deeper than `round_off` (m), an early one if easy, or infinity."""
-    wanted = query.separation - 2.0 * round_off
+    wanted = _wanted(query, round_off)
     events = first_impacts(multibody, pairs, 0.0, query, wanted)
     sure = [float(e["upper"]) for e in events if e["status"] == HIT and e["upper"] <= query.horizon]
     if sure:
         return min(sure)
+    return _sampled_depth(a, b, query, wanted)
+
+
+def _wanted(query: MotionQuery, round_off: float) -> float:
+    """Distance (m) below which they are certainly deeper than round-off."""
+    return query.separation - 2.0 * round_off
+
+
+def _sampled_depth(a: MovingShape, b: MovingShape, query: MotionQuery, wanted: float) -> float:
+    """Return an early one of some times (s) at which they are nearer than `wanted` (m), or infinity."""
     found = math.inf
-    for t in query.horizon * 0.5 ** np.arange(DEEPENING_TIMES):
+    step = 1 if len(a.pieces) + len(b.pieces) < MANY_PIECES else 5
+    for t in query.horizon * 0.5 ** np.arange(0, DEEPENING_TIMES, step):
         distance = contact(a.shapes, a.motion.at(t), b.shapes, b.motion.at(t)).signed_distance
         if distance < wanted:
             found = float(t)

@@ -1,0 +1,130 @@
+"""Meshes that no tree prunes: slivers in one line, bodies very far away, soups in soups. The work is counted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import collision_monitor as cm
+from collision_monitor import Motion, Pose
+from collision_monitor.geometry.inside import UNKNOWN
+from collision_monitor.meshes.nearest import LEAST, MEMORY, answer_row, tree_distance
+from collision_monitor.meshes.shape_trees import kept_tree
+from collision_monitor.meshes.solid import MOST_EXAMINED
+from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
+from collision_monitor.prediction.impact_record import IMPACT
+from collision_monitor.prediction.pair_impacts import predict_pairs
+from collision_monitor.query import deepest, moving_pair, touching
+from collision_monitor.query.posed import Posed
+
+RNG = np.random.default_rng(3)
+
+
+def slivers(count: int) -> cm.Mesh:
+    """Triangles of 1 um in the x axis, between -1 and 1."""
+    corners = np.zeros((count, 3, 3))
+    corners[:, :, 0] = RNG.uniform(-1.0, 1.0, (count, 3))
+    corners[:, 1, 1] = 1e-6
+    return cm.Mesh(corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3))
+
+
+def soup(count: int) -> cm.Mesh:
+    corners = 0.4 * RNG.normal(size=(count, 1, 3)) + 0.05 * RNG.normal(size=(count, 3, 3))
+    return cm.Mesh(corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3))
+
+
+def test_slivers_that_touch_are_followed_in_few_directions_and_few_batches(monkeypatch: pytest.MonkeyPatch) -> None:
+    tries, batches = [], []
+    one_try, one_batch = touching._parting_time, touching.first_impacts
+    monkeypatch.setattr(touching, "MOST_TRIES", 50)
+    monkeypatch.setattr(touching, "_parting_time", lambda *arguments: tries.append(1) or one_try(*arguments))
+    monkeypatch.setattr(touching, "first_impacts", lambda *arguments: batches.append(1) or one_batch(*arguments))
+    mesh, drum = slivers(2_000), cm.Cylinder(0.5, 1.0)
+    turning = Motion(Pose(), angular=(0.3, 0.5, 0.7))
+    found = cm.time_of_impact(mesh, turning, drum, Motion(Pose((0, 0, 0.5)), (0, 0, -0.3), (0.5, -0.2, 0.1)))
+    assert found.status != "clear" and found.lower == 0.0
+    assert len(tries) <= 50
+    assert len(batches) <= 3
+
+
+def test_round_off_does_not_hide_which_triangles_of_a_body_very_far_away_are_nearest() -> None:
+    """A search that ends early, because it opens too many leaves, states a lower bound below the distance."""
+    tree, work, answer = kept_tree(soup(8_000)).tree, np.empty(MEMORY), answer_row()
+    far = np.array([2e17, -3e17, 1e18])
+    distance = tree_distance(tree, np.eye(3), np.zeros(3), tree, np.eye(3), far, np.inf, answer, work)
+    assert distance == pytest.approx(np.linalg.norm(far), rel=1e-14)
+    assert answer[LEAST] == distance
+
+
+@pytest.mark.parametrize("solid", [cm.ConvexHull(RNG.normal(size=(30, 3))), cm.Ellipsoid((0.2, 0.3, 0.5))])
+def test_a_cloud_very_far_away_keeps_its_bound(solid: cm.Shape) -> None:
+    cloud, far = cm.Points(RNG.normal(size=(2 * MOST_EXAMINED, 3)), 0.01), np.array([2e17, -3e17, 1e18])
+    found = cm.contact(cloud, Pose(), solid, Pose(far))
+    assert abs(found.signed_distance - np.linalg.norm(far)) <= found.error_bound < 1e-9 * np.linalg.norm(far)
+
+
+def test_the_depth_of_more_slivers_than_are_examined_is_within_its_bound() -> None:
+    """The deepest point of the x axis in an ellipsoid is its centre, 0.3 m from the surface."""
+    count = 2 * MOST_EXAMINED
+    corners = np.zeros((count, 3, 3))
+    corners[:, :, 0] = RNG.uniform(-1.0, 1.0, (count, 1)) + 1e-7 * RNG.normal(size=(count, 3))
+    mesh = cm.Mesh(corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3))
+    found = cm.contact(mesh, Pose(), cm.Ellipsoid((0.5, 0.4, 0.3)), Pose())
+    assert found.signed_distance - found.error_bound <= -0.3 + 1e-4 <= found.signed_distance + 1e-3
+
+
+def test_points_are_not_located_in_a_soup_beyond_a_number_of_tests(monkeypatch: pytest.MonkeyPatch) -> None:
+    located = []
+    locate = deepest.locate_in_surface
+    monkeypatch.setattr(deepest, "MOST_TESTS", 4_000)
+    monkeypatch.setattr(deepest, "locate_in_surface", lambda own, surface: located.append(own) or locate(own, surface))
+    mesh = soup(400)
+    side = Posed([(mesh, Pose())], Pose(), [(mesh, Pose())])
+    assert deepest.locate(side, side, np.zeros(3)) == UNKNOWN
+    assert sum(map(len, located)) * len(mesh.faces) <= 4_000
+
+
+def terrain(count: int) -> cm.Mesh:
+    """A square of 10 m, flat about its middle and waves of 0.1 m around that."""
+    x, y = np.meshgrid(*[np.linspace(-5, 5, count)] * 2, indexing="ij")
+    z = np.where(np.hypot(x, y) < 2, 0, 0.1 * np.sin(3 * x) ** 2)
+    k = np.arange(count * count).reshape(count, count)
+    quads = np.stack([k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]], axis=-1).reshape(-1, 4)
+    return cm.Mesh(np.stack([x, y, z], -1).reshape(-1, 3), quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3))
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.5, 0.0, 0.0)], ids=str)
+@pytest.mark.parametrize("other", [cm.Box((0.5, 0.4, 0.3)), cm.Cylinder(0.3, 0.3), terrain(12)], ids=repr)
+def test_only_triangles_near_a_body_on_a_terrain_are_followed_one_by_one(
+    other: cm.Shape, velocity: tuple[float, float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ground = terrain(32)
+    height = 0.0 if isinstance(other, cm.Mesh) else 0.15
+    a, b = Motion(Pose()), Motion(Pose((0.3, 0.2, height)), velocity)
+    whole = cm.time_of_impact(ground, a, other, b)
+    counts = []
+    follow = moving_pair.in_convex_pieces
+    monkeypatch.setattr(
+        "collision_monitor.query.time_of_impact.in_convex_pieces",
+        lambda *arguments: counts.append(follow(*arguments)) or counts[-1],
+    )
+    monkeypatch.setattr(moving_pair, "MANY_FACES", 100)
+    found = cm.time_of_impact(ground, a, other, b)
+    assert found.lower == pytest.approx(whole.lower, abs=1e-5)
+    assert (found.status == "clear") == (whole.status == "clear")
+    if not isinstance(other, cm.Mesh):
+        assert len(counts[0].pieces) < len(ground.faces) / 10
+
+
+@pytest.mark.parametrize("other", [soup(200), cm.Cylinder(0.5, 1.0)], ids=["mesh", "solid"])
+def test_the_search_ends_where_the_time_has_no_finer_resolution(other: cm.Shape) -> None:
+    """At 1e18 m/s the boxes take steps that do not change the time; 1,000 steps count as one distance query."""
+    a = Motion(Pose(), angular=(0.3, 0.5, 0.7))
+    b = Motion(Pose((3.0, 0.2, 1e18)), (0.6, -0.2, -1e18), (0.1, -0.4, 0.9))
+    moving = [moving_pair.make_moving_shape(shape, motion, "") for shape, motion in ((soup(500), a), (other, b))]
+    multibody = moving_pair.lay_out_pair(*moving, 2.0)
+    events = np.zeros(2, IMPACT)
+    search = ImpactQuery(0.0, 1e-6, 1000)
+    found, queries = predict_pairs(multibody, np.array([[0, 1]], np.int32), 0.0, search, events, make_scratch())
+    assert queries <= 2
+    assert found == 1 and events[0]["lower"] == pytest.approx(1.0)
