@@ -121,6 +121,10 @@ class ActivePairs(Stage):
         self.pairs["since"] = np.nan
         self.end(np.arange(len(self.pairs)))
 
+    def forget_answers(self) -> None:
+        """Answer every contact anew in the next step, because the carried answers may lack the details that it needs."""
+        self._carried[:] = np.nan
+
     # ------------------------------------------------------------------ the step
 
     def unite(self, step: StepContext, due: Rows) -> None:

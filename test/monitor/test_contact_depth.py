@@ -65,3 +65,17 @@ def test_without_details_all_other_numbers_are_the_same_bytes(shapes: str, toler
 def test_points_of_contacts_need_details() -> None:
     with pytest.raises(ProfileError, match="contact_points, contact_details: expected contact_points 1 or"):
         Profile(contact_points=4, contact_details=False)
+
+
+def test_details_that_are_turned_on_are_not_those_of_answers_without_them() -> None:
+    monitor = Monitor(Profile(distance_tolerance=0.05, contact_details=False))
+    for i in (1, 2):
+        monitor.add(i, BOX)
+    poses = [(0, 0, 0, 0, 0, 0, 1), (0.45, 0, 0, 0, 0, 0, 1)]
+    for k in range(2):
+        (row,) = monitor.step(k * 10**7, [1, 2], poses).contacts
+        assert np.isnan(row["point_a"]).all()
+    monitor.profile = monitor.profile.replace(contact_details=True)
+    (row,) = monitor.step(2 * 10**7, [1, 2], poses).contacts
+    assert row["point_a"] == pytest.approx((0.25, 0, 0))
+    assert row["feature_type_a"] != UNKNOWN
