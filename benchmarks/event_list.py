@@ -81,7 +81,8 @@ class Boxes:
 def run(move: str, objects: int, args: argparse.Namespace) -> dict[str, Any]:
     """Measure one kind of motion; returns the row of the table."""
     boxes = Boxes(objects, args.seed)
-    profile = Profile(threads=args.threads, distance_tolerance=args.distance_tolerance)
+    answers = {"distance_tolerance": args.distance_tolerance, "contact_details": not args.no_details}
+    profile = Profile(threads=args.threads, **answers)
     boxes.linear, boxes.angular = SPEEDS.get(move, 1.0) * boxes.linear, SPEEDS.get(move, 1.0) * boxes.angular
     # half of the declared tolerances, so that two noisy states stay within them
     noise = 0.49 * profile.position_tolerance if move == "noise" else 0.0
@@ -141,6 +142,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=5.0, help="simulated time at 100 Hz")
     parser.add_argument("--every", type=int, default=25, help="compare with recomputation at every K-th step")
     parser.add_argument("--distance-tolerance", type=float, default=0.0, help="distance_tolerance of the profile (m)")
+    parser.add_argument("--no-details", action="store_true", help="no witness points and features (contact_details)")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--moves", default=",".join(MOVES), help=f"kinds of motion: {', '.join(MOVES)}")

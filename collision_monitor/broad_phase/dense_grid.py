@@ -106,7 +106,7 @@ def classify(size: Any, starts: Any, octave: Any, cubes: Any, grid: Any) -> None
     """Assign bodies with half extent `size` (N,) m to classes; NaN: absent, beyond LARGEST_BODY: unbounded.
 
     octave (_OCTAVES, 2): scratch for counts and classes; cubes (_OCTAVES, 2): scratch for the sum and the maximum of
-    the cubed sizes in an octave, relative to the octave's size.
+    the cubed sizes in an octave, relative to the octave's size. Overwrites grid.bucket.
     """
     octave[:] = 0
     cubes[:] = 0.0
@@ -114,6 +114,7 @@ def classify(size: Any, starts: Any, octave: Any, cubes: Any, grid: Any) -> None
         if size[i] <= LARGEST_BODY:
             mantissa, exponent = frexp(size[i])
             k = min(max(exponent + _OCTAVES // 2, 0), _OCTAVES - 1)
+            grid.bucket[i] = k
             octave[k, 0] += 1
             cubes[k, 0] += mantissa * mantissa * mantissa
             cubes[k, 1] = max(cubes[k, 1], mantissa * mantissa * mantissa)
@@ -135,8 +136,7 @@ def classify(size: Any, starts: Any, octave: Any, cubes: Any, grid: Any) -> None
     for i in range(size.size):
         rest = 0 if starts[i] else STARTING
         if size[i] <= LARGEST_BODY:
-            k = min(max(frexp(size[i])[1] + _OCTAVES // 2, 0), _OCTAVES - 1)
-            grid.klass[i] = rest + octave[k, 1]
+            grid.klass[i] = rest + octave[grid.bucket[i], 1]
         elif size[i] > LARGEST_BODY:
             grid.klass[i] = rest
         else:
@@ -440,6 +440,7 @@ def _box_pairs(centre: Any, half: Any, starts: Any, grid: Any, pairs: Any) -> in
     gather_centres(centre, grid, 0, n)
     extent = np.zeros((3, n + PAD))
     for p in range(n):
+        prefetch(half, np.intp(grid.order[min(p + AHEAD, n - 1)]))
         for c in range(3):
             extent[c, p] = half[grid.order[p], c]
     found = np.empty(n + PAD, np.int32)

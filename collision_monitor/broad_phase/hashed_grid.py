@@ -1,8 +1,9 @@
 """Hashed uniform grid with one resolution per size class, updated object by object.
 
-Each box is stored in exactly one cell: the cell of its centre, at the level with cells at least half as wide as the
+Each box is stored in exactly one cell: the cell of its centre, at the level with cells at least as wide as the
 box. A query visits the cells from which a box of the level could reach, so mixed sizes cost one lookup per occupied
-level. Cells are chains in a hash table, so that empty space costs nothing.
+level. Cells are chains in a hash table, so that empty space costs nothing. A chain links nodes of half a cache line
+with rounded bounds; the exact box is read only if these meet.
 Source: lecture slides "Efficient collision detection: spatial partitioning" (hash tables, multiresolution grids).
 """
 
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel, device, inlined, kernel
+from collision_monitor._jit.alignment import aligned_zeros
 from collision_monitor.broad_phase.region import Region, regions_overlap
 
 GRID_LEVELS: Final = 128
@@ -38,20 +40,46 @@ GRID_BOX = np.dtype(
         ("cell_y", np.int64),
         ("cell_z", np.int64),
         ("level", np.int32),  # -1: the box is not in the grid
-        ("next", np.int32),  # in the bucket; -1: end of the chain
         ("previous", np.int32),  # in the bucket; -2 - bucket: first of the chain
-        ("level_next", np.int32),  # chain of all boxes of a level
-        ("level_previous", np.int32),  # -1: first of the chain
+        ("level_previous", np.int32),  # in the level; -1: first of the chain
+        ("reserved", np.int32),  # 0; the record has no padding, whose bytes a copy need not keep
     ],
     align=True,
 )
-"""One box; all that a query reads of it is adjacent in memory."""
+"""One box."""
+
+GRID_NODE = np.dtype(
+    [
+        ("low_x", np.float32),  # bounds of the box (m), rounded outwards
+        ("low_y", np.float32),
+        ("low_z", np.float32),
+        ("high_x", np.float32),
+        ("high_y", np.float32),
+        ("high_z", np.float32),
+        ("next", np.int32),  # in the bucket; -1: end of the chain
+        ("level_next", np.int32),  # in the chain of all boxes of a level
+    ]
+)
+"""What a query reads of every box that it passes."""
+
+FLOAT32_ROUNDING: Final = 2.0**-23
+"""Twice the relative rounding error of a float32."""
+
+FLOAT64_ROUNDING: Final = 2.0**-50
+"""More than the relative rounding error of a bound computed from a centre and a half extent."""
+
+SMALLEST: Final = 1e-40
+"""m: more than the rounding error of the smallest float32 numbers."""
+
+LARGEST_FLOAT32: Final = 3e38
+"""Nearly the largest float32; larger numbers would become infinite."""
 
 
 class HashedGrid(NamedTuple):
     """Grid with a capacity of N boxes and B buckets (a power of two)."""
 
     box: Any  # (N,) GRID_BOX
+    node: Any  # (N,) GRID_NODE: of the same boxes
     head: Any  # (B,) int32: first box of the bucket, -1: none
     level_head: Any  # (GRID_LEVELS,) int32
     level_count: Any  # (GRID_LEVELS,) int32
@@ -64,6 +92,7 @@ def make_hashed_grid(capacity: int) -> HashedGrid:
     box["level"] = -1
     return HashedGrid(
         box=box,
+        node=aligned_zeros(capacity, GRID_NODE),  # so that none is in two cache lines
         head=np.full(buckets, -1, np.int32),
         level_head=np.full(GRID_LEVELS, -1, np.int32),
         level_count=np.zeros(GRID_LEVELS, np.int32),
@@ -107,28 +136,59 @@ def remove_box(grid, i):
     box = grid.box[i]
     if box.level < 0:
         return
+    node = grid.node[i]
     if box.previous < -1:
-        grid.head[-2 - box.previous] = box.next
+        grid.head[-2 - box.previous] = node.next
     else:
-        grid.box[box.previous].next = box.next
-    if box.next >= 0:
-        grid.box[box.next].previous = box.previous
+        grid.node[box.previous].next = node.next
+    if node.next >= 0:
+        grid.box[node.next].previous = box.previous
     if box.level_previous < 0:
-        grid.level_head[box.level] = box.level_next
+        grid.level_head[box.level] = node.level_next
     else:
-        grid.box[box.level_previous].level_next = box.level_next
-    if box.level_next >= 0:
-        grid.box[box.level_next].level_previous = box.level_previous
+        grid.node[box.level_previous].level_next = node.level_next
+    if node.level_next >= 0:
+        grid.box[node.level_next].level_previous = box.level_previous
     grid.level_count[box.level] -= 1
     box.level = -1
+
+
+@inlined
+def _low(centre, half, rounding):
+    return centre - half - (rounding * (abs(centre) + half) + SMALLEST)
+
+
+@inlined
+def _high(centre, half, rounding):
+    return centre + half + (rounding * (abs(centre) + half) + SMALLEST)
+
+
+@inlined
+def _write_bounds(node, box):
+    """Write the bounds of a box (a Region), rounded outwards, into its node."""
+    node.low_x = np.float32(min(_low(box.x, box.hx, FLOAT32_ROUNDING), LARGEST_FLOAT32))
+    node.low_y = np.float32(min(_low(box.y, box.hy, FLOAT32_ROUNDING), LARGEST_FLOAT32))
+    node.low_z = np.float32(min(_low(box.z, box.hz, FLOAT32_ROUNDING), LARGEST_FLOAT32))
+    node.high_x = np.float32(max(_high(box.x, box.hx, FLOAT32_ROUNDING), -LARGEST_FLOAT32))
+    node.high_y = np.float32(max(_high(box.y, box.hy, FLOAT32_ROUNDING), -LARGEST_FLOAT32))
+    node.high_z = np.float32(max(_high(box.z, box.hz, FLOAT32_ROUNDING), -LARGEST_FLOAT32))
+
+
+@inlined
+def _may_overlap(low, high, node):
+    """Whether the bounds of a node meet the corners `low` and `high` (m) of a box; True if the boxes overlap."""
+    # no branches: each would be taken at random
+    along_x = (low[0] <= node.high_x) & (node.low_x <= high[0])
+    along_y = (low[1] <= node.high_y) & (node.low_y <= high[1])
+    return along_x & along_y & (low[2] <= node.high_z) & (node.low_z <= high[2])
 
 
 @device
 def put_box(grid, i, region):
     """Insert box i with the bounds `region`, or move it there."""
     remove_box(grid, i)
-    box = grid.box[i]
-    level = _level_of(max(region.hx, region.hy, region.hz))
+    box, node = grid.box[i], grid.node[i]
+    level = _level_of(2.0 * max(region.hx, region.hy, region.hz))
     size = 2.0 ** (level - LEVEL_OFFSET)
     x, y, z = _coordinate(region.x, size), _coordinate(region.y, size), _coordinate(region.z, size)
     bucket = _bucket(level, x, y, z, grid.head.size - 1)
@@ -136,15 +196,16 @@ def put_box(grid, i, region):
     box.cell_x, box.cell_y, box.cell_z = x, y, z
     box.x, box.y, box.z = region.x, region.y, region.z
     box.hx, box.hy, box.hz = region.hx, region.hy, region.hz
-    box.next = grid.head[bucket]
+    _write_bounds(node, region)
+    node.next = grid.head[bucket]
     box.previous = -2 - bucket
-    if box.next >= 0:
-        grid.box[box.next].previous = i
+    if node.next >= 0:
+        grid.box[node.next].previous = i
     grid.head[bucket] = i
-    box.level_next = grid.level_head[level]
+    node.level_next = grid.level_head[level]
     box.level_previous = -1
-    if box.level_next >= 0:
-        grid.box[box.level_next].level_previous = i
+    if node.level_next >= 0:
+        grid.box[node.level_next].level_previous = i
     grid.level_head[level] = i
     grid.level_count[level] += 1
 
@@ -156,13 +217,23 @@ def query_box(grid, box, i, found):
     Returns n. If n is larger than found.size, the rest was counted but not written.
     """
     n = 0
+    low = (
+        _low(box.x, box.hx, FLOAT64_ROUNDING),
+        _low(box.y, box.hy, FLOAT64_ROUNDING),
+        _low(box.z, box.hz, FLOAT64_ROUNDING),
+    )
+    high = (
+        _high(box.x, box.hx, FLOAT64_ROUNDING),
+        _high(box.y, box.hy, FLOAT64_ROUNDING),
+        _high(box.z, box.hz, FLOAT64_ROUNDING),
+    )
     for level in range(GRID_LEVELS):
         count = grid.level_count[level]
         if count == 0:
             continue
         size = 2.0 ** (level - LEVEL_OFFSET)
-        # a box of this level reaches at most one cell from its centre; the outermost level holds boxes of any size
-        reach = size if level < GRID_LEVELS - 1 else np.inf
+        # a box of this level reaches at most half a cell from its centre; the outermost level holds boxes of any size
+        reach = 0.5 * size if level < GRID_LEVELS - 1 else np.inf
         x0, x1 = np.floor((box.x - box.hx - reach) / size), np.floor((box.x + box.hx + reach) / size)
         y0, y1 = np.floor((box.y - box.hy - reach) / size), np.floor((box.y + box.hy + reach) / size)
         z0, z1 = np.floor((box.z - box.hz - reach) / size), np.floor((box.z + box.hz + reach) / size)
@@ -171,11 +242,11 @@ def query_box(grid, box, i, found):
         if not (cells <= 2.0 * count and outermost < CELL_LIMIT):
             j = grid.level_head[level]
             while j >= 0:
-                if j != i and regions_overlap(box, grid.box[j]):
+                if j != i and _may_overlap(low, high, grid.node[j]) and regions_overlap(box, grid.box[j]):
                     if n < found.size:
                         found[n] = j
                     n += 1
-                j = grid.box[j].level_next
+                j = grid.node[j].level_next
             continue
         for x in range(np.int64(x0), np.int64(x1) + 1):
             for y in range(np.int64(y0), np.int64(y1) + 1):
@@ -184,7 +255,8 @@ def query_box(grid, box, i, found):
                     while j >= 0:
                         other = grid.box[j]
                         if (
-                            regions_overlap(box, other)
+                            _may_overlap(low, high, grid.node[j])
+                            and regions_overlap(box, other)
                             and other.cell_x == x
                             and other.cell_y == y
                             and other.cell_z == z
@@ -194,7 +266,7 @@ def query_box(grid, box, i, found):
                             if n < found.size:
                                 found[n] = j
                             n += 1
-                        j = other.next
+                        j = grid.node[j].next
     return n
 
 

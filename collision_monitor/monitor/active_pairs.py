@@ -12,12 +12,14 @@ from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.candidates import is_checked
-from collision_monitor.monitor.carried_contacts import CARRIED, carry, keep, no_answers
+from collision_monitor.monitor.carried_contacts import CARRIED, Carrying, carry, has_answer, keep, no_answers, saved
+from collision_monitor.monitor.contact_depth import depth_of_boxes
 from collision_monitor.monitor.contact_details import complete_contact
 from collision_monitor.monitor.event_list import NO_EVENTS
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
+from collision_monitor.narrow_phase.contact_row import DISTANCE
 from collision_monitor.prediction.body_contact import RESULT, body_contact
 from collision_monitor.prediction.body_impact import Scratch, Window, body_impact
 from collision_monitor.prediction.impact_record import CLEAR, IMPACT, holds, ids_of_keys, pair_key
@@ -39,6 +41,9 @@ PAIR = np.dtype(
 
 PREFETCH_AHEAD: Final = 2
 """How many pairs ahead the bodies are prefetched."""
+
+UNITE_AHEAD: Final = 16
+"""The same in `_unite`, which does little with each pair."""
 
 Rows = NDArray[np.void]
 
@@ -116,6 +121,10 @@ class ActivePairs(Stage):
         self.pairs["since"] = np.nan
         self.end(np.arange(len(self.pairs)))
 
+    def forget_answers(self) -> None:
+        """Answer every contact anew in the next step, because carried answers may lack details that it needs."""
+        self._carried[:] = np.nan
+
     # ------------------------------------------------------------------ the step
 
     def unite(self, step: StepContext, due: Rows) -> None:
@@ -149,7 +158,8 @@ class ActivePairs(Stage):
 
     def examine(self, step: StepContext, which: NDArray[np.intp], scratch: Scratch, later: Rows) -> int:
         """Examine the pairs `which` (M,). Write the events of pairs certified apart to `later`; return how many."""
-        queries = step.settings.impact, step.settings.contact, step.profile.distance_tolerance
+        carrying = Carrying(step.profile.distance_tolerance, step.period)
+        queries = step.settings.impact, step.settings.contact, carrying, step.profile.contact_details
         n, tests, made = _examine(step.roster.multibody, self.active, which, step.now, queries, scratch, later)
         step.work.narrow_phase_tests += tests
         step.work.impact_queries += made
@@ -174,7 +184,7 @@ class ActivePairs(Stage):
     def save(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
         snapshot.arrays.update(pairs=self.pairs.copy(), pair_events=self.events.copy())
-        snapshot.arrays["carried"] = self._carried.copy()
+        snapshot.arrays["carried"] = saved(self._carried)
         facts["orphans"] = list(self._orphans)
 
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
@@ -202,18 +212,23 @@ def _unite(ids, used, version, pairs, events, carried, due, order, new_pairs, ne
     n = k = m = 0
     while k < pairs.size or m < order.size:
         if k < pairs.size:
+            ahead = pairs[min(k + UNITE_AHEAD, pairs.size - 1)]
+            prefetch(version, np.intp(ahead.i))
+            prefetch(version, np.intp(ahead.j))
+            prefetch(ids, np.intp(ahead.j))
             i, j = pairs[k].i, pairs[k].j
             gone = not (used[i] and used[j]) or pair_key(ids[i], ids[j]) != pairs[k].key
             changed = not holds(version, events[k])
             if gone or pairs[k].leaving == 1 or (changed and pairs[k].touching == 0):
                 k += 1
                 continue
-        for c in range(CARRIED if new_carried.shape[0] > 0 else 0):
-            new_carried[n, c] = np.nan
+        if new_carried.shape[0] > 0:
+            new_carried[n, DISTANCE] = np.nan
         if k < pairs.size and (m >= order.size or pairs[k].key <= due[order[m]].key):
-            takes_along = pairs[k].touching == 1 and carried.shape[0] > 0 and new_carried.shape[0] > 0
-            for c in range(CARRIED if takes_along else 0):
-                new_carried[n, c] = carried[k, c]
+            may_carry = pairs[k].touching == 1 and carried.shape[0] > 0 and new_carried.shape[0] > 0
+            if may_carry and has_answer(carried[k]):
+                for c in range(CARRIED):
+                    new_carried[n, c] = carried[k, c]
             new_pairs[n] = pairs[k]
             new_pairs[n].touched = pairs[k].touching
             new_events[n] = events[k]
@@ -233,14 +248,36 @@ def _unite(ids, used, version, pairs, events, carried, due, order, new_pairs, ne
 
 
 @inlined
-def _ask_for(table, bodies, i):
+def _ask_for_body(table, parts, bodies, i):
     row = np.intp(i)
     prefetch(bodies.position, row)
     prefetch(bodies.quaternion, row)
     prefetch(bodies.linear, row)
     prefetch(bodies.angular, row)
+    prefetch(bodies.acceleration, row)
+    prefetch(bodies.time, row)
+    prefetch(bodies.excess, row)
     prefetch(bodies.motion, row)
-    prefetch(table.size, np.intp(bodies.first_shape[i]))
+    shape = np.intp(bodies.first_shape[i])
+    prefetch(table.size, shape)
+    prefetch(table.margin, shape)
+    prefetch(table.kind, shape)
+    prefetch(parts.next, shape)
+    prefetch(parts.placed, shape)
+
+
+@inlined
+def _ask_for(multibody, pairs, which, at):
+    """Prefetch the data of the pairs that `_examine` visits after the pair at index `at` of `which`."""
+    table, parts, bodies = multibody
+    if at + 2 * PREFETCH_AHEAD < which.size:
+        far = pairs[which[at + 2 * PREFETCH_AHEAD]]
+        prefetch(bodies.first_shape, np.intp(far.i))
+        prefetch(bodies.first_shape, np.intp(far.j))
+    if at + PREFETCH_AHEAD < which.size:
+        near = pairs[which[at + PREFETCH_AHEAD]]
+        _ask_for_body(table, parts, bodies, near.i)
+        _ask_for_body(table, parts, bodies, near.j)
 
 
 @kernel
@@ -249,26 +286,27 @@ def _examine(multibody, active, which, now, queries, scratch, later):
 
     The pairs keep their indices. A pair that does not touch and is certified apart for a while returns to the event
     list: it is marked as leaving, and its event goes into `later` (IMPACT). A pair without a further impact, or one
-    that this step predicted anew, is marked as leaving too. queries: an ImpactQuery, a ContactQuery and the tolerance
-    (m) within which contacts are carried over.
+    that this step predicted anew, is marked as leaving too. queries: ImpactQuery, ContactQuery, Carrying, and
+    whether contacts have details.
     Returns (number of events in `later`, narrow-phase tests, impact queries).
     """
-    table, bodies = multibody.table, multibody.bodies
+    bodies = multibody.bodies
     pairs, events, results, carried = active
-    impact, contact, tolerance = queries
+    impact, contact, carrying, has_details = queries
     n_later = tests = made = 0
     for at in range(which.size):
-        if at + PREFETCH_AHEAD < which.size:
-            _ask_for(table, bodies, pairs[which[at + PREFETCH_AHEAD]].i)
-            _ask_for(table, bodies, pairs[which[at + PREFETCH_AHEAD]].j)
+        _ask_for(multibody, pairs, which, at)
         k = which[at]
         pair, event = pairs[k], events[k]
         i, j = pair.i, pair.j
-        may_carry = tolerance > 0.0 and pair.touched == 1
-        if may_carry and carry(multibody, i, j, now, contact, tolerance, scratch, carried[k], results[k]):
+        may_carry = carrying.tolerance > 0.0 and pair.touched == 1
+        if may_carry and carry(multibody, i, j, now, contact, carrying.tolerance, scratch, carried[k], results[k]):
             pair.touching, pair.leaving = 1, 0
             continue
-        touching, count = body_contact(multibody, i, j, now, contact, scratch, results[k])
+        is_complete = not has_details and depth_of_boxes(multibody, i, j, now, contact, scratch, results[k])
+        touching, count = True, 1
+        if not is_complete:
+            touching, count = body_contact(multibody, i, j, now, contact, scratch, results[k])
         tests += count
         stays = touching
         if not touching and not is_predicted_anew(bodies, i, j, now, event):
@@ -280,10 +318,10 @@ def _examine(multibody, active, which, now, queries, scratch, later):
                     n_later += 1
                 else:
                     stays = True
-        if touching:
+        if touching and not is_complete:
             complete_contact(multibody, i, j, now, scratch, results[k])
-        if tolerance > 0.0:
-            keep(multibody, i, j, touching, now, contact, scratch, results[k], carried[k])
+        if carrying.tolerance > 0.0:
+            keep(multibody, i, j, touching, now, contact, carrying, scratch, results[k], carried[k])
         if touching and pair.touched == 0:
             pair.since = now
         pair.touching = 1 if touching else 0

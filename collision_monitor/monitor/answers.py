@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor import records
-from collision_monitor._jit import kernel
+from collision_monitor._jit import inlined, kernel
+from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.active_pairs import ActivePairs
 from collision_monitor.monitor.event_list import EventList
@@ -34,6 +35,9 @@ from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, 
 from collision_monitor.prediction.body_impact import CLOSING
 from collision_monitor.prediction.impact_record import BOUND_ONLY, HIT, TREE_BOUND, UNRESOLVED, ids_of
 from collision_monitor.records import Phase, joined
+
+PREFETCH_AHEAD: Final = 8
+"""How many predictions ahead the bodies are prefetched."""
 
 PERSIST: Final = int(Phase.PERSIST)
 BEGIN: Final = int(Phase.BEGIN)
@@ -59,7 +63,9 @@ class Answers(Stage):
         if len(contacts):
             b = step.roster.bodies
             columns = b.model, multibody.parts.index
-            contacts = contacts[: write_contacts(active.pairs, active.results, *columns, step.now, contacts)]
+            details = step.profile.contact_details
+            n = write_contacts(active.pairs, active.results, *columns, step.now, details, contacts)
+            contacts = contacts[:n]
         if step.profile.contact_points > 1:
             contacts = with_patches(contacts, multibody, active.active, step.now, step.profile.contact_points)
         ended = active.take_orphans(step.now)
@@ -179,12 +185,20 @@ def count_answers(pairs, contacts, predictions):
     return touching, unresolved
 
 
+@inlined
+def _leave_out_details(contact):
+    for c in range(3):
+        contact.point_a[c] = contact.point_b[c] = nan
+    contact.closing_speed = nan
+    contact.feature_type_a = contact.feature_index_a = contact.feature_type_b = contact.feature_index_b = 0
+
+
 @kernel
-def write_contacts(pairs, results, model, shape_index, now, contacts):
+def write_contacts(pairs, results, model, shape_index, now, has_details, contacts):
     """Write the contacts (records.CONTACT) of the pairs that touch or have just ended; return their number.
 
     results (n, RESULT): of the pairs. model (N,): column of Bodies. shape_index (S,): a shape's place in its object's
-    description.
+    description. has_details: whether there are witness points, features and closing speeds.
     """
     n = 0
     for k in range(pairs.size):
@@ -209,6 +223,8 @@ def write_contacts(pairs, results, model, shape_index, now, contacts):
             contact.feature_type_b, contact.feature_index_b = int(row[FEATURE_TYPE_B]), int(row[FEATURE_INDEX_B])
             contact.phase = PERSIST if pair.touched == 1 else BEGIN
             contact.status = int(row[STATUS])
+            if not has_details:
+                _leave_out_details(contact)
         else:
             contact.signed_distance = contact.error_bound = contact.closing_speed = nan
             for c in range(3):
@@ -255,6 +271,13 @@ def write_predictions(predicted, bodies, shape_index, times, predictions, slots)
             event = pending[k - pairs.size]
             if event.lower > now + horizon:
                 break
+            ahead = pending[min(k - pairs.size + PREFETCH_AHEAD, pending.size - 1)]
+            prefetch(bodies.time, np.intp(ahead.i))
+            prefetch(bodies.time, np.intp(ahead.j))
+            prefetch(bodies.excess, np.intp(ahead.i))
+            prefetch(bodies.excess, np.intp(ahead.j))
+            prefetch(shape_index, np.intp(ahead.shape_i))
+            prefetch(shape_index, np.intp(ahead.shape_j))
         i, j = event.i, event.j
         slots[n, 0], slots[n, 1] = i, j
         row = predictions[n]

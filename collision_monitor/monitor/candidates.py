@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.broad_phase.hashed_grid import (
     HashedGrid,
@@ -28,8 +29,11 @@ from collision_monitor.prediction.motion import swept_box
 MOST_TESTS: Final = 6_000
 """Up to this number of pairs of a body to predict and any body, each is tested. For more, there are the grids."""
 
-MOST_QUERIES: Final = 0.01
+MOST_QUERIES: Final = 0.005
 """Up to this fraction of the bodies, each is queried in the hashed grid. For more, a dense grid is built and swept."""
+
+PREFETCH_AHEAD: Final = 4
+"""How many pairs ahead the bodies are prefetched."""
 
 Pairs = NDArray[np.int32]
 
@@ -214,6 +218,11 @@ def keep_new(bodies, box, pairs, is_new, now, margin):
     """
     n = 0
     for k in range(pairs.shape[0]):
+        ahead = min(k + PREFETCH_AHEAD, pairs.shape[0] - 1)
+        prefetch(bodies.motion, np.intp(pairs[ahead, 0]))
+        prefetch(bodies.motion, np.intp(pairs[ahead, 1]))
+        prefetch(box, np.intp(pairs[ahead, 0]))
+        prefetch(box, np.intp(pairs[ahead, 1]))
         i, j = pairs[k, 0], pairs[k, 1]
         first = _reporter(bodies, box, i, j, is_new, now, margin)
         if first >= 0:

@@ -5,6 +5,7 @@ the angle that each body turns times its radius, because every point of the surf
 at least the gap along the old normal, which changes by the motion along it, minus the same angles times the radii. An
 answer is carried over, to the middle of this range, while half of the range is within the tolerance and the pair
 certainly touches; half of the range is added to the error of the answer. Its witness points move with the bodies.
+An answer that the motion of the pair would end before the next step is not kept.
 Contacts of two meshes are carried over by their triangles (carried_triangles.py). Those of compounds and of other
 concave shapes are answered anew in every step.
 """
@@ -12,7 +13,7 @@ concave shapes are answered anew in every step.
 from __future__ import annotations
 
 from math import nan, sqrt
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,9 +45,29 @@ NORMAL_ERROR: Final = 1e-6
 """Largest error of a normal (rad); those of round surfaces are off by up to 1e-7."""
 
 
+class Carrying(NamedTuple):
+    """For how long contacts are carried over."""
+
+    tolerance: Any  # m: largest error that this may add; 0: every contact is computed in every step
+    period: Any  # s since the step before, which the next step is expected to take as well
+
+
 def no_answers() -> NDArray[np.float64]:
     """Return no rows."""
     return np.empty((0, CARRIED))
+
+
+def saved(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Copy the rows (n, CARRIED); those without an answer become NaN, because their other numbers are arbitrary."""
+    copy = rows.copy()
+    copy[np.isnan(rows[:, DISTANCE])] = nan
+    return copy
+
+
+@inlined
+def has_answer(row):
+    """Whether there is an answer to carry in a carried row."""
+    return row[DISTANCE] == row[DISTANCE]
 
 
 @inlined
@@ -72,7 +93,7 @@ def carry(multibody, i, j, now, query, tolerance, scratch, row, result):
 
     query: ContactQuery. tolerance: largest error (m) that this may add. Returns whether it holds.
     """
-    if not row[DISTANCE] <= query.margin:
+    if not has_answer(row):
         return False
     bodies, q = multibody.bodies, scratch.quaternion[0]
     relative = relative_now(bodies, i, j, now)
@@ -115,17 +136,35 @@ def _is_convex(multibody, i):
     return convex
 
 
+@inlined
+def _turning(bodies, i):
+    """Speed (m/s) at which the surface of body i turns."""
+    x, y, z = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
+    return bodies.spin_radius[i] * sqrt(x * x + y * y + z * z)
+
+
+@inlined
+def _outlasts(bodies, i, j, v, n, carrying):
+    """Whether an answer with normal n of bodies with relative velocity v (m/s) will hold after one more period."""
+    along = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
+    half = 0.5 * (sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) - along)
+    return (half + _turning(bodies, i) + _turning(bodies, j)) * carrying.period <= carrying.tolerance
+
+
 @device
-def keep(multibody, i, j, touching, now, query, scratch, result, row):
+def keep(multibody, i, j, touching, now, query, carrying, scratch, result, row):
     """Write the carried row of bodies i and j from their result row, if that may be carried."""
     row[DISTANCE] = nan
     if not (touching and result[STATUS] == TOUCHING):
         return
     bodies, q = multibody.bodies, scratch.quaternion[0]
-    by_trees = result[DISTANCE] <= 0.0 and meets_by_trees(multibody, i, j)
-    if not (by_trees or (_is_convex(multibody, i) and _is_convex(multibody, j))):
-        return
     relative = relative_now(bodies, i, j, now)
+    by_trees = result[DISTANCE] <= 0.0 and meets_by_trees(multibody, i, j)
+    if not by_trees:
+        if not _outlasts(bodies, i, j, relative.v, result[NORMAL : NORMAL + 3], carrying):
+            return
+        if not (_is_convex(multibody, i) and _is_convex(multibody, j)):
+            return
     for c in range(RESULT):
         row[c] = result[c]
     row[PLACE_I] = row[PLACE_J] = NONE if by_trees else NO_MESH

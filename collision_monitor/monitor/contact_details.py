@@ -162,6 +162,11 @@ def complete_contact(multibody: Any, i: int, j: int, now: float, scratch: Any, r
     """
     table, parts, bodies = multibody
     quaternion, R = scratch.quaternion, scratch.rotation
+    several = parts.next[bodies.first_shape[i]] >= 0 or parts.next[bodies.first_shape[j]] >= 0
+    several = several or has_mesh(table, bodies.first_shape[i], bodies.first_shape[j])
+    is_named = row[FEATURE_TYPE_A] != UNKNOWN and row[FEATURE_TYPE_B] != UNKNOWN
+    if is_named and not (several and row[DISTANCE] <= 0.0):
+        return
     n = (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2])
     rotation_now(bodies, i, now, quaternion, R[0])
     rotation_now(bodies, j, now, quaternion, R[1])
@@ -174,8 +179,6 @@ def complete_contact(multibody: Any, i: int, j: int, now: float, scratch: Any, r
             row[at], row[at + FEATURE_INDEX_A - FEATURE_TYPE_A] = feature_along(
                 table, s, rotate_back(R[2], n if side == 0 else opposite(n))
             )
-    several = parts.next[bodies.first_shape[i]] >= 0 or parts.next[bodies.first_shape[j]] >= 0
-    several = several or has_mesh(table, bodies.first_shape[i], bodies.first_shape[j])
     if several and row[DISTANCE] <= 0.0:
         if table.kind[int(row[SHAPE_I])] == HALF_SPACE or table.kind[int(row[SHAPE_J])] == HALF_SPACE:
             return  # the only way out is along its normal

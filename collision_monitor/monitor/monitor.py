@@ -106,6 +106,8 @@ class Monitor:
             self._roster.renew_all()
         if changed & {"horizon", "horizon_by_name"}:
             self._roster.bodies.slack[:] = 0.0  # its limits are multiples of the horizon
+        if "contact_details" in changed:
+            self._active_pairs.forget_answers()
         if "threads" in changed:
             self._first_impacts.use_threads(new.threads)
         self._prepare_for_budget()

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
+from collision_monitor._jit.alignment import in_one_block
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.planar import flat_pose, is_planar
@@ -70,7 +71,7 @@ class Roster(Stage):
     CACHES = ("_last_ids", "_last_slots", "_allowed_keys", "_all_memory", "_by_name")
 
     def __init__(self) -> None:
-        self.bodies: Bodies = make_bodies(FIRST_CAPACITY)
+        self.bodies: Bodies = _empty_bodies(FIRST_CAPACITY)
         self.parts = make_parts(FIRST_CAPACITY)
         self.top = 0
         self.planar = False
@@ -284,7 +285,7 @@ class Roster(Stage):
         if self._free:
             return self._free.pop()
         if self.top == self.capacity:
-            bodies = make_bodies(2 * self.top)
+            bodies = _empty_bodies(2 * self.top)
             enlarge(self.bodies, bodies)
             self.bodies = bodies
         self.top += 1
@@ -348,7 +349,7 @@ class Roster(Stage):
         bodies = Bodies(**snapshot.columns("bodies", self.bodies, top))
         parts = Parts(**snapshot.columns("parts", self.parts, count))
         _check_chains(bodies, parts, self._shapes.used.kind)
-        self.top, self.bodies, self.parts = top, make_bodies(capacity), make_parts(len(self._shapes.table.kind))
+        self.top, self.bodies, self.parts = top, _empty_bodies(capacity), make_parts(len(self._shapes.table.kind))
         enlarge(bodies, self.bodies)
         enlarge(parts, self.parts)
         used = self.used()
@@ -390,6 +391,10 @@ class Roster(Stage):
         free_blocks = {count: list(starts) for count, starts in facts["free_blocks"]}
         self._shapes = ShapeTableBuilder.restored(table, list(facts["free_shapes"]), free_blocks)
         plant_meshes(self._shapes, snapshot)
+
+
+def _empty_bodies(capacity: int) -> Bodies:
+    return in_one_block(make_bodies(capacity))
 
 
 def _check_chains(bodies: Bodies, parts: Parts, kind: NDArray[Any]) -> None:

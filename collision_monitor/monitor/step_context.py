@@ -66,6 +66,7 @@ class StepContext:
     settings: KernelSettings
     now: float  # s after the timeline's origin
     number: int  # of the step, from 1
+    period: float = 0.0  # s since the step before; known after stage 2
     work: Work = field(default_factory=Work)
     samples: int = 0  # of the states of uncertain pairs, see StepResult
 

@@ -70,13 +70,12 @@ class Tracking(Stage):
     """Compares the bodies' states with their predicted motions, and starts the bodies anew that left them."""
 
     SAVED = ("_outside", "_width", "_before")
-    CACHES = ("_columns", "_futile", "_are_few")
+    CACHES = ("_columns", "_are_few")
 
     def __init__(self) -> None:
         self._outside: NDArray[np.bool_] = np.zeros(0, np.bool_)  # by slot: outside of the region
         self._width: NDArray[np.float64] = np.zeros(0)  # by slot: part of the tolerances that the body uses
         self._before = 0.0  # time of the step before (s)
-        self._futile = 0.0  # duration of FUTILE_STEPS steps (s)
         self._are_few = False  # whether the scene has at most FEW_BODIES
         self._columns = make_columns()
 
@@ -129,7 +128,7 @@ class Tracking(Stage):
         settings, columns = step.settings.motion, self._columns
         seconds = step.now, step.horizons
         n, m, moving = find_moved(roster.bodies, uncertainty, roster.top, seconds, settings, columns, found)
-        self._futile, self._before = FUTILE_STEPS * (step.now - self._before), step.now
+        step.period, self._before = step.now - self._before, step.now
         self._are_few = moving <= FEW_BODIES
         return found[0, :n], found[1, :m]
 
@@ -144,7 +143,7 @@ class Tracking(Stage):
         bodies, settings = step.roster.bodies, step.settings.motion
         uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
         self._make_room(step.roster.capacity)
-        limits = self._futile, self._are_few
+        limits = FUTILE_STEPS * step.period, self._are_few
         seconds = step.now, step.horizons
         renew_motions(bodies, uncertainty, grid, moved, ending, seconds, limits, settings, self._width)
 

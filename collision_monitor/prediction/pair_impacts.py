@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from math import inf, isfinite
+from typing import Final
+
+import numpy as np
 
 from collision_monitor._jit import inlined, kernel
+from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.prediction.body_impact import Window, body_impact, tube_of
 from collision_monitor.prediction.impact_record import BOUND_ONLY, CLEAR, UNRESOLVED, write_pair
 from collision_monitor.prediction.motion import half_acceleration
 from collision_monitor.prediction.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
+
+PREFETCH_AHEAD: Final = 4
+"""How many pairs ahead the motions of the bodies are prefetched."""
 
 
 @inlined
@@ -36,6 +43,9 @@ def predict_pairs(multibody, pairs, now, query, events, scratch):
     """
     n = queries = 0
     for k in range(pairs.shape[0]):
+        ahead = min(k + PREFETCH_AHEAD, pairs.shape[0] - 1)
+        prefetch(multibody.bodies.motion, np.intp(pairs[ahead, 0]))
+        prefetch(multibody.bodies.motion, np.intp(pairs[ahead, 1]))
         i, j = pairs[k, 0], pairs[k, 1]
         window = window_of(multibody.bodies, i, j, now)
         if window.begin > now and window.begin >= window.end:

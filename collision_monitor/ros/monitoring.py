@@ -21,6 +21,7 @@ from collision_monitor.pipeline.pipeline import Outputs, Pipeline, TakenShapes
 from collision_monitor.pipeline.preparation import Preparation
 from collision_monitor.pipeline.topics import STATUS_PERIOD, Topic
 from collision_monitor.records import Phase
+from collision_monitor.ros.contact_readers import ContactReaders
 from collision_monitor.ros.endpoints import answer_publisher, subscription
 from collision_monitor.ros.health import Facts
 from collision_monitor.ros.keeping_up import KeepingUp
@@ -72,6 +73,7 @@ class Monitoring:
         self._preparation = Preparation()
         resources.callback(self._preparation.close)
         self._pipeline = Pipeline(profile, settings.frame_id, preparation=self._preparation, rules=rules)
+        self._chosen = profile  # without regard to what is read
         self._times = StepTimes(profile.max_time_step)
         self._peaks = StepPeaks()
         self._markers = MarkerView(self._pipeline.catalogue, settings.frame_id)
@@ -96,6 +98,8 @@ class Monitoring:
         states = subscription(node, Topic.STATES, self._on_states)
         self._shapes_in, self._states_in = shapes.topic_name, states.topic_name
         self._refusals = RefusalLog(self._pipeline.monitor, self._logger.warning)
+        readable = self._contacts_out, self._markers_out
+        self._readers = ContactReaders(readable, self._recording, self._pipeline)
         self._keeping_up = KeepingUp(states, self._times, self._refusals, profile, enabled=settings.keep_up)
         self._sources = self._live_sources(settings.sources)
         node.create_timer(WATCHDOG_PERIOD, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -154,6 +158,8 @@ class Monitoring:
     def _take_step(self, data: bytes) -> None:
         """Publish the answers, then record them. Publish status and markers and record a snapshot if they are due."""
         began, received = time.monotonic_ns(), self._now()
+        if self._readers.look():
+            self._use(self._chosen)
         outputs = self._answer(data, received)
         ended = time.monotonic_ns()
         self._refusals.report(self._states_in, ended)
@@ -178,7 +184,8 @@ class Monitoring:
             outputs = self._pipeline.on_states(states, received + self._keeping_up.mean_step)
             if outputs is not None:
                 self._predictions_out.publish(outputs.predictions)  # first: a warning is worth more if it is early
-                self._contacts_out.publish(outputs.contacts)
+                if self._readers.found or not self._readers.are_there:  # no first message without details
+                    self._contacts_out.publish(outputs.contacts)
                 self._monitored.move(states)  # before the alerts, which a guard compares with them
                 self._publish_alerts(outputs.alerts)
             return outputs
@@ -242,9 +249,9 @@ class Monitoring:
         self._check_rules()
 
     def _use(self, profile: Profile) -> None:
-        """Take the next steps with this profile."""
-        now = self._now()
-        change = self._pipeline.change_settings(profile, now, self._name)
+        """Take the next steps with this profile, of which the details of contacts only if anything reads them."""
+        now, self._chosen = self._now(), profile
+        change = self._pipeline.change_settings(self._readers.used(profile), now, self._name)
         self._recording.write(Topic.SETTINGS, change.settings, now, now, settings=self._pipeline.settings())
         if change.shapes is not None:
             self._record_shapes(change.shapes, now)

@@ -48,6 +48,11 @@ class NodeRecording:
     def __str__(self) -> str:
         return f"recording to {self._recorder.path}" if self._recorder else "not recording"
 
+    @property
+    def is_on(self) -> bool:
+        """Whether messages are recorded."""
+        return self._recorder is not None
+
     def write(self, topic: Topic, data: bytes, log_time: int, publish_time: int, **what: Any) -> None:
         """Record a message, as `Recorder.write` does."""
         if self._recorder is not None:

@@ -81,6 +81,10 @@ class Profile:
         "1",
         "Largest number of points of one contact. Above 1, touching faces have a row for each corner.",
     )
+    contact_details: bool = switch(
+        True,
+        "Whether to compute witness points, features and closing speeds of contacts. Without, they are NaN or UNKNOWN.",
+    )
     distance_tolerance: float = number(
         0.0,
         0.0,
@@ -253,6 +257,11 @@ class Profile:
                     f"horizon_by_name, {pattern}: expected at most the horizon, {self.horizon:g} s, got {value:g}; "
                     "raise the horizon, and name the classes with a shorter one"
                 )
+        if self.contact_points > 1 and not self.contact_details:
+            raise ProfileError(
+                f"contact_points, contact_details: expected contact_points 1 or contact_details true, got "
+                f"{self.contact_points} and false; the points of a contact are details"
+            )
         for axis, low, high in zip("xyz", self.region_min, self.region_max, strict=True):
             if not low <= high:
                 raise ProfileError(

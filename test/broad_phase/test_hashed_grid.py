@@ -43,6 +43,14 @@ SCENES = {
         rng.integers(0, 5, (n, 3)).astype(float),
         np.full((n, 3), 0.5) * [1, 1, 0],
     ),
+    "beyond float32": lambda rng, n: (
+        rng.choice([-1e60, 0.0, 1e-60, 1e60], (n, 3)),
+        10.0 ** rng.choice([-60, -45, 0, 45, 60], (n, 1)) * np.ones((1, 3)),
+    ),
+    "corner of a large box": lambda rng, n: (
+        np.where(np.arange(n)[:, None] % 2, 1e6, 1e-9 * rng.integers(-3, 4, (n, 3))),
+        np.where(np.arange(n)[:, None] % 2, 1e6, 1e-9) * np.ones((1, 3)),
+    ),
     "far out and without end": lambda rng, n: (
         rng.choice([-1e18, 0.0, 1e18], (n, 3)),
         np.where(rng.random((n, 1)) < 0.1, np.inf, rng.uniform(0, 1e3, (n, 3))),

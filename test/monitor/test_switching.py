@@ -26,6 +26,7 @@ OTHER: dict[str, Any] = {
     "rate_by_name": "*2=5",
     "contact_margin": 0.05,
     "contact_points": 4,
+    "contact_details": False,
     "distance_tolerance": 1e-3,
     "impact_tolerance": 1e-6,
     "impact_iterations": 200,

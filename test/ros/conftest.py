@@ -91,15 +91,20 @@ class Team:
         self.statuses: list[Any] = []
         self._shapes_out = self.publisher(ObjectDescriptionArray, "objects/shapes", quality_of(Topic.SHAPES))
         self._states_out = self.publisher(ObjectStateArray, "objects/states", quality_of(Topic.STATES))
-        self._subscribe(ContactArray, "contacts", quality_of(Topic.CONTACTS), self.contacts)
+        self._contacts_in = self._subscribe(ContactArray, "contacts", quality_of(Topic.CONTACTS), self.contacts)
         self._subscribe(PredictedCollisionArray, "predictions", quality_of(Topic.PREDICTIONS), self.predictions)
         self._subscribe(MonitorStatus, "status", quality_of(Topic.STATUS), self.statuses)
 
     def publisher(self, message: Any, topic: str, quality: QoSProfile) -> Any:
         return self.node.create_publisher(message, f"/object_monitor/{topic}", quality)
 
-    def _subscribe(self, message: Any, topic: str, quality: QoSProfile, kept: list[Any]) -> None:
-        self.node.create_subscription(message, f"/object_monitor/{topic}", kept.append, quality)
+    def _subscribe(self, message: Any, topic: str, quality: QoSProfile, kept: list[Any]) -> Any:
+        return self.node.create_subscription(message, f"/object_monitor/{topic}", kept.append, quality)
+
+    def stop_reading_contacts(self) -> None:
+        """Unsubscribe from the contacts."""
+        self.node.destroy_subscription(self._contacts_in)
+        self.listen(0.5)  # until the monitor has noticed
 
     def until(self, condition: Callable[[], Any], timeout: float = 10.0) -> None:
         """Listen until the condition holds; otherwise fail and show the last status."""

@@ -1,0 +1,81 @@
+"""Tests of contacts without details, against contacts with them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from collision_monitor.errors import ProfileError
+from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Cylinder, Sphere
+from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.narrow_phase.contact_row import UNKNOWN
+from collision_monitor.records import Model
+from collision_monitor.settings.profile import Profile
+
+FEATURES = ("feature_type_a", "feature_type_b", "feature_index_a", "feature_index_b")
+POINTS = ("point_a", "point_b", "closing_speed")
+BOX = Box((0.5, 0.4, 0.3))
+SHAPES = {
+    "boxes": [BOX],
+    "boxes in two slots each": [[(BOX, Pose()), (Sphere(0.1), Pose((0.2, 0, 0)))], BOX],
+    "boxes beside their origin": [[(BOX, Pose((0.1, 0.2, 0.3), (0, 0, 0.6, 0.8)))], BOX],
+    "others": [BOX, Sphere(0.2), Capsule(0.15, 0.4), Cylinder(0.2, 0.4), ConvexHull(np.eye(4, 3) - 0.25)],
+}
+
+
+def play(shapes, profile: Profile, *, seed: int, **fields):
+    """Yield the answers to bodies in a heap; some updates are missing, so that states become older than others."""
+    rng = np.random.default_rng(seed)
+    n = 40
+    monitor = Monitor(profile)
+    for i in range(n):
+        monitor.add(n - i, shapes[i % len(shapes)], **fields)
+    position, linear, angular = rng.uniform(0, 1.1, (n, 3)), rng.normal(size=(n, 3)), rng.normal(size=(n, 3))
+    quaternion = rng.normal(size=(n, 4))
+    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
+    quaternion[::5] = (0, 0, 0, 1)
+    for k in range(8):
+        seen = rng.random(n) < (0.7 if k else 1.1)
+        poses = np.hstack([position + 0.02 * k * linear, quaternion])
+        yield monitor.step(round(2e7 * k), 1 + np.flatnonzero(seen), poses[seen], np.hstack([linear, angular])[seen])
+
+
+@pytest.mark.parametrize("fields", [{}, {"model": Model.OBB}, {"padding": 0.02}], ids=["exact", "obb", "padding"])
+@pytest.mark.parametrize("tolerance", [0.0, 0.05])
+@pytest.mark.parametrize("shapes", SHAPES)
+def test_without_details_all_other_numbers_are_the_same_bytes(shapes: str, tolerance: float, fields) -> None:
+    profile = Profile(distance_tolerance=tolerance, contact_margin=0.01)
+    found = 0
+    lean = play(SHAPES[shapes], profile.replace(contact_details=False), seed=5, **fields)
+    for mine, truth in zip(lean, play(SHAPES[shapes], profile, seed=5, **fields), strict=True):
+        assert mine.predictions.tobytes() == truth.predictions.tobytes()
+        assert mine.status == truth.status
+        for name in truth.contacts.dtype.names:
+            if name not in POINTS + FEATURES:
+                assert np.array_equal(mine.contact_rows[name], truth.contact_rows[name], equal_nan=True), name
+        for name in POINTS:
+            assert np.isnan(mine.contact_rows[name]).all()
+        for name in FEATURES:
+            assert (mine.contact_rows[name] == UNKNOWN).all()
+        found += len(mine.contacts)
+    assert found > 300
+
+
+def test_points_of_contacts_need_details() -> None:
+    with pytest.raises(ProfileError, match="contact_points, contact_details: expected contact_points 1 or"):
+        Profile(contact_points=4, contact_details=False)
+
+
+def test_details_that_are_turned_on_are_not_those_of_answers_without_them() -> None:
+    monitor = Monitor(Profile(distance_tolerance=0.05, contact_details=False))
+    for i in (1, 2):
+        monitor.add(i, BOX)
+    poses = [(0, 0, 0, 0, 0, 0, 1), (0.45, 0, 0, 0, 0, 0, 1)]
+    for k in range(2):
+        (row,) = monitor.step(k * 10**7, [1, 2], poses).contacts
+        assert np.isnan(row["point_a"]).all()
+    monitor.profile = monitor.profile.replace(contact_details=True)
+    (row,) = monitor.step(2 * 10**7, [1, 2], poses).contacts
+    assert row["point_a"] == pytest.approx((0.25, 0, 0))
+    assert row["feature_type_a"] != UNKNOWN
