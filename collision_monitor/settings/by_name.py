@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fnmatch import fnmatchcase
-from functools import cache
+from functools import lru_cache
 from typing import Final
 
 from collision_monitor.errors import ProfileError
@@ -16,7 +16,7 @@ Classes = tuple[tuple[str, float], ...]
 """Pattern of the names and value of each class. An object belongs to the first one that matches."""
 
 
-@cache
+@lru_cache(maxsize=MOST_CLASSES)
 def classes_of(name: str, text: str) -> Classes:
     """Read the classes of the setting `name` from its text. Empty: none. Raises ProfileError."""
     wanted = f"{name}: expected patterns of names with a value each, such as 'person*=4, pallet_?=1'"

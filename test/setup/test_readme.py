@@ -50,7 +50,7 @@ def test_the_parameter_table_has_every_setting_with_its_default(setting: Profile
     text = {
         tuple: lambda: ", ".join(f"{x:g}" for x in default),
         bool: lambda: str(default).lower(),
-        str: lambda: f"`{default}`",
+        str: lambda: f"`{default}`" if default else "empty",
     }.get(setting.type, lambda: f"{default:g}")()
     assert f"| `{setting.name}` | {text} |" in (ROOT / "docs" / "node.md").read_text()
 
