@@ -23,6 +23,9 @@ from collision_monitor.prediction.sample_gaps import NOT_TURNED, enter_planes, g
 TRIED: Final = 32
 """Number of samples that decide how the normal of a plane turns."""
 
+BLOCK: Final = 256
+"""Number of samples among which the one that passes most briefly is sought."""
+
 
 class CutSettings(NamedTuple):
     """What counts as entered."""
@@ -41,19 +44,13 @@ def plane_margin(settings):
 
 
 @inlined
-def _next_sample(entry, leave, checked, samples, briefest, cursor):
-    """Sample that enters and is not checked: the one that leaves soonest, or the first from `cursor` on; -1: none."""
+def _briefest(entry, leave, checked, first, last):
+    """Sample of first:last that enters, is not checked, and leaves soonest; -1: none."""
     chosen, shortest = -1, inf
-    if briefest:
-        for n in range(samples):
-            length = leave[n] - entry[n]
-            if length >= 0.0 and length < shortest and checked[n] == 0.0:
-                chosen, shortest = n, length
-    else:
-        for n in range(cursor, samples):
-            if leave[n] >= entry[n] and checked[n] == 0.0:
-                chosen = n
-                break
+    for n in range(first, last):
+        length = leave[n] - entry[n]
+        if length >= 0.0 and length < shortest and checked[n] == 0.0:
+            chosen, shortest = n, length
     return chosen
 
 
@@ -146,25 +143,24 @@ def cut_extremes(table, parts, pair, k, extremes, settings, memory, scratch):
 def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch):
     """Add planes to segment k of memory.obstacle for a pair of shapes (ShapePair), where the first `samples` need them.
 
-    Every second sample is the one that passes the planes most briefly, because it may miss the shapes. The search ends
-    when `wanted` samples needed no plane, half of them after the last plane. `begin_segment` comes before it.
+    In each BLOCK of samples in turn, the one that passes the planes most briefly comes next, because it may miss the
+    shapes. The search ends when `wanted` samples needed no plane, half of them after the last plane. `begin_segment`
+    comes before it.
     """
     obstacle, entry, leave, checked = memory.obstacle, memory.entry, memory.leave, memory.checked
     for n in range(samples):
         checked[n] = 0.0
-    verified = cursor = 0
-    briefest = True
-    while verified < wanted and obstacle.count[k] < MOST_PLANES:
-        n = _next_sample(entry, leave, checked, samples, briefest, cursor)
-        if n < 0 and briefest:
-            break
-        is_brief, briefest = briefest, not briefest
+    blocks = -(-samples // BLOCK)
+    block, verified, idle = k, 0, 0
+    while verified < wanted and idle < blocks and obstacle.count[k] < MOST_PLANES:
+        first = block % blocks * BLOCK
+        n = _briefest(entry, leave, checked, first, min(first + BLOCK, samples))
+        block += 1
         if n < 0:
+            idle += 1
             continue
-        cursor = cursor if is_brief else n
-        checked[n] = 1.0
-        at = 0.5 * (entry[n] + leave[n]) if is_brief else entry[n]
-        if _check(table, parts, pair, n, at, samples, k, settings, memory, scratch):
+        idle, checked[n] = 0, 1.0
+        if _check(table, parts, pair, n, 0.5 * (entry[n] + leave[n]), samples, k, settings, memory, scratch):
             checked[n] = 0.0
             verified //= 2
         else:

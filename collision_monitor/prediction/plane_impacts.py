@@ -53,7 +53,7 @@ SPINS: Final = 4.0
 """Standard deviations of the angular velocity above which a body counts as one that turns."""
 
 VERIFIED_IN_PILOT: Final = 6
-VERIFIED: Final = 48
+VERIFIED: Final = 24
 """Samples of the pilot lattice, and of all, that must need no new plane of a segment."""
 
 SURE_EXTREMES: Final = 4
