@@ -117,14 +117,13 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         take_root(work.joint)
         _clear_upper(work.joint)
         errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, (far_i, far_j))
-        is_even = False
+        is_even = True
         if are_round(table, parts, pair, errors, query.margin, work):
-            samples = enter_round_bodies(table, parts, pair, errors, sampling, lattice, memory, work)
+            samples, is_even = enter_round_bodies(table, parts, pair, errors, sure, sampling, lattice, memory, work)
         elif sure:
-            is_even = True
             samples = enter_surely(multibody, i, j, errors, sampling, lattice, memory, work)
         else:
-            samples = enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work)
+            samples, is_even = enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work)
         if samples < 0:
             answers[k, PROBABILITY] = LEFT
             continue

@@ -20,7 +20,7 @@ from collision_monitor.prediction.cutting_planes import (
     end_segment,
 )
 from collision_monitor.prediction.impact_record import CLEAR
-from collision_monitor.prediction.normal_samples import FURTHEST, WIDENED
+from collision_monitor.prediction.normal_samples import FURTHEST
 from collision_monitor.prediction.obstacle_planes import MOST_SEGMENTS, set_nodes
 from collision_monitor.prediction.pair_errors import (
     BENDING,
@@ -32,7 +32,7 @@ from collision_monitor.prediction.pair_errors import (
 )
 from collision_monitor.prediction.sample_count import latest, samples_needed
 from collision_monitor.prediction.screening import meeting
-from collision_monitor.prediction.straight_samples import set_errors
+from collision_monitor.prediction.straight_samples import draw_evenly, set_errors
 from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE
 
 FACETS: Final = 0.015
@@ -138,7 +138,8 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
         begin_segment(table, pair, k, settings, memory, search.points, 0, samples)
         cut_extremes(table, parts, pair, k, search.extremes, settings, memory, scratch)
         cut_planes(table, parts, pair, k, samples, search.verified, settings, memory, scratch)
-        left = end_segment(memory.entry, memory.leave, alone, 0, samples)
+        before, left = left, end_segment(memory.entry, memory.leave, alone, 0, samples)
+        memory.obstacle.is_quiet[k] = left == before
         if left == 0:
             break
         if k + 1 < segments:
@@ -157,8 +158,10 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
     alone, times = memory.alone, memory.times
     for n in range(samples):
         alone[n] = inf
-    each = max(VERIFIED_IN_PILOT, verified // max(segments - 3, 1))
+    each = max(VERIFIED_IN_PILOT, verified // max(segments - 3, 1)) if verified > 0 else 0
     for k in range(segments):
+        if memory.obstacle.is_quiet[k]:
+            continue
         begin_segment(table, pair, k, settings, memory, points, 0, samples)
         cut_planes(table, parts, pair, k, samples, each, settings, memory, work.scratch)
         if end_segment(memory.entry, memory.leave, alone, 0, samples) == 0:
@@ -170,7 +173,8 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
 def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
     """Write the times of the samples' impacts of bodies i and j into memory.times.
 
-    work.joint: root of the covariance of the pair. Returns the number of samples, see `samples_needed`, or TOO_FAST.
+    work.joint: root of the covariance of the pair. Returns the number of samples, see `samples_needed`, or TOO_FAST;
+    and whether they have equal weights.
     """
     table, parts, bodies = multibody
     A, B = work.motion[0], work.motion[1]
@@ -186,7 +190,7 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
     while True:
         _lower(times, memory.alone, pilot)
         if not laid.complete:
-            return TOO_FAST
+            return TOO_FAST, False
         a, b = next_pair(parts, first_b, a, b)
         if a < 0:
             break
@@ -195,12 +199,15 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
         laid = _lay_planes(table, parts, pair, errors, search, until, sampling, memory, work)
     samples, until = samples_needed(times, lattice, sampling), latest(times, pilot)
     if samples == 0:
-        return 0
-    set_errors(work.joint, work.frame, errors.time, points, pilot, samples, memory.off)
+        return 0, False
+    is_even = until < inf
+    if is_even:
+        draw_evenly(work.joint)
+    set_errors(work.joint, work.frame, errors.time, points, 0 if is_even else pilot, samples, memory.off)
     for n in range(times.size):
         times[n] = inf
-    verified = VERIFIED_IN_PILOT if until < inf else VERIFIED
-    tolerance = max((FACETS_IN_PILOT if until < inf else FACETS) * errors.sigma, sampling.query.tolerance)
+    verified = 0 if is_even else VERIFIED
+    tolerance = max((FACETS_IN_PILOT if is_even else FACETS) * errors.sigma, sampling.query.tolerance)
     _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work)
     last_a, last_b = pair.a, pair.b  # its planes are still there; those of the others are laid again
     a, b = first_a, first_b
@@ -209,7 +216,7 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
         laid = _lay_planes(table, parts, pair, errors, search, min(end, until), sampling, memory, work)
         _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work)
         a, b = next_pair(parts, first_b, a, b)
-    return samples
+    return samples, is_even
 
 
 @device
@@ -220,8 +227,7 @@ def enter_surely(multibody, i, j, errors, sampling, lattice, memory, work):
     """
     table, parts, bodies = multibody
     times, points, samples = memory.times, lattice.points, lattice.pilot
-    for r in range(6):
-        work.joint[r, 0] /= WIDENED
+    draw_evenly(work.joint)
     set_errors(work.joint, work.frame, errors.time, points, 0, samples, memory.off)
     for n in range(samples):
         times[n] = inf

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from math import inf
+
 from collision_monitor._jit import device
 from collision_monitor.geometry.shape_table import CYLINDER, SPHERE
 from collision_monitor.narrow_phase.cylinder_cylinder import is_parallel
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.bodies import place_shape
-from collision_monitor.prediction.sample_count import samples_needed
-from collision_monitor.prediction.straight_samples import enter_cylinder, enter_sphere, set_errors
+from collision_monitor.prediction.sample_count import latest, samples_needed
+from collision_monitor.prediction.straight_samples import draw_evenly, enter_cylinder, enter_sphere, set_errors
 
 
 @device
@@ -47,16 +49,22 @@ def _enter_round(table, parts, pair, end, margin, first, last, memory, work):
 
 
 @device
-def enter_round_bodies(table, parts, pair, errors, sampling, lattice, memory, work):
+def enter_round_bodies(table, parts, pair, errors, sure, sampling, lattice, memory, work):
     """Write the times of the samples' impacts of bodies for which `are_round` holds into memory.times.
 
-    work.joint: root of the covariance of the pair. Returns the number of samples, see `samples_needed`.
+    work.joint: root of the covariance of the pair; sure: they surely meet. Returns the number of samples, see
+    `samples_needed`, and whether they have equal weights.
     """
     margin, end, pilot, points = sampling.query.margin, sampling.horizon, lattice.pilot, lattice.points
-    set_errors(work.joint, work.frame, errors.time, points, 0, pilot, memory.off)
-    _enter_round(table, parts, pair, end, margin, 0, pilot, memory, work)
-    samples = samples_needed(memory.times, lattice, sampling)
-    if samples > pilot:
-        set_errors(work.joint, work.frame, errors.time, points, pilot, samples, memory.off)
-        _enter_round(table, parts, pair, end, margin, pilot, samples, memory, work)
-    return samples
+    first, samples, is_even = 0, pilot, sure
+    if not sure:
+        set_errors(work.joint, work.frame, errors.time, points, 0, pilot, memory.off)
+        _enter_round(table, parts, pair, end, margin, 0, pilot, memory, work)
+        samples, is_even = samples_needed(memory.times, lattice, sampling), latest(memory.times, pilot) < inf
+        first = 0 if is_even else pilot
+    if is_even:
+        draw_evenly(work.joint)
+    if first < samples:
+        set_errors(work.joint, work.frame, errors.time, points, first, samples, memory.off)
+        _enter_round(table, parts, pair, end, margin, first, samples, memory, work)
+    return samples, is_even

@@ -9,10 +9,18 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Final
 
-from collision_monitor._jit import device
+from collision_monitor._jit import device, inlined
+from collision_monitor.prediction.normal_samples import WIDENED
 
 ERRORS: Final = 6
 """Rows of the errors: position at time 0 (m) and velocity (m/s) of B relative to A."""
+
+
+@inlined
+def draw_evenly(root):
+    """Undo for all samples that their first coordinate is drawn wider; root (6, 6): see `set_errors`."""
+    for r in range(root.shape[0]):
+        root[r, 0] /= WIDENED
 
 
 @device
