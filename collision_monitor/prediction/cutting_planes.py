@@ -21,9 +21,9 @@ from collision_monitor.prediction.obstacle_planes import (
 from collision_monitor.prediction.sample_gaps import NOT_TURNED, enter_planes, gaps_at_end, set_samples
 
 TRIED: Final = 32
-"""Number of samples that decide how the normal of a plane turns."""
+"""Number of samples that decide how the normal of a plane turns: a block of the samples, which are spread out."""
 
-BLOCK: Final = 256
+BLOCK: Final = 128
 """Number of samples among which the one that passes most briefly is sought."""
 
 
@@ -63,7 +63,8 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
     Of those that do, the best is the one behind which TRIED samples spend the least time. Returns whether there is one.
     """
     obstacle, rows, entry, leave = memory.obstacle, memory.rows, memory.entry, memory.leave
-    tried = min(TRIED, settings.pilot)
+    first = n // TRIED * TRIED
+    last = min(first + TRIED, samples)
     count, nodes = obstacle.count[k], obstacle.node[k : k + 2]
     planes, margin, before = obstacle.planes[k, count : count + 1], plane_margin(settings), leave[n] - entry[n]
     best, latest, span = -1, -inf, nodes[1].time - nodes[0].time
@@ -72,19 +73,14 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
         if mode != AT_REST and not settings.follows[mode]:
             continue
         set_plane(direction, mode, obstacle, planes[0])
-        trial_entry[n], trial_leave[n] = entry[n], leave[n]
-        enter_planes(table, pair, planes, margin, turning, nodes, n, n + 1, rows, trial_entry, trial_leave)
-        if not trial_leave[n] - trial_entry[n] < before:
-            continue
-        if not (settings.follows[0] or settings.follows[1]):
-            best = mode
-            break
-        for m in range(tried):
+        for m in range(first, last):
             trial_entry[m] = entry[m]
             trial_leave[m] = leave[m]
-        enter_planes(table, pair, planes, margin, turning, nodes, 0, tried, rows, trial_entry, trial_leave)
+        enter_planes(table, pair, planes, margin, turning, nodes, first, last, rows, trial_entry, trial_leave)
+        if not trial_leave[n] - trial_entry[n] < before:
+            continue
         total = 0.0
-        for m in range(tried):
+        for m in range(first, last):
             total += min(max(trial_entry[m] - trial_leave[m], -span), span)
         if total > latest:
             best, latest = mode, total

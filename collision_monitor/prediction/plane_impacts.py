@@ -52,8 +52,8 @@ shape, the pair is left to the exact method unless it surely meets: it needs so 
 SPINS: Final = 4.0
 """Standard deviations of the angular velocity above which a body counts as one that turns."""
 
-VERIFIED_IN_PILOT: Final = 6
-VERIFIED: Final = 24
+VERIFIED_IN_PILOT: Final = 4
+VERIFIED: Final = 36
 """Samples of the pilot lattice, and of all, that must need no new plane of a segment."""
 
 SURE_EXTREMES: Final = 4
