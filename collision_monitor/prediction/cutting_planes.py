@@ -18,13 +18,14 @@ from collision_monitor.prediction.obstacle_planes import (
     separation_at,
     set_plane,
 )
-from collision_monitor.prediction.sample_gaps import NOT_TURNED, enter_planes, gaps_at_end, set_samples
+from collision_monitor.prediction.sample_gaps import NOT_TURNED, SERIES, enter_planes, gaps_at_end, set_samples
 
 TRIED: Final = 32
-"""Number of samples that decide how the normal of a plane turns: a block of the samples, which are spread out."""
+"""Number of samples that decide how the normal of a plane turns: a block of the samples, which are spread out. With
+large errors of orientation it is the first one, so that all planes of a segment are compared alike."""
 
-BLOCK: Final = 128
-"""Number of samples among which the one that passes most briefly is sought."""
+BLOCK: Final = 256
+"""Number of samples among which the one that passes most briefly is sought; all with large errors of orientation."""
 
 
 class CutSettings(NamedTuple):
@@ -54,6 +55,15 @@ def _briefest(entry, leave, checked, first, last):
     return chosen
 
 
+@inlined
+def _entering(entry, leave, checked, first, last):
+    """First sample of first:last that enters and is not checked; -1: none."""
+    for n in range(first, last):
+        if leave[n] >= entry[n] and checked[n] == 0.0:
+            return n
+    return -1
+
+
 @device
 def _cut(table, pair, n, samples, direction, k, settings, memory):
     """Add the plane along the direction that separates sample n. Its normal may turn with a body.
@@ -63,7 +73,7 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
     Of those that do, the best is the one behind which TRIED samples spend the least time. Returns whether there is one.
     """
     obstacle, rows, entry, leave = memory.obstacle, memory.rows, memory.entry, memory.leave
-    first = n // TRIED * TRIED
+    first = n // TRIED * TRIED if max(settings.turning[0], settings.turning[1]) < SERIES else 0
     last = min(first + TRIED, samples)
     count, nodes = obstacle.count[k], obstacle.node[k : k + 2]
     planes, margin, before = obstacle.planes[k, count : count + 1], plane_margin(settings), leave[n] - entry[n]
@@ -77,6 +87,9 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
             trial_entry[m] = entry[m]
             trial_leave[m] = leave[m]
         enter_planes(table, pair, planes, margin, turning, nodes, first, last, rows, trial_entry, trial_leave)
+        if n >= last:
+            trial_entry[n], trial_leave[n] = entry[n], leave[n]
+            enter_planes(table, pair, planes, margin, turning, nodes, n, n + 1, rows, trial_entry, trial_leave)
         if not trial_leave[n] - trial_entry[n] < before:
             continue
         total = 0.0
@@ -139,24 +152,32 @@ def cut_extremes(table, parts, pair, k, extremes, settings, memory, scratch):
 def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch):
     """Add planes to segment k of memory.obstacle for a pair of shapes (ShapePair), where the first `samples` need them.
 
-    In each BLOCK of samples in turn, the one that passes the planes most briefly comes next, because it may miss the
-    shapes. The search ends when `wanted` samples needed no plane, half of them after the last plane. `begin_segment`
-    comes before it.
+    Every second sample is the one that passes the planes most briefly in a BLOCK of samples, in turn, because it may
+    miss the shapes. The search ends when `wanted` samples needed no plane, half of them after the last plane.
+    `begin_segment` comes before it.
     """
     obstacle, entry, leave, checked = memory.obstacle, memory.entry, memory.leave, memory.checked
     for n in range(samples):
         checked[n] = 0.0
-    blocks = -(-samples // BLOCK)
-    block, verified, idle = k, 0, 0
-    while verified < wanted and idle < blocks and obstacle.count[k] < MOST_PLANES:
-        first = block % blocks * BLOCK
-        n = _briefest(entry, leave, checked, first, min(first + BLOCK, samples))
-        block += 1
+    size = samples if max(settings.turning[0], settings.turning[1]) == SERIES else min(BLOCK, samples)
+    blocks = -(-samples // size)
+    block, cursor, verified, idle = k, 0, 0, 0
+    is_brief = False
+    while verified < wanted and idle < 2 * blocks and obstacle.count[k] < MOST_PLANES:
+        is_brief = not is_brief
+        if is_brief:
+            first = block % blocks * size
+            n = _briefest(entry, leave, checked, first, min(first + size, samples))
+            block += 1
+        else:
+            n = _entering(entry, leave, checked, cursor, samples)
+            cursor = n if n >= 0 else samples
         if n < 0:
             idle += 1
             continue
         idle, checked[n] = 0, 1.0
-        if _check(table, parts, pair, n, 0.5 * (entry[n] + leave[n]), samples, k, settings, memory, scratch):
+        at = 0.5 * (entry[n] + leave[n]) if is_brief else entry[n]
+        if _check(table, parts, pair, n, at, samples, k, settings, memory, scratch):
             checked[n] = 0.0
             verified //= 2
         else:

@@ -31,6 +31,7 @@ from collision_monitor.prediction.pair_errors import (
     turning_order,
 )
 from collision_monitor.prediction.sample_count import latest, samples_needed
+from collision_monitor.prediction.sample_gaps import SERIES
 from collision_monitor.prediction.screening import meeting
 from collision_monitor.prediction.straight_samples import draw_evenly, set_errors
 from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE
@@ -52,8 +53,8 @@ shape, the pair is left to the exact method unless it surely meets: it needs so 
 SPINS: Final = 4.0
 """Standard deviations of the angular velocity above which a body counts as one that turns."""
 
-VERIFIED_IN_PILOT: Final = 4
-VERIFIED: Final = 36
+VERIFIED_IN_PILOT: Final = 6
+VERIFIED: Final = 48
 """Samples of the pilot lattice, and of all, that must need no new plane of a segment."""
 
 SURE_EXTREMES: Final = 4
@@ -139,7 +140,7 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
         cut_extremes(table, parts, pair, k, search.extremes, settings, memory, scratch)
         cut_planes(table, parts, pair, k, samples, search.verified, settings, memory, scratch)
         before, left = left, end_segment(memory.entry, memory.leave, alone, 0, samples)
-        memory.obstacle.is_quiet[k] = left == before
+        memory.obstacle.is_quiet[k] = left == before and max(turning[0], turning[1]) < SERIES
         if left == 0:
             break
         if k + 1 < segments:
@@ -173,8 +174,7 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
 def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
     """Write the times of the samples' impacts of bodies i and j into memory.times.
 
-    work.joint: root of the covariance of the pair. Returns the number of samples, see `samples_needed`, or TOO_FAST;
-    and whether they have equal weights.
+    work.joint: root of the covariance of the pair. Returns the number of samples, see `samples_needed`, or TOO_FAST.
     """
     table, parts, bodies = multibody
     A, B = work.motion[0], work.motion[1]
@@ -190,7 +190,7 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
     while True:
         _lower(times, memory.alone, pilot)
         if not laid.complete:
-            return TOO_FAST, False
+            return TOO_FAST
         a, b = next_pair(parts, first_b, a, b)
         if a < 0:
             break
@@ -199,15 +199,13 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
         laid = _lay_planes(table, parts, pair, errors, search, until, sampling, memory, work)
     samples, until = samples_needed(times, lattice, sampling), latest(times, pilot)
     if samples == 0:
-        return 0, False
-    is_even = until < inf
-    if is_even:
-        draw_evenly(work.joint)
-    set_errors(work.joint, work.frame, errors.time, points, 0 if is_even else pilot, samples, memory.off)
+        return 0
+    meets = until < inf
+    set_errors(work.joint, work.frame, errors.time, points, pilot, samples, memory.off)
     for n in range(times.size):
         times[n] = inf
-    verified = 0 if is_even else VERIFIED
-    tolerance = max((FACETS_IN_PILOT if is_even else FACETS) * errors.sigma, sampling.query.tolerance)
+    verified = 0 if meets else VERIFIED
+    tolerance = max((FACETS_IN_PILOT if meets else FACETS) * errors.sigma, sampling.query.tolerance)
     _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work)
     last_a, last_b = pair.a, pair.b  # its planes are still there; those of the others are laid again
     a, b = first_a, first_b
@@ -216,7 +214,7 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
         laid = _lay_planes(table, parts, pair, errors, search, min(end, until), sampling, memory, work)
         _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work)
         a, b = next_pair(parts, first_b, a, b)
-    return samples, is_even
+    return samples
 
 
 @device

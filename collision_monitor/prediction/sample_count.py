@@ -7,13 +7,17 @@ from typing import Final
 
 from collision_monitor._jit import device, inlined
 
+SURE_SAMPLES: Final = 256
+"""Number of samples of a pair that meets in all of the pilot: they differ only in their times. With fewer, because of
+their weights, the earliest time would have to be that of grown bodies."""
+
 PILOT_PART: Final = 0.3
 """A pair of shapes that is stated to pass is left out if it meets in the pilot with less than this fraction of
 min_probability."""
 
 RARE: Final = 0.03
-"""Part of the pilot that meets, or does not, below which half of the samples suffice: the error of a probability falls
-with it."""
+"""Part of the pilot that does not meet below which half of the samples suffice: the error of the probability falls with
+it."""
 
 
 @inlined
@@ -29,8 +33,7 @@ def latest(times, count):
 def samples_needed(times, lattice, sampling):
     """Number of samples for bodies with these times (S,) of the pilot's samples; infinite: they do not meet.
 
-    0: the bodies are stated to pass, and hardly meet in the pilot. Those of the pilot: they meet in all of it, and only
-    their times differ, for which the samples are not drawn wider.
+    0: the bodies are stated to pass, and hardly meet in the pilot. SURE_SAMPLES: they meet in all of it.
     """
     weights, pilot = lattice.weights, lattice.pilot
     seen = part = 0.0
@@ -40,6 +43,5 @@ def samples_needed(times, lattice, sampling):
     if seen < part * PILOT_PART * sampling.min_probability and not sampling.stated:
         return 0
     if latest(times, pilot) < inf:
-        return pilot
-    is_rare = min(seen, part - seen) < RARE * part
-    return max(pilot, weights.size // 2) if is_rare else weights.size
+        return min(SURE_SAMPLES, weights.size)
+    return max(pilot, weights.size // 2) if part - seen < RARE * part else weights.size

@@ -107,3 +107,23 @@ def enter_cylinder(p, v, axis, radius, half, end, off, first, last, times):
         leave = high if high < leave else leave
         leave = end if end < leave else leave
         times[n] = at if at <= leave else inf
+
+
+@device
+def tilt(points, row, axis, up, turning, first, last, off):
+    """Move the samples first:last as errors of orientation move a point on a body's axis.
+
+    axis (3,): unit vector; up: height (m) of the point over the body's origin along it; turning: error of orientation
+    now (rad) and its rate (rad/s), one standard deviation. points (DIMENSIONS, S): unit errors, three rows from `row`.
+    """
+    ax, ay, az = axis
+    x, y, z = points[row, first:last], points[row + 1, first:last], points[row + 2, first:last]
+    for part in range(2):
+        by = up * turning[part]
+        u, v, w = off[3 * part, first:last], off[3 * part + 1, first:last], off[3 * part + 2, first:last]
+        for n in range(u.size):
+            u[n] += by * (y[n] * az - z[n] * ay)
+        for n in range(v.size):
+            v[n] += by * (z[n] * ax - x[n] * az)
+        for n in range(w.size):
+            w[n] += by * (x[n] * ay - y[n] * ax)
