@@ -18,14 +18,14 @@ from collision_monitor.prediction.obstacle_planes import (
     separation_at,
     set_plane,
 )
-from collision_monitor.prediction.sample_gaps import NOT_TURNED, SERIES, enter_planes, gaps_at_end, set_samples
+from collision_monitor.prediction.sample_gaps import NOT_TURNED, enter_planes, gaps_at_end, set_samples
 
 TRIED: Final = 32
-"""Number of samples that decide how the normal of a plane turns: a block of the samples, which are spread out. With
-large errors of orientation it is the first one, so that all planes of a segment are compared alike."""
+"""Number of samples that decide how the normal of a plane turns: a block of the samples, which are spread out. The
+first one if the search is careful, so that all planes of a segment are compared alike."""
 
 BLOCK: Final = 256
-"""Number of samples among which the one that passes most briefly is sought; all with large errors of orientation."""
+"""Number of samples among which the one that passes most briefly is sought; all if the search is careful."""
 
 
 class CutSettings(NamedTuple):
@@ -36,6 +36,7 @@ class CutSettings(NamedTuple):
     pilot: int  # number of samples of the pilot lattice
     follows: Any  # (bool, bool): whether normals may turn with the bodies
     turning: Any  # (int, int): how errors of orientation turn the bodies, see sample_gaps
+    careful: bool  # errors of orientation are large: compare more samples
 
 
 @inlined
@@ -73,7 +74,7 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
     Of those that do, the best is the one behind which TRIED samples spend the least time. Returns whether there is one.
     """
     obstacle, rows, entry, leave = memory.obstacle, memory.rows, memory.entry, memory.leave
-    first = n // TRIED * TRIED if max(settings.turning[0], settings.turning[1]) < SERIES else 0
+    first = 0 if settings.careful else n // TRIED * TRIED
     last = min(first + TRIED, samples)
     count, nodes = obstacle.count[k], obstacle.node[k : k + 2]
     planes, margin, before = obstacle.planes[k, count : count + 1], plane_margin(settings), leave[n] - entry[n]
@@ -159,7 +160,7 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
     obstacle, entry, leave, checked = memory.obstacle, memory.entry, memory.leave, memory.checked
     for n in range(samples):
         checked[n] = 0.0
-    size = samples if max(settings.turning[0], settings.turning[1]) == SERIES else min(BLOCK, samples)
+    size = samples if settings.careful else min(BLOCK, samples)
     blocks = -(-samples // size)
     block, cursor, verified, idle = k, 0, 0, 0
     is_brief = False

@@ -166,7 +166,7 @@ def enter_round_bodies(table, parts, pair, form, errors, sure, sampling, lattice
         draw_evenly(work.joint)
     set_errors(work.joint, work.frame, errors.time, points, 0, pilot, memory.off)
     _enter_round(table, parts, pair, form, errors, end, margin, 0, pilot, points, memory, work)
-    samples = pilot if sure else samples_needed(memory.times, lattice, sampling)
+    samples = pilot if sure else samples_needed(memory.times, lattice, sampling, False)
     if samples > pilot:
         set_errors(work.joint, work.frame, errors.time, points, pilot, samples, memory.off)
         _enter_round(table, parts, pair, form, errors, end, margin, pilot, samples, points, memory, work)

@@ -30,7 +30,7 @@ def latest(times, count):
 
 
 @device
-def samples_needed(times, lattice, sampling):
+def samples_needed(times, lattice, sampling, careful):
     """Number of samples for bodies with these times (S,) of the pilot's samples; infinite: they do not meet.
 
     0: the bodies are stated to pass, and hardly meet in the pilot. SURE_SAMPLES: they meet in all of it.
@@ -44,4 +44,4 @@ def samples_needed(times, lattice, sampling):
         return 0
     if latest(times, pilot) < inf:
         return min(SURE_SAMPLES, weights.size)
-    return max(pilot, weights.size // 2) if part - seen < RARE * part else weights.size
+    return max(pilot, weights.size // 2) if part - seen < RARE * part and not careful else weights.size
