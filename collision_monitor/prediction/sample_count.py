@@ -34,6 +34,7 @@ def samples_needed(times, lattice, sampling, careful):
     """Number of samples for bodies with these times (S,) of the pilot's samples; infinite: they do not meet.
 
     0: the bodies are stated to pass, and hardly meet in the pilot. SURE_SAMPLES: they meet in all of it.
+    careful: take all samples also if nearly all of the pilot meets.
     """
     weights, pilot = lattice.weights, lattice.pilot
     seen = part = 0.0
