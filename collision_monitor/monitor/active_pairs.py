@@ -13,6 +13,7 @@ from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.candidates import is_checked
 from collision_monitor.monitor.carried_contacts import CARRIED, Carrying, carry, has_answer, keep, no_answers, saved
+from collision_monitor.monitor.carried_triangles import overlap_of_trees
 from collision_monitor.monitor.contact_depth import depth_of_boxes
 from collision_monitor.monitor.contact_details import complete_contact
 from collision_monitor.monitor.event_list import NO_EVENTS
@@ -304,6 +305,8 @@ def _examine(multibody, active, which, now, queries, scratch, later):
             pair.touching, pair.leaving = 1, 0
             continue
         is_complete = not has_details and depth_of_boxes(multibody, i, j, now, contact, scratch, results[k])
+        if not is_complete and carrying.tolerance > 0.0:
+            is_complete = overlap_of_trees(multibody, i, j, now, contact, carrying, scratch, results[k])
         touching, count = True, 1
         if not is_complete:
             touching, count = body_contact(multibody, i, j, now, contact, scratch, results[k])

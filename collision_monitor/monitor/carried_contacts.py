@@ -26,6 +26,7 @@ from collision_monitor.monitor.carried_triangles import (
     PLACE_J,
     carry_triangles,
     meets_by_trees,
+    turning,
 )
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.prediction.body_contact import RESULT, STATUS, TOUCHING, closing_now, relative_now, widening
@@ -137,18 +138,11 @@ def _is_convex(multibody, i):
 
 
 @inlined
-def _turning(bodies, i):
-    """Speed (m/s) at which the surface of body i turns."""
-    x, y, z = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
-    return bodies.spin_radius[i] * sqrt(x * x + y * y + z * z)
-
-
-@inlined
 def _outlasts(bodies, i, j, v, n, carrying):
     """Whether an answer with normal n of bodies with relative velocity v (m/s) will hold after one more period."""
     along = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
     half = 0.5 * (sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) - along)
-    return (half + _turning(bodies, i) + _turning(bodies, j)) * carrying.period <= carrying.tolerance
+    return (half + turning(bodies, i) + turning(bodies, j)) * carrying.period <= carrying.tolerance
 
 
 @device

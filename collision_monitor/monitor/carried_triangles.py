@@ -8,15 +8,18 @@ middle of this range is reported. A full answer finds all pairs of triangles tha
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Final
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.meshes.depth_range import depth_range
 from collision_monitor.meshes.layout import WIDTH
-from collision_monitor.meshes.nearest import PAIRS
+from collision_monitor.meshes.nearest import PAIRS, PLACE_A, PLACE_B
 from collision_monitor.meshes.placing import relative
 from collision_monitor.meshes.touching import touching
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.narrow_phase.vector import dot
 from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.body_contact import (
     RESULT,
@@ -25,6 +28,7 @@ from collision_monitor.prediction.body_contact import (
     STATUS,
     TOUCHING,
     closing_now,
+    relative_now,
     widening,
 )
 from collision_monitor.prediction.body_impact import CLOSING
@@ -35,6 +39,9 @@ PLACE_I: Final = RESULT + 11
 PLACE_J: Final = RESULT + 12
 """Columns of a carried row: places of two triangles that met, WIDTH * block + member relative to the roots of their
 trees, which a snapshot does not keep in place. NONE: not known; NO_MESH: the pair has no trees."""
+
+WHOLE: Final = 2.0 - 1e-6
+"""Width of the range of an answer whose error is the whole tolerance, but for round-off, in tolerances."""
 
 NONE: Final = -1.0
 NO_MESH: Final = -2.0
@@ -75,27 +82,24 @@ def _meet(table, a, b, pose, row, scratch):
     return scratch.out[DISTANCE] <= 0.0
 
 
-@device
-def carry_triangles(multibody, i, j, now, there, moved, query, tolerance, scratch, row, result):
-    """Write the contact of bodies i and j at `now` (s) into a result row, from their carried row, if triangles meet.
-
-    there: the bodies (Now). moved (m): how far a surface can have moved relative to the other since the answer.
-    query: ContactQuery. tolerance: largest error (m) that this may add. Returns whether that suffices.
-    """
+@inlined
+def _placed(multibody, i, j, now, there, scratch):
+    """Offsets of the shapes of bodies i and j from their origins, and the pose of the pair at `now` (s)."""
     table, parts, bodies = multibody
     a, b = bodies.first_shape[i], bodies.first_shape[j]
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     rotation_now(bodies, i, now, scratch.quaternion, R_i)
     rotation_now(bodies, j, now, scratch.quaternion, R_j)
     oa, ob, p = place_shape(table, parts, a, R_i, R_a), place_shape(table, parts, b, R_j, R_b), there.p
-    pose = PairPose(R_a, R_b, (p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]))
-    if not _meet(table, a, b, pose, row, scratch):
-        return False
-    out = scratch.out
-    most, least = min(out[DISTANCE], row[DISTANCE] + moved), row[DISTANCE] - moved
+    return oa, PairPose(R_a, R_b, (p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]))
+
+
+@device
+def _write(multibody, i, j, there, oa, known, query, out, result):
+    """Write a contact of triangles (`out`) into a result row; its distance is between known[0] and known[1] (m)."""
+    bodies = multibody.bodies
+    least, most = known
     half = max(0.5 * (most - least), 0.0)
-    if not half <= tolerance:
-        return False
     for c in range(CONTACT_SIZE):
         result[c] = out[c]
     for c in range(3):
@@ -103,11 +107,67 @@ def carry_triangles(multibody, i, j, now, there, moved, query, tolerance, scratc
         result[POINT_B + c] += oa[c]
     result[CLOSING] = closing_now(bodies, i, j, there, result)
     result[DISTANCE] = most - half
-    result[BOUND] += row[BOUND] + half + widening(there, query.stale_acceleration)
+    result[BOUND] += half + widening(there, query.stale_acceleration)
     result[STATUS] = TOUCHING
-    result[SHAPE_I], result[SHAPE_J] = a, b
+    result[SHAPE_I], result[SHAPE_J] = bodies.first_shape[i], bodies.first_shape[j]
     for c in range(3):
         at = position_now(bodies, i, there.age_i, c)
         result[POINT_A + c] += at
         result[POINT_B + c] += at
+
+
+@device
+def carry_triangles(multibody, i, j, now, there, moved, query, tolerance, scratch, row, result):
+    """Write the contact of bodies i and j at `now` (s) into a result row, from their carried row, if triangles meet.
+
+    there: the bodies (Now). moved (m): how far a surface can have moved relative to the other since the answer.
+    query: ContactQuery. tolerance: largest error (m) that this may add. Returns whether that suffices.
+    """
+    table, bodies = multibody.table, multibody.bodies
+    oa, pose = _placed(multibody, i, j, now, there, scratch)
+    if not _meet(table, bodies.first_shape[i], bodies.first_shape[j], pose, row, scratch):
+        return False
+    out, moved = scratch.out, moved + row[BOUND]
+    most, least = min(out[DISTANCE], row[DISTANCE] + moved), row[DISTANCE] - moved
+    if not most - least <= 2.0 * tolerance:
+        return False
+    _write(multibody, i, j, there, oa, (least, most), query, out, result)
+    return True
+
+
+@inlined
+def turning(bodies, i):
+    """Speed (m/s) at which the surface of body i turns."""
+    x, y, z = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
+    return bodies.spin_radius[i] * sqrt(x * x + y * y + z * z)
+
+
+@device
+def overlap_of_trees(multibody, i, j, now, query, carrying, scratch, result):
+    """Write the contact of bodies i and j at `now` (s) into a result row, if triangles of both meet.
+
+    The search for the deepest triangles ends when the depth is known within the tolerance, or within half of it if the
+    other half lasts for the motion until the next step. Returns whether they meet. query: ContactQuery. carrying: see
+    carried_contacts.py.
+    """
+    if not meets_by_trees(multibody, i, j):
+        return False
+    table, bodies = multibody.table, multibody.bodies
+    a, b = bodies.first_shape[i], bodies.first_shape[j]
+    there = relative_now(bodies, i, j, now)
+    p, reach = there.p, bodies.motion[i].radius + bodies.motion[j].radius
+    if dot(p, p) > reach * reach:
+        return False
+    oa, pose = _placed(multibody, i, j, now, there, scratch)
+    X, out, answer = relative(pose.R_A, pose.R_B, pose.p), scratch.out, scratch.answer
+    speed = sqrt(dot(there.v, there.v)) + turning(bodies, i) + turning(bodies, j)
+    lasts = speed * carrying.period <= 0.5 * carrying.tolerance
+    wanted = (1.0 if lasts else WHOLE) * carrying.tolerance
+    least, most = depth_range(table.blocks, root_of(table, a), root_of(table, b), X, wanted, answer, scratch.tree)
+    if least < 0.0:
+        return False
+    triangles_contact(table, a, b, pose, (int(answer[PLACE_A]), int(answer[PLACE_B])), out)
+    if not out[DISTANCE] <= 0.0:
+        return False
+    _write(multibody, i, j, there, oa, (out[DISTANCE] - (most - least), out[DISTANCE]), query, out, result)
     return True
