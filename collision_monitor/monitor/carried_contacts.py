@@ -25,6 +25,7 @@ from collision_monitor.monitor.carried_triangles import (
     PLACE_I,
     PLACE_J,
     carry_triangles,
+    lasts,
     meets_by_trees,
     turning,
 )
@@ -154,7 +155,10 @@ def keep(multibody, i, j, touching, now, query, carrying, scratch, result, row):
     bodies, q = multibody.bodies, scratch.quaternion[0]
     relative = relative_now(bodies, i, j, now)
     by_trees = result[DISTANCE] <= 0.0 and meets_by_trees(multibody, i, j)
-    if not by_trees:
+    if by_trees:
+        if not lasts(bodies, i, j, relative.v, carrying):
+            return
+    else:
         if not _outlasts(bodies, i, j, relative.v, result[NORMAL : NORMAL + 3], carrying):
             return
         if not (_is_convex(multibody, i) and _is_convex(multibody, j)):

@@ -142,6 +142,13 @@ def turning(bodies, i):
     return bodies.spin_radius[i] * sqrt(x * x + y * y + z * z)
 
 
+@inlined
+def lasts(bodies, i, j, v, carrying):
+    """Whether bodies with relative velocity v (m/s) move at most half of the tolerance until the next step."""
+    speed = sqrt(dot(v, v)) + turning(bodies, i) + turning(bodies, j)
+    return speed * carrying.period <= 0.5 * carrying.tolerance
+
+
 @device
 def overlap_of_trees(multibody, i, j, now, query, carrying, scratch, result):
     """Write the contact of bodies i and j at `now` (s) into a result row, if triangles of both meet.
@@ -160,9 +167,7 @@ def overlap_of_trees(multibody, i, j, now, query, carrying, scratch, result):
         return False
     oa, pose = _placed(multibody, i, j, now, there, scratch)
     X, out, answer = relative(pose.R_A, pose.R_B, pose.p), scratch.out, scratch.answer
-    speed = sqrt(dot(there.v, there.v)) + turning(bodies, i) + turning(bodies, j)
-    lasts = speed * carrying.period <= 0.5 * carrying.tolerance
-    wanted = (1.0 if lasts else WHOLE) * carrying.tolerance
+    wanted = (1.0 if lasts(bodies, i, j, there.v, carrying) else WHOLE) * carrying.tolerance
     least, most = depth_range(table.blocks, root_of(table, a), root_of(table, b), X, wanted, answer, scratch.tree)
     if least < 0.0:
         return False
