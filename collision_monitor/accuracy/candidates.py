@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from collision_monitor.accuracy.demands import Demands
+from collision_monitor.accuracy.scope import wanted, with_horizon
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import containing_model, shape_class
@@ -84,8 +85,7 @@ class Space:
         return [each for each in found if self._allows(each)]
 
     def _based(self, name: str) -> Profile:
-        recorded = self.recorded
-        profile = Profile.named(name).replace(horizon=recorded.horizon, contact_margin=recorded.contact_margin)
+        profile = Profile.named(name).replace(**wanted(self.recorded))
         if self.uncertain and profile.uncertainty and profile.uncertainty_samples not in self.samples:
             return profile.replace(uncertainty_samples=self.samples[-1])
         return profile
@@ -101,11 +101,12 @@ class Space:
     def _changes(self, profile: Profile) -> Iterator[dict[str, Any]]:
         yield from ({"distance_tolerance": value} for value in DISTANCES)
         yield from ({f"model_{kind}": model} for kind, models in self.models.items() for model in models)
+        yield {"adaptive_tolerances": not profile.adaptive_tolerances}
         yield from ({"impact_tolerance": profile.impact_tolerance * factor} for factor in (10.0, 0.1))
         if self.uncertain and profile.uncertainty:
             yield from ({"uncertainty_samples": n} for n in self.samples if n < profile.uncertainty_samples)
         if self.horizon < profile.horizon:
-            yield {"horizon": self.horizon}
+            yield with_horizon(profile, self.horizon)
         if self.demands.budget_ms is not None:
             yield {"budget_ms": min(max(BUDGET_PART * self.demands.budget_ms, 0.05), NO_BUDGET)}
 
@@ -149,4 +150,4 @@ def _changed(profile: Profile, **changes: Any) -> Profile:
 def _text(value: Any) -> str:
     if isinstance(value, bool):
         return "on" if value else "off"
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{value:g}" if isinstance(value, float) else str(value)[:40]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from math import inf
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from collision_monitor.accuracy.measurement import Measurement
 from collision_monitor.accuracy.playback import Step, play
 from collision_monitor.accuracy.reference_monitor import ReferenceMonitor
 from collision_monitor.accuracy.reported import Reported
+from collision_monitor.accuracy.scope import compared, unfiltered
 from collision_monitor.accuracy.tally import Tally, compare_reports
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.monitor import Monitor
@@ -33,13 +35,11 @@ def exact_answers(
     progress: Progress,
     most_seconds: float = inf,
 ) -> tuple[Reported, int]:
-    """Return the exact answers with the horizon and the contact margin of the profile, and the number of steps.
+    """Return the exact answers with the horizon, contact margin and region of the profile, and the number of steps.
 
     most_seconds: time of the steps after which the others are left out.
     """
-    exact = Profile.named(REFERENCE).replace(
-        horizon=profile.horizon, contact_margin=profile.contact_margin, uncertainty=False
-    )
+    exact = Profile.named(REFERENCE).replace(uncertainty=False, **compared(profile))
     answers = play(ReferenceMonitor(exact), described, steps, progress, most_seconds).answers
     return Reported.of(answers), len(answers)
 
@@ -63,10 +63,12 @@ def measure_profile(
 ) -> Tally:
     """Play a profile over consecutive steps, and compare its answers with the exact ones to the same steps.
 
+    Its filters are off, because they only remove answers.
+
     first: place of the first of these steps among those of `contacts`. most_seconds: time of the steps, after which
     the others are left out.
     """
-    played = play(Monitor(profile, warns=False), described, steps, progress, most_seconds)
+    played = play(Monitor(unfiltered(profile), warns=False), described, steps, progress, most_seconds)
     count = len(played.answers)
     if count < len(steps):
         truth = truth.until(count)
@@ -91,10 +93,10 @@ def profile_tradeoff(
         raise InputError(f"scene {scene}: expected at least one step, there is none")
     described = list(descriptions)
     rows = []
-    truths: dict[tuple[float, float], tuple[Reported, Contacts]] = {}
+    truths: dict[tuple[Any, ...], tuple[Reported, Contacts]] = {}
     for each in profiles:
         profile = Profile.named(each) if isinstance(each, str) else each
-        key = (profile.horizon, profile.contact_margin)
+        key = tuple(compared(profile).values())
         if key in truths:
             progress(len(steps))
         else:

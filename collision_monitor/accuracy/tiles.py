@@ -20,6 +20,7 @@ import numpy as np
 from collision_monitor.accuracy.playback import Step, play
 from collision_monitor.accuracy.profile_tradeoff import Progress, contacts_of, exact_answers, measure_profile
 from collision_monitor.accuracy.reported import Reported
+from collision_monitor.accuracy.scope import compared
 from collision_monitor.accuracy.tally import Tally
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
@@ -46,11 +47,15 @@ class Recording:
 
     @classmethod
     def cut(
-        cls, described: list[ObjectDescription], steps: list[Step], horizons: Sequence[float], margin: float
+        cls, described: list[ObjectDescription], steps: list[Step], profile: Profile, horizons: Sequence[float]
     ) -> Self:
-        """Cut steps into tiles, and find all their contacts, which takes one run without predictions."""
+        """Cut steps into tiles, and find all their contacts, which takes one run without predictions.
+
+        profile: recorded one, whose contact margin and region apply.
+        """
         begins = np.linspace(0, len(steps), tiles_of(len(steps)) + 1).astype(int).tolist()
-        plain = Profile(name="contacts", horizon=0.0, contact_margin=margin, uncertainty=False)
+        none = {"horizon": 0.0, "horizon_by_name": "", "uncertainty": False}
+        plain = Profile(name="contacts", **compared(profile) | none)
         truth = Reported.of(play(Monitor(plain, warns=False), described, steps, lambda done: None).answers)
         return cls(described, steps, begins, {each: contacts_of(steps, truth, each) for each in horizons})
 
@@ -70,10 +75,10 @@ class Recording:
     def measure(self, tile: int, profiles: Sequence[Profile], most_seconds: float, progress: Progress) -> list[Tally]:
         """Measure profiles on a tile, most_seconds (s) of steps of each. progress: called after each profile."""
         first, steps = self.begins[tile], self.steps_of(tile)
-        truths: dict[tuple[float, float], Reported] = {}
+        truths: dict[tuple[Any, ...], Reported] = {}
         found = []
         for profile in profiles:
-            key = (profile.horizon, profile.contact_margin)
+            key = tuple(compared(profile).values())
             if key not in truths:
                 truths[key], _ = exact_answers(self.described, steps, profile, lambda done: None)
             contacts = self.contacts[profile.horizon]

@@ -57,7 +57,7 @@ def tune(work: Workload, space: Space, progress_bar: ProgressBar, jobs: int | No
     """Search the profiles of the space on a recording, on `jobs` cores (None: all)."""
     recorded = space.recorded
     horizons = sorted({space.horizon, recorded.horizon})
-    recording = Recording.cut(work.descriptions, work.steps, horizons, recorded.contact_margin)
+    recording = Recording.cut(work.descriptions, work.steps, recorded, horizons)
     with ExitStack() as stack:
         team = stack.enter_context(workers(recording, jobs))
         progress = stack.enter_context(progress_bar(work.name, _runs(space, recording.tiles, team.jobs)))

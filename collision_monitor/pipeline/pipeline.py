@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Collection, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
@@ -20,8 +19,6 @@ from collision_monitor.codec import (
     Change,
     MonitorStatus,
     ObjectStateArray,
-    Removal,
-    decode_descriptions,
     decode_states,
     encode_alert,
     encode_alerts,
@@ -31,16 +28,13 @@ from collision_monitor.codec import (
     encode_status,
 )
 from collision_monitor.codec.states import COVARIANCE_SIZE
-from collision_monitor.errors import InputError, MessageError, Refusal, TooCostlyError, reason_of
+from collision_monitor.errors import InputError, MessageError, Refusal
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.snapshot import Snapshot
-from collision_monitor.objects.bounding_box_model import bounding_box_model
-from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.objects.models import Modelled
-from collision_monitor.objects.preparation_cost import BOXES_MS, Budget, is_quick
 from collision_monitor.pipeline.catalogue import Catalogue
-from collision_monitor.pipeline.preparation import STAYS, Job, Preparation
+from collision_monitor.pipeline.frames import is_in_frame
+from collision_monitor.pipeline.preparation import Preparation
 from collision_monitor.pipeline.provenance import provenance
 from collision_monitor.pipeline.sequence import LostMessages
 from collision_monitor.pipeline.settings_event import (
@@ -51,13 +45,10 @@ from collision_monitor.pipeline.settings_event import (
     decode_settings,
     encode_settings,
 )
-from collision_monitor.records import Model
+from collision_monitor.pipeline.shape_intake import ShapeIntake, TakenShapes
 from collision_monitor.settings.profile import Profile
 
 Records = NDArray[np.void]
-Budgets = tuple[Budget, Budget]
-"""Of one message: for the objects with their own models, and for the boxes."""
-
 _PIPELINE: Final = "pipeline"
 """Key of the pipeline's entry in `Snapshot.facts`."""
 
@@ -84,14 +75,6 @@ class Outputs:
     alerts: tuple[bytes, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class TakenShapes:
-    """The changes that a message made; and the message as the monitor took it, which a session needs."""
-
-    changes: list[Change]
-    data: bytes
-
-
 class Pipeline:
     """Feeds a Monitor with message bytes. No method raises for the content of a message: it is refused and counted.
 
@@ -114,8 +97,7 @@ class Pipeline:
         self.monitor = Monitor(profile, timed=timed, warns=False)
         self.catalogue = Catalogue()
         self.frame_id = frame_id
-        self._preparation = preparation
-        self._without_model = 0, ""  # number of refusals then, and the last text about an object without its own model
+        self._shapes = ShapeIntake(self.monitor, self.catalogue, frame_id, preparation)
         self._lost = LostMessages()
         self._alerts = Alerts(rules)
         self._kept = frozenset(kept)
@@ -147,7 +129,7 @@ class Pipeline:
             self.monitor.refuse(Refusal.MALFORMED, str(error))
             return None
         self._lost.receive(message.sequence)
-        if not self._is_our_frame(message.frame_id, "ObjectStateArray"):
+        if not is_in_frame(self.monitor, self.frame_id, message.frame_id, "ObjectStateArray"):
             return None
         if len(message.covariance) not in (0, COVARIANCE_SIZE * len(message.states)):
             self.monitor.refuse(
@@ -195,120 +177,17 @@ class Pipeline:
         """
         return self.take_shapes(data).changes
 
-    def take_shapes(self, data: bytes, ready: Modelled | None = None) -> TakenShapes:
-        """Process an ObjectDescriptionArray as `on_shapes` does. Return what a session has to hold of it.
-
-        ready: what represents the only object of the message, if it is known already.
-        """
-        try:
-            message = decode_descriptions(data)
-        except Exception as error:  # see `reason_of`
-            self.monitor.refuse(Refusal.MALFORMED, reason_of(error))
-            return TakenShapes([], data)
-        if not self._is_our_frame(message.frame_id, "ObjectDescriptionArray"):
-            return TakenShapes([], data)
-        for _, text in message.refused:
-            self.monitor.refuse(Refusal.SHAPE, text)
-        changes = self.catalogue.changes(message)
-        implied = len(changes) - len(message.objects)
+    def take_shapes(self, data: bytes) -> TakenShapes:
+        """Process an ObjectDescriptionArray as `on_shapes` does. Return what a session has to hold of it."""
         self._alerts.forget_classes()
-        budgets, made, coarse = (Budget(), Budget(BOXES_MS)), [], []
-        for k, change in enumerate(changes):
-            taken = self._apply(change, message.stamp_ns, budgets, ready)
-            if taken is not None:
-                made.append(taken)
-                if taken is not change:
-                    coarse.append(message.model_at[k - implied])
-        return TakenShapes(made, _with_model(data, coarse, Model.AABB) if coarse else data)
-
-    def _apply(self, change: Change, stamp_ns: int, budgets: Budgets, ready: Modelled | None) -> Change | None:
-        """Change the monitor and then the catalogue. Return the change as it was made; None: it was refused."""
-        was_known = False
-        try:
-            if isinstance(change, Removal):
-                self.monitor.remove(change.object_id)
-            else:
-                was_known = change.object_id in self.monitor
-                change = self._describe(change, stamp_ns, budgets, ready)
-        except Exception as error:  # see `reason_of`
-            if not isinstance(change, Removal):  # removing an unknown object is no error
-                self.monitor.refuse(Refusal.SHAPE, _about(change.object_id, reason_of(error)))
-                if not was_known:  # an unexpected error may have left it in the monitor, but not in the catalogue
-                    with suppress(InputError):
-                        self.monitor.remove(change.object_id)
-            return None
-        self.catalogue.apply(change)
-        return change
-
-    def _describe(
-        self, change: ObjectDescription, stamp_ns: int, budgets: Budgets, ready: Modelled | None
-    ) -> ObjectDescription:
-        """Describe an object in the time that is left. Return the description that was taken.
-
-        The second budget, that of the boxes, is used in the same way live and in a replay, where `change` is what was
-        taken then. The first one is for the live monitor alone.
-        """
-        if is_quick(change.shapes):
-            self.monitor.describe(change, ready)
-            return change
-        own, boxes = budgets
-        model = self.monitor.model_of(change)
-        if model is not Model.AABB:
-            if ready is None and self._preparation is not None:
-                if own.fits(change.shapes, model) and self._described_within(own, change):
-                    return change
-                ready = self._preparation.result(change, model)
-            if ready is not None or self._preparation is None:
-                self.monitor.describe(change, ready)
-                return change
-            coarse = dataclasses.replace(change, model=Model.AABB)
-            self._preparation.start(self._job(change, coarse, stamp_ns, model))
-            change = coarse
-        if not (boxes.fits(change.shapes, Model.AABB) and self._described_within(boxes, change)):
-            self.monitor.describe(change, bounding_box_model(change.shapes))
-        return change
-
-    def _described_within(self, budget: Budget, change: ObjectDescription) -> bool:
-        """Describe an object; return False if that needs more exact arithmetic than the budget allows."""
-        try:
-            with budget.exact():
-                self.monitor.describe(change)  # the model is made before anything changes
-        except TooCostlyError:
-            return False
-        return True
-
-    def _job(self, change: ObjectDescription, coarse: ObjectDescription, stamp_ns: int, model: Model) -> Job:
-        """The job to make an object's own model: from its shapes as they will be decoded again, to the last bit."""
-        data = encode_descriptions(stamp_ns, self.frame_id, [change])
-        (again,) = decode_descriptions(data).objects
-        assert isinstance(again, ObjectDescription)
-        return Job(data, again, coarse, model)
+        return self._shapes.take(data)
 
     def take_prepared(self) -> tuple[list[TakenShapes], list[str]]:
         """Describe the objects again whose models are ready. Return what was taken, and texts about the others."""
-        taken, texts = [], []
-        for each in self._preparation.ended() if self._preparation is not None else ():
-            job, result = each.job, each.result
-            if self.catalogue.descriptions.get(job.object_id) is not job.coarse:
-                continue  # it was removed or described again
-            if isinstance(result, str):
-                texts.append(f"{_about(job.object_id, result)}; it {STAYS}")
-                self._without_model = self._refusals, texts[-1]
-            else:
-                same = self.monitor.model_of(job.description) is job.model
-                taken.append(self.take_shapes(job.data, result if same else None))
+        taken, texts = self._shapes.take_prepared()
+        if taken:
+            self._alerts.forget_classes()
         return taken, texts
-
-    @property
-    def _refusals(self) -> int:
-        return sum(self.monitor.refused.values())
-
-    def _is_our_frame(self, frame_id: str, message: str) -> bool:
-        """Return whether the frame is ours, else refuse the message. An empty frame counts as ours."""
-        if frame_id in ("", self.frame_id):
-            return True
-        self.monitor.refuse(Refusal.FRAME, f"{message}: expected frame_id {self.frame_id!r}, got {frame_id!r}")
-        return False
 
     # -- settings
 
@@ -390,7 +269,6 @@ class Pipeline:
             values = {"objects": objects, "objects_static": static, "objects_unseen": objects - static}
         if silent:
             values["objects_stale"] = values["objects"] - values["objects_static"] - values["objects_unseen"]
-        refusals, text = self._without_model
         values.update({f"refused_{reason.value}": monitor.refused.get(reason, 0) for reason in Refusal})
         return encode_status(
             MonitorStatus(
@@ -398,7 +276,7 @@ class Pipeline:
                 digest=monitor.digest,
                 version=VERSION,
                 profile=monitor.profile.name,
-                last_refusal=text if text and refusals == self._refusals else monitor.last_refusal,
+                last_refusal=self._shapes.last_refusal,
                 messages_lost=self._lost.count,
                 **values,
                 **live,
@@ -442,6 +320,7 @@ class Pipeline:
             pipeline.monitor = Monitor.restored(profile, snapshot, warns=False)
             pipeline._lost = LostMessages(facts["messages_lost"], facts["sequence"])
             pipeline.catalogue = Catalogue.restored(facts)
+            pipeline._shapes = ShapeIntake(pipeline.monitor, pipeline.catalogue, frame_id, None)
             if _ALERTS in snapshot.facts:
                 pipeline._alerts = Alerts.restored(snapshot, snapshot.facts[_ALERTS])
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
@@ -454,17 +333,3 @@ def _time(value: Any) -> int | None:
     if value is None or type(value) is int:
         return value
     raise InputError(f"parameter {NOW}: expected a time in ns, got {value!r}")
-
-
-def _about(object_id: int, text: str) -> str:
-    """The text, with the object in front unless it names it already."""
-    what = f"object {object_id}"
-    return text if text.startswith(what) else f"{what}: {text}"
-
-
-def _with_model(data: bytes, offsets: list[int], model: Model) -> bytes:
-    """Return a message with this model in the bytes at the offsets."""
-    changed = bytearray(data)
-    for at in offsets:
-        changed[at] = model
-    return bytes(changed)

@@ -17,8 +17,9 @@ from rclpy.lifecycle import LifecycleNode
 
 from collision_monitor import codec
 from collision_monitor.alerts.rules import Rules
-from collision_monitor.pipeline.pipeline import Outputs, Pipeline, TakenShapes
+from collision_monitor.pipeline.pipeline import Outputs, Pipeline
 from collision_monitor.pipeline.preparation import Preparation
+from collision_monitor.pipeline.shape_intake import TakenShapes
 from collision_monitor.pipeline.topics import STATUS_PERIOD, Topic
 from collision_monitor.records import Phase
 from collision_monitor.ros.contact_readers import ContactReaders

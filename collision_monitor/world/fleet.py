@@ -159,14 +159,14 @@ class Fleet(Scene):
         point: Array = node * PITCH + self._random.uniform(-room, room, node.shape)
         return point
 
-    def _walk_on(self, who: NDArray[np.intp]) -> None:
+    def _walk_on(self, walkers: NDArray[np.intp]) -> None:
         """Give people at their goal a new goal in a neighbouring crossing."""
-        next_node = self._goal_node[who][:, None] + HEADINGS
+        next_node = self._goal_node[walkers][:, None] + HEADINGS
         score = np.where(self._inside(next_node), self._random.random(next_node.shape[:2]), -1.0)
-        self._goal_node[who] = next_node[np.arange(len(who)), score.argmax(axis=1)]
-        self._from[who] = self._to[who]
-        self._to[who] = self._point_in_crossing(self._goal_node[who])
-        self._length[who] = np.linalg.norm(self._to[who] - self._from[who], axis=1)
+        self._goal_node[walkers] = next_node[np.arange(len(walkers)), score.argmax(axis=1)]
+        self._from[walkers] = self._to[walkers]
+        self._to[walkers] = self._point_in_crossing(self._goal_node[walkers])
+        self._length[walkers] = np.linalg.norm(self._to[walkers] - self._from[walkers], axis=1)
 
     def _advance_people(self, dt: float) -> None:
         self._walked += self._pace * dt

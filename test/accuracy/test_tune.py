@@ -117,8 +117,39 @@ def test_rungs_grow_to_all_tiles() -> None:
     assert rungs_of(1, 4) == [1, 1]
 
 
+WANTED = {
+    "horizon": 1.5,
+    "horizon_by_name": "pallet*=1, box_?=0.5",
+    "rate_by_name": "pallet*=2",
+    "contact_margin": 0.1,
+    "contact_points": 4,
+    "region_max": (5.0, 1e18, 1e18),
+    "ignore_separating": True,
+    "min_closing_speed": 0.2,
+    "stale_after": 0.3,
+}
+
+
+def test_a_search_keeps_what_the_recorded_profile_wants() -> None:
+    space = Space(Profile(**WANTED), Demands(horizon=0.75), uncertain=True, models={})
+    first = space.first_generation()
+    assert {name for each in first for name in WANTED if getattr(each, name) != WANTED[name]} == set()
+    assert {each.adaptive_tolerances for each in space.variations(first[0])} == {True, False}
+    shorter = [each for each in space.variations(first[0]) if each.horizon == 0.75]
+    assert [each.horizon_by_name for each in shorter] == ["pallet*=0.75, box_?=0.5"]
+
+
+def test_filters_and_a_region_are_no_misses(work: Workload) -> None:
+    half = {"region_max": (0.0, 1e18, 1e18), "ignore_separating": True, "min_closing_speed": 0.5}
+    whole, part = profile_tradeoff(
+        work.name, work.descriptions, work.steps, [Profile(uncertainty=False), Profile(uncertainty=False, **half)]
+    )
+    assert 0 < part.compared < whole.compared
+    assert (part.misses, part.outside_bound) == (0, 0)
+
+
 def test_the_file_makes_the_profile_again(tmp_path: Path) -> None:
-    space = Space(Profile(horizon=1.5, contact_margin=0.1), Demands(), uncertain=True, models={"primitive": ("obb",)})
+    space = Space(Profile(**WANTED), Demands(), uncertain=True, models={"primitive": ("obb",)})
     first = space.first_generation()
     for profile in [*first, *space.variations(first[3])]:
         text = parameter_file(profile, ["two", "lines"])

@@ -14,8 +14,9 @@ from collision_monitor.codec import Removal, decode_contacts, decode_status, enc
 from collision_monitor.errors import Refusal
 from collision_monitor.monitor import roster
 from collision_monitor.objects.description import MOST_SHAPES, ObjectDescription
-from collision_monitor.pipeline.pipeline import Pipeline, TakenShapes
+from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.preparation import STAYS, Preparation
+from collision_monitor.pipeline.shape_intake import TakenShapes
 from collision_monitor.records import STATE, Model
 from collision_monitor.session.replaying.difference import compare_status
 from collision_monitor.settings.profile import Profile

@@ -17,6 +17,7 @@ from collision_monitor.cli.main import main
 from collision_monitor.codec import decode_contacts, encode_contacts
 from collision_monitor.errors import InputError, SessionError
 from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorded, Session, Splitting
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.session.mcap.rosbag2 import full_name
@@ -28,6 +29,7 @@ from collision_monitor.session.recording.queue_entry import QueueEntry
 from collision_monitor.session.recording.session_file import SessionFile
 from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict
+from collision_monitor.settings.profile import Profile
 
 LENGTH = 0.54
 """s: 50 steps and the other messages between them."""
@@ -113,6 +115,20 @@ def test_quiet_sessions_have_few_snapshots(tmp_path: Path, often: None, monkeypa
     record(tmp_path / "run.mcap", snapshots=True)
     data = [each.data for each in Session(tmp_path / "run.mcap").entries() if isinstance(each, RecordedSnapshot)]
     assert len(data) == 1, "the first snapshot is written at once"
+
+
+def test_rates_of_classes_replay_from_the_middle(tmp_path: Path, often: None) -> None:
+    """Which state of a class is used next depends on the last one that was used, before the snapshot."""
+    classes = Profile(horizon_by_name="body 1=0.5, wall=1", rate_by_name="body [123]=15, body*=37")
+    record(tmp_path / "run", splitting=Splitting(size=1), snapshots=True, pipeline=Pipeline(classes))
+    record(tmp_path / "plain.mcap")
+    digests = [replay(Session(tmp_path / name)).digest for name in ("run", "plain.mcap")]
+    assert digests[0] != digests[1], "the classes matter"
+    files = sorted((tmp_path / "run").glob("*.mcap"))
+    assert len(files) > 2
+    for path in files:
+        report = replay(Session(path))
+        assert (report.verdict, report.late) == (Verdict.IDENTICAL, False)
 
 
 @pytest.mark.parametrize("splitting", [Splitting(duration=0.2), Splitting(size=1)])
