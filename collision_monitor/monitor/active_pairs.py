@@ -309,9 +309,10 @@ def _examine(multibody, active, which, now, queries, scratch, later):
             pair.touching, pair.leaving = 1, 0
             continue
         is_complete = not has_details and depth_of_boxes(multibody, i, j, now, contact, scratch, results[k])
+        touching, count, spread = True, 1, 0.0
         if not is_complete and carrying.tolerance > 0.0:
-            is_complete = overlap_of_trees(multibody, i, j, now, contact, carrying, scratch, results[k])
-        touching, count = True, 1
+            found = overlap_of_trees(multibody, i, j, now, contact, carrying, scratch, results[k])
+            is_complete, spread = found >= 0.0, max(found, 0.0)
         if not is_complete:
             touching, count = body_contact(multibody, i, j, now, contact, scratch, results[k])
         tests += count
@@ -330,7 +331,7 @@ def _examine(multibody, active, which, now, queries, scratch, later):
         if touching and not is_complete:
             complete_contact(multibody, i, j, now, scratch, results[k])
         if carrying.tolerance > 0.0:
-            keep(multibody, i, j, touching, now, contact, carrying, scratch, results[k], carried[k])
+            keep(multibody, i, j, touching, now, contact, carrying, scratch, results[k], carried[k], spread)
         if touching and pair.touched == 0:
             pair.since = now
         pair.touching = 1 if touching else 0

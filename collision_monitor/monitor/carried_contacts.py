@@ -147,8 +147,11 @@ def _outlasts(bodies, i, j, v, n, carrying):
 
 
 @device
-def keep(multibody, i, j, touching, now, query, carrying, scratch, result, row):
-    """Write the carried row of bodies i and j from their result row, if that may be carried."""
+def keep(multibody, i, j, touching, now, query, carrying, scratch, result, row, spread):
+    """Write the carried row of bodies i and j from their result row, if that may be carried.
+
+    spread: by how much the distance of the deepest triangles may differ (m), of two meshes.
+    """
     row[DISTANCE] = nan
     if not (touching and result[STATUS] == TOUCHING):
         return
@@ -166,7 +169,7 @@ def keep(multibody, i, j, touching, now, query, carrying, scratch, result, row):
     for c in range(RESULT):
         row[c] = result[c]
     row[PLACE_I] = row[PLACE_J] = NONE if by_trees else NO_MESH
-    row[BOUND] -= widening(relative, query.stale_acceleration)
+    row[BOUND] = spread if by_trees else row[BOUND] - widening(relative, query.stale_acceleration)
     for c in range(3):
         row[POINT_A + c] -= position_now(bodies, i, relative.age_i, c)
         row[POINT_B + c] -= position_now(bodies, j, relative.age_j, c)

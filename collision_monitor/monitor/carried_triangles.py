@@ -12,14 +12,15 @@ from math import sqrt
 from typing import Final
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.meshes.boxes import half_of
 from collision_monitor.meshes.depth_range import depth_range
-from collision_monitor.meshes.layout import WIDTH
+from collision_monitor.meshes.layout import CENTER, WIDTH
 from collision_monitor.meshes.nearest import PAIRS, PLACE_A, PLACE_B
-from collision_monitor.meshes.placing import relative
+from collision_monitor.meshes.placing import relative, turned_back
 from collision_monitor.meshes.touching import touching
-from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, POINT_A, POINT_B
+from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.narrow_phase.vector import dot
+from collision_monitor.narrow_phase.vector import dot, opposite, rotate_back
 from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.body_contact import (
     RESULT,
@@ -84,7 +85,7 @@ def _meet(table, a, b, pose, row, scratch):
 
 @inlined
 def _placed(multibody, i, j, now, there, scratch):
-    """Offsets of the shapes of bodies i and j from their origins, and the pose of the pair at `now` (s)."""
+    """Offset of the shape of body i from its origin in world axes, and the pose of the pair of shapes at `now` (s)."""
     table, parts, bodies = multibody
     a, b = bodies.first_shape[i], bodies.first_shape[j]
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
@@ -94,12 +95,29 @@ def _placed(multibody, i, j, now, there, scratch):
     return oa, PairPose(R_a, R_b, (p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]))
 
 
+@inlined
+def _reach(table, s, R, n):
+    """How far the box of a whole tree reaches from its shape's origin along n (m). R: rotation of the shape."""
+    blocks, root, d = table.blocks, root_of(table, s), rotate_back(R, n)
+    m, e = turned_back(blocks, root, 0, d), half_of(blocks, root, 0)
+    c = blocks[root, CENTER, 0], blocks[root, CENTER + 1, 0], blocks[root, CENTER + 2, 0]
+    return dot(c, d) + abs(m[0]) * e[0] + abs(m[1]) * e[1] + abs(m[2]) * e[2] + table.margin[s]
+
+
 @device
-def _write(multibody, i, j, there, oa, known, query, out, result):
-    """Write a contact of triangles (`out`) into a result row; its distance is between known[0] and known[1] (m)."""
-    bodies = multibody.bodies
+def _write(multibody, i, j, there, placed, known, query, out, result):
+    """Write a contact of triangles (`out`) into a result row; the deepest ones have a distance in known (m, m).
+
+    A translation along the normal that parts both solids may be longer than the depth; the bound holds that of their
+    boxes. placed: of `_placed`. Returns half of the width of the known range.
+    """
+    table, bodies = multibody.table, multibody.bodies
+    oa, pose = placed
     least, most = known
     half = max(0.5 * (most - least), 0.0)
+    n = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
+    parting = _reach(table, bodies.first_shape[i], pose.R_A, n) - dot(n, pose.p)
+    parting += _reach(table, bodies.first_shape[j], pose.R_B, opposite(n))
     for c in range(CONTACT_SIZE):
         result[c] = out[c]
     for c in range(3):
@@ -107,13 +125,14 @@ def _write(multibody, i, j, there, oa, known, query, out, result):
         result[POINT_B + c] += oa[c]
     result[CLOSING] = closing_now(bodies, i, j, there, result)
     result[DISTANCE] = most - half
-    result[BOUND] += half + widening(there, query.stale_acceleration)
+    result[BOUND] += max(half, parting + most - half) + widening(there, query.stale_acceleration)
     result[STATUS] = TOUCHING
     result[SHAPE_I], result[SHAPE_J] = bodies.first_shape[i], bodies.first_shape[j]
     for c in range(3):
         at = position_now(bodies, i, there.age_i, c)
         result[POINT_A + c] += at
         result[POINT_B + c] += at
+    return half
 
 
 @device
@@ -124,14 +143,15 @@ def carry_triangles(multibody, i, j, now, there, moved, query, tolerance, scratc
     query: ContactQuery. tolerance: largest error (m) that this may add. Returns whether that suffices.
     """
     table, bodies = multibody.table, multibody.bodies
-    oa, pose = _placed(multibody, i, j, now, there, scratch)
+    placed = _placed(multibody, i, j, now, there, scratch)
+    pose = placed[1]
     if not _meet(table, bodies.first_shape[i], bodies.first_shape[j], pose, row, scratch):
         return False
     out, moved = scratch.out, moved + row[BOUND]
     most, least = min(out[DISTANCE], row[DISTANCE] + moved), row[DISTANCE] - moved
     if not most - least <= 2.0 * tolerance:
         return False
-    _write(multibody, i, j, there, oa, (least, most), query, out, result)
+    _write(multibody, i, j, there, placed, (least, most), query, out, result)
     return True
 
 
@@ -154,25 +174,26 @@ def overlap_of_trees(multibody, i, j, now, query, carrying, scratch, result):
     """Write the contact of bodies i and j at `now` (s) into a result row, if triangles of both meet.
 
     The search for the deepest triangles ends when the depth is known within the tolerance, or within half of it if the
-    other half lasts for the motion until the next step. Returns whether they meet. query: ContactQuery. carrying: see
-    carried_contacts.py.
+    other half lasts for the motion until the next step. Returns by how much the distance of the deepest triangles may
+    differ (m); NONE if none meet. query: ContactQuery. carrying: see carried_contacts.py.
     """
     if not meets_by_trees(multibody, i, j):
-        return False
+        return NONE
     table, bodies = multibody.table, multibody.bodies
     a, b = bodies.first_shape[i], bodies.first_shape[j]
     there = relative_now(bodies, i, j, now)
     p, reach = there.p, bodies.motion[i].radius + bodies.motion[j].radius
     if dot(p, p) > reach * reach:
-        return False
-    oa, pose = _placed(multibody, i, j, now, there, scratch)
+        return NONE
+    placed = _placed(multibody, i, j, now, there, scratch)
+    pose = placed[1]
     X, out, answer = relative(pose.R_A, pose.R_B, pose.p), scratch.out, scratch.answer
     wanted = (1.0 if lasts(bodies, i, j, there.v, carrying) else WHOLE) * carrying.tolerance
     least, most = depth_range(table.blocks, root_of(table, a), root_of(table, b), X, wanted, answer, scratch.tree)
     if least < 0.0:
-        return False
+        return NONE
     triangles_contact(table, a, b, pose, (int(answer[PLACE_A]), int(answer[PLACE_B])), out)
     if not out[DISTANCE] <= 0.0:
-        return False
-    _write(multibody, i, j, there, oa, (out[DISTANCE] - (most - least), out[DISTANCE]), query, out, result)
-    return True
+        return NONE
+    known = out[DISTANCE] - (most - least), out[DISTANCE]
+    return _write(multibody, i, j, there, placed, known, query, out, result)

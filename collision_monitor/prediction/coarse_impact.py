@@ -50,7 +50,7 @@ STEPS: Final = 500
 SHARE: Final = 0.2
 """Largest gap at which the search ends, as a part of the distance that the bodies move until then."""
 
-TRIES: Final = (1.0, 2.0, 4.0)
+TRIES: Final = (1.5, 4.0)
 """Times after the lower end at which triangles may meet: those in which the bodies move by so many gaps."""
 
 TOO_MANY: Final = 253
