@@ -23,6 +23,7 @@ from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.narrow_phase.contact_row import DISTANCE
 from collision_monitor.prediction.body_contact import RESULT, body_contact
 from collision_monitor.prediction.body_impact import Scratch, Window, body_impact
+from collision_monitor.prediction.coarse_impact import are_trees, coarse_impact
 from collision_monitor.prediction.impact_record import CLEAR, HIT, IMPACT, holds, ids_of_keys, pair_key
 from collision_monitor.prediction.pair_impacts import cover_of
 from collision_monitor.records import Model, Phase
@@ -163,8 +164,7 @@ class ActivePairs(Stage):
     def examine(self, step: StepContext, which: NDArray[np.intp], scratch: Scratch, later: Rows) -> int:
         """Examine the pairs `which` (M,). Write the events of pairs certified apart to `later`; return how many."""
         carrying = Carrying(step.profile.distance_tolerance, step.period)
-        wait = SOON * step.period if step.coarse > 0.0 else 0.0
-        queries = step.settings.impact, step.settings.contact, carrying, step.profile.contact_details, wait
+        queries = step.settings.impact, step.settings.contact, carrying, step.profile.contact_details, step.coarse
         n, tests, made = _examine(step.roster.multibody, self.active, which, step.now, queries, scratch, later)
         step.work.narrow_phase_tests += tests
         step.work.impact_queries += made
@@ -292,12 +292,12 @@ def _examine(multibody, active, which, now, queries, scratch, later):
     The pairs keep their indices. A pair that does not touch and is certified apart for a while returns to the event
     list: it is marked as leaving, and its event goes into `later` (IMPACT). A pair without a further impact, or one
     that this step predicted anew, is marked as leaving too. queries: ImpactQuery, ContactQuery, Carrying,
-    whether contacts have details, and the time (s) for which a pair waits that certainly meets within it.
+    whether contacts have details, and the gap (m) to which impacts of meshes are bounded, or 0.
     Returns (number of events in `later`, narrow-phase tests, impact queries).
     """
     bodies = multibody.bodies
     pairs, events, results, carried = active
-    impact, contact, carrying, has_details, wait = queries
+    impact, contact, carrying, has_details, coarse = queries
     n_later = tests = made = 0
     for at in range(which.size):
         _ask_for(multibody, pairs, which, at)
@@ -317,11 +317,14 @@ def _examine(multibody, active, which, now, queries, scratch, later):
             touching, count = body_contact(multibody, i, j, now, contact, scratch, results[k])
         tests += count
         stays = touching
-        if not touching and _meets_soon(bodies, event, now, wait):
+        if not touching and coarse > 0.0 and _meets_soon(bodies, event, now, SOON * carrying.period):
             stays = True
         elif not touching and not is_predicted_anew(bodies, i, j, now, event):
             window = Window(now, cover_of(bodies, i, j))
-            made += body_impact(multibody, i, j, window, impact, scratch, event)
+            bounded = coarse > 0.0 and pair.touched == 1 and are_trees(multibody, i, j)
+            bounded = bounded and coarse_impact(multibody, i, j, window, impact, coarse, scratch, event)
+            if not bounded or (event.status != CLEAR and event.lower <= now):
+                made += body_impact(multibody, i, j, window, impact, scratch, event)
             if event.status != CLEAR:
                 if event.lower > now:
                     later[n_later] = event

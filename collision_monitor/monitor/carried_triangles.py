@@ -44,6 +44,9 @@ trees, which a snapshot does not keep in place. NONE: not known; NO_MESH: the pa
 WHOLE: Final = 2.0 - 1e-6
 """Width of the range of an answer whose error is the whole tolerance, but for round-off, in tolerances."""
 
+SMALL: Final = 0.1
+"""Tolerance, in radii of the smaller body, from which the boxes of two trees bound the depth well enough."""
+
 NONE: Final = -1.0
 NO_MESH: Final = -2.0
 
@@ -164,9 +167,14 @@ def turning(bodies, i):
 
 @inlined
 def lasts(bodies, i, j, v, carrying):
-    """Whether bodies with relative velocity v (m/s) move at most half of the tolerance until the next step."""
+    """Whether to carry the contact of bodies over that have the relative velocity v (m/s).
+
+    They have to move at most half of the tolerance until the next step. If the tolerance is not small beside their
+    boxes, a new answer takes no longer.
+    """
     speed = sqrt(dot(v, v)) + turning(bodies, i) + turning(bodies, j)
-    return speed * carrying.period <= 0.5 * carrying.tolerance
+    small = carrying.tolerance < SMALL * min(bodies.motion[i].radius, bodies.motion[j].radius)
+    return small and speed * carrying.period <= 0.5 * carrying.tolerance
 
 
 @device

@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Final
 
-from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit import device, inlined, kernel, outlined
 from collision_monitor.meshes.approach import seen_from_b
 from collision_monitor.meshes.box_times import box_times
 from collision_monitor.meshes.contact import reach_in
@@ -172,8 +172,8 @@ def _write_hit(pair, t, event, out):
     event.closing_speed = closing_speed(v, (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz), p, out)
 
 
-@device
-def _bound(multibody, i, j, window, query, tolerance, scratch, event):
+@outlined
+def coarse_impact(multibody, i, j, window, query, tolerance, scratch, event):
     """Write a bound on the first impact of two bodies of one tree each into the IMPACT record `event`.
 
     event.status = CLEAR if there is none. Returns False if only a full search can tell, for example if one of the
@@ -219,7 +219,7 @@ def _bound(multibody, i, j, window, query, tolerance, scratch, event):
 
 
 @inlined
-def _are_trees(multibody, i, j):
+def are_trees(multibody, i, j):
     """Whether two bodies are one shape each, with a tree, one of them a mesh or a cloud."""
     table, parts, bodies = multibody
     a, b = bodies.first_shape[i], bodies.first_shape[j]
@@ -236,12 +236,12 @@ def bound_meshes(multibody, pairs, now, query, tolerance, events, rest, scratch)
     n = left = made = 0
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
-        if _are_trees(multibody, i, j):
+        if are_trees(multibody, i, j):
             window = window_of(multibody.bodies, i, j, now)
             if window.begin > now and window.begin >= window.end:
                 continue
             made += 1
-            if _bound(multibody, i, j, window, query, tolerance, scratch, events[n]):
+            if coarse_impact(multibody, i, j, window, query, tolerance, scratch, events[n]):
                 if events[n].status != CLEAR:
                     n += 1
                 continue
