@@ -53,11 +53,11 @@ def drifting_meshes(objects: int, seconds: float, *, seed: int = 1, turns: float
     for k in range(round(seconds * RATE)):
         steps.append((round(k * 1e9 / RATE), states.copy()))
         states["position"] += states["linear"] / RATE
-        states["quaternion"] = np.array(
-            [multiply(from_rotation_vector(w / RATE), q) for w, q in zip(states["angular"], states["quaternion"], strict=True)]
-        )
+        turn = from_rotation_vector(states["angular"] / RATE)
+        states["quaternion"] = [multiply(*each) for each in zip(turn, states["quaternion"], strict=True)]
         outward = (np.abs(states["position"]) > half) & (states["position"] * states["linear"] > 0)
         states["linear"] = np.where(outward, -states["linear"], states["linear"])
         new = rng.random(objects) < turns / RATE
-        states["linear"][new], states["angular"][new] = rng.normal(0, 0.6, (new.sum(), 3)), rng.normal(0, 0.5, (new.sum(), 3))
+        states["linear"][new] = rng.normal(0, 0.6, (new.sum(), 3))
+        states["angular"][new] = rng.normal(0, 0.5, (new.sum(), 3))
     return Workload(f"meshes ({objects:,})", [ObjectDescription(int(i), kinds[i % len(kinds)]) for i in ids], steps)

@@ -68,7 +68,8 @@ def _radius_of(blocks, block, member):
 def _boxes_meet(table, parts, pair, now, window, tube, query, tolerance, scratch):
     """Time in a window (begin, end; s) until which two trees stay apart; CLEAR, UNRESOLVED or TOO_MANY; a gap (m).
 
-    UNRESOLVED: at that time they may be within the gap, which is at most the tolerance (m). pair: ShapePair. The tube's time begins with the window.
+    UNRESOLVED: at that time they may be within the gap, which is at most the tolerance (m), and shorter near `now` (s).
+    pair: ShapePair. The tube's time begins with the window.
     """
     begin, end = window
     blocks, work = table.blocks, scratch.tree
@@ -142,7 +143,7 @@ def _triangles_meet(table, parts, pair, t, allowed, scratch):
 
     The contact, about A's origin, stays in scratch.out.
     """
-    A, B, a, b = pair
+    a, b = pair.a, pair.b
     pose, out, answer = _pose_at(table, parts, pair, t, scratch), scratch.out, scratch.answer
     X = relative(pose.R_A, pose.R_B, pose.p)
     found, _ = depth_range(table.blocks, root_of(table, a), root_of(table, b), X, inf, answer, scratch.tree)
