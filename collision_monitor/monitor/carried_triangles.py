@@ -2,8 +2,9 @@
 
 The depth of two solids changes by at most the distance that the origins move relative to each other, plus the angle
 that each body turns times its radius. It is at least the depth of any pair of their triangles. So one pair of triangles
-that meets proves the contact, and bounds the distance from above; the last full answer bounds it from both sides. The
-middle of this range is reported. A full answer finds all pairs of triangles that meet, which takes much longer.
+that meets proves the contact, and bounds the distance from above; the last answer bounds it from both sides. The middle
+of this range is reported. A new answer is a range too (meshes/depth_range.py): to find all pairs of triangles that meet
+takes much longer.
 """
 
 from __future__ import annotations
@@ -40,6 +41,11 @@ PLACE_I: Final = RESULT + 11
 PLACE_J: Final = RESULT + 12
 """Columns of a carried row: places of two triangles that met, WIDTH * block + member relative to the roots of their
 trees, which a snapshot does not keep in place. NONE: not known; NO_MESH: the pair has no trees."""
+
+LASTING: Final = 1.0
+LASTS: Final = 0.5
+"""Largest motion until the next step with which a contact is carried over, and the width of the range of its answer, in
+tolerances. The range widens by half of the motion, where the deepest triangles stay the same."""
 
 WHOLE: Final = 2.0 - 1e-6
 """Width of the range of an answer whose error is the whole tolerance, but for round-off, in tolerances."""
@@ -169,21 +175,21 @@ def turning(bodies, i):
 def lasts(bodies, i, j, v, carrying):
     """Whether to carry the contact of bodies over that have the relative velocity v (m/s).
 
-    They have to move at most half of the tolerance until the next step. If the tolerance is not small beside their
+    They have to move by less than the tolerance until the next step. If the tolerance is not small beside their
     boxes, a new answer takes no longer.
     """
     speed = sqrt(dot(v, v)) + turning(bodies, i) + turning(bodies, j)
     small = carrying.tolerance < SMALL * min(bodies.motion[i].radius, bodies.motion[j].radius)
-    return small and speed * carrying.period <= 0.5 * carrying.tolerance
+    return small and speed * carrying.period <= LASTING * carrying.tolerance
 
 
 @device
 def overlap_of_trees(multibody, i, j, now, query, carrying, scratch, result):
     """Write the contact of bodies i and j at `now` (s) into a result row, if triangles of both meet.
 
-    The search for the deepest triangles ends when the depth is known within the tolerance, or within half of it if the
-    other half lasts for the motion until the next step. Returns by how much the distance of the deepest triangles may
-    differ (m); NONE if none meet. query: ContactQuery. carrying: see carried_contacts.py.
+    The search for the deepest triangles ends when the depth is known within the tolerance, or within a quarter of it if
+    the answer is carried over. Returns by how much the distance of the deepest triangles may differ (m); NONE if none
+    meet. query: ContactQuery. carrying: see carried_contacts.py.
     """
     if not meets_by_trees(multibody, i, j):
         return NONE
@@ -196,7 +202,7 @@ def overlap_of_trees(multibody, i, j, now, query, carrying, scratch, result):
     placed = _placed(multibody, i, j, now, there, scratch)
     pose = placed[1]
     X, out, answer = relative(pose.R_A, pose.R_B, pose.p), scratch.out, scratch.answer
-    wanted = (1.0 if lasts(bodies, i, j, there.v, carrying) else WHOLE) * carrying.tolerance
+    wanted = (LASTS if lasts(bodies, i, j, there.v, carrying) else WHOLE) * carrying.tolerance
     least, most = depth_range(table.blocks, root_of(table, a), root_of(table, b), X, wanted, answer, scratch.tree)
     if least < 0.0:
         return NONE
