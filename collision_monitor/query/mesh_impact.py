@@ -31,12 +31,18 @@ _MEMORY: Final = _Memory()
 
 
 def mesh_impact(
-    shape_a: Shape, motion_a: Motion, shape_b: Shape, motion_b: Motion, query: tuple[float, float, float, int]
+    shape_a: Shape,
+    motion_a: Motion,
+    shape_b: Shape,
+    motion_b: Motion,
+    query: tuple[float, float, float, int],
+    begin: float = 0.0,
 ) -> tuple[float, float] | None:
     """First impact of two moving shapes: lower and upper (s), infinite for none; of an open mesh its surface.
 
-    query: horizon (s), tolerance (m), separation (m), iterations. None for a pair without trees or without a mesh,
-    and for shapes that touch at the start, which have to be followed (touching.py).
+    query: horizon (s), tolerance (m), separation (m), iterations. begin: time (s) before which there is none.
+    None for a pair without trees or without a mesh, and for shapes that touch at the start, which have to be followed
+    (touching.py).
     """
     if trees_of_pair(shape_a, shape_b, surface=True) is None:
         return None
@@ -47,7 +53,7 @@ def mesh_impact(
         if states[0] is None or states[1] is None:
             return None
     times = np.empty(2)
-    code = _mesh_impact(pair_table(shape_a, shape_b, True), *states, np.array(query), _MEMORY.impact, times)
+    code = _mesh_impact(pair_table(shape_a, shape_b, True), *states, np.array((*query, begin)), _MEMORY.impact, times)
     return None if code == TOUCHING else (float(times[0]), float(times[1]))
 
 
@@ -55,7 +61,8 @@ def mesh_impact(
 def _mesh_impact(table, state_a, state_b, query, own, times):
     """Write the first impact to times (2,): lower and upper (s), infinite for none; return a code of its row.
 
-    states (1, 16): packed motions. query (4,): horizon (s), tolerance (m), separation (m) and iterations.
+    states (1, 16): packed motions. query (5,): horizon (s), tolerance (m), separation (m),
+    iterations, and the time at which the search begins (s).
     """
     bodies, parts, scratch, event, _ = own
     horizon = query[0]
@@ -63,7 +70,7 @@ def _mesh_impact(table, state_a, state_b, query, own, times):
     set_motion(bodies, 0, state_a, 0, table, horizon)
     set_motion(bodies, 1, state_b, 0, table, horizon)
     search = ImpactQuery(query[2], query[1], int(query[3]))
-    body_impact(Multibody(table, parts, bodies), 0, 1, Window(0.0, horizon), search, scratch, event[0])
+    body_impact(Multibody(table, parts, bodies), 0, 1, Window(query[4], horizon), search, scratch, event[0])
     if event[0].status == CLEAR:
         return DECIDED
     times[0] = event[0].lower

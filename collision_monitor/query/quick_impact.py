@@ -8,7 +8,7 @@ from typing import Final
 
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import Mesh, Shape
-from collision_monitor.meshes.shape_trees import kept_tree
+from collision_monitor.meshes.shape_trees import kept_tree, trees_of_pair
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.convex_pairs import convex_contact, convex_impact
 from collision_monitor.query.fillings import filled_box, filled_mesh
@@ -35,20 +35,42 @@ def quick_impact(
     return None
 
 
-def quick_possible_impact(
+def quick_open_impact(
     shape_a: Compound, motion_a: Motion, shape_b: Compound, motion_b: Motion, query: MotionQuery
-) -> float | None:
-    """First time (s) at which the boxes that fill an open mesh (fillings.py) may meet the other shape, or its boxes.
+) -> tuple[float, float] | None:
+    """`quick_impact` with an open mesh: lower of the solids that the surfaces may belong to, upper of the surfaces.
 
-    None for a pair that kernels do not answer, and if it is not certain that the boxes are apart, or overlap, now.
+    The surfaces are sought from the time on before which the boxes that contain them do not meet.
     """
     if not (isinstance(shape_a, Shape) and isinstance(shape_b, Shape)):
         return None
+    if not (isinstance(motion_a, Motion) and isinstance(motion_b, Motion)):
+        return None
+    if trees_of_pair(shape_a, shape_b, surface=True) is None:
+        return None
+    possible = _possible_impact(shape_a, motion_a, shape_b, motion_b, query)
+    if possible is None:
+        return None
+    first, holds_surfaces = possible
+    if holds_surfaces and first == inf:
+        return inf, inf
+    found = mesh_impact(shape_a, motion_a, shape_b, motion_b, query, first if holds_surfaces else 0.0)
+    return found and (min(first, found[0]), found[1])
+
+
+def _possible_impact(
+    shape_a: Shape, motion_a: Motion, shape_b: Shape, motion_b: Motion, query: MotionQuery
+) -> tuple[float, bool] | None:
+    """First time (s) at which the boxes that fill an open mesh (fillings.py) may meet the other shape, or its boxes.
+
+    And whether the surfaces do not meet earlier either. None for a pair that kernels do not answer, and if it is not
+    certain that the boxes are apart, or overlap, now.
+    """
     whole_a, whole_b = _with_filling(shape_a), _with_filling(shape_b)
     if whole_a and whole_b and boxes_apart(whole_a, motion_a.pose, whole_b, motion_b.pose):  # neither is in the other
         times = quick_impact(whole_a, motion_a, whole_b, motion_b, query)
         if times is not None:
-            return times[0]
+            return times[0], True
     boxes = [filled_box(shape) if isinstance(shape, Mesh) else None for shape in (shape_a, shape_b)]
     # the solid is in the hull of its surface, so that a box around the surface replaces it
     parts_a, parts_b = (
@@ -61,7 +83,7 @@ def quick_possible_impact(
             continue
         times = quick_impact(a, motion_a, b, motion_b, query)
         if times is None:
-            return 0.0 if _overlap(a, motion_a, b, motion_b, query) else None
+            return (0.0, False) if _overlap(a, motion_a, b, motion_b, query) else None
         first = min(first, times[0])
     pose_a, pose_b = motion_a.pose, motion_b.pose
     own, other = [(shape_a, _HERE)], [(shape_b, _HERE)]
@@ -69,8 +91,8 @@ def quick_possible_impact(
         (shape_b in parts_b and may_be_inside(own, pose_a, other, pose_b))
         or (shape_a in parts_a and may_be_inside(other, pose_b, own, pose_a))
     ):
-        return 0.0
-    return first
+        return 0.0, False
+    return first, shape_a not in parts_a or shape_b not in parts_b
 
 
 def _with_filling(shape: Shape) -> Shape | None:

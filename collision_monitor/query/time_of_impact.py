@@ -25,7 +25,7 @@ from collision_monitor.query.moving_pair import (
     make_moving_shape,
 )
 from collision_monitor.query.open_gap import least_gap
-from collision_monitor.query.quick_impact import quick_impact, quick_possible_impact
+from collision_monitor.query.quick_impact import quick_impact, quick_open_impact
 from collision_monitor.query.touching import follow
 from collision_monitor.records import Method
 from collision_monitor.tolerances import GJK_TOUCHING
@@ -111,17 +111,13 @@ def time_of_impact(
         duration = finite_number("step", step, positive=True)
         return impact_by_method(shape_a, motion_a, shape_b, motion_b, query, method, duration)
     arguments = shape_a, motion_a, shape_b, motion_b
-    quick = quick_impact(*arguments, query)
+    is_certain = all(shape.surface.certain for shape in (shape_a, shape_b) if type(shape) is Mesh)
+    quick = (quick_impact if is_certain else quick_open_impact)(*arguments, query)
     if quick is not None:
-        found = impact_of_times(quick, arguments)
-        if all(shape.surface.certain for shape in (shape_a, shape_b) if type(shape) is Mesh):
-            return found
-        first = quick_possible_impact(*arguments, query)
-        if first is not None:
-            return found if first >= found.lower else _impact(first, found.upper, found.method, arguments)
+        return impact_of_times(quick, arguments)
     a, b = make_moving_shape(shape_a, motion_a, "A"), make_moving_shape(shape_b, motion_b, "B")
     check_bounded(a, b)
-    found = _first_impact(a, b, query) if quick is None else impact_of_times(quick, arguments)
+    found = _first_impact(a, b, query)
     if all(shape.surface.certain for body in (a, b) for shape, _ in body.shapes if isinstance(shape, Mesh)):
         return found
     possible = _first_possible_impact(a, b, query) if found.lower > 0.0 else 0.0

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import collision_monitor as cm
 from collision_monitor import Motion, Pose
 from collision_monitor.query.moving_pair import make_moving_shape
-from collision_monitor.query.quick_impact import quick_possible_impact
+from collision_monitor.query.quick_impact import quick_impact, quick_open_impact
 from collision_monitor.query.time_of_impact import _first_possible_impact, check_query
 
 CUBE = trimesh.creation.box((2, 2, 2))
@@ -150,13 +150,31 @@ def test_the_impact_of_what_open_meshes_may_be_is_the_same_with_and_without_the_
             Motion(random_pose(rng, 0.0), angular=rng.normal(size=3)),
             Motion(start, -start.position, rng.normal(size=3)),
         )
-        quick = quick_possible_impact(A, motions[0], B, motions[1], query)
+        quick = quick_open_impact(A, motions[0], B, motions[1], query)
         if quick is not None:
             compared += 1
             slow = _first_possible_impact(
                 make_moving_shape(A, motions[0], "A"), make_moving_shape(B, motions[1], "B"), query
             )
-            surfaces = cm.time_of_impact(A, motions[0], B, motions[1]).upper
+            surfaces = quick_impact(A, motions[0], B, motions[1], query)
             # the surfaces count besides; steps of advancement end within the tolerance
-            assert min(quick, surfaces) == pytest.approx(min(slow, surfaces), abs=1e-5), k
+            assert quick[0] == pytest.approx(min(slow, surfaces[0]), abs=1e-5), k
+            assert quick[1] == pytest.approx(surfaces[1], abs=1e-5), k
     assert compared > 10
+
+
+@pytest.mark.parametrize(("a", "b"), [("soup", "soup"), ("cup", "cup"), ("soup", "cup")])
+def test_open_meshes_that_part_or_pass_each_other_are_clear_as_their_surfaces_are(a, b):
+    rng = np.random.default_rng(5)
+    make = {"soup": scattered, "cup": lambda rng: cm.Mesh(CUP.vertices, CUP.faces)}
+    query = check_query(2.0, 1e-6, 0.0, 1000)
+    for _ in range(10):
+        A, B = make[a](rng), make[b](rng)
+        aside = 5.0 * np.eye(3)[rng.integers(3)]
+        motions = (
+            Motion(Pose(), angular=rng.normal(size=3)),
+            Motion(Pose(aside), rng.choice([1.0, -0.1]) * aside, rng.normal(size=3)),
+        )
+        surfaces = quick_impact(A, motions[0], B, motions[1], query)
+        assert quick_open_impact(A, motions[0], B, motions[1], query) == surfaces == (np.inf, np.inf)
+        assert cm.time_of_impact(A, motions[0], B, motions[1]).status == "clear"
