@@ -32,6 +32,9 @@ MOST_TESTS: Final = 6_000
 MOST_QUERIES: Final = 0.005
 """Up to this fraction of the bodies, each is queried in the hashed grid. For more, a dense grid is built and swept."""
 
+MOSTLY_NEW: Final = 0.5
+"""From this fraction of the bodies on, the sweep does not sort out the others, which takes up to twice the time."""
+
 PREFETCH_AHEAD: Final = 4
 """How many pairs ahead the bodies are prefetched."""
 
@@ -73,7 +76,7 @@ class Candidates(Stage):
         if len(which) > MOST_QUERIES * top and not is_small:
             centre, half = np.empty((2, top, 3))
             read_boxes(self.grid.box, centre, half)
-            pairs = box_pairs(centre, half, is_new[:top])
+            pairs = box_pairs(centre, half, is_new[:top] if len(which) < MOSTLY_NEW * top else None)
             return pairs[: keep_new(bodies, self.grid.box, pairs, is_new, step.now, margin)]
         search = Search(which, is_new, np.empty(len(self.grid.box), np.int32))
         while True:  # at most twice: the second time the array is large enough
