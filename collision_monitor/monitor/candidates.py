@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.broad_phase.hashed_grid import (
@@ -152,6 +153,7 @@ def _finds(bodies, is_new, i, j):
     return covered < other or (covered == other and i < j)
 
 
+@direct
 @kernel
 def find_partners(bodies, grid, search, now, margin, pairs):
     """Write the pairs of each body of the search with all bodies whose swept box overlaps its own, each pair once.
@@ -191,6 +193,7 @@ def _reporter(bodies, box, i, j, is_new, now, margin):
     return i
 
 
+@direct
 @kernel
 def sweep(bodies, box, search, top, now, margin, pairs):
     """As `find_partners`, but by a test of each body of the search with all bodies in the first `top` slots.
@@ -212,6 +215,7 @@ def sweep(bodies, box, search, top, now, margin, pairs):
     return n
 
 
+@direct
 @kernel
 def keep_new(bodies, box, pairs, is_new, now, margin):
     """Move the pairs (P, 2) that `find_partners` would find to the front; return their number.

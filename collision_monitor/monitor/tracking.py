@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit.direct import direct
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, put_box, remove_boxes
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
@@ -174,6 +175,7 @@ def _turned_away(bodies, start, count, columns, angles):
         turned_away(bodies, start, count, columns, angles)
 
 
+@direct
 @kernel
 def find_moved(bodies, uncertainty, count, seconds, settings, columns, found):
     """Find the bodies among the first `count` slots whose predictions no longer hold at `now`, or end too soon.
@@ -357,6 +359,7 @@ def _fit_width(bodies, i, now, limits, settings, width):
     width[i] = min(max(ROOM * used, w * ROOM), 1.0) if used <= 1.0 else max(0.5 * w, NARROWEST)
 
 
+@direct
 @kernel
 def renew_motions(bodies, uncertainty, grid, moved, ending, seconds, limits, settings, width):
     """`restart_motion` of the bodies `moved` (M,), then `continue_motion` of those in `ending`.

@@ -1,0 +1,82 @@
+"""Kernels that Python code calls in every step with many arrays, without numba's look at the type of each of them.
+
+numba describes all arguments of a call by a text to find the compiled function: 4 to 6 µs for the 35 arrays of the
+bodies and their shapes, which were the largest part of a step of 100 objects. Here a tuple of many arrays is looked at
+once and known again by its identity; of the other arguments, whatever numba's types depend on is compared.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable, Iterable
+from typing import Any, Final, TypeVar, cast
+
+import numpy as np
+
+from collision_monitor._jit.function import Function
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+MANY: Final = 3
+"""Number of arrays of a tuple from which on it is known again by its identity."""
+
+_known: dict[type, tuple[int, weakref.ref[Any], int]] = {}
+"""The last tuple of many arrays of each class: its identity, its first array and its kind. It keeps no array alive."""
+
+_numbers: dict[Any, int] = {}
+"""Short names of the kinds of such tuples."""
+
+
+def kinds(values: Iterable[Any]) -> tuple[Any, ...]:
+    """Return a hashable description: values of equal kinds have equal types for numba."""
+    return tuple(
+        [
+            (each.dtype, each.ndim, each.flags.num)
+            if type(each) is np.ndarray
+            else _of_tuple(each)
+            if isinstance(each, tuple)
+            else type(each)
+            for each in values
+        ]
+    )
+
+
+def _of_tuple(value: tuple[Any, ...]) -> Any:
+    own = type(value)
+    if len(value) < MANY or type(value[0]) is not np.ndarray:
+        return own, kinds(value)
+    known = _known.get(own)
+    if known is None or known[0] != id(value) or known[1]() is not value[0]:
+        full = own, kinds(value)
+        known = _known[own] = id(value), weakref.ref(value[0]), _numbers.setdefault(full, len(_numbers))
+    return known[2]
+
+
+class DirectFunction(Function):
+    """A kernel whose compiled function is found by the kinds of its arguments."""
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        super().__init__(function, options, "kernel")
+        self._found: dict[Any, Callable[..., Any]] = {}
+
+    def __call__(self, *args: Any) -> Any:
+        """Call the function. numba finds it for arguments of new kinds."""
+        found = self._found.get(kinds(args))
+        return found(*args) if found is not None else self._first(args)
+
+    def _first(self, args: tuple[Any, ...]) -> Any:
+        dispatcher = self._entry
+        key = kinds(args)
+        result = dispatcher(*args)
+        overloads = getattr(dispatcher, "overloads", {})  # without a compiler, the dispatcher is the plain function
+        if overloads:
+            types = tuple(dispatcher.typeof_pyval(each) for each in args)
+            if types in overloads:
+                self._found[key] = overloads[types].entry_point
+        return result
+
+
+def direct(function: F) -> F:
+    """Let Python code call a kernel without numba's look at each array."""
+    given = cast(Function, function)
+    return cast(F, DirectFunction(given.py_func, given._options))
