@@ -7,7 +7,6 @@ once and known again by its identity; of the other arguments, whatever numba's t
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Callable, Iterable
 from typing import Any, Final, TypeVar, cast
 
@@ -18,13 +17,18 @@ from collision_monitor._jit.function import Function
 F = TypeVar("F", bound=Callable[..., Any])
 
 MANY: Final = 3
-"""Number of arrays of a tuple from which on it is known again by its identity."""
+"""Number of members of a named tuple from which on it is known again by its identity."""
 
-_known: dict[type, tuple[int, weakref.ref[Any], int]] = {}
-"""The last tuple of many arrays of each class: its identity, its first array and its kind. It keeps no array alive."""
+_known: dict[type, tuple[tuple[Any, ...], int]] = {}
+"""The last such tuple of each class, and its kind. It is kept, because a new one could take its place in memory."""
 
 _numbers: dict[Any, int] = {}
 """Short names of the kinds of such tuples."""
+
+
+def forget() -> None:
+    """Release the tuples that were kept, and with them their arrays."""
+    _known.clear()
 
 
 def kinds(values: Iterable[Any]) -> tuple[Any, ...]:
@@ -43,13 +47,15 @@ def kinds(values: Iterable[Any]) -> tuple[Any, ...]:
 
 def _of_tuple(value: tuple[Any, ...]) -> Any:
     own = type(value)
-    if len(value) < MANY or type(value[0]) is not np.ndarray:
-        return own, kinds(value)
     known = _known.get(own)
-    if known is None or known[0] != id(value) or known[1]() is not value[0]:
-        full = own, kinds(value)
-        known = _known[own] = id(value), weakref.ref(value[0]), _numbers.setdefault(full, len(_numbers))
-    return known[2]
+    if known is not None and known[0] is value:
+        return known[1]
+    found = own, kinds(value)
+    if own is tuple or len(value) < MANY:
+        return found
+    number = _numbers.setdefault(found, len(_numbers))
+    _known[own] = value, number
+    return number
 
 
 class DirectFunction(Function):
