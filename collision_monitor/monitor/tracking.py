@@ -13,10 +13,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit import device, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, put_box, remove_boxes
 from collision_monitor.monitor import filters
+from collision_monitor.monitor.adaptive_tubes import FUTILE_STEPS, NARROWEST, PATIENCE, Unrest, fit_width, widest_tube
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
@@ -28,27 +29,6 @@ FIRST_SLACK: Final = 0.5
 SHORTEST_SLACK: Final = 0.0625
 LONGEST_SLACK: Final = 1.0
 """Slack: how far beyond the horizon a body is predicted, in horizons; initial, smallest and largest value."""
-
-NARROWEST: Final = 2.0**-26
-ONCE: Final = 2.0**-25
-ROOM: Final = 2.0
-"""Width: the part of the tolerances that a body uses. Smallest value; that of a body which left
-its motion within FUTILE_STEPS steps once; and its ratio to the last deviation, if that was within the tolerances,
-because the next deviation of a noisy state may be larger."""
-
-FUTILE_STEPS: Final = 4.0
-PATIENCE: Final = 512.0
-"""A body with half of the tolerances or more that leaves its motion within FUTILE_STEPS steps turns or accelerates. Its
-tolerances are NARROWEST for its next PATIENCE motions; its width is minus the number of those that are left. A body
-with the NARROWEST tolerances has noise only if it leaves its motion so soon twice in a row; one that bounces has none.
-"""
-
-FEW_BODIES: Final = 32
-"""Up to this number of moving bodies keep the NARROWEST adaptive tolerances, because to predict them anew takes less
-time than to examine the pairs that wider tolerances leave UNRESOLVED."""
-
-WIDEST: Final = 0.4
-"""Widest adaptive tube at the end of the horizon, in radii of its body. Larger: it meets more pairs than it saves."""
 
 WIDER: Final = 1.1
 """Factor on the spread of a box, because standard deviations vary a little from state to state."""
@@ -70,14 +50,15 @@ class Uncertainty(NamedTuple):
 class Tracking(Stage):
     """Compares the bodies' states with their predicted motions, and starts the bodies anew that left them."""
 
-    SAVED = ("_outside", "_width", "_before")
-    CACHES = ("_columns", "_are_few")
+    SAVED = ("_outside", "_width", "_before", "_unrest")
+    CACHES = ("_columns", "_are_narrow")
 
     def __init__(self) -> None:
         self._outside: NDArray[np.bool_] = np.zeros(0, np.bool_)  # by slot: outside of the region
         self._width: NDArray[np.float64] = np.zeros(0)  # by slot: part of the tolerances that the body uses
         self._before = 0.0  # time of the step before (s)
-        self._are_few = False  # whether the scene has at most FEW_BODIES
+        self._unrest = Unrest()
+        self._are_narrow = False  # whether all adaptive tolerances are NARROWEST in this step
         self._columns = make_columns()
 
     @property
@@ -130,7 +111,7 @@ class Tracking(Stage):
         seconds = step.now, step.horizons
         n, m, moving = find_moved(roster.bodies, uncertainty, roster.top, seconds, settings, columns, found)
         step.period, self._before = step.now - self._before, step.now
-        self._are_few = moving <= FEW_BODIES
+        self._are_narrow = self._unrest.keeps_narrow(n, moving)
         return found[0, :n], found[1, :m]
 
     def _make_room(self, capacity: int) -> None:
@@ -144,7 +125,7 @@ class Tracking(Stage):
         bodies, settings = step.roster.bodies, step.settings.motion
         uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
         self._make_room(step.roster.capacity)
-        limits = FUTILE_STEPS * step.period, self._are_few
+        limits = FUTILE_STEPS * step.period, self._are_narrow
         seconds = step.now, step.horizons
         renew_motions(bodies, uncertainty, grid, moved, ending, seconds, limits, settings, self._width)
 
@@ -156,13 +137,15 @@ class Tracking(Stage):
         """See Stage."""
         snapshot.arrays["outside"] = self._outside.copy()
         snapshot.arrays["width"] = self._width.copy()
-        facts["before"] = self._before
+        facts["before"], facts["unrest"] = self._before, [self._unrest.share, self._unrest.left]
 
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
         self._outside = snapshot.array("outside", np.zeros(0, np.bool_))[: len(snapshot.arrays["bodies.used"])]
         self._width = np.clip(snapshot.array("width", np.zeros(0)), -PATIENCE, 1.0)
         self._before = float(facts["before"])
+        share, left = facts["unrest"]
+        self._unrest = Unrest(float(share), int(left))
 
 
 @device
@@ -312,53 +295,6 @@ def _cover(bodies, i, now, horizon):
     m.cover = now + horizon + bodies.slack[i] * share
 
 
-@inlined
-def _widest_tube(bodies, i, settings):
-    """Deviation (m) and drift (m/s) that the tolerances allow body i. Adaptive ones depend on its size."""
-    r, radius = bodies.spin_radius[i], bodies.motion[i].radius
-    tube_0 = settings.position_tolerance + r * settings.orientation_tolerance
-    tube_1 = settings.velocity_tolerance + r * settings.angular_velocity_tolerance
-    if settings.adaptive:
-        tube_1 = min(tube_1, WIDEST * radius / max(settings.horizon, 1e-9))
-    return tube_0, tube_1
-
-
-@device
-def _fit_width(bodies, i, now, limits, settings, width):
-    """Fit the width (N,) of body i, which leaves its motion.
-
-    A body that deviates within the tolerances is noisy: its next tube has ROOM for more than this deviation. One that
-    deviates further has changed its motion, and halves its width. limits: duration of FUTILE_STEPS steps (s), and
-    whether there are only FEW_BODIES.
-    """
-    futile, are_few = limits
-    m = bodies.motion[i]
-    w, since = width[i], now - m.time
-    if are_few or bodies.slack[i] == 0.0:  # 0: the body is new
-        width[i] = NARROWEST
-        return
-    if w < 0.0:
-        width[i] = w + 1.0 if w < -1.0 else NARROWEST
-        return
-    if w >= 0.5 and since <= futile:
-        width[i] = -PATIENCE
-        return
-    if w <= NARROWEST or (w <= ONCE and since > futile):
-        width[i] = ONCE if since <= futile else NARROWEST
-        return
-    r = bodies.spin_radius[i]
-    tube_0, tube_1 = _widest_tube(bodies, i, settings)
-    apart = drift = off = 0.0
-    p = (m.x + m.vx * since, m.y + m.vy * since, m.z + m.vz * since)
-    v, w_m = (m.vx, m.vy, m.vz), (m.wx, m.wy, m.wz)
-    for c in range(3):
-        apart += (bodies.position[i, c] - p[c]) ** 2
-        drift += (bodies.linear[i, c] - v[c]) ** 2
-        off += (bodies.angular[i, c] - w_m[c]) ** 2
-    used = max(sqrt(apart) / max(tube_0, 1e-300), (sqrt(drift) + r * sqrt(off)) / max(tube_1, 1e-300))
-    width[i] = min(max(ROOM * used, w * ROOM), 1.0) if used <= 1.0 else max(0.5 * w, NARROWEST)
-
-
 @direct
 @kernel
 def renew_motions(bodies, uncertainty, grid, moved, ending, seconds, limits, settings, width):
@@ -376,7 +312,7 @@ def restart_motion(bodies, uncertainty, grid, which, seconds, limits, settings, 
 
     The version of the body changes, so that its pairs leave the event list. A stale object widens its bounds here: its
     tube grows by what it may deviate, at stale_acceleration, until the age of its last state has doubled.
-    width (N,): part of the tolerances that a body uses if they are adaptive. limits: see `_fit_width`.
+    width (N,): part of the tolerances that a body uses if they are adaptive. limits: see `fit_width`.
     """
     now, horizons = seconds
     stale_acceleration = settings.stale_acceleration
@@ -384,7 +320,7 @@ def restart_motion(bodies, uncertainty, grid, which, seconds, limits, settings, 
         i = which[k]
         part = 1.0
         if settings.adaptive:
-            _fit_width(bodies, i, now, limits, settings, width)
+            fit_width(bodies, i, now, limits, settings, width)
             part = max(width[i], NARROWEST)
         m = bodies.motion[i]
         bodies.version[i] += np.uint32(1)
@@ -403,7 +339,7 @@ def restart_motion(bodies, uncertainty, grid, which, seconds, limits, settings, 
         m.tube_0 = m.tube_1 = 0.0
         _cover(bodies, i, now, horizons[i])
         if not bodies.static[i]:
-            tube_0, tube_1 = _widest_tube(bodies, i, settings)
+            tube_0, tube_1 = widest_tube(bodies, i, settings)
             m.tube_0, m.tube_1 = part * tube_0, part * tube_1
             if age > 0.0:
                 m.tube_0 += 2.0 * stale_acceleration * age * age

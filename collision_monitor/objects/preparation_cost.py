@@ -40,7 +40,7 @@ _TREE: Final = (0.1, 5e-3)  # the surface and the tree of an exact concave mesh:
 _POINT: Final = 1.5e-4  # a point of a cloud, in its tree
 _EXACT: Final = 0.02  # a determinant in integers
 _PIECE: Final = 10.0  # the excess around several pieces: for each piece
-_TRIANGLE: Final = 3.0  # the excess around a concave mesh beside other shapes: for each face
+_TRIANGLE: Final = 3.0  # the excess around a concave mesh beside other shapes, also convex meshes: for each face
 _POLYGON: Final = 0.012  # two corners of a concave polygon
 
 _MODELS: Final = {
@@ -71,11 +71,15 @@ class Budget:
         if coarse and any(isinstance(shape, HalfSpace) for shape, _ in shapes):
             return True  # it is refused at once, with the same text as in a replay
         cost = _PIECE * len(shapes) if coarse and len(shapes) > 1 else 0.0
-        mixed = coarse and not all(isinstance(shape, Mesh) for shape, _ in shapes)
         for shape, _ in shapes:
-            cost += self._estimate(shape, model, mixed)
+            cost += self._estimate(shape, model)
             if cost > max(self.left, SMALL_MS):
                 return False
+        concave = [shape for shape, _ in shapes if isinstance(shape, Mesh) and not is_convex_mesh(shape)]
+        if coarse and len(concave) < len(shapes):
+            cost += _TRIANGLE * sum(len(each.faces) for each in concave)
+        if cost > max(self.left, SMALL_MS):
+            return False
         if cost > SMALL_MS:
             self.left -= cost
         return True
@@ -92,8 +96,8 @@ class Budget:
                 if used > SMALL_MS:
                     self.left -= used
 
-    def _estimate(self, shape: Shape, model: Model, mixed: bool) -> float:
-        """Return the time for one shape of an object. mixed: there are shapes other than meshes, and a coarse model."""
+    def _estimate(self, shape: Shape, model: Model) -> float:
+        """Return the time for one shape of an object that has no others."""
         fixed, each = _MODELS.get(model, (0.0, 0.0))
         match shape:
             case ConvexHull():
@@ -115,7 +119,7 @@ class Budget:
                     return own
                 if model is Model.CONVEX_DECOMPOSITION:
                     return inf
-                return own + _CONCAVE[0] + (_TRIANGLE if mixed else _CONCAVE[1]) * m
+                return own + _CONCAVE[0] + _CONCAVE[1] * m
             case Points():
                 return _POINT * len(shape.points) if model in (Model.AUTO, Model.EXACT) else inf
             case Polygon():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from collision_monitor.geometry.shapes import Sphere
+from collision_monitor.monitor.adaptive_tubes import AVERAGED_STEPS, REST
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.records import PredictionStatus
@@ -94,6 +95,27 @@ def test_few_objects_keep_the_narrowest_tolerances() -> None:
         states = scene.step(0.02)
         fast, exact = (monitor.step(round(k * 2e7), states.copy()).status for monitor in monitors)
         assert (fast.predictions, fast.unresolved) == (exact.predictions, exact.unresolved)
+
+
+def test_a_scene_that_restarts_in_every_step_keeps_the_narrowest_tolerances_for_a_while() -> None:
+    """While nearly all objects turn, wide tolerances save nothing; with noise alone they are tried again."""
+    rng = np.random.default_rng(4)
+    n, turns = 60, 4 * AVERAGED_STEPS
+    monitor = Monitor("fast")
+    for k in range(n):
+        monitor.add(k, Sphere(0.3))
+    position, velocity = rng.uniform(-8, 8, (n, 3)), rng.uniform(-0.5, 0.5, (n, 3))
+    moved = []
+    for step in range(turns + REST + 20):
+        if step < turns:
+            velocity = rng.uniform(-0.5, 0.5, (n, 3))
+        poses = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (n, 1))
+        poses[:, :3] = position + rng.uniform(-1e-3, 1e-3, (n, 3))
+        result = monitor.step(round(step * 2e7), range(n), poses, np.hstack([velocity, np.zeros((n, 3))]))
+        moved.append(result.status.objects_moved)
+        position += velocity * 0.02
+    assert set(moved[: turns + REST // 2]) == {n}
+    assert np.mean(moved[-20:]) < 0.2 * n
 
 
 def test_adaptive_tolerances_survive_a_snapshot() -> None:
