@@ -1,13 +1,14 @@
 """Kernels that Python code calls in every step with many arrays, without numba's look at the type of each of them.
 
-numba describes all arguments of a call by a text to find the compiled function: 4 to 6 µs for the 35 arrays of the
-bodies and their shapes, which were the largest part of a step of 100 objects. Here a tuple of many arrays is looked at
-once and known again by its identity; of the other arguments, whatever numba's types depend on is compared.
+To find the compiled function, numba writes the types of all arguments of a call into a text, which takes 4 µs for the
+35 arrays of the bodies and their shapes. Here a named tuple is looked at once and known again by its identity; of the
+other arguments, whatever numba's types depend on is compared. An array in a named tuple must not be locked later.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from itertools import count
 from typing import Any, Final, TypeVar, cast
 
 import numpy as np
@@ -24,6 +25,9 @@ _known: dict[type, tuple[tuple[Any, ...], int]] = {}
 
 _numbers: dict[Any, int] = {}
 """Short names of the kinds of such tuples."""
+
+_names: Final = count()
+"""Numbers that no two threads get twice."""
 
 
 def forget() -> None:
@@ -53,7 +57,7 @@ def _of_tuple(value: tuple[Any, ...]) -> Any:
     found = own, kinds(value)
     if own is tuple or len(value) < MANY:
         return found
-    number = _numbers.setdefault(found, len(_numbers))
+    number = _numbers.setdefault(found, next(_names))
     _known[own] = value, number
     return number
 
