@@ -15,12 +15,15 @@ import math
 import time
 
 import numpy as np
+from drifting_meshes import drifting_meshes
 
 from collision_monitor.accuracy.inputs import Workload, simulated
 from collision_monitor.monitor.monitor import Monitor
 
 PROFILES = ("fast", "balanced", "exact")
-SCENES = ("fleet", "clutter", "swarm", "particles", "crossing", "arm")
+MESHES = "meshes"
+"""Scene of benchmarks/drifting_meshes.py."""
+SCENES = ("fleet", "clutter", "swarm", "particles", "crossing", "arm", MESHES)
 FIXED = ("crossing", "arm")
 """Scenes with a fixed set of objects."""
 
@@ -64,7 +67,10 @@ def main() -> None:
     for name in args.scenes:
         for size in [None] if name in FIXED else args.sizes:
             seconds = args.seconds if size is None or size < 5_000 else 0.5 * args.seconds
-            (work,) = simulated([name], objects=size, noise=args.noise, duration=seconds)
+            if name == MESHES:
+                work = drifting_meshes(size or 0, seconds)
+            else:
+                (work,) = simulated([name], objects=size, noise=args.noise, duration=seconds)
             fast, balanced, exact = times(work)
             ratios = [median_ratio(each, exact) for each in (fast, balanced)]
             cells = " | ".join(f"{ratio:.3f} ± {off:.3f}" for ratio, off in ratios)

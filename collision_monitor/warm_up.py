@@ -46,6 +46,8 @@ def warm_up_monitor(profile: Profile | None = None) -> None:
     if profile is None or profile.uncertainty:
         monitor.profile = monitor.profile.replace(uncertainty=True)
         _step_uncertain(monitor, poses, seconds=5)
+    if profile is None or profile.mesh_impact_tolerance > 0.0:
+        _step_bounded_meshes(monitor)
     points = MOST_POINTS if profile is None else profile.contact_points
     if profile is None or TimeCritical.has_budget(profile) or points > 1:
         _step_limited(monitor, poses, twists, points)
@@ -87,6 +89,21 @@ def _step_uncertain(monitor: Monitor, poses: Array, seconds: int) -> None:
     monitor.step(stamp + 10_000_000, states, covariance=np.zeros((len(poses), 12)))
     states["orientation_stddev"] = 1.0  # too large for planes: every sample is followed
     monitor.step(stamp + 20_000_000, states)
+
+
+def _step_bounded_meshes(monitor: Monitor) -> None:
+    """Step two meshes that approach, with a bound on their impact."""
+    corner = Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [(0, 1, 2), (0, 1, 3)])
+    before = monitor.profile
+    monitor.profile = before.replace(uncertainty=False, mesh_impact_tolerance=0.1)
+    ids = np.array([OBJECTS + 1, OBJECTS + 2])
+    for each in ids.tolist():
+        monitor.add(each, corner)
+    twists = np.array([[0.0, 0, 0, 0, 0, 0], [-1.0, 0, 0, 0, 0, 0]])
+    monitor.step(5_500_000_000, ids, np.array([[0, 500.0, 0, 0, 0, 0, 1], [2, 500.0, 0, 0, 0, 0, 1]]), twists)
+    for each in ids.tolist():
+        monitor.remove(each)
+    monitor.profile = before
 
 
 def _step_limited(monitor: Monitor, poses: Array, twists: Array, points: int) -> None:

@@ -33,6 +33,9 @@ SAMPLES: Final = (64, 128, 256, 512, 1024, 2048, 4096)
 DISTANCES: Final = (1e-4, 1e-3, 1e-2)
 """Values of distance_tolerance (m)."""
 
+MESH_GAP: Final = 0.1
+"""Value of mesh_impact_tolerance (m)."""
+
 MODELS: Final = ("sphere", "obb", "kdop26", "convex_hull")
 """Models from coarse to fine."""
 
@@ -103,6 +106,8 @@ class Space:
         yield from ({f"model_{kind}": model} for kind, models in self.models.items() for model in models)
         yield {"adaptive_tolerances": not profile.adaptive_tolerances}
         yield from ({"impact_tolerance": profile.impact_tolerance * factor} for factor in (10.0, 0.1))
+        if "mesh" in self.models and not profile.uncertainty and not profile.mesh_impact_tolerance:
+            yield {"mesh_impact_tolerance": MESH_GAP}
         if self.uncertain and profile.uncertainty:
             yield from ({"uncertainty_samples": n} for n in self.samples if n < profile.uncertainty_samples)
         if self.horizon < profile.horizon:

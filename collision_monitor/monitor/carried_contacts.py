@@ -25,7 +25,9 @@ from collision_monitor.monitor.carried_triangles import (
     PLACE_I,
     PLACE_J,
     carry_triangles,
+    lasts,
     meets_by_trees,
+    turning,
 )
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.prediction.body_contact import RESULT, STATUS, TOUCHING, closing_now, relative_now, widening
@@ -137,30 +139,29 @@ def _is_convex(multibody, i):
 
 
 @inlined
-def _turning(bodies, i):
-    """Speed (m/s) at which the surface of body i turns."""
-    x, y, z = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
-    return bodies.spin_radius[i] * sqrt(x * x + y * y + z * z)
-
-
-@inlined
 def _outlasts(bodies, i, j, v, n, carrying):
     """Whether an answer with normal n of bodies with relative velocity v (m/s) will hold after one more period."""
     along = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
     half = 0.5 * (sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) - along)
-    return (half + _turning(bodies, i) + _turning(bodies, j)) * carrying.period <= carrying.tolerance
+    return (half + turning(bodies, i) + turning(bodies, j)) * carrying.period <= carrying.tolerance
 
 
 @device
-def keep(multibody, i, j, touching, now, query, carrying, scratch, result, row):
-    """Write the carried row of bodies i and j from their result row, if that may be carried."""
+def keep(multibody, i, j, touching, now, query, carrying, scratch, result, row, spread):
+    """Write the carried row of bodies i and j from their result row, if that may be carried.
+
+    spread: by how much the distance of the deepest triangles may differ (m), of two meshes.
+    """
     row[DISTANCE] = nan
     if not (touching and result[STATUS] == TOUCHING):
         return
     bodies, q = multibody.bodies, scratch.quaternion[0]
     relative = relative_now(bodies, i, j, now)
     by_trees = result[DISTANCE] <= 0.0 and meets_by_trees(multibody, i, j)
-    if not by_trees:
+    if by_trees:
+        if not lasts(bodies, i, j, relative.v, carrying):
+            return
+    else:
         if not _outlasts(bodies, i, j, relative.v, result[NORMAL : NORMAL + 3], carrying):
             return
         if not (_is_convex(multibody, i) and _is_convex(multibody, j)):
@@ -168,7 +169,7 @@ def keep(multibody, i, j, touching, now, query, carrying, scratch, result, row):
     for c in range(RESULT):
         row[c] = result[c]
     row[PLACE_I] = row[PLACE_J] = NONE if by_trees else NO_MESH
-    row[BOUND] -= widening(relative, query.stale_acceleration)
+    row[BOUND] = spread if by_trees else row[BOUND] - widening(relative, query.stale_acceleration)
     for c in range(3):
         row[POINT_A + c] -= position_now(bodies, i, relative.age_i, c)
         row[POINT_B + c] -= position_now(bodies, j, relative.age_j, c)

@@ -2,21 +2,26 @@
 
 The depth of two solids changes by at most the distance that the origins move relative to each other, plus the angle
 that each body turns times its radius. It is at least the depth of any pair of their triangles. So one pair of triangles
-that meets proves the contact, and bounds the distance from above; the last full answer bounds it from both sides. The
-middle of this range is reported. A full answer finds all pairs of triangles that meet, which takes much longer.
+that meets proves the contact, and bounds the distance from above; the last answer bounds it from both sides. The middle
+of this range is reported. A new answer is a range too (meshes/depth_range.py): to find all pairs of triangles that meet
+takes much longer.
 """
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Final
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.meshes.layout import WIDTH
-from collision_monitor.meshes.nearest import PAIRS
-from collision_monitor.meshes.placing import relative
+from collision_monitor.meshes.boxes import half_of
+from collision_monitor.meshes.depth_range import depth_range
+from collision_monitor.meshes.layout import CENTER, WIDTH
+from collision_monitor.meshes.nearest import PAIRS, PLACE_A, PLACE_B
+from collision_monitor.meshes.placing import relative, turned_back
 from collision_monitor.meshes.touching import touching
-from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, POINT_A, POINT_B
+from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.narrow_phase.vector import dot, opposite, rotate_back
 from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.body_contact import (
     RESULT,
@@ -25,6 +30,7 @@ from collision_monitor.prediction.body_contact import (
     STATUS,
     TOUCHING,
     closing_now,
+    relative_now,
     widening,
 )
 from collision_monitor.prediction.body_impact import CLOSING
@@ -35,6 +41,17 @@ PLACE_I: Final = RESULT + 11
 PLACE_J: Final = RESULT + 12
 """Columns of a carried row: places of two triangles that met, WIDTH * block + member relative to the roots of their
 trees, which a snapshot does not keep in place. NONE: not known; NO_MESH: the pair has no trees."""
+
+LASTING: Final = 1.0
+LASTS: Final = 0.5
+"""Largest motion until the next step with which a contact is carried over, and the width of the range of its answer, in
+tolerances. The range widens by half of the motion, where the deepest triangles stay the same."""
+
+WHOLE: Final = 2.0 - 1e-6
+"""Width of the range of an answer whose error is the whole tolerance, but for round-off, in tolerances."""
+
+SMALL: Final = 0.1
+"""Tolerance, in radii of the smaller body, from which the boxes of two trees bound the depth well enough."""
 
 NONE: Final = -1.0
 NO_MESH: Final = -2.0
@@ -75,27 +92,41 @@ def _meet(table, a, b, pose, row, scratch):
     return scratch.out[DISTANCE] <= 0.0
 
 
-@device
-def carry_triangles(multibody, i, j, now, there, moved, query, tolerance, scratch, row, result):
-    """Write the contact of bodies i and j at `now` (s) into a result row, from their carried row, if triangles meet.
-
-    there: the bodies (Now). moved (m): how far a surface can have moved relative to the other since the answer.
-    query: ContactQuery. tolerance: largest error (m) that this may add. Returns whether that suffices.
-    """
+@inlined
+def _placed(multibody, i, j, now, there, scratch):
+    """Offset of the shape of body i from its origin in world axes, and the pose of the pair of shapes at `now` (s)."""
     table, parts, bodies = multibody
     a, b = bodies.first_shape[i], bodies.first_shape[j]
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     rotation_now(bodies, i, now, scratch.quaternion, R_i)
     rotation_now(bodies, j, now, scratch.quaternion, R_j)
     oa, ob, p = place_shape(table, parts, a, R_i, R_a), place_shape(table, parts, b, R_j, R_b), there.p
-    pose = PairPose(R_a, R_b, (p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]))
-    if not _meet(table, a, b, pose, row, scratch):
-        return False
-    out = scratch.out
-    most, least = min(out[DISTANCE], row[DISTANCE] + moved), row[DISTANCE] - moved
+    return oa, PairPose(R_a, R_b, (p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]))
+
+
+@inlined
+def _reach(table, s, R, n):
+    """How far the box of a whole tree reaches from its shape's origin along n (m). R: rotation of the shape."""
+    blocks, root, d = table.blocks, root_of(table, s), rotate_back(R, n)
+    m, e = turned_back(blocks, root, 0, d), half_of(blocks, root, 0)
+    c = blocks[root, CENTER, 0], blocks[root, CENTER + 1, 0], blocks[root, CENTER + 2, 0]
+    return dot(c, d) + abs(m[0]) * e[0] + abs(m[1]) * e[1] + abs(m[2]) * e[2] + table.margin[s]
+
+
+@device
+def _write(multibody, i, j, there, placed, known, query, out, result):
+    """Write a contact of triangles (`out`) into a result row; the deepest ones have a distance in known (m, m).
+
+    A translation along the normal that parts both solids may be longer than the depth; the bound holds that of their
+    boxes. placed: of `_placed`. Returns half of the width of the known range.
+    """
+    table, bodies = multibody.table, multibody.bodies
+    oa, pose = placed
+    least, most = known
     half = max(0.5 * (most - least), 0.0)
-    if not half <= tolerance:
-        return False
+    n = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
+    parting = _reach(table, bodies.first_shape[i], pose.R_A, n) - dot(n, pose.p)
+    parting += _reach(table, bodies.first_shape[j], pose.R_B, opposite(n))
     for c in range(CONTACT_SIZE):
         result[c] = out[c]
     for c in range(3):
@@ -103,11 +134,80 @@ def carry_triangles(multibody, i, j, now, there, moved, query, tolerance, scratc
         result[POINT_B + c] += oa[c]
     result[CLOSING] = closing_now(bodies, i, j, there, result)
     result[DISTANCE] = most - half
-    result[BOUND] += row[BOUND] + half + widening(there, query.stale_acceleration)
+    result[BOUND] += max(half, parting + most - half) + widening(there, query.stale_acceleration)
     result[STATUS] = TOUCHING
-    result[SHAPE_I], result[SHAPE_J] = a, b
+    result[SHAPE_I], result[SHAPE_J] = bodies.first_shape[i], bodies.first_shape[j]
     for c in range(3):
         at = position_now(bodies, i, there.age_i, c)
         result[POINT_A + c] += at
         result[POINT_B + c] += at
+    return half
+
+
+@device
+def carry_triangles(multibody, i, j, now, there, moved, query, tolerance, scratch, row, result):
+    """Write the contact of bodies i and j at `now` (s) into a result row, from their carried row, if triangles meet.
+
+    there: the bodies (Now). moved (m): how far a surface can have moved relative to the other since the answer.
+    query: ContactQuery. tolerance: largest error (m) that this may add. Returns whether that suffices.
+    """
+    table, bodies = multibody.table, multibody.bodies
+    placed = _placed(multibody, i, j, now, there, scratch)
+    pose = placed[1]
+    if not _meet(table, bodies.first_shape[i], bodies.first_shape[j], pose, row, scratch):
+        return False
+    out, moved = scratch.out, moved + row[BOUND]
+    most, least = min(out[DISTANCE], row[DISTANCE] + moved), row[DISTANCE] - moved
+    if not most - least <= 2.0 * tolerance:
+        return False
+    _write(multibody, i, j, there, placed, (least, most), query, out, result)
     return True
+
+
+@inlined
+def turning(bodies, i):
+    """Speed (m/s) at which the surface of body i turns."""
+    x, y, z = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
+    return bodies.spin_radius[i] * sqrt(x * x + y * y + z * z)
+
+
+@inlined
+def lasts(bodies, i, j, v, carrying):
+    """Whether to carry the contact of bodies over that have the relative velocity v (m/s).
+
+    They have to move by less than the tolerance until the next step. If the tolerance is not small beside their
+    boxes, a new answer takes no longer.
+    """
+    speed = sqrt(dot(v, v)) + turning(bodies, i) + turning(bodies, j)
+    small = carrying.tolerance < SMALL * min(bodies.motion[i].radius, bodies.motion[j].radius)
+    return small and speed * carrying.period <= LASTING * carrying.tolerance
+
+
+@device
+def overlap_of_trees(multibody, i, j, now, query, carrying, scratch, result):
+    """Write the contact of bodies i and j at `now` (s) into a result row, if triangles of both meet.
+
+    The search for the deepest triangles ends when the depth is known within the tolerance, or within a quarter of it if
+    the answer is carried over. Returns by how much the distance of the deepest triangles may differ (m); NONE if none
+    meet. query: ContactQuery. carrying: see carried_contacts.py.
+    """
+    if not meets_by_trees(multibody, i, j):
+        return NONE
+    table, bodies = multibody.table, multibody.bodies
+    a, b = bodies.first_shape[i], bodies.first_shape[j]
+    there = relative_now(bodies, i, j, now)
+    p, reach = there.p, bodies.motion[i].radius + bodies.motion[j].radius
+    if dot(p, p) > reach * reach:
+        return NONE
+    placed = _placed(multibody, i, j, now, there, scratch)
+    pose = placed[1]
+    X, out, answer = relative(pose.R_A, pose.R_B, pose.p), scratch.out, scratch.answer
+    wanted = (LASTS if lasts(bodies, i, j, there.v, carrying) else WHOLE) * carrying.tolerance
+    least, most = depth_range(table.blocks, root_of(table, a), root_of(table, b), X, wanted, answer, scratch.tree)
+    if least < 0.0:
+        return NONE
+    triangles_contact(table, a, b, pose, (int(answer[PLACE_A]), int(answer[PLACE_B])), out)
+    if not out[DISTANCE] <= 0.0:
+        return NONE
+    known = out[DISTANCE] - (most - least), out[DISTANCE]
+    return _write(multibody, i, j, there, placed, known, query, out, result)

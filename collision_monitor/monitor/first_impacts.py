@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.prediction.body_impact import Scratch, make_scratch
+from collision_monitor.prediction.coarse_impact import bound_meshes
 from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.prediction.pair_impacts import bound_pairs, predict_pairs, refine
 from collision_monitor.records import joined
@@ -47,11 +49,14 @@ class FirstImpacts(Stage):
 
     def predict(self, step: StepContext, pairs: Pairs) -> Events:
         """First impacts (IMPACT) of pairs (P, 2) of body slots, in their order. Pairs without one are left out."""
+        find = _coarse_impacts if step.coarse > 0.0 else partial(_impacts, predict_pairs)
         if self.pool is None or len(pairs) < FEWEST_PAIRS_FOR_THREADS:
-            return self._find(predict_pairs, step, pairs)
+            events, queries = find(step, pairs, self.scratch)
+            step.work.impact_queries += queries
+            return events
 
         def part(pairs: Pairs, scratch: Scratch) -> tuple[Events, int]:
-            return _impacts(predict_pairs, step, pairs, scratch)
+            return find(step, pairs, scratch)
 
         # the kernels release the GIL; the parts are joined in order, so any number of threads gives the same answer
         parts = list(self.pool.map(part, np.array_split(pairs, len(self._scratch)), self._scratch))
@@ -76,6 +81,17 @@ class FirstImpacts(Stage):
 
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage: there is nothing to restore."""
+
+
+def _coarse_impacts(step: StepContext, pairs: Pairs, scratch: Scratch) -> tuple[Events, int]:
+    """As `_impacts` of `predict_pairs`, but with bounds on those of meshes."""
+    events, rest = np.empty(len(pairs) + 1, IMPACT), np.empty_like(pairs)
+    query = step.settings.impact
+    n, left, made = bound_meshes(step.roster.multibody, pairs, step.now, query, step.coarse, events, rest, scratch)
+    if not left:
+        return events[:n], made
+    others, queries = _impacts(predict_pairs, step, rest[:left], scratch)
+    return joined([events[:n], others]), made + queries
 
 
 def _impacts(

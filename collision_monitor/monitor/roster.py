@@ -98,6 +98,11 @@ class Roster(Stage):
         return Multibody(self._shapes.table, self.parts, self.bodies)
 
     @property
+    def has_trees(self) -> bool:
+        """Whether a shape had a tree so far, as meshes and clouds have."""
+        return len(self._shapes.table.blocks) > 1
+
+    @property
     def capacity(self) -> int:
         """Number of body slots."""
         return len(self.bodies.used)

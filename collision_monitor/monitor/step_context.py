@@ -71,6 +71,12 @@ class StepContext:
     samples: int = 0  # of the states of uncertain pairs, see StepResult
 
     @property
+    def coarse(self) -> float:
+        """Gap (m) to which impacts of meshes are only bounded. 0: all are exact, as those of uncertain states are."""
+        p = self.profile
+        return 0.0 if p.uncertainty or not self.roster.has_trees else p.mesh_impact_tolerance
+
+    @property
     def horizons(self) -> NDArray[np.float64]:
         """Horizon of each body (N,), by slot (s)."""
         p = self.profile

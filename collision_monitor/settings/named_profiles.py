@@ -15,6 +15,7 @@ _TOLERANCES: Final = ("position_tolerance", "orientation_tolerance", "velocity_t
 
 _EVERYTHING_EXACT: Final[dict[str, Any]] = {
     "distance_tolerance": 0.0,
+    "mesh_impact_tolerance": 0.0,
     "model_mesh": "auto",
     "model_error": 1e6,
 }
@@ -40,8 +41,9 @@ NAMED_PROFILES: Final[dict[str, dict[str, Any]]] = {
         "angular_velocity_tolerance": 0.2,
         "adaptive_tolerances": True,
         "distance_tolerance": 5e-2,
-        "model_mesh": "convex_hull",
-        "model_error": 0.1,
+        "mesh_impact_tolerance": 0.1,
+        "model_mesh": "auto",  # by its tree a mesh is faster than its hull
+        "model_error": 1e6,
     },
     "exact": {
         "impact_tolerance": 1e-6,

@@ -90,7 +90,7 @@ class Profile:
         0.0,
         1.0,
         "m",
-        "Largest error of the distance of a contact that persists, before it is computed anew. With 0, in every step.",
+        "Largest error of the distance of meshes that overlap, and of a contact that is not computed anew. 0: none.",
     )
     impact_tolerance: float = number(
         1e-4,
@@ -98,6 +98,14 @@ class Profile:
         1.0,
         "m",
         "Largest gap that may remain at a predicted impact. A smaller one gives tighter times and takes longer.",
+        predictions=True,
+    )
+    mesh_impact_tolerance: float = number(
+        0.0,
+        0.0,
+        1e3,
+        "m",
+        "Gap up to which a predicted impact of two meshes is only bounded, until it is due. With 0, impact_tolerance.",
         predictions=True,
     )
     impact_iterations: int = number(

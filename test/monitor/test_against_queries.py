@@ -41,7 +41,7 @@ KINDS: dict[str, Callable[[np.random.Generator, float], object]] = {
 }
 
 
-class _Scene:
+class Scene:
     """Bodies with their true motions. An error within `slack` (m) of contact is the profile's."""
 
     def __init__(self, seed: int, profile: str) -> None:
@@ -121,7 +121,7 @@ class _Scene:
 def test_every_step_agrees_with_the_contacts_of_all_pairs(profile: str) -> None:
     onsets = 0
     for seed in range(5):
-        scene = _Scene(seed, profile)
+        scene = Scene(seed, profile)
         for _ in range(20):
             scene.step()
             scene.move()

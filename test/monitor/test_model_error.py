@@ -28,8 +28,8 @@ def model_in(monitor: Monitor, object_id: int) -> Model:
 
 
 @pytest.mark.parametrize(("error", "expected"), [(0.1, Model.EXACT), (2.0, Model.CONVEX_HULL)])
-def test_fast_replaces_a_mesh_by_its_hull_only_if_that_is_close(error: float, expected: Model) -> None:
-    monitor = Monitor(Profile.named("fast").replace(model_error=error))
+def test_a_hull_replaces_a_mesh_only_if_it_is_close(error: float, expected: Model) -> None:
+    monitor = Monitor(Profile(model_mesh="convex_hull", model_error=error))
     monitor.add(1, bracket())
     assert model_in(monitor, 1) is expected
 

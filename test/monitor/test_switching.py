@@ -29,6 +29,7 @@ OTHER: dict[str, Any] = {
     "contact_details": False,
     "distance_tolerance": 1e-3,
     "impact_tolerance": 1e-6,
+    "mesh_impact_tolerance": 0.05,
     "impact_iterations": 200,
     "position_tolerance": 1e-2,
     "orientation_tolerance": 1e-2,
