@@ -132,7 +132,7 @@ class Intake(Stage):
         if given.ndim != 1:
             raise InputError(f"states: expected one dimension, got shape {given.shape}")
         unknown = given["flags"] & _TWIST_UNKNOWN  # the kernel writes their standard deviations
-        if given.flags.carray and not is_written and not unknown.any():
+        if given.flags.carray and not is_written and not np.count_nonzero(unknown):
             return given
         if len(given) > len(self._buffer):
             self._buffer = np.empty(len(given), records.STATE)

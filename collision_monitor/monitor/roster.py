@@ -147,7 +147,7 @@ class Roster(Stage):
 
     def slots_of(self, ids: NDArray[np.uint32]) -> NDArray[np.int32]:
         """Slot of each id, -1 where unknown. Cached, because messages usually name the same objects as the last one."""
-        if not np.array_equal(ids, self._last_ids):
+        if len(ids) != len(self._last_ids) or np.count_nonzero(ids != self._last_ids):
             self._last_slots = self.find_slots(ids)
             self._last_ids = ids.copy()
         return self._last_slots
