@@ -282,6 +282,7 @@ class UncertainPredictions(Stage):
             p.confidence,
             step.roster.planar,
             *normal_samples(p.uncertainty_samples),
+            stops_early=p.impact_tolerance >= FINEST_WITH_PLANES,
         )
 
     def _screen(self, step: StepContext, slots: Pairs) -> NDArray[np.float64]:

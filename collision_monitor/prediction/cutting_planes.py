@@ -21,7 +21,11 @@ from collision_monitor.prediction.obstacle_planes import (
 from collision_monitor.prediction.sample_gaps import NOT_TURNED, enter_planes, gaps_at_end, set_samples
 
 TRIED: Final = 32
-"""Number of samples that decide how the normal of a plane turns."""
+"""Number of samples that decide how the normal of a plane turns: a block of the samples, which are spread out. The
+first one if the search is careful, so that all planes of a segment are compared alike."""
+
+BLOCK: Final = 256
+"""Number of samples among which the one that passes most briefly is sought; all if the search is careful."""
 
 
 class CutSettings(NamedTuple):
@@ -32,6 +36,7 @@ class CutSettings(NamedTuple):
     pilot: int  # number of samples of the pilot lattice
     follows: Any  # (bool, bool): whether normals may turn with the bodies
     turning: Any  # (int, int): how errors of orientation turn the bodies, see sample_gaps
+    careful: bool  # errors of orientation are large: compare more samples
 
 
 @inlined
@@ -41,20 +46,23 @@ def plane_margin(settings):
 
 
 @inlined
-def _next_sample(entry, leave, checked, samples, briefest, cursor):
-    """Sample that enters and is not checked: the one that leaves soonest, or the first from `cursor` on; -1: none."""
+def _briefest(entry, leave, checked, first, last):
+    """Sample of first:last that enters, is not checked, and leaves soonest; -1: none."""
     chosen, shortest = -1, inf
-    if briefest:
-        for n in range(samples):
-            length = leave[n] - entry[n]
-            if length >= 0.0 and length < shortest and checked[n] == 0.0:
-                chosen, shortest = n, length
-    else:
-        for n in range(cursor, samples):
-            if leave[n] >= entry[n] and checked[n] == 0.0:
-                chosen = n
-                break
+    for n in range(first, last):
+        length = leave[n] - entry[n]
+        if length >= 0.0 and length < shortest and checked[n] == 0.0:
+            chosen, shortest = n, length
     return chosen
+
+
+@inlined
+def _entering(entry, leave, checked, first, last):
+    """First sample of first:last that enters and is not checked; -1: none."""
+    for n in range(first, last):
+        if leave[n] >= entry[n] and checked[n] == 0.0:
+            return n
+    return -1
 
 
 @device
@@ -66,7 +74,8 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
     Of those that do, the best is the one behind which TRIED samples spend the least time. Returns whether there is one.
     """
     obstacle, rows, entry, leave = memory.obstacle, memory.rows, memory.entry, memory.leave
-    tried = min(TRIED, settings.pilot)
+    first = 0 if settings.careful else n // TRIED * TRIED
+    last = min(first + TRIED, samples)
     count, nodes = obstacle.count[k], obstacle.node[k : k + 2]
     planes, margin, before = obstacle.planes[k, count : count + 1], plane_margin(settings), leave[n] - entry[n]
     best, latest, span = -1, -inf, nodes[1].time - nodes[0].time
@@ -75,19 +84,17 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
         if mode != AT_REST and not settings.follows[mode]:
             continue
         set_plane(direction, mode, obstacle, planes[0])
-        trial_entry[n], trial_leave[n] = entry[n], leave[n]
-        enter_planes(table, pair, planes, margin, turning, nodes, n, n + 1, rows, trial_entry, trial_leave)
-        if not trial_leave[n] - trial_entry[n] < before:
-            continue
-        if not (settings.follows[0] or settings.follows[1]):
-            best = mode
-            break
-        for m in range(tried):
+        for m in range(first, last):
             trial_entry[m] = entry[m]
             trial_leave[m] = leave[m]
-        enter_planes(table, pair, planes, margin, turning, nodes, 0, tried, rows, trial_entry, trial_leave)
+        enter_planes(table, pair, planes, margin, turning, nodes, first, last, rows, trial_entry, trial_leave)
+        if n >= last:
+            trial_entry[n], trial_leave[n] = entry[n], leave[n]
+            enter_planes(table, pair, planes, margin, turning, nodes, n, n + 1, rows, trial_entry, trial_leave)
+        if not trial_leave[n] - trial_entry[n] < before:
+            continue
         total = 0.0
-        for m in range(tried):
+        for m in range(first, last):
             total += min(max(trial_entry[m] - trial_leave[m], -span), span)
         if total > latest:
             best, latest = mode, total
@@ -146,23 +153,30 @@ def cut_extremes(table, parts, pair, k, extremes, settings, memory, scratch):
 def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch):
     """Add planes to segment k of memory.obstacle for a pair of shapes (ShapePair), where the first `samples` need them.
 
-    Every second sample is the one that passes the planes most briefly, because it may miss the shapes. The search ends
-    when `wanted` samples needed no plane, half of them after the last plane. `begin_segment` comes before it.
+    Every second sample is the one that passes the planes most briefly in a BLOCK of samples, in turn, because it may
+    miss the shapes. The search ends when `wanted` samples needed no plane, half of them after the last plane.
+    `begin_segment` comes before it.
     """
     obstacle, entry, leave, checked = memory.obstacle, memory.entry, memory.leave, memory.checked
     for n in range(samples):
         checked[n] = 0.0
-    verified = cursor = 0
-    briefest = True
-    while verified < wanted and obstacle.count[k] < MOST_PLANES:
-        n = _next_sample(entry, leave, checked, samples, briefest, cursor)
-        if n < 0 and briefest:
-            break
-        is_brief, briefest = briefest, not briefest
+    size = samples if settings.careful else min(BLOCK, samples)
+    blocks = -(-samples // size)
+    block, cursor, verified, idle = k, 0, 0, 0
+    is_brief = False
+    while verified < wanted and idle < 2 * blocks and obstacle.count[k] < MOST_PLANES:
+        is_brief = not is_brief
+        if is_brief:
+            first = block % blocks * size
+            n = _briefest(entry, leave, checked, first, min(first + size, samples))
+            block += 1
+        else:
+            n = _entering(entry, leave, checked, cursor, samples)
+            cursor = n if n >= 0 else samples
         if n < 0:
+            idle += 1
             continue
-        cursor = cursor if is_brief else n
-        checked[n] = 1.0
+        idle, checked[n] = 0, 1.0
         at = 0.5 * (entry[n] + leave[n]) if is_brief else entry[n]
         if _check(table, parts, pair, n, at, samples, k, settings, memory, scratch):
             checked[n] = 0.0

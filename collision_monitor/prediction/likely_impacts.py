@@ -24,7 +24,7 @@ from collision_monitor.prediction.impact_histogram import NOT_FOUND, summarise_b
 from collision_monitor.prediction.motion import carry_on, half_acceleration
 from collision_monitor.prediction.pair_errors import PairErrors, set_gap_covariance, surface_bend, swing_bound
 from collision_monitor.prediction.plane_impacts import enter_bodies, enter_surely
-from collision_monitor.prediction.round_impacts import are_round, enter_round_bodies
+from collision_monitor.prediction.round_impacts import NOT_ROUND, enter_round_bodies, round_form
 from collision_monitor.prediction.sample_gaps import TURNED_FARTHEST
 from collision_monitor.prediction.screening import design_point
 from collision_monitor.prediction.sphere_interval import sphere_interval
@@ -117,11 +117,10 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         take_root(work.joint)
         _clear_upper(work.joint)
         errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, (far_i, far_j))
-        is_even = False
-        if are_round(table, parts, pair, errors, query.margin, work):
-            samples = enter_round_bodies(table, parts, pair, errors, sampling, lattice, memory, work)
+        form = round_form(table, parts, pair, errors, query.margin, work)
+        if form != NOT_ROUND:
+            samples = enter_round_bodies(table, parts, pair, form, errors, sure, sampling, lattice, memory, work)
         elif sure:
-            is_even = True
             samples = enter_surely(multibody, i, j, errors, sampling, lattice, memory, work)
         else:
             samples = enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work)
@@ -133,8 +132,8 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
             continue
         followed += samples
         answer = answers[k]
-        weights, sums = (lattice.even, lattice.even_sums) if is_even else (lattice.weights, lattice.sums)
-        outward = EVENLY_OUTWARD if is_even else OUTWARD
+        weights, sums = (lattice.even, lattice.even_sums) if sure else (lattice.weights, lattice.sums)
+        outward = EVENLY_OUTWARD if sure else OUTWARD
         first = summarise_by_bins(memory.times[0:samples], weights, sums, outward, sampling.confidence, memory, answer)
         if answer[EARLIEST] == NOT_FOUND:
             wide = Tube(sampling.safe_sigmas * tube.start, sampling.safe_sigmas * tube.growth)

@@ -58,6 +58,7 @@ class Obstacle(NamedTuple):
     planes: Any  # (MOST_SEGMENTS, MOST_PLANES + 1, PLANE_SIZE)
     placed: Any  # (2, 3, 3): rotation of both shapes where a plane is sought
     count: Any  # (MOST_SEGMENTS,) int64: planes of each segment
+    is_quiet: Any  # (MOST_SEGMENTS,) bool: segments in which no sample of the pilot meets
     node: Any  # (MOST_SEGMENTS + 1,) NODE
 
 
@@ -67,6 +68,7 @@ def make_obstacle() -> Obstacle:
         np.zeros((MOST_SEGMENTS, MOST_PLANES + 1, PLANE_SIZE)),
         np.zeros((2, 3, 3)),
         np.zeros(MOST_SEGMENTS, np.int64),
+        np.zeros(MOST_SEGMENTS, np.bool_),
         np.zeros(MOST_SEGMENTS + 1, NODE),
     )
 
@@ -101,7 +103,7 @@ def set_nodes(table, parts, pair, window, length, turning, planar, scratch, obst
         if t >= end:
             break
     for k in range(segments):
-        obstacle.count[k] = 0
+        obstacle.count[k], obstacle.is_quiet[k] = 0, False
     return segments
 
 

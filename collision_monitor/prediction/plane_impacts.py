@@ -20,7 +20,7 @@ from collision_monitor.prediction.cutting_planes import (
     end_segment,
 )
 from collision_monitor.prediction.impact_record import CLEAR
-from collision_monitor.prediction.normal_samples import FURTHEST, WIDENED
+from collision_monitor.prediction.normal_samples import FURTHEST
 from collision_monitor.prediction.obstacle_planes import MOST_SEGMENTS, set_nodes
 from collision_monitor.prediction.pair_errors import (
     BENDING,
@@ -32,7 +32,7 @@ from collision_monitor.prediction.pair_errors import (
 )
 from collision_monitor.prediction.sample_count import latest, samples_needed
 from collision_monitor.prediction.screening import meeting
-from collision_monitor.prediction.straight_samples import set_errors
+from collision_monitor.prediction.straight_samples import draw_evenly, set_errors
 from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE
 
 FACETS: Final = 0.015
@@ -49,12 +49,17 @@ SMALL: Final = 0.1
 """If bodies that turn divide the time into more than MOST_PARTS, and errors exceed SMALL rad, or twice SMALL radii of a
 shape, the pair is left to the exact method unless it surely meets: it needs so many planes that it is no faster."""
 
+CAREFUL: Final = 0.05
+"""Standard deviation of an orientation (rad) above which more samples are compared, and no part of the time is left
+out."""
+
 SPINS: Final = 4.0
 """Standard deviations of the angular velocity above which a body counts as one that turns."""
 
-VERIFIED_IN_PILOT: Final = 6
+VERIFIED_IN_PILOT: Final = 4
 VERIFIED: Final = 48
-"""Samples of the pilot lattice, and of all, that must need no new plane of a segment."""
+"""Samples of the pilot lattice, and of all, that must need no new plane of a segment. Twice as many if it is
+careful."""
 
 SURE_EXTREMES: Final = 4
 """Number of the extreme samples at which the planes of bodies that surely meet are checked: one for each axis of the
@@ -107,7 +112,8 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
         not flat and errors.radius[0] > 0.0 and turning[0] + spin_rate(A) > 0.0,
         not flat and errors.radius[1] > 0.0 and turning[1] + spin_rate(B) > 0.0,
     )
-    settings = CutSettings(margin, tolerance, samples, follows, turning)
+    careful = max(turned_at(errors, 0), turned_at(errors, 1)) > CAREFUL
+    settings = CutSettings(margin, tolerance, samples, follows, turning, careful)
     for n in range(samples):
         alone[n] = inf
     wide = Tube(FURTHEST * errors.tube.start, FURTHEST * errors.tube.growth)
@@ -137,8 +143,9 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
     for k in range(segments):
         begin_segment(table, pair, k, settings, memory, search.points, 0, samples)
         cut_extremes(table, parts, pair, k, search.extremes, settings, memory, scratch)
-        cut_planes(table, parts, pair, k, samples, search.verified, settings, memory, scratch)
-        left = end_segment(memory.entry, memory.leave, alone, 0, samples)
+        cut_planes(table, parts, pair, k, samples, (1 + careful) * search.verified, settings, memory, scratch)
+        before, left = left, end_segment(memory.entry, memory.leave, alone, 0, samples)
+        memory.obstacle.is_quiet[k] = left == before and not settings.careful
         if left == 0:
             break
         if k + 1 < segments:
@@ -153,12 +160,17 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
     verified: number of samples of all that must need no new plane; tolerance (m): see CutSettings.
     """
     segments, pilots, _ = laid
-    settings = CutSettings(pilots.margin, tolerance, pilots.pilot, pilots.follows, pilots.turning)
+    settings = CutSettings(
+        pilots.margin, tolerance, pilots.pilot, pilots.follows, pilots.turning, pilots.careful
+    )
     alone, times = memory.alone, memory.times
     for n in range(samples):
         alone[n] = inf
-    each = max(VERIFIED_IN_PILOT, verified // max(segments - 3, 1))
+    each = max(VERIFIED_IN_PILOT, verified // max(segments - 3, 1)) if verified > 0 or settings.careful else 0
+    each *= 1 + settings.careful
     for k in range(segments):
+        if memory.obstacle.is_quiet[k]:
+            continue
         begin_segment(table, pair, k, settings, memory, points, 0, samples)
         cut_planes(table, parts, pair, k, samples, each, settings, memory, work.scratch)
         if end_segment(memory.entry, memory.leave, alone, 0, samples) == 0:
@@ -193,14 +205,15 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
         pair = ShapePair(A, B, a, b)
         until = min(end, latest(times, pilot))
         laid = _lay_planes(table, parts, pair, errors, search, until, sampling, memory, work)
-    samples, until = samples_needed(times, lattice, sampling), latest(times, pilot)
+    samples, until = samples_needed(times, lattice, sampling, laid.settings.careful), latest(times, pilot)
     if samples == 0:
         return 0
+    meets = until < inf
     set_errors(work.joint, work.frame, errors.time, points, pilot, samples, memory.off)
     for n in range(times.size):
         times[n] = inf
-    verified = VERIFIED_IN_PILOT if until < inf else VERIFIED
-    tolerance = max((FACETS_IN_PILOT if until < inf else FACETS) * errors.sigma, sampling.query.tolerance)
+    verified = 0 if meets else VERIFIED
+    tolerance = max((FACETS_IN_PILOT if meets else FACETS) * errors.sigma, sampling.query.tolerance)
     _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work)
     last_a, last_b = pair.a, pair.b  # its planes are still there; those of the others are laid again
     a, b = first_a, first_b
@@ -220,8 +233,7 @@ def enter_surely(multibody, i, j, errors, sampling, lattice, memory, work):
     """
     table, parts, bodies = multibody
     times, points, samples = memory.times, lattice.points, lattice.pilot
-    for r in range(6):
-        work.joint[r, 0] /= WIDENED
+    draw_evenly(work.joint)
     set_errors(work.joint, work.frame, errors.time, points, 0, samples, memory.off)
     for n in range(samples):
         times[n] = inf

@@ -15,6 +15,10 @@ PILOT_PART: Final = 0.3
 """A pair of shapes that is stated to pass is left out if it meets in the pilot with less than this fraction of
 min_probability."""
 
+RARE: Final = 0.03
+"""Part of the pilot that does not meet below which half of the samples suffice: the error of the probability falls with
+it."""
+
 
 @inlined
 def latest(times, count):
@@ -26,10 +30,11 @@ def latest(times, count):
 
 
 @device
-def samples_needed(times, lattice, sampling):
+def samples_needed(times, lattice, sampling, careful):
     """Number of samples for bodies with these times (S,) of the pilot's samples; infinite: they do not meet.
 
     0: the bodies are stated to pass, and hardly meet in the pilot. SURE_SAMPLES: they meet in all of it.
+    careful: take all samples also if nearly all of the pilot meets.
     """
     weights, pilot = lattice.weights, lattice.pilot
     seen = part = 0.0
@@ -40,4 +45,4 @@ def samples_needed(times, lattice, sampling):
         return 0
     if latest(times, pilot) < inf:
         return min(SURE_SAMPLES, weights.size)
-    return weights.size
+    return max(pilot, weights.size // 2) if part - seen < RARE * part and not careful else weights.size

@@ -9,10 +9,18 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Final
 
-from collision_monitor._jit import device
+from collision_monitor._jit import device, inlined
+from collision_monitor.prediction.normal_samples import WIDENED
 
 ERRORS: Final = 6
 """Rows of the errors: position at time 0 (m) and velocity (m/s) of B relative to A."""
+
+
+@inlined
+def draw_evenly(root):
+    """Undo for all samples that their first coordinate is drawn wider; root (6, 6): see `set_errors`."""
+    for r in range(root.shape[0]):
+        root[r, 0] /= WIDENED
 
 
 @device
@@ -99,3 +107,23 @@ def enter_cylinder(p, v, axis, radius, half, end, off, first, last, times):
         leave = high if high < leave else leave
         leave = end if end < leave else leave
         times[n] = at if at <= leave else inf
+
+
+@device
+def tilt(points, row, axis, up, turning, first, last, off):
+    """Move the samples first:last as errors of orientation move a point on a body's axis.
+
+    axis (3,): unit vector; up: height (m) of the point over the body's origin along it; turning: error of orientation
+    now (rad) and its rate (rad/s), one standard deviation. points (DIMENSIONS, S): unit errors, three rows from `row`.
+    """
+    ax, ay, az = axis
+    x, y, z = points[row, first:last], points[row + 1, first:last], points[row + 2, first:last]
+    for part in range(2):
+        by = up * turning[part]
+        u, v, w = off[3 * part, first:last], off[3 * part + 1, first:last], off[3 * part + 2, first:last]
+        for n in range(u.size):
+            u[n] += by * (y[n] * az - z[n] * ay)
+        for n in range(v.size):
+            v[n] += by * (z[n] * ax - x[n] * az)
+        for n in range(w.size):
+            w[n] += by * (x[n] * ay - y[n] * ax)

@@ -205,6 +205,7 @@ class Sampling(NamedTuple):
     points: Any  # (S, 12): normal_samples
     weights: Any  # (S,)
     only_screens: bool = False  # bounds in place of answers, see likely_impacts
+    stops_early: bool = False  # pairs that meet in a coarse lattice of the samples need no others
 
 
 @allocating_kernel
@@ -268,11 +269,13 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
         )
         work.axes[:, 3] = inf  # no axis is known yet
         stride = max(1, weights.size // PILOT)
-        seen = 0.0
-        likely = True
+        stride = 2 if stride == 1 and sampling.stops_early and weights.size >= PILOT else stride
+        seen, met, begun = 0.0, 0, followed
+        likely, surely = True, False
         for first in range(stride):
             likely = stated or first == 0 or seen * stride >= PILOT_PART * sampling.min_probability * first
-            if not likely:
+            surely = stated and sampling.stops_early and first == 1 and met == followed - begun
+            if not likely or surely:
                 break
             for n in range(first, weights.size, stride):
                 followed += 1
@@ -293,7 +296,11 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                 if straight:
                     pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
                     remember(table, parts, pair, times[n] == inf, n, work.scratch, work.axes)
+                met += 1 if times[n] < inf else 0
                 seen += weights[n] if times[n] < inf else 0.0
-        if likely:
+        if surely:
+            some, part = times[0::stride].copy(), weights[0::stride].copy()
+            summarise(some, part, np.argsort(some), sampling.confidence, safe, answers[k], part.sum())
+        elif likely:
             summarise(times, weights, np.argsort(times), sampling.confidence, safe, answers[k], 1.0)
     return followed

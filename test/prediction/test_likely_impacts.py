@@ -82,6 +82,7 @@ CASES = {
     "much turned": Case(turned=0.15),
     "turning": Case(spin=1.0, noise=(0.003, 0.01), turned=0.005),
     "people": Case(("person",), upright=True),
+    "tilted people": Case(("person",), upright=True, spin=0.3, turned=0.02),
     "plane": Case(("disc", "polygon"), spin=0.3, noise=(0.01, 0.03), turned=0.02, upright=True, fewest=20),
 }
 
