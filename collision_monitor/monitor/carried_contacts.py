@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import inlined
 from collision_monitor.monitor.carried_triangles import (
     NO_MESH,
     NONE,
