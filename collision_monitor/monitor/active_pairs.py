@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from collision_monitor import records
 from collision_monitor._jit import inlined, kernel
+from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.candidates import is_checked
@@ -285,6 +286,7 @@ def _ask_for(multibody, pairs, which, at):
         _ask_for_body(table, parts, bodies, near.j)
 
 
+@direct
 @kernel
 def _examine(multibody, active, which, now, queries, scratch, later):
     """Examine the active pairs `which` (M,) at `now`: write contacts into the results, predict the other pairs further.

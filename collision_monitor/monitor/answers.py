@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from collision_monitor import records
 from collision_monitor._jit import inlined, kernel
+from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.active_pairs import ActivePairs
@@ -252,6 +253,7 @@ class Times(NamedTuple):
     stale_after: float
 
 
+@direct
 @kernel
 def write_predictions(predicted, bodies, shape_index, times, predictions, slots):
     """Write the predictions (records.PREDICTION) of the active pairs that do not touch, then of the pending events.

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.broad_phase.hashed_grid import (
@@ -31,6 +32,9 @@ MOST_TESTS: Final = 6_000
 
 MOST_QUERIES: Final = 0.005
 """Up to this fraction of the bodies, each is queried in the hashed grid. For more, a dense grid is built and swept."""
+
+MOSTLY_NEW: Final = 0.5
+"""From this fraction of the bodies on, the sweep does not sort out the others, which takes up to twice the time."""
 
 PREFETCH_AHEAD: Final = 4
 """How many pairs ahead the bodies are prefetched."""
@@ -73,7 +77,7 @@ class Candidates(Stage):
         if len(which) > MOST_QUERIES * top and not is_small:
             centre, half = np.empty((2, top, 3))
             read_boxes(self.grid.box, centre, half)
-            pairs = box_pairs(centre, half, is_new[:top])
+            pairs = box_pairs(centre, half, is_new[:top] if len(which) < MOSTLY_NEW * top else None)
             return pairs[: keep_new(bodies, self.grid.box, pairs, is_new, step.now, margin)]
         search = Search(which, is_new, np.empty(len(self.grid.box), np.int32))
         while True:  # at most twice: the second time the array is large enough
@@ -149,6 +153,7 @@ def _finds(bodies, is_new, i, j):
     return covered < other or (covered == other and i < j)
 
 
+@direct
 @kernel
 def find_partners(bodies, grid, search, now, margin, pairs):
     """Write the pairs of each body of the search with all bodies whose swept box overlaps its own, each pair once.
@@ -188,6 +193,7 @@ def _reporter(bodies, box, i, j, is_new, now, margin):
     return i
 
 
+@direct
 @kernel
 def sweep(bodies, box, search, top, now, margin, pairs):
     """As `find_partners`, but by a test of each body of the search with all bodies in the first `top` slots.
@@ -209,6 +215,7 @@ def sweep(bodies, box, search, top, now, margin, pairs):
     return n
 
 
+@direct
 @kernel
 def keep_new(bodies, box, pairs, is_new, now, margin):
     """Move the pairs (P, 2) that `find_partners` would find to the front; return their number.

@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import inlined
 from collision_monitor.monitor.carried_triangles import (
     NO_MESH,
     NONE,
@@ -78,7 +78,7 @@ def _turn_now(bodies, i, now, q):
     turn_quaternion(bodies.quaternion, i, wx, wy, wz, age_of(bodies, i, now), q)
 
 
-@device
+@inlined
 def _turned(bodies, i, now, row, at, q):
     """Distance (m) that the surface of body i has turned since the answer. q (4,): scratch."""
     radius = bodies.spin_radius[i]
@@ -89,7 +89,7 @@ def _turned(bodies, i, now, row, at, q):
     return angle * radius if angle > 0.0 else 0.0
 
 
-@device
+@inlined
 def carry(multibody, i, j, now, query, tolerance, scratch, row, result):
     """Write the contact of bodies i and j into a result row, from their carried row, if that still holds.
 
@@ -146,7 +146,7 @@ def _outlasts(bodies, i, j, v, n, carrying):
     return (half + turning(bodies, i) + turning(bodies, j)) * carrying.period <= carrying.tolerance
 
 
-@device
+@inlined
 def keep(multibody, i, j, touching, now, query, carrying, scratch, result, row, spread):
     """Write the carried row of bodies i and j from their result row, if that may be carried.
 

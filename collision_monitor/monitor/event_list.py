@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit.direct import direct
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.prediction.bodies import Bodies
 from collision_monitor.prediction.impact_record import BOUND_ONLY, HIT, IMPACT, UNRESOLVED, holds
@@ -126,6 +127,7 @@ def _place(key, new, place):
     return at
 
 
+@direct
 @kernel
 def keep_first(new, bodies, pending, pairs, room, keep):
     """`EventList.first_of_pairs`; returns their number. room (R,) int32: a hash table. keep (n,) bool: all True."""

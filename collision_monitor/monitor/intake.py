@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor import records
 from collision_monitor._jit import device, kernel
+from collision_monitor._jit.direct import direct
 from collision_monitor.errors import InputError, Refusal
 from collision_monitor.geometry.planar import flat_states
 from collision_monitor.monitor.result import Refused
@@ -131,7 +132,7 @@ class Intake(Stage):
         if given.ndim != 1:
             raise InputError(f"states: expected one dimension, got shape {given.shape}")
         unknown = given["flags"] & _TWIST_UNKNOWN  # the kernel writes their standard deviations
-        if given.flags.carray and not is_written and not unknown.any():
+        if given.flags.carray and not is_written and not np.count_nonzero(unknown):
             return given
         if len(given) > len(self._buffer):
             self._buffer = np.empty(len(given), records.STATE)
@@ -230,6 +231,7 @@ def _states(ids: NDArray[Any], poses: Any, twists: Any) -> States:
     return states
 
 
+@direct
 @kernel
 def take_states(bodies, slots, numbers, flags, time, rates, verdicts):
     """Store states as the bodies' last ones.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from itertools import chain
 from typing import Any, Final
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
 from collision_monitor._jit.alignment import in_one_block
+from collision_monitor._jit.direct import forget
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.planar import flat_pose, is_planar
@@ -76,6 +78,7 @@ class Roster(Stage):
         self.top = 0
         self.planar = False
         self.renewed: set[int] = set()
+        weakref.finalize(self, forget)  # the kernels keep the arrays of their last call
         self._shapes = ShapeTableBuilder()
         self._slots: dict[int, int] = {}
         self._names: dict[int, str] = {}
@@ -144,7 +147,7 @@ class Roster(Stage):
 
     def slots_of(self, ids: NDArray[np.uint32]) -> NDArray[np.int32]:
         """Slot of each id, -1 where unknown. Cached, because messages usually name the same objects as the last one."""
-        if not np.array_equal(ids, self._last_ids):
+        if len(ids) != len(self._last_ids) or np.count_nonzero(ids != self._last_ids):
             self._last_slots = self.find_slots(ids)
             self._last_ids = ids.copy()
         return self._last_slots

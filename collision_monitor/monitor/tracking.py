@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, kernel
+from collision_monitor._jit.direct import direct
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, put_box, remove_boxes
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.adaptive_tubes import FUTILE_STEPS, NARROWEST, PATIENCE, Unrest, fit_width, widest_tube
@@ -157,6 +158,7 @@ def _turned_away(bodies, start, count, columns, angles):
         turned_away(bodies, start, count, columns, angles)
 
 
+@direct
 @kernel
 def find_moved(bodies, uncertainty, count, seconds, settings, columns, found):
     """Find the bodies among the first `count` slots whose predictions no longer hold at `now`, or end too soon.
@@ -293,6 +295,7 @@ def _cover(bodies, i, now, horizon):
     m.cover = now + horizon + bodies.slack[i] * share
 
 
+@direct
 @kernel
 def renew_motions(bodies, uncertainty, grid, moved, ending, seconds, limits, settings, width):
     """`restart_motion` of the bodies `moved` (M,), then `continue_motion` of those in `ending`.

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from collision_monitor._jit import inlined, kernel
+from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.prediction.body_impact import Window, body_impact, tube_of
 from collision_monitor.prediction.impact_record import BOUND_ONLY, CLEAR, UNRESOLVED, write_pair
@@ -34,6 +35,7 @@ def cover_of(bodies, i, j):
     return min(bodies.motion[i].cover, bodies.motion[j].cover)
 
 
+@direct
 @kernel
 def predict_pairs(multibody, pairs, now, query, events, scratch):
     """Write the first impacts of pairs (P, 2) until both bodies' cover times into events (IMPACT).

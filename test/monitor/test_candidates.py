@@ -23,8 +23,9 @@ def test_both_grids_find_the_pairs_that_tests_of_all_bodies_find(scene: str, mon
         monkeypatch.setattr(candidates, "MOST_TESTS", 10**9)
         tested = {tuple(sorted(pair)) for pair in find(self, step, which).tolist()}
         monkeypatch.setattr(candidates, "MOST_TESTS", -1)
-        for most_queries in (2.0, -1.0):
+        for most_queries, mostly_new in ((2.0, 0.5), (-1.0, 2.0), (-1.0, 0.0)):
             monkeypatch.setattr(candidates, "MOST_QUERIES", most_queries)
+            monkeypatch.setattr(candidates, "MOSTLY_NEW", mostly_new)
             swept = find(self, step, which)
             assert {tuple(sorted(pair)) for pair in swept.tolist()} == tested
             assert len(swept) == len(tested)
