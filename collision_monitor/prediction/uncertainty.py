@@ -52,6 +52,10 @@ GAP_NODES: Final = 9
 SAMPLE_TOLERANCE: Final = 0.05
 """Tolerance of a sample's impact in standard deviations of the gap; it changes the probability by 0.004."""
 
+SEARCH_ITERATIONS: Final = 8
+"""Iterations of the search for a sample's impact with one mesh: 4,000 boxes or 1.2 ms. Ordinary ones take a tenth. Each
+sample of a disc of 100 km that turns beside a mesh took 20 ms."""
+
 PILOT_PART: Final = 0.2
 """A pair that is stated to pass is left out if it meets with less than this fraction of min_probability in the first
 coarse lattice of samples. The test is repeated after each further one."""
@@ -234,7 +238,11 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
         now_j, growth_j = surface_spread(spread, j, r_j, age_j, horizon, stale_acceleration)
         tube = Tube(now_i + now_j, growth_i + growth_j)
         coarse = max(query.tolerance, SAMPLE_TOLERANCE * tube.start)
-        roughly, whole = ImpactQuery(query.margin, coarse, query.iterations), Window(0.0, horizon)
+        a, b = bodies.first_shape[i], bodies.first_shape[j]
+        has_mesh = body_has_mesh(table, parts, a) or body_has_mesh(table, parts, b)
+        is_one_search = has_mesh and parts.next[a] < 0 and parts.next[b] < 0
+        iterations = min(query.iterations, SEARCH_ITERATIONS) if is_one_search else query.iterations
+        roughly, whole = ImpactQuery(query.margin, coarse, iterations), Window(0.0, horizon)
         if not stated:
             wide = Tube(sampling.sigmas * tube.start, sampling.sigmas * tube.growth)
             if first_contact(multibody, i, j, whole, wide, roughly, work) == inf:
@@ -255,11 +263,10 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                 work.rotation[1, r, c] = B.rotation[r, c]
         level = 0.0 if sampling.planar else 1.0
         coarse = max(query.tolerance, SAMPLE_TOLERANCE * work.joint[0, 0])
-        roughly = ImpactQuery(query.margin, coarse, query.iterations)
+        roughly = ImpactQuery(query.margin, coarse, iterations)
         begin = safe if safe < inf else 0.0
         # a search for the overlap of half a tolerance; the surface of a mesh has no gap below 0
-        exact = body_has_mesh(table, parts, bodies.first_shape[i]) or body_has_mesh(table, parts, bodies.first_shape[j])
-        exact = exact or (r_i == 0.0 and r_j == 0.0)
+        exact = has_mesh or (r_i == 0.0 and r_j == 0.0)
         bias = 0.0 if exact else -0.75 * coarse
         p, v = (B.x, B.y, B.z), (B.vx, B.vy, B.vz)
         w_i, w_j = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
