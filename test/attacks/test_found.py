@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from processor_time import within
 
 from collision_monitor.codec import decode_status, encode_descriptions, encode_states
 from collision_monitor.codec.descriptions import decode_descriptions
@@ -15,6 +16,7 @@ from collision_monitor.geometry.convex_pieces import is_convex_mesh
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Circle, ConvexHull, Cylinder, HalfSpace, Mesh, Sphere
+from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.preparation_cost import Budget
@@ -178,3 +180,23 @@ def test_a_flat_box_does_not_refuse_the_objects_after_it(flat: Box) -> None:
     assert outputs is not None
     found = {(int(row["id_a"]), int(row["id_b"])) for row in outputs.result.contacts}
     assert found >= {(1, 2), (2, 3)} | ({(1, 3)} if flat.size[1] == 1.0 else set())
+
+
+@pytest.mark.parametrize("seed", [3, 27])
+def test_samples_of_a_huge_disc_beside_a_mesh_take_bounded_time(seed: int) -> None:
+    """Each sample of a disc of 100 km that turns beside a mesh took 20 ms, and a step 5 s."""
+    rng = np.random.default_rng(seed)
+    torus = trimesh.creation.torus(1.0, 0.4, major_sections=12, minor_sections=12)
+    monitor = Monitor(warns=False)
+    monitor.add(1, Mesh(torus.vertices, torus.faces))
+    monitor.add(2, Cylinder(95_677.0, 0.74))
+    states = np.zeros(2, STATE)
+    states["id"], quaternion = (1, 2), rng.normal(size=(2, 4))
+    states["quaternion"] = quaternion / np.linalg.norm(quaternion, axis=1)[:, None]
+    states["position"], states["linear"] = rng.uniform(-10, 10, (2, 3)), rng.uniform(-2, 2, (2, 3))
+    states["angular"] = rng.uniform(-1, 1, (2, 3))
+    states["position_stddev"], states["orientation_stddev"] = 0.05, 0.01
+    monitor.step(0, states)
+    states["position"] += 0.02 * states["linear"]
+    with within(1.5):
+        monitor.step(20_000_000, states)
