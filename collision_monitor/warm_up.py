@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from collision_monitor.alerts.alerts import Alerts
 from collision_monitor.alerts.rules import Rules
 from collision_monitor.geometry.pose import Motion, Pose
-from collision_monitor.geometry.shapes import Box, ConvexHull, Cylinder, Mesh, Shape, Sphere
+from collision_monitor.geometry.shapes import Box, ConvexHull, Cylinder, Mesh, Points, Shape, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.time_critical import TimeCritical
 from collision_monitor.objects.models import containing_model
@@ -92,13 +92,13 @@ def _step_uncertain(monitor: Monitor, poses: Array, seconds: int) -> None:
 
 
 def _step_bounded_meshes(monitor: Monitor) -> None:
-    """Step two meshes that approach, with a bound on their impact."""
-    corner = Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [(0, 1, 2), (0, 1, 3)])
+    """Step two clouds that approach, with a bound on their impact. A small mesh may have a hull in its place."""
+    cloud = Points(np.eye(3), 0.1)
     before = monitor.profile
     monitor.profile = before.replace(uncertainty=False, mesh_impact_tolerance=0.1)
     ids = np.array([OBJECTS + 1, OBJECTS + 2])
     for each in ids.tolist():
-        monitor.add(each, corner)
+        monitor.add(each, cloud)
     twists = np.array([[0.0, 0, 0, 0, 0, 0], [-1.0, 0, 0, 0, 0, 0]])
     monitor.step(5_500_000_000, ids, np.array([[0, 500.0, 0, 0, 0, 0, 1], [2, 500.0, 0, 0, 0, 0, 1]]), twists)
     for each in ids.tolist():

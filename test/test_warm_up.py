@@ -92,8 +92,24 @@ for threads in (1, 2):
 print(json.dumps({"compiled": compiled, "contacts": len(contacts), "first": first}))
 """
 
+MESHES = START + """
+from collision_monitor.world.arm import lathe
+monitor = cm.Monitor("fast")
+rng = np.random.default_rng(0)
+for i in range(40):
+    monitor.add(i, lathe([(0.06, -0.2), (0.06, -0.12), (0.03, -0.1), (0.03, 0.1), (0.06, 0.12), (0.06, 0.2)], 16))
+poses = np.zeros((40, 7)); poses[:, 6] = 1; poses[:, :3] = rng.uniform(0, 1, (40, 3))
+twists = rng.uniform(-0.3, 0.3, (40, 6))
+contacts = 0
+for step in range(40):
+    contacts += len(monitor.step(step * 10_000_000, np.arange(40), poses, twists).contacts)
+    poses[:, :3] += 0.01 * twists[:, :3]
+assert contacts > 10
+print(json.dumps({"compiled": compiled, "contacts": contacts}))
+"""
 
-@pytest.mark.parametrize("session", [SESSION, FUNCTIONS], ids=["monitor", "functions"])
+
+@pytest.mark.parametrize("session", [SESSION, FUNCTIONS, MESHES], ids=["monitor", "functions", "meshes"])
 def test_nothing_is_compiled_after_the_warm_up(session: str) -> None:
     subprocess.run([sys.executable, "-m", "collision_monitor.warm_up"], check=True)
     told = subprocess.run([sys.executable, "-c", session], check=True, capture_output=True, text=True).stdout
@@ -124,8 +140,10 @@ CERTAIN_SESSION = re.sub(r"    if step == 5:\n.*\n    if step in .*\n.*\n", "", 
         ("warm_up.warm_up_monitor()", SESSION),
         ("warm_up.warm_up_monitor(Profile(uncertainty=False))", CERTAIN_SESSION),
         ("warm_up.warm_up_monitor(); warm_up.warm_up_functions()", FUNCTIONS),
+        ("warm_up.warm_up_monitor(); warm_up.warm_up_functions()", MESHES),
+        ("warm_up.warm_up_monitor(Profile.named('fast')); warm_up.warm_up_functions()", MESHES),
     ],
-    ids=["all", "certain", "functions"],
+    ids=["all", "certain", "functions", "meshes", "meshes fast"],
 )
 def test_nothing_is_loaded_after_the_warm_up(warm_up: str, session: str) -> None:
     """The first step of a node once compiled a kernel for 0.5 s that the warm-up did not call."""
