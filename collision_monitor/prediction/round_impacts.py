@@ -13,6 +13,7 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.shape_table import CYLINDER, SPHERE
 from collision_monitor.narrow_phase.cylinder_cylinder import is_parallel
 from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.narrow_phase.vector import cross, dot
 from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.motion import half_acceleration
 from collision_monitor.prediction.normal_samples import FURTHEST
@@ -37,18 +38,6 @@ LEVELS: Final = 3
 
 
 @inlined
-def _dot(a, b):
-    """Scalar product of two vectors (3,)."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@inlined
-def _turned(w, axis):
-    """Rate (3,) at which the angular velocity w (3,) tilts an axis."""
-    return w[1] * axis[2] - w[2] * axis[1], w[2] * axis[0] - w[0] * axis[2], w[0] * axis[1] - w[1] * axis[0]
-
-
-@inlined
 def _axis(R, side):
     """Axis (3,) of a cylinder that is placed with R[side]."""
     return R[side, 0, 2], R[side, 1, 2], R[side, 2, 2]
@@ -59,8 +48,8 @@ def _levels(table, pair, t, axis, offsets):
     """Lowest and highest point that two cylinders share at time t, and the origin of B, over that of A (m)."""
     A, B, a, b = pair
     x, y, z = B.x - A.x + t * (B.vx - A.vx), B.y - A.y + t * (B.vy - A.vy), B.z - A.z + t * (B.vz - A.vz)
-    up = _dot((x, y, z), axis)
-    middle_a, middle_b = _dot(offsets[0], axis), up + _dot(offsets[1], axis)
+    up = dot((x, y, z), axis)
+    middle_a, middle_b = dot(offsets[0], axis), up + dot(offsets[1], axis)
     half_a, half_b = table.size[a, 1], table.size[b, 1]
     return max(middle_a - half_a, middle_b - half_b), min(middle_a + half_a, middle_b + half_b), up
 
@@ -85,10 +74,10 @@ def round_form(table, parts, pair, errors, margin, work):
     aslant = sqrt((one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2 + (one[2] - other[2]) ** 2)
     for side in range(2):
         m, axis, o = (A, one, oa) if side == 0 else (B, other, ob)
-        rate = _turned((m.wx, m.wy, m.wz), axis)
-        aslant += sqrt(_dot(rate, rate)) * errors.time
-        across = _turned(o, axis)
-        if sqrt(_dot(across, across)) * (turned_at(errors, side) + spin_rate(m)) > 0.0:
+        rate = cross((m.wx, m.wy, m.wz), axis)
+        aslant += sqrt(dot(rate, rate)) * errors.time
+        across = cross(o, axis)
+        if sqrt(dot(across, across)) * (turned_at(errors, side) + spin_rate(m)) > 0.0:
             return NOT_ROUND
     low, high, _ = _levels(table, pair, errors.time, other, (oa, ob))
     now_low, now_high, _ = _levels(table, pair, 0.0, other, (oa, ob))
@@ -107,9 +96,9 @@ def _enter_tilted(table, parts, pair, errors, end, first, last, points, memory, 
     R, off, times = work.scratch.rotation, memory.off, memory.times
     offsets = place_shape(table, parts, a, A.rotation, R[0]), place_shape(table, parts, b, B.rotation, R[1])
     one, other, reach = _axis(R, 0), _axis(R, 1), table.size[a, 0] + table.size[b, 0]
-    slow_a, slow_b = _turned((A.wx, A.wy, A.wz), one), _turned((B.wx, B.wy, B.wz), other)
+    slow_a, slow_b = cross((A.wx, A.wy, A.wz), one), cross((B.wx, B.wy, B.wz), other)
     low, high, up = _levels(table, pair, errors.time, other, offsets)
-    middle = _dot(offsets[1], other) - _dot(offsets[0], other)
+    middle = dot(offsets[1], other) - dot(offsets[0], other)
     half = table.size[a, 1] + table.size[b, 1]
     for n in range(first, last):
         times[n] = inf
