@@ -22,8 +22,8 @@ def aligned_zeros(rows: int, dtype: np.dtype[Any]) -> NDArray[Any]:
 def in_one_block(columns: Columns) -> Columns:
     """Copy the arrays of a structure into one block, each to the begin of a cache line.
 
-    A row of 32 bytes then never lies in two lines, and the system can use large pages, of which a random access misses
-    fewer. NumPy requests these for blocks of 4 MiB and more.
+    A row of 32 bytes then never lies in two lines, and the system can use large pages, so that random accesses miss
+    fewer pages. NumPy requests these for blocks of 4 MiB and more.
     """
     sizes = [-(-column.nbytes // CACHE_LINE) * CACHE_LINE for column in columns]
     block = aligned_zeros(sum(sizes), np.dtype(np.uint8))

@@ -250,7 +250,7 @@ class Monitoring:
         self._check_rules()
 
     def _use(self, profile: Profile) -> None:
-        """Take the next steps with this profile, of which the details of contacts only if anything reads them."""
+        """Take the next steps with this profile, with the details of contacts only if anything reads them."""
         now, self._chosen = self._now(), profile
         change = self._pipeline.change_settings(self._readers.used(profile), now, self._name)
         self._recording.write(Topic.SETTINGS, change.settings, now, now, settings=self._pipeline.settings())
