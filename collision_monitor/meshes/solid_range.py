@@ -9,16 +9,16 @@ from __future__ import annotations
 from math import inf
 from typing import Any, Final
 
-from collision_monitor._jit import outlined
+from collision_monitor._jit import inlined, outlined
 from collision_monitor.meshes.layout import CENTER, CHILD, RADIUS, WIDTH
 from collision_monitor.meshes.nearest import NEAR_A, triangle_at
 from collision_monitor.meshes.placing import inverse, place_point, relative
 from collision_monitor.meshes.point_range import point_range
-from collision_monitor.meshes.solid import SolidMemory, _middle, _push, _reach_along, _triangle_contact
+from collision_monitor.meshes.solid import SolidMemory, _push, _reach_along, _triangle_contact
 from collision_monitor.meshes.touching import repeats
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, write
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.narrow_phase.vector import along, dot, minus, opposite, rotate, sum_of_sizes
+from collision_monitor.narrow_phase.vector import Vector, along, dot, minus, opposite, rotate, sum_of_sizes
 from collision_monitor.tolerances import SAT_ROUND_OFF
 
 MOST_EXAMINED: Final = 300
@@ -48,6 +48,15 @@ def solid_range(
         place = int(work[2 * waiting + 1])
         child = blocks[place // WIDTH, CHILD, place % WIDTH]
         block, first = root + int(abs(child)), waiting
+        if child < 0.0:  # one corner is enough if it is as deep as the box can be
+            x, radius = triangle_at(blocks, block, 0).a, blocks[block, RADIUS, 0] + margin
+            _, upper, n = point_range(table, b, place_point(Y, x))
+            upper -= radius + table.margin[b]
+            if upper <= 0.0 and work[2 * waiting] >= min(upper, most) - wanted:
+                if upper < most:
+                    _write_point(x, radius, n, upper, table, b, pose, out)
+                least, most = min(least, work[2 * waiting]), min(upper, most)
+                continue
         for k in range(WIDTH):
             if child > 0.0:
                 if blocks[block, CHILD, k] == 0.0:
@@ -82,12 +91,20 @@ def solid_range(
                     for c in range(CONTACT_SIZE):
                         out[c] = row[c]
             elif upper < most:
-                n, x = opposite(rotate(pose.R_B, n)), rotate(pose.R_A, place_point(X, x))
-                size = table.size[b, 0] + table.size[b, 1] + table.size[b, 2]
-                scale = sum_of_sizes(pose.p) + sum_of_sizes(x) + radius + size
-                write(out, upper, n, along(x, radius, n), SAT_ROUND_OFF * scale)
+                _write_point(place_point(X, x), radius, n, upper, table, b, pose, out)
             least, most = min(least, lower), min(most, upper)
     return min(least, most), most
+
+
+@inlined
+def _write_point(
+    x: Vector, radius: float, n: Vector, distance: float, table: Any, b: int, pose: PairPose, out: Any
+) -> None:
+    """Write the contact of a point x of A, in A's frame, whose distance is along the direction n in that of b."""
+    n, x = opposite(rotate(pose.R_B, n)), rotate(pose.R_A, x)
+    size = table.size[b, 0] + table.size[b, 1] + table.size[b, 2]
+    scale = sum_of_sizes(pose.p) + sum_of_sizes(x) + radius + size
+    write(out, distance, n, along(x, radius, n), SAT_ROUND_OFF * scale)
 
 
 @outlined

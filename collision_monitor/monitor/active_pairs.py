@@ -26,7 +26,7 @@ from collision_monitor.narrow_phase.contact_row import DISTANCE
 from collision_monitor.prediction.body_contact import RESULT, body_contact
 from collision_monitor.prediction.body_impact import Scratch, Window, body_impact
 from collision_monitor.prediction.coarse_impact import coarse_impact, has_bounds
-from collision_monitor.prediction.impact_record import CLEAR, HIT, IMPACT, holds, ids_of_keys, pair_key
+from collision_monitor.prediction.impact_record import BOUND_ONLY, CLEAR, HIT, IMPACT, holds, ids_of_keys, pair_key
 from collision_monitor.prediction.pair_impacts import cover_of
 from collision_monitor.records import Model, Phase
 
@@ -50,7 +50,9 @@ UNITE_AHEAD: Final = 16
 """The same in `_unite`, which does little with each pair."""
 
 SOON: Final = 5.0
-"""Steps for which a pair of bounded meshes that certainly meets is only tested, which takes a tenth of a search."""
+WAIT: Final = 4.0
+"""Steps for which a pair of bounded meshes that certainly meets, or that a search found to be near, is only tested. A
+test takes a fifth of a search."""
 
 Rows = NDArray[np.void]
 
@@ -322,7 +324,7 @@ def _examine(multibody, active, which, now, queries, scratch, later):
             touching, count = body_contact(multibody, i, j, now, contact, scratch, results[k])
         tests += count
         stays = touching
-        if not touching and coarse.tolerance > 0.0 and _meets_soon(bodies, event, now, SOON * carrying.period):
+        if not touching and coarse.tolerance > 0.0 and _can_wait(bodies, event, now, carrying.period):
             stays = True
         elif not touching and not is_predicted_anew(bodies, i, j, now, event):
             window = Window(now, cover_of(bodies, i, j))
@@ -347,9 +349,13 @@ def _examine(multibody, active, which, now, queries, scratch, later):
 
 
 @inlined
-def _meets_soon(bodies, event, now, wait):
-    """Whether the pair of an event certainly meets within `wait` (s), so that its interval needs no better begin."""
-    return event.status == HIT and now < event.upper <= now + wait and holds(bodies.version, event)
+def _can_wait(bodies, event, now, period):
+    """Whether a pair of bounded meshes is only tested: it certainly meets soon, or was found to be near just before."""
+    if not holds(bodies.version, event):
+        return False
+    if event.status == HIT and now < event.upper:
+        return event.upper <= now + SOON * period
+    return event.method == BOUND_ONLY and now - WAIT * period < event.lower < now - 0.5 * period
 
 
 @inlined

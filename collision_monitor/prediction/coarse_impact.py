@@ -11,7 +11,11 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Final
 
+import numpy as np
+
 from collision_monitor._jit import device, inlined, kernel, outlined
+from collision_monitor._jit.direct import direct
+from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.geometry.shape_table import HALF_SPACE
 from collision_monitor.meshes.inside import OUTSIDE
 from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
@@ -29,7 +33,7 @@ from collision_monitor.prediction.impact_record import (
 )
 from collision_monitor.prediction.mesh_pair import enclosure, has_mesh, have_trees, is_mesh
 from collision_monitor.prediction.motion import half_acceleration, relative_position, relative_velocity
-from collision_monitor.prediction.pair_impacts import window_of
+from collision_monitor.prediction.pair_impacts import PREFETCH_AHEAD, window_of
 from collision_monitor.prediction.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
 
 TRIES: Final = (1.5, 4.0)
@@ -125,6 +129,7 @@ def has_bounds(multibody, i, j):
     )
 
 
+@direct
 @kernel
 def bound_meshes(multibody, pairs, now, query, near, events, rest, scratch):
     """Write bounds on the first impacts of pairs (P, 2) that have some into events (IMPACT), and the other pairs into rest.
@@ -134,6 +139,9 @@ def bound_meshes(multibody, pairs, now, query, near, events, rest, scratch):
     """
     n = left = made = 0
     for k in range(pairs.shape[0]):
+        ahead = min(k + PREFETCH_AHEAD, pairs.shape[0] - 1)
+        prefetch(multibody.bodies.motion, np.intp(pairs[ahead, 0]))
+        prefetch(multibody.bodies.motion, np.intp(pairs[ahead, 1]))
         i, j = pairs[k, 0], pairs[k, 1]
         if has_bounds(multibody, i, j):
             window = window_of(multibody.bodies, i, j, now)
