@@ -10,11 +10,11 @@ from math import inf
 from typing import Any, Final
 
 from collision_monitor._jit import inlined, outlined
-from collision_monitor.meshes.layout import CENTER, CHILD, RADIUS, WIDTH
+from collision_monitor.meshes.layout import CHILD, RADIUS, WIDTH
 from collision_monitor.meshes.nearest import NEAR_A, triangle_at
 from collision_monitor.meshes.placing import inverse, place_point, relative
 from collision_monitor.meshes.point_range import point_range
-from collision_monitor.meshes.solid import SolidMemory, _push, _reach_along, _triangle_contact
+from collision_monitor.meshes.solid import SolidMemory, center_of, push_box, reach_along, triangle_contact
 from collision_monitor.meshes.touching import repeats
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, write
 from collision_monitor.narrow_phase.pair_pose import PairPose
@@ -61,12 +61,11 @@ def solid_range(
             if child > 0.0:
                 if blocks[block, CHILD, k] == 0.0:
                     continue
-                c = blocks[block, CENTER, k], blocks[block, CENTER + 1, k], blocks[block, CENTER + 2, k]
-                lower, _, n = point_range(table, b, place_point(Y, c))
+                lower, _, n = point_range(table, b, place_point(Y, center_of(blocks, block, k)))
                 n = minus(place_point(X, n), (X.x, X.y, X.z))
-                lower -= _reach_along(blocks, block, k, n) + margin + table.margin[b]
+                lower -= reach_along(blocks, block, k, n) + margin + table.margin[b]
                 if lower <= 0.0:
-                    _push(work, first, waiting, lower, float(WIDTH * block + k))
+                    push_box(work, first, waiting, lower, float(WIDTH * block + k))
                     waiting += 1
                 continue
             if repeats(blocks, block, k):
@@ -84,7 +83,7 @@ def solid_range(
                 examined += 1
                 if examined > MOST_EXAMINED:
                     return -inf, inf
-                if not _triangle_contact(table, b, pose, T, radius, 0.0, row, memory):
+                if not triangle_contact(table, b, pose, T, radius, 0.0, row, memory):
                     continue
                 lower, upper = row[DISTANCE] - row[BOUND], row[DISTANCE]
                 if upper < most:

@@ -63,6 +63,7 @@ APART: Final = -2.0
 
 @inlined
 def has_one_shape(multibody, i):
+    """Whether body i is one shape."""
     return multibody.parts.next[multibody.bodies.first_shape[i]] < 0
 
 

@@ -13,7 +13,8 @@ from collision_monitor._jit import device
 from collision_monitor.meshes.solid import SolidMemory
 from collision_monitor.meshes.solid_range import solid_range
 from collision_monitor.monitor.carried_triangles import NONE, WHOLE, apart_or_none, has_one_shape, placed_shapes
-from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
+from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, POINT_A, POINT_B
+from collision_monitor.narrow_phase.dispatch import mirror
 from collision_monitor.narrow_phase.pair_pose import swapped
 from collision_monitor.narrow_phase.vector import dot
 from collision_monitor.prediction.body_contact import (
@@ -36,8 +37,8 @@ def overlap_of_solid(
 ) -> float:
     """Write the contact of bodies i and j at `now` (s) into a result row, if one is a mesh that overlaps a solid.
 
-    query: ContactQuery. tolerance: largest error (m) that this may add. The contact names no features. Returns 0; APART;
-    or NONE if only `body_contact` can tell.
+    query: ContactQuery. tolerance: largest error (m) that this may add. The contact names no features. Returns 0; or
+    APART; or NONE if only `body_contact` can tell.
     """
     table, bodies = multibody.table, multibody.bodies
     a, b = bodies.first_shape[i], bodies.first_shape[j]
@@ -59,13 +60,12 @@ def overlap_of_solid(
     least, most = solid_range(table.blocks, root_of(table, a), table.margin[a], table, b, pose, wanted, out, memory)
     if not most <= 0.0:
         return apart_or_none(multibody, a, b, pose, there, query, scratch) if least == inf else NONE
+    if is_swapped:
+        mirror(out, p)
     for c in range(CONTACT_SIZE):
         result[c] = out[c]
     half = 0.5 * (most - least)
     for c in range(3):
-        if is_swapped:
-            result[NORMAL + c] = -out[NORMAL + c]
-            result[POINT_A + c], result[POINT_B + c] = out[POINT_B + c] + p[c], out[POINT_A + c] + p[c]
         result[POINT_A + c] += origin[c]
         result[POINT_B + c] += origin[c]
     result[CLOSING] = closing_now(bodies, i, j, there, result)

@@ -132,10 +132,10 @@ def has_bounds(multibody, i, j):
 @direct
 @kernel
 def bound_meshes(multibody, pairs, now, query, near, events, rest, scratch):
-    """Write bounds on the first impacts of pairs (P, 2) that have some into events (IMPACT), and the other pairs into rest.
+    """Write bounds on the first impacts of pairs (P, 2) into events (IMPACT), and the pairs without bounds into rest.
 
-    rest (P, 2). Times as for `predict_pairs`. near: Nearness. Returns (number of impacts, number of
-    other pairs, number of searches).
+    rest (P, 2). Times as for `predict_pairs`. near: Nearness. Returns (number of impacts, number of other pairs, number
+    of searches).
     """
     n = left = made = 0
     for k in range(pairs.shape[0]):

@@ -5,22 +5,35 @@ from __future__ import annotations
 from math import inf, sqrt
 
 from collision_monitor._jit import device
+from collision_monitor.meshes.boxes import half_of
 from collision_monitor.meshes.contact import reach_in
-from collision_monitor.meshes.layout import CENTER, CHILD, WIDTH
+from collision_monitor.meshes.layout import CHILD, WIDTH
 from collision_monitor.meshes.nearest import BOUNDS, PAIRS, size_of
 from collision_monitor.meshes.placing import inverse, place_point, relative
 from collision_monitor.meshes.point_range import point_range
-from collision_monitor.meshes.solid import MovingSolid, SolidMemory, box_time, leaf_solid_time
+from collision_monitor.meshes.solid import MovingSolid, SolidMemory, center_of, leaf_solid_time, reach_along, solid_time
 from collision_monitor.meshes.solid_range import solid_range
-from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
+from collision_monitor.narrow_phase.contact_row import BOUND, POINT_A, POINT_B
 from collision_monitor.narrow_phase.core import core_length
+from collision_monitor.narrow_phase.dispatch import mirror
 from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
-from collision_monitor.narrow_phase.vector import dot
+from collision_monitor.narrow_phase.vector import cross, dot, minus
 from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.coarse_trees import KEEP, STEPS, TOO_MANY, box_radius, nearness, pose_at
 from collision_monitor.prediction.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.prediction.mesh_pair import is_mesh, root_of
 from collision_monitor.prediction.tree_impact import HEAP, approach_at, pop_first, push_pair
+
+
+@device
+def _box_time(blocks, block, k, solid):
+    """`box_time` along a direction that is better for cones and ellipsoids."""
+    table, b, _, X, move = solid
+    c, e = center_of(blocks, block, k), half_of(blocks, block, k)
+    lower, _, n = point_range(table, b, place_point(inverse(X), c))
+    n = minus((X.x, X.y, X.z), place_point(X, n))
+    gap, turn = lower - reach_along(blocks, block, k, n), reach_along(blocks, block, k, cross(n, move.w_a))
+    return solid_time(table, b, X, n, gap - move.start, c, sqrt(dot(e, e)), turn, move)
 
 
 @device
@@ -47,8 +60,7 @@ def solid_near(table, parts, pair, now, window, tube, query, near, scratch):
         speed = sqrt(dot(move.v, move.v)) + move.growth
         speed += sqrt(move.bend_a) * reach_in(blocks, root) + sqrt(move.bend_b) * own
         gap = nearness(near, speed, t - now, query)
-        c = blocks[i, CENTER, k], blocks[i, CENTER + 1, k], blocks[i, CENTER + 2, k]
-        _, most, _ = point_range(table, b, place_point(inverse(X), c))
+        _, most, _ = point_range(table, b, place_point(inverse(X), center_of(blocks, i, k)))
         if steps > STEPS or most + box_radius(blocks, i, k) <= gap + move.start:
             return t, UNRESOLVED, gap
         soon = inf
@@ -59,7 +71,7 @@ def solid_near(table, parts, pair, now, window, tube, query, near, scratch):
         else:
             for m in range(WIDTH):
                 if blocks[block, CHILD, m] != 0.0:
-                    work[BOUNDS + m] = box_time(blocks, block, m, solid)
+                    work[BOUNDS + m] = _box_time(blocks, block, m, solid)
                     soon = min(soon, work[BOUNDS + m])
         if child < 0.0 or (soon * speed > KEEP * size and t + soon > t):
             if t + soon < end:
@@ -85,11 +97,10 @@ def solid_overlaps(table, parts, pair, t, allowed, scratch):
     _, most = solid_range(table.blocks, root_of(table, a), table.margin[a], table, b, pose, inf, out, memory)
     if not most + out[BOUND] + allowed <= 0.0:
         return False
+    if is_swapped:
+        mirror(out, p)
     offset = place_shape(table, parts, pair.a, scratch.rotation[0], scratch.rotation[2])
     for c in range(3):
-        if is_swapped:
-            out[NORMAL + c] = -out[NORMAL + c]
-            out[POINT_A + c], out[POINT_B + c] = out[POINT_B + c] + p[c], out[POINT_A + c] + p[c]
         out[POINT_A + c] += offset[c]
         out[POINT_B + c] += offset[c]
     return True

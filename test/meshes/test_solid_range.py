@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from collision_monitor._jit import kernel
-from collision_monitor.geometry.shape_table import ShapeTableBuilder
+from collision_monitor.geometry.shape_table import ShapeTable, ShapeTableBuilder
 from collision_monitor.geometry.shapes import Box, Cone, Cylinder, Ellipsoid, HalfSpace, Mesh, Points, Shape
 from collision_monitor.meshes.point_range import point_range
 from collision_monitor.meshes.shape_trees import made_tree
@@ -56,7 +58,7 @@ def point_ranges(table, points, lower, upper, normal):
         normal[k, 0], normal[k, 1], normal[k, 2] = n
 
 
-def table_of(shape: Shape, padding: float = 0.0):
+def table_of(shape: Shape, padding: float = 0.0) -> ShapeTable:
     builder = ShapeTableBuilder()
     builder.append(shape, margin=padding)
     return builder.table
@@ -66,7 +68,7 @@ def table_of(shape: Shape, padding: float = 0.0):
 @pytest.mark.parametrize("name", list(TREES))
 def test_the_range_holds_the_depth_of_the_deepest_triangle(name: str, other: str) -> None:
     rng = np.random.default_rng(7)
-    tree, table, s = made_tree(TREES[name]), table_of(SOLIDS[other]), make_scratch()
+    tree, table, s = made_tree(TREES[name]), table_of(SOLIDS[other], padding=0.03), make_scratch()
     assert tree is not None
     found, out, row = np.zeros(2), np.zeros(CONTACT_SIZE), np.zeros(CONTACT_SIZE)
     meeting = apart = 0
@@ -102,33 +104,37 @@ def test_the_range_of_a_point_holds_its_distance(name: str) -> None:
     lower, upper, normal = np.zeros(40), np.zeros(40), np.zeros((40, 3))
     point_ranges(table, points, lower, upper, normal)
     np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0)
-    h = support_of(SOLIDS[name])
+    h = SUPPORTS.get(name)
     if h is None:
         return
     directions = rng.normal(size=(4000, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     for x, low, high, n in zip(points, lower, upper, normal, strict=True):
-        assert np.isclose(n @ x - h(n), low, atol=1e-12)
-        found = float(np.max(directions @ x - h(directions)))
+
+        def apart(d: np.ndarray, x: np.ndarray = x) -> float:
+            unit = d / np.linalg.norm(d)
+            return float(h(unit) - unit @ x)
+
+        assert np.isclose(-apart(n), low, atol=1e-12)
         start = directions[np.argmax(directions @ x - h(directions))]
-        for at in (start, n):
-            best = minimize(lambda d, x=x: h(d / np.linalg.norm(d)) - d @ x / np.linalg.norm(d), at, method="Nelder-Mead",
-                            options={"xatol": 1e-10, "fatol": 1e-12})
-            found = max(found, -float(best.fun))
+        options = {"xatol": 1e-10, "fatol": 1e-12}
+        found = -min(float(minimize(apart, at, method="Nelder-Mead", options=options).fun) for at in (start, n))
         assert low <= found + 1e-9
         assert found <= high + 1e-7
         if name != "ellipsoid":
-            assert np.isclose(low, high) and np.isclose(found, high, atol=1e-6)
+            assert np.isclose(low, high)
+            assert np.isclose(found, high, atol=1e-6)
 
 
-def support_of(shape: Shape):
-    match shape:
-        case Cylinder():
-            return lambda d: shape.radius * np.hypot(d[..., 0], d[..., 1]) + 0.5 * shape.length * np.abs(d[..., 2])
-        case Cone():
-            return lambda d: np.maximum(0.5 * shape.length * d[..., 2], shape.radius * np.hypot(d[..., 0], d[..., 1]) - 0.5 * shape.length * d[..., 2])
-        case Ellipsoid():
-            return lambda d: np.linalg.norm(d * np.asarray(shape.radii), axis=-1)
-        case Box():
-            return lambda d: np.abs(d) @ (0.5 * np.asarray(shape.size))
-    return None
+def _across(d: np.ndarray) -> np.ndarray:
+    return np.hypot(d[..., 0], d[..., 1])
+
+
+SUPPORTS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "cylinder": lambda d: 0.2 * _across(d) + 0.35 * np.abs(d[..., 2]),
+    "cone": lambda d: np.maximum(0.3 * d[..., 2], 0.3 * _across(d) - 0.3 * d[..., 2]),
+    "flat cone": lambda d: np.maximum(0.025 * d[..., 2], 0.5 * _across(d) - 0.025 * d[..., 2]),
+    "ellipsoid": lambda d: np.linalg.norm(d * (0.1, 0.3, 0.5), axis=-1),
+    "box": lambda d: np.abs(d) @ (0.25, 0.15, 0.1),
+}
+"""Support functions of SOLIDS."""
