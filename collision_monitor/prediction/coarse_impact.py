@@ -69,6 +69,15 @@ def _overlap(table, parts, pair, t, allowed, scratch):
     return solid_overlaps(table, parts, pair, t, allowed, scratch)
 
 
+@inlined
+def _together(A, B, window, margin):
+    """First and last time (s) after the begin of a window at which the bounding spheres of two motions may overlap."""
+    begin, end = window
+    tube, approach = tube_of(A, B, begin), approach_at(A, B, begin)
+    growth = tube.growth + half_acceleration(A, B) * (end - begin)
+    return sphere_interval(approach.p, approach.v, A.radius + B.radius + margin + tube.start, growth, end - begin, 1.0)
+
+
 @outlined
 def coarse_impact(multibody, i, j, window, query, near, scratch, event):
     """Write a bound on the first impact of two bodies with `has_bounds` into the IMPACT record `event`.
@@ -77,15 +86,13 @@ def coarse_impact(multibody, i, j, window, query, near, scratch, event):
     bodies may be inside the other. near: Nearness; the radius of the smaller body limits its gap too.
     """
     table, parts, bodies = multibody
-    begin, end = window
+    begin = window.begin
     if bodies.id[i] > bodies.id[j]:
         i, j = j, i
     A, B = bodies.motion[i], bodies.motion[j]
     event.status = CLEAR
     tube, approach = tube_of(A, B, begin), approach_at(A, B, begin)
-    bent = half_acceleration(A, B) * (end - begin)
-    reach = A.radius + B.radius + query.margin
-    first, last = sphere_interval(approach.p, approach.v, reach + tube.start, tube.growth + bent, end - begin, 1.0)
+    first, last = _together(A, B, window, query.margin)
     if first > last:
         return True
     pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
@@ -137,15 +144,19 @@ def bound_meshes(multibody, pairs, now, query, near, events, rest, scratch):
     rest (P, 2). Times as for `predict_pairs`. near: Nearness. Returns (number of impacts, number of other pairs, number
     of searches).
     """
+    bodies = multibody.bodies
     n = left = made = 0
     for k in range(pairs.shape[0]):
         ahead = min(k + PREFETCH_AHEAD, pairs.shape[0] - 1)
-        prefetch(multibody.bodies.motion, np.intp(pairs[ahead, 0]))
-        prefetch(multibody.bodies.motion, np.intp(pairs[ahead, 1]))
+        prefetch(bodies.motion, np.intp(pairs[ahead, 0]))
+        prefetch(bodies.motion, np.intp(pairs[ahead, 1]))
         i, j = pairs[k, 0], pairs[k, 1]
         if has_bounds(multibody, i, j):
-            window = window_of(multibody.bodies, i, j, now)
+            window = window_of(bodies, i, j, now)
             if window.begin > now and window.begin >= window.end:
+                continue
+            first, last = _together(bodies.motion[i], bodies.motion[j], window, query.margin)
+            if first > last:
                 continue
             made += 1
             if coarse_impact(multibody, i, j, window, query, near, scratch, events[n]):
