@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from contextlib import nullcontext
@@ -12,7 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from collision_monitor.accuracy.candidates import Space, models_of
+from collision_monitor.accuracy.candidates import Space, models_of, with_threads
 from collision_monitor.accuracy.demands import Demands
 from collision_monitor.accuracy.halving import rungs_of
 from collision_monitor.accuracy.inputs import Workload, recorded
@@ -111,6 +112,12 @@ def test_models_are_tried_only_where_all_objects_of_a_class_have_them() -> None:
     assert models_of(objects) == {"primitive": ("sphere", "obb", "kdop26", "convex_hull")}
 
 
+def test_more_threads_are_at_most_one_for_each_core() -> None:
+    assert [each.threads for each in with_threads(Profile(), 4)] == [2, 4]
+    assert [each.threads for each in with_threads(Profile(threads=4), 16)] == [8, 16]
+    assert with_threads(Profile(), 1) == []
+
+
 def test_rungs_grow_to_all_tiles() -> None:
     assert rungs_of(16, 4) == [4, 8, 16]
     assert rungs_of(7, 4) == [4, 7]
@@ -197,6 +204,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     answer = json.loads(out)
     assert answer["chosen"] is None and answer["reasons"][0].startswith("none of")
     assert all("step time" in each["failures"][-1] for each in answer["rows"])
+    assert any(each["profile"].endswith(", threads 2") for each in answer["rows"]) == (len(os.sched_getaffinity(0)) > 1)
     assert not (tmp_path / "none.yaml").exists()
     with pytest.raises(SystemExit) as wrong:
         run("--budget-ms", 0)
