@@ -39,10 +39,10 @@ def work() -> Workload:
 
 @pytest.fixture(scope="module")
 def tuned(work: Workload):
-    told = []
+    done = []
     space = space_of(work, Profile(), Demands(ttc_error=0.01))
-    found = tune(work, space, lambda name, total: nullcontext(told.append), jobs=1)
-    assert sum(told) > len(found.trials)
+    found = tune(work, space, lambda name, total: nullcontext(done.append), jobs=1)
+    assert sum(done) > len(found.trials)
     return found
 
 
@@ -197,8 +197,8 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     assert "→ " in good.stdout and "\nchosen: " in good.stdout and "written balanced.yaml" in good.stdout
     check_parameter_file(tmp_path / "balanced.yaml")
     assert (tmp_path / "tried.png").read_bytes().startswith(b"\x89PNG")
-    code, _, told = run("--max-ttc-error", 0.05)
-    assert code == 1 and "--force" in told
+    code, _, error = run("--max-ttc-error", 0.05)
+    assert code == 1 and "--force" in error
     code, out, _ = run("--budget-ms", 1e-6, "--json", "-o", "none.yaml")
     assert code == 3
     answer = json.loads(out)
