@@ -20,7 +20,7 @@ from collision_monitor.geometry.shape_table import HALF_SPACE
 from collision_monitor.meshes.inside import OUTSIDE
 from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.vector import dot
-from collision_monitor.prediction.body_impact import ShapePair, Tube, closing_speed, tube_of
+from collision_monitor.prediction.body_impact import ShapePair, Tube, body_impact, closing_speed, tube_of
 from collision_monitor.prediction.coarse_solid import solid_near, solid_overlaps
 from collision_monitor.prediction.coarse_trees import TOO_MANY, Nearness, pose_at, trees_near, trees_overlap
 from collision_monitor.prediction.impact_record import (
@@ -138,31 +138,27 @@ def has_bounds(multibody, i, j):
 
 @direct
 @kernel
-def bound_meshes(multibody, pairs, now, query, near, events, rest, scratch):
-    """Write bounds on the first impacts of pairs (P, 2) into events (IMPACT), and the pairs without bounds into rest.
-
-    rest (P, 2). Times as for `predict_pairs`. near: Nearness. Returns (number of impacts, number of other pairs, number
-    of searches).
-    """
+def predict_coarsely(multibody, pairs, now, query, near, events, scratch):
+    """As `predict_pairs`, but with bounds on the impacts of pairs with `has_bounds`. near: Nearness."""
     bodies = multibody.bodies
-    n = left = made = 0
+    n = queries = 0
     for k in range(pairs.shape[0]):
         ahead = min(k + PREFETCH_AHEAD, pairs.shape[0] - 1)
         prefetch(bodies.motion, np.intp(pairs[ahead, 0]))
         prefetch(bodies.motion, np.intp(pairs[ahead, 1]))
         i, j = pairs[k, 0], pairs[k, 1]
+        window = window_of(bodies, i, j, now)
+        if window.begin > now and window.begin >= window.end:
+            continue
+        is_known = False
         if has_bounds(multibody, i, j):
-            window = window_of(bodies, i, j, now)
-            if window.begin > now and window.begin >= window.end:
-                continue
             first, last = _together(bodies.motion[i], bodies.motion[j], window, query.margin)
             if first > last:
                 continue
-            made += 1
-            if coarse_impact(multibody, i, j, window, query, near, scratch, events[n]):
-                if events[n].status != CLEAR:
-                    n += 1
-                continue
-        rest[left, 0], rest[left, 1] = i, j
-        left += 1
-    return n, left, made
+            queries += 1
+            is_known = coarse_impact(multibody, i, j, window, query, near, scratch, events[n])
+        if not is_known:
+            queries += body_impact(multibody, i, j, window, query, scratch, events[n])
+        if events[n].status != CLEAR:
+            n += 1
+    return n, queries
