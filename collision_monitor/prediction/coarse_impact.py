@@ -1,9 +1,9 @@
 """First impacts of meshes that are not due yet: only until when their boxes stay apart (`mesh_impact_tolerance`).
 
-The search of tree_impact.py, ended as soon as two boxes are so small and so near that their triangles are within a gap
-of some cm. The lower end is as certain as that of a full search. A collision is certain if triangles meet at one of a
-few later times; else the upper end is open. Pairs that are due get a full search, so far pairs are coarse and near
-pairs exact.
+The search of tree_impact.py or solid_impact.py, ended as soon as boxes are so small and so near that their triangles
+are within a gap of some cm. The lower end is as certain as that of a full search. A collision is certain if triangles
+meet at one of a few later times; else the upper end is open. Pairs that are due are searched again from there, with a
+gap of at least the motion in a step.
 """
 
 from __future__ import annotations
