@@ -19,8 +19,10 @@ SPARE: Final = 12
 
 
 @inlined
-def _open_ranks(times, order):
+def open_ranks(times, order, spare):
     """Ranks (4,) of the pilot at which both parts with both outcomes begin and end, at the ends of the longest run.
+
+    order (pilot,): sorts the pilot's times by the first coordinate; spare: see SPARE.
 
     The run itself is open too if it is less than half of the pilot: its times matter, and it is small.
     """
@@ -32,7 +34,7 @@ def _open_ranks(times, order):
             hits, first, last = hits + 1, min(first, rank), rank + 1
         if run > end - begin:
             begin, end = rank + 1 - run, rank + 1
-    before, after = SPARE + (begin - first) // 4, SPARE + (last - end) // 4
+    before, after = spare + (begin - first) // 4, spare + (last - end) // 4
     low = max(first - before, 0) if begin > 0 else 0
     high = min(last + after, pilot) if end < pilot else pilot
     low_end = begin + before if begin > 0 else 0
@@ -75,7 +77,7 @@ def choose_samples(times, lattice, sampling, careful, chosen):
     if latest(times, pilot) < inf:
         is_open = (0, 0, pilot, pilot)
     elif not careful:
-        is_open = _open_ranks(times, lattice.order)
+        is_open = open_ranks(times, lattice.order, SPARE)
     weights = chosen.weights[0:base]
     for n in range(base):
         weights[n] = lattice.weights[n]

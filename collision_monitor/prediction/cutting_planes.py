@@ -30,6 +30,7 @@ BLOCK: Final = 256
 
 
 NO_MODE: Final = -1
+"""In place of a mode, see obstacle_planes.py: all are to be tried."""
 
 COARSER: Final = 4.0
 """Factor by which the tolerance of a segment may grow, to the largest gap that no plane closes: the gaps there are not
@@ -75,7 +76,7 @@ def _entering(entry, leave, checked, first, last):
 
 @inlined
 def _sole_mode(table, pair, n, settings, obstacle):
-    """Mode of a plane along n (3,) where obstacle.placed has the shapes; NO_MODE: try all, as if both have a side along it."""
+    """Mode of a plane along n (3,) where obstacle.placed has the shapes; NO_MODE: any, both have a side along it."""
     has_a = settings.follows[0] and has_side(table, pair.a, obstacle.placed[0], n)
     has_b = settings.follows[1] and has_side(table, pair.b, obstacle.placed[1], n)
     if (has_a and has_b) or settings.careful:

@@ -131,7 +131,7 @@ def _enter_tilted(table, parts, pair, errors, end, first, last, points, memory, 
     _set_lowest(then, errors.time, other, first, last, off, lifts, step)
     for n in range(first, last):
         times[n] = inf
-    for level in range(LEVELS):
+    for _level in range(LEVELS):
         tilt(points, 6, one, lifts[0], errors.turning[0], lean_a, first, last, off)
         tilt(points, 9, other, lifts[1], errors.turning[1], lean_b, first, last, off)
         enter_cylinder(p, v, other, reach, half, end, off, first, last, memory.alone)
