@@ -2,32 +2,22 @@
 
 from __future__ import annotations
 
-import threading
 from math import inf
-from typing import Final
 
 import numpy as np
 
 from collision_monitor._jit import kernel
+from collision_monitor._jit.direct import direct
 from collision_monitor.geometry.pose import Motion
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.meshes.shape_trees import trees_of_pair
 from collision_monitor.prediction.bodies import Multibody
 from collision_monitor.prediction.body_impact import ImpactQuery, Window, body_impact
 from collision_monitor.prediction.impact_record import CLEAR, HIT
+from collision_monitor.query.convex_pairs import MEMORY
 from collision_monitor.query.packed import packed_motion
-from collision_monitor.query.pair_impact_rows import DECIDED, TOUCHING, ImpactMemory, impact_memory, set_motion
+from collision_monitor.query.pair_impact_rows import DECIDED, TOUCHING, set_motion
 from collision_monitor.query.pair_table import pair_table
-
-
-class _Memory(threading.local):
-    """Work memory of each thread."""
-
-    def __init__(self) -> None:
-        self.impact: ImpactMemory = impact_memory()
-
-
-_MEMORY: Final = _Memory()
 
 
 def mesh_impact(
@@ -53,10 +43,11 @@ def mesh_impact(
         if states[0] is None or states[1] is None:
             return None
     times = np.empty(2)
-    code = _mesh_impact(pair_table(shape_a, shape_b, True), *states, np.array((*query, begin)), _MEMORY.impact, times)
+    code = _mesh_impact(pair_table(shape_a, shape_b, True), *states, np.array((*query, begin)), MEMORY.impact, times)
     return None if code == TOUCHING else (float(times[0]), float(times[1]))
 
 
+@direct
 @kernel
 def _mesh_impact(table, state_a, state_b, query, own, times):
     """Write the first impact to times (2,): lower and upper (s), infinite for none; return a code of its row.
