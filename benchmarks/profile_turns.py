@@ -2,6 +2,7 @@
 
     python benchmarks/profile_turns.py                              # 100, 1,000 and 10,000 objects of each scene
     python benchmarks/profile_turns.py --sizes 100 --noise 0.005    # states that declare a noise
+    python benchmarks/profile_turns.py --scenes mixed --kinds cone  # every second object a cone, the others meshes
 
 The median over the steps of the ratio of both times, and half of the width of its 95 % interval by the order of the
 ratios. The order of the profiles changes from step to step. The garbage collector is off.
@@ -15,7 +16,7 @@ import math
 import time
 
 import numpy as np
-from drifting_meshes import drifting_meshes
+from drifting_meshes import SOLIDS, drifting_meshes
 
 from collision_monitor.accuracy.inputs import Workload, simulated
 from collision_monitor.monitor.monitor import Monitor
@@ -23,7 +24,9 @@ from collision_monitor.monitor.monitor import Monitor
 PROFILES = ("fast", "balanced", "exact")
 MESHES = "meshes"
 """Scene of benchmarks/drifting_meshes.py."""
-SCENES = ("fleet", "clutter", "swarm", "particles", "crossing", "arm", MESHES)
+MIXED = "mixed"
+"""The same with a solid in place of every second mesh."""
+SCENES = ("fleet", "clutter", "swarm", "particles", "crossing", "arm", MESHES, MIXED)
 FIXED = ("crossing", "arm")
 """Scenes with a fixed set of objects."""
 
@@ -60,6 +63,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sizes", type=int, nargs="+", default=[100, 1_000, 10_000])
     parser.add_argument("--scenes", nargs="+", default=list(SCENES))
+    parser.add_argument("--kinds", nargs="+", default=list(SOLIDS), choices=list(SOLIDS), help="solids of `mixed`")
     parser.add_argument("--noise", type=float, default=0.0)
     parser.add_argument("--seconds", type=float, default=4.0)
     args = parser.parse_args()
@@ -67,8 +71,8 @@ def main() -> None:
     for name in args.scenes:
         for size in [None] if name in FIXED else args.sizes:
             seconds = args.seconds if size is None or size < 5_000 else 0.5 * args.seconds
-            if name == MESHES:
-                work = drifting_meshes(size or 0, seconds)
+            if name in (MESHES, MIXED):
+                work = drifting_meshes(size or 0, seconds, kinds=args.kinds if name == MIXED else ())
             else:
                 (work,) = simulated([name], objects=size, noise=args.noise, duration=seconds)
             fast, balanced, exact = times(work)

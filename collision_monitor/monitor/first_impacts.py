@@ -49,7 +49,7 @@ class FirstImpacts(Stage):
 
     def predict(self, step: StepContext, pairs: Pairs) -> Events:
         """First impacts (IMPACT) of pairs (P, 2) of body slots, in their order. Pairs without one are left out."""
-        find = _coarse_impacts if step.coarse > 0.0 else partial(_impacts, predict_pairs)
+        find = _coarse_impacts if step.coarse.is_allowed else partial(_impacts, predict_pairs)
         if self.pool is None or len(pairs) < FEWEST_PAIRS_FOR_THREADS:
             events, queries = find(step, pairs, self.scratch)
             step.work.impact_queries += queries
