@@ -27,22 +27,26 @@ def _cross(a: list[Lanes], b: list[Lanes]) -> list[Lanes]:
     return [a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3] for k in range(3)]
 
 
-def times_until(gap: Lanes, speed: Lanes, curvatures: tuple[Lanes, Lanes, Lanes], until: Lanes) -> Lanes:
-    """Times until which eight gaps stay open. curvatures: the largest of any time, that now, its change per second."""
+def times_open(gap: Lanes, speed: Lanes, curvature: Lanes) -> Lanes:
+    """`time_until` of eight gaps."""
     zero, tiny = Lanes.constant(gap.builder, 0.0), Lanes.constant(gap.builder, 1e-300)
-    largest, bent, change = curvatures
     gap = gap.largest(zero)
+    root = (speed * speed + (curvature + curvature) * gap).root()
+    length = (gap + gap).where(speed, (root - speed).largest(tiny))
+    return (length / (speed + root).where(speed, curvature)).where(gap, zero)
 
-    def time(curvature: Lanes) -> Lanes:  # `time_until`
-        root = (speed * speed + (curvature + curvature) * gap).root()
-        # closing: 2 gap / (speed + root); opening: (root - speed) / curvature
-        length = (gap + gap).where(speed, (root - speed).largest(tiny))
-        return (length / (speed + root).where(speed, curvature)).where(gap, zero)
 
-    first = time(largest)
+def curvature_until(until: Lanes, largest: Lanes, bent: Lanes, change: Lanes) -> Lanes:
+    """Largest curvature within a time, from the largest of any time, that now, and its change per second."""
+    within = bent + until * change * Lanes.constant(until.builder, 1.0 / 3.0)
+    return largest.least(within.largest(Lanes.constant(until.builder, 0.0)))
+
+
+def _times(gap: Lanes, speed: Lanes, curvatures: tuple[Lanes, Lanes, Lanes], until: Lanes) -> Lanes:
+    """Times until which eight gaps stay open. curvatures: as for `curvature_until`."""
+    first = times_open(gap, speed, curvatures[0])
     later = (first * Lanes.constant(gap.builder, STRETCH)).least(until)
-    within = bent + later * change * Lanes.constant(gap.builder, 1.0 / 3.0)
-    return first.largest(later.least(time(largest.least(within.largest(zero)))))
+    return first.largest(later.least(times_open(gap, speed, curvature_until(later, *curvatures))))
 
 
 class _Motion:
@@ -67,7 +71,7 @@ class _Motion:
         largest, change = (
             origin + of_a * a.radius + of_b * b.radius for of_a, of_b, origin in (self._bends, self._jerks)
         )
-        return times_until(gap - self.start, speed, (largest, bent, change), self.until)
+        return _times(gap - self.start, speed, (largest, bent, change), self.until)
 
 
 class _Boxes:

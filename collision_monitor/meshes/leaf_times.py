@@ -16,7 +16,7 @@ from numba.extending import intrinsic
 from collision_monitor._jit import device
 from collision_monitor._jit.lanes import Lanes, load, store
 from collision_monitor.meshes.approach import Approach
-from collision_monitor.meshes.box_times import norm, times_until
+from collision_monitor.meshes.box_times import curvature_until, norm, times_open
 from collision_monitor.meshes.boxes import Block, inner
 from collision_monitor.meshes.layout import CORNERS, RADIUS, WIDTH
 from collision_monitor.meshes.leaf_bounds import least_of_pairs
@@ -67,8 +67,8 @@ def _raise_times(typing_context, numbers, work, other, times):
         far, forth, curving, reach = (
             load(context, builder, signature.args[1], arguments[1], arguments[2], WIDTH * k) for k in range(FACTS)
         )
-        curvatures = largest + bend * reach, bent + curving, change + jerk * reach
-        time = times_until(gap - far, speed + forth, curvatures, until)
+        curvature = curvature_until(until, largest + bend * reach, bent + curving, change + jerk * reach)
+        time = times_open(gap - far, speed + forth, curvature)
         known = load(context, builder, signature.args[1], arguments[1], arguments[3])
         store(context, builder, known.largest(time), signature.args[1], arguments[1], arguments[3])
         return context.get_dummy_value()
