@@ -47,7 +47,6 @@ class Block:
     """The vectors of a block while a kernel is compiled."""
 
     def __init__(self, context: Any, builder: Any, array_type: Any, array: Any, block: Any) -> None:
-        self.builder = builder
         self._load = lambda row: load(
             context, builder, array_type, array, builder.mul(block, block.type(ROWS * WIDTH)), WIDTH * row
         )

@@ -136,7 +136,7 @@ def _direction(answer, distance):
 
 
 @inlined
-def _toward(blocks_a, a, i, blocks_b, b, j, X):
+def toward(blocks_a, a, i, blocks_b, b, j, X):
     """Unit vector from the centre of a box of A to that of a box of B; 0 if they are one point."""
     w = minus(place_point(X, _center(blocks_b, b, j)), _center(blocks_a, a, i))
     return _unit(w) if dot(w, w) > 0.0 else (0.0, 0.0, 0.0)
@@ -242,7 +242,7 @@ def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
     Y = inverse(X)
     work[0], work[1], work[2] = 0.0, WIDTH * root_a, WIDTH * root_b
     waiting, leaves = 1, 0
-    n = _direction(answer, found) if found < inf else _toward(blocks_a, root_a, 0, blocks_b, root_b, 0, X)
+    n = _direction(answer, found) if found < inf else toward(blocks_a, root_a, 0, blocks_b, root_b, 0, X)
     while waiting > 0 and best > 0.0:  # terminates: each pair of boxes is opened once
         waiting -= 1
         limit = CLOSER * best * best
@@ -262,7 +262,7 @@ def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
                 best = found = distance
                 n = _direction(answer, found)
             continue
-        u = _toward(blocks_a, a, i, blocks_b, b, j, X)
+        u = toward(blocks_a, a, i, blocks_b, b, j, X)
         if opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
             block = root_b + int(child_b)
             _bounds_of(blocks_a, a, i, blocks_b, block, X, n, u, limit, work)

@@ -8,6 +8,7 @@ using bounding volume hierarchies of k-DOPs, 1998: supports in fixed directions)
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -49,25 +50,24 @@ def reach_along(blocks: Any, block: int, member: int, d: Vector) -> float:
 
 
 class Supports:
-    """The boxes of a block, and what they contain, while a kernel is compiled."""
+    """Boxes with the supports of their content while a kernel is compiled."""
 
-    def __init__(self, members: Block) -> None:
-        self._builder = members.builder
-        self._axes, self.center, self._half = members.matrix(AXES), members.vector(CENTER), members.vector(HALF)
-        self._edges = [[members.row(ROWS * EDGES + 4 * plane + k) for k in range(4)] for plane in range(3)]
-        self._corners = [members.row(ROWS * CORNERS_OF_BOX + k) for k in range(8)]
+    def __init__(self, row: Callable[[int], Lanes]) -> None:
+        """row: a row of the blocks of boxes, from the first of them on."""
+        self.half = [row(HALF + k) for k in range(3)]
+        self._edges = [[row(ROWS * EDGES + 4 * plane + k) for k in range(4)] for plane in range(3)]
+        self._corners = [row(ROWS * CORNERS_OF_BOX + k) for k in range(8)]
 
-    def reach(self, d: list[Lanes]) -> Lanes:
-        """`reach_along` from the centres of the boxes."""
-        zero = Lanes.constant(self._builder, 0.0)
-        along = [inner([self._axes[r][c] for r in range(3)], d) for c in range(3)]
+    def reach(self, along: list[Lanes]) -> Lanes:
+        """`reach_along` from the centres of the boxes, along directions in their axes."""
+        zero = Lanes.constant(along[0].builder, 0.0)
         back, size = [zero - each for each in along], [abs(each) for each in along]
         least = size[0].least(size[1]).least(size[2])
         total = least * _chosen(back, self._corners)
         for (i, j, k), edges in zip(PLANES, self._edges, strict=True):
             lower, upper = size[i].least(size[j]), size[i].largest(size[j])
             total = total.plus_product((lower - size[k]).largest(zero), _chosen([back[i], back[j]], edges))
-            total = total.plus_product((size[k] - upper).largest(zero), self._half[k])
+            total = total.plus_product((size[k] - upper).largest(zero), self.half[k])
         return total
 
 
@@ -87,11 +87,12 @@ def _bounds(typing_context, n, u, gaps, blocks, block, out, at):
         def vector(k: int) -> list[Lanes]:
             return [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[k])]
 
-        members = Supports(Block(context, builder, signature.args[3], arguments[3], arguments[4]))
+        members = Block(context, builder, signature.args[3], arguments[3], arguments[4])
+        axes, center, supports = members.matrix(AXES), members.vector(CENTER), Supports(members.row)
         gap = Lanes.constant(builder, 0.0)
         for d, beyond in zip((vector(0), vector(1)), vector(2), strict=True):
-            reach = members.reach(d) + inner(d, members.center)
-            gap = gap.largest(beyond - reach)
+            along = [inner([axes[r][c] for r in range(3)], d) for c in range(3)]
+            gap = gap.largest(beyond - supports.reach(along) - inner(d, center))
         store(context, builder, gap * gap, signature.args[5], arguments[5], arguments[6])
         return context.get_dummy_value()
 
