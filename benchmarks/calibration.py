@@ -57,12 +57,12 @@ class Scene:
 class Row:
     """Result of one scene.
 
-    told: whether the monitor predicts the pair. too_early: part of the impacts before `earliest`. late: part of the
+    reported: whether the monitor predicts the pair. too_early: part of the impacts before `earliest`. late: part of the
     futures without an impact until `latest`; NaN without a `latest`. us: cost of the uncertainty (µs of CPU).
     """
 
     kinds: str
-    told: bool
+    reported: bool
     status: int
     probability: float
     truth: float
@@ -119,8 +119,8 @@ def predicted(scene: Scene, profile: Profile) -> tuple[np.void | None, bool, flo
             took.append(time.process_time() - begin)
         seconds.append(np.median(took))
     assert result is not None
-    told = result.predictions[0] if len(result.predictions) else None
-    return told, len(result.contacts) > 0, 1e6 * float(seconds[1] - seconds[0])
+    reported = result.predictions[0] if len(result.predictions) else None
+    return reported, len(result.contacts) > 0, 1e6 * float(seconds[1] - seconds[0])
 
 
 def impact_times(scene: Scene, futures: int, rng: np.random.Generator) -> Array:
@@ -138,24 +138,25 @@ def impact_times(scene: Scene, futures: int, rng: np.random.Generator) -> Array:
 
 def compare(scene: Scene, profile: Profile, futures: int, rng: np.random.Generator) -> Row | None:
     """Return one row, or None if the pair touches from the start, because contacts have no prediction."""
-    told, touching, us = predicted(scene, profile)
+    reported, touching, us = predicted(scene, profile)
     if touching:
         return None
     times = impact_times(scene, futures, rng)
     hits = times[times < inf]
     kinds = "–".join(sorted(scene.kinds))
-    if told is None:
+    if reported is None:
         return Row(kinds, False, -1, 0.0, len(hits) / futures, 0.0, np.nan, us)
-    late = np.mean(times > told["latest"]) if told["latest"] < inf else np.nan
-    early = np.mean(hits < told["earliest"]) if len(hits) > 20 else np.nan
+    late = np.mean(times > reported["latest"]) if reported["latest"] < inf else np.nan
+    early = np.mean(hits < reported["earliest"]) if len(hits) > 20 else np.nan
     return Row(
-        kinds, True, int(told["status"]), float(told["probability"]), len(hits) / futures, float(early), float(late), us
+        kinds, True, int(reported["status"]), float(reported["probability"]), len(hits) / futures, float(early),
+        float(late), us,
     )
 
 
 def crowd(people: int = 200, side: float = 40.0, steps: int = 20) -> str:
     """Measure a step of a crowd without and with uncertainty (ms of CPU); returns a line of text."""
-    told = []
+    costs = []
     for stddev in (0.0, 0.15):
         rng = np.random.default_rng(0)
         monitor = cm.Monitor()
@@ -174,16 +175,16 @@ def crowd(people: int = 200, side: float = 40.0, steps: int = 20) -> str:
             count = len(monitor.step(step * 33_000_000, rows).predictions)
             took.append(time.process_time() - begin)
             rows["position"] += 0.033 * rows["linear"]
-        told.append(f"{1e3 * np.median(took):.2g} ms a step with {count} predictions")
-    return f"{people} people on {side:g} m x {side:g} m: {told[0]}; uncertain: {told[1]}"
+        costs.append(f"{1e3 * np.median(took):.2g} ms a step with {count} predictions")
+    return f"{people} people on {side:g} m x {side:g} m: {costs[0]}; uncertain: {costs[1]}"
 
 
 def table(rows: list[Row], confidence: float) -> list[str]:
     """Lines of the Markdown table."""
     groups: dict[str, list[Row]] = {
-        "stated to meet": [r for r in rows if r.told and r.status != 2],
-        "stated to pass, predicted": [r for r in rows if r.told and r.status == 2],
-        "stated to pass, not predicted": [r for r in rows if not r.told],
+        "stated to meet": [r for r in rows if r.reported and r.status != 2],
+        "stated to pass, predicted": [r for r in rows if r.reported and r.status == 2],
+        "stated to pass, not predicted": [r for r in rows if not r.reported],
         "all": rows,
     }
     lines = [
@@ -195,7 +196,7 @@ def table(rows: list[Row], confidence: float) -> list[str]:
         if not group:
             continue
         off = np.array([r.probability - r.truth for r in group])
-        early = np.array([r.too_early for r in group if np.isfinite(r.too_early) and r.told] or [np.nan])
+        early = np.array([r.too_early for r in group if np.isfinite(r.too_early) and r.reported] or [np.nan])
         late = np.array([r.late for r in group if np.isfinite(r.late)] or [np.nan])
         us = np.array([r.us for r in group])
         lines.append(
@@ -217,9 +218,9 @@ def draw(rows: list[Row], confidence: float, path: Path) -> None:
         left.fill_between(line, line - MOST_OFF, line + MOST_OFF, color="0.9", label=f"within {MOST_OFF:g}")
         left.plot(line, line, color="0.5", linewidth=0.8)
         for name, color, which in (
-            ("stated to meet", "tab:red", lambda r: r.told and r.status != 2),
-            ("stated to pass each other", "tab:blue", lambda r: r.told and r.status == 2),
-            ("not predicted", "0.3", lambda r: not r.told),
+            ("stated to meet", "tab:red", lambda r: r.reported and r.status != 2),
+            ("stated to pass each other", "tab:blue", lambda r: r.reported and r.status == 2),
+            ("not predicted", "0.3", lambda r: not r.reported),
         ):
             chosen = [r for r in rows if which(r)]
             x, y = [r.truth for r in chosen], [r.probability for r in chosen]
@@ -227,7 +228,7 @@ def draw(rows: list[Row], confidence: float, path: Path) -> None:
         left.set_xlabel("part of the true futures with an impact within 2 s")
         left.set_ylabel("stated probability")
         left.legend(frameon=False)
-        early = np.sort([r.too_early for r in rows if r.told and np.isfinite(r.too_early)])[::-1]
+        early = np.sort([r.too_early for r in rows if r.reported and np.isfinite(r.too_early)])[::-1]
         right.bar(np.arange(len(early)), early, width=1.0, color="tab:blue")
         right.axhline(1.0 - confidence, color="tab:red", linewidth=1, label=f"stated: at most {1 - confidence:.2f}")
         right.set_xlabel("scenes, sorted")

@@ -58,7 +58,7 @@ class Clip:
 
 
 @dataclass(frozen=True)
-class Told:
+class Reported:
     """Predictions of one clip at one horizon, (F, P): warnings from the stated motions alone; the probabilities."""
 
     stated: NDArray[np.bool_]
@@ -129,7 +129,7 @@ def watch(clip: Clip, horizon: float, clearance: float, sigmas: dict[str, Array]
         bound = BALL * float(sigmas[kind][2]) if sigmas else 0.0
         monitor.describe(replace(d, max_linear_acceleration=bound))
     column = {pair: k for k, pair in enumerate(clip.pairs)}
-    told = np.zeros_like(clip.distance)
+    reported = np.zeros_like(clip.distance)
     for frame, rows in enumerate(clip.states):
         states = rows.copy()
         if sigmas:
@@ -137,8 +137,8 @@ def watch(clip: Clip, horizon: float, clearance: float, sigmas: dict[str, Array]
             states["position_stddev"], states["velocity_stddev"] = of[:, 0], of[:, 1]
         for p in monitor.step(round(frame / FRAME_RATE * 1e9), states).predictions:
             if not p["stale"]:
-                told[frame, column[int(p["id_a"]), int(p["id_b"])]] = p["probability"] if sigmas else 1.0
-    return told
+                reported[frame, column[int(p["id_a"]), int(p["id_b"])]] = p["probability"] if sigmas else 1.0
+    return reported
 
 
 @dataclass
@@ -200,7 +200,7 @@ def look_ahead(distance: Array, n: int, clearance: float) -> tuple[Array, NDArra
     return coming, np.isfinite(coming) & (distance > clearance)
 
 
-def draw(clips: list[Clip], said: dict[float, list[Told]], clearance: float, path: Path) -> None:
+def draw(clips: list[Clip], said: dict[float, list[Reported]], clearance: float, path: Path) -> None:
     """Draw right warnings against encounters found, and stated probabilities against observed frequencies."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
@@ -213,8 +213,9 @@ def draw(clips: list[Clip], said: dict[float, list[Told]], clearance: float, pat
             points = []
             for level in [*levels, None]:
                 score = Score()
-                for clip, told in zip(clips, said[horizon], strict=True):
-                    score.add(clip, told.stated if level is None else told.probability >= level, horizon, clearance)
+                for clip, reported in zip(clips, said[horizon], strict=True):
+                    warned = reported.stated if level is None else reported.probability >= level
+                    score.add(clip, warned, horizon, clearance)
                 points.append((score.right / max(score.near, 1), score.right / max(score.warned, 1)))
             x, y = 100 * np.array(points).T
             left.plot(x[:-1], y[:-1], ".-", color=color, linewidth=1, label=f"{horizon:g} s, by probability")
@@ -267,16 +268,16 @@ def main() -> None:
         f"\n| s ahead | warned | encounters within {args.clearance:g} m | median lead (s) | moments found "
         "| warnings right | wrong ones missed by (m) | alerts a minute |\n|---:|---|---:|---:|---:|---:|---:|---:|"
     )
-    said: dict[float, list[Told]] = {}
+    said: dict[float, list[Reported]] = {}
     for horizon in HORIZONS:
         said[horizon] = [
-            Told(watch(c, horizon, args.clearance, None) > 0.0, watch(c, horizon, args.clearance, sigmas))
+            Reported(watch(c, horizon, args.clearance, None) > 0.0, watch(c, horizon, args.clearance, sigmas))
             for c, sigmas in zip(clips, declared, strict=True)
         ]
         for threshold in (None, *THRESHOLDS):
             score = Score()
-            for clip, told in zip(clips, said[horizon], strict=True):
-                warned = told.stated if threshold is None else told.probability >= threshold
+            for clip, reported in zip(clips, said[horizon], strict=True):
+                warned = reported.stated if threshold is None else reported.probability >= threshold
                 score.add(clip, warned, horizon, args.clearance)
             print(score.row(horizon, "stated motion alone" if threshold is None else f"probability ≥ {threshold:g}"))
     if args.png:

@@ -50,11 +50,11 @@ def by_pair(rows: NDArray[np.void]) -> dict[tuple[int, int], Any]:
 
 def wrong(mine: StepResult, truth: StepResult, horizon: float) -> tuple[int, int]:
     """Number of collisions without an answer, and number of answers that do not hold."""
-    told, touching = (by_pair(r.contacts[r.contacts["phase"] != records.Phase.END]) for r in (mine, truth))
+    reported, touching = (by_pair(r.contacts[r.contacts["phase"] != records.Phase.END]) for r in (mine, truth))
     stated, true = by_pair(mine.predictions), by_pair(truth.predictions)
     certain = {k for k, e in true.items() if e["status"] == records.PredictionStatus.HIT and e["upper"] < horizon}
-    missed = (touching.keys() | certain) - told.keys() - stated.keys()
-    off = [k for k in told.keys() & touching.keys() if _is_off(told[k], touching[k])]
+    missed = (touching.keys() | certain) - reported.keys() - stated.keys()
+    off = [k for k in reported.keys() & touching.keys() if _is_off(reported[k], touching[k])]
     off += [k for k in stated.keys() & true.keys() if _is_apart(stated[k], true[k])]
     return len(missed), len(off)
 
@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     gc.collect()
     gc.freeze()
     spent, alone = np.empty((2, args.steps))
-    deferred = missed = off = unresolved = told = 0
+    deferred = missed = off = unresolved = reported = 0
     memory = np.ones(len(WALKED))
     for step in range(-WARM, args.steps):
         time.sleep(args.pause_ms * 1e-3)
@@ -118,7 +118,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             if step % args.every == 0:
                 one, two = wrong(answer, plain.step(stamp, states), monitor.profile.horizon)
                 missed, off = missed + one, off + two
-                told += answer.status.contacts + answer.status.predictions
+                reported += answer.status.contacts + answer.status.predictions
                 unresolved += answer.status.unresolved
         boxes.move(1 / RATE, args.turning)
         boxes.walls()
@@ -137,7 +137,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         "machine_alone_p99_9_ms": float(np.percentile(alone, 99.9)),
         "machine_alone_in_time": float((alone <= 1.1 * np.median(alone)).mean()),
         "deferred_per_step": deferred / args.steps,
-        "told_per_step": told / compared,
+        "reported_per_step": reported / compared,
         "unresolved_per_step": unresolved / compared,
         "compared_steps": compared,
         "missed": missed,

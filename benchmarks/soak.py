@@ -139,7 +139,7 @@ class Traffic:
         rows["linear"] += push * dt
         rows["quaternion"] = _turned(rows["quaternion"], rows["angular"] * dt)
 
-    def heard(self, step: int) -> NDArray[np.void]:
+    def observed(self, step: int) -> NDArray[np.void]:
         """Return the noisy states of those that are not silent; some fall silent."""
         rng = self.rng
         quiet = rng.random(self.count) < 0.002
@@ -265,7 +265,7 @@ class Soak:
         if number % HOUR == HOUR - 1:
             self.restart()
         is_complete = number % self.every == self.every - 1
-        states = self.traffic.states.copy() if is_complete else self.traffic.heard(number)
+        states = self.traffic.states.copy() if is_complete else self.traffic.observed(number)
         outputs = self.pipeline.on_states(encode_states(self.stamp, "world", number + 1, states))
         report = self.report
         report.steps += 1
@@ -297,12 +297,12 @@ class Soak:
 
 def missed(mine: StepResult, truth: StepResult) -> list[str]:
     """Return the pairs that truly overlap by more than DEEP and are in none of the answers, one sentence each."""
-    told = {(int(r["id_a"]), int(r["id_b"])) for r in mine.contacts[mine.contacts["phase"] != Phase.END]}
-    told |= {(int(r["id_a"]), int(r["id_b"])) for r in mine.predictions}
+    reported = {(int(r["id_a"]), int(r["id_b"])) for r in mine.contacts[mine.contacts["phase"] != Phase.END]}
+    reported |= {(int(r["id_a"]), int(r["id_b"])) for r in mine.predictions}
     rows = truth.contacts[truth.contacts["phase"] != Phase.END]
     true = {(int(r["id_a"]), int(r["id_b"])): float(r["signed_distance"]) for r in rows}
     deep = {pair: -depth for pair, depth in true.items() if depth < -DEEP}
-    return [f"{pair} overlaps by {deep[pair]:.3f} m and is not reported" for pair in sorted(deep.keys() - told)]
+    return [f"{pair} overlaps by {deep[pair]:.3f} m and is not reported" for pair in sorted(deep.keys() - reported)]
 
 
 def run(args: argparse.Namespace) -> tuple[Report, float]:

@@ -82,15 +82,15 @@ def measure(name: str, steps: int) -> str:
     off: list[Any] = []
     for step in range(steps):
         rows = next(states)
-        told = {}
+        reported = {}
         for way, (_, finest) in ways.items():
             uncertain_predictions.FINEST_WITH_PLANES = finest  # type: ignore[misc]
             began = time.perf_counter()
             result = monitors[way].step(50_000_000 * step, rows)
             took[way].append(1e3 * (time.perf_counter() - began))
-            told[way] = {(p["id_a"], p["id_b"]): p for p in result.predictions}
-        for pair in told["planes"].keys() & told["samples"].keys():
-            one, other = told["planes"][pair], told["samples"][pair]
+            reported[way] = {(p["id_a"], p["id_b"]): p for p in result.predictions}
+        for pair in reported["planes"].keys() & reported["samples"].keys():
+            one, other = reported["planes"][pair], reported["samples"][pair]
             off.append([one[field] - other[field] for field in ("probability", "earliest", "most_likely")])
     ms = {way: np.array(times[2:]) for way, times in took.items()}
     apart = np.array(off)

@@ -112,8 +112,8 @@ print(json.dumps({"compiled": compiled, "contacts": contacts}))
 @pytest.mark.parametrize("session", [SESSION, FUNCTIONS, MESHES], ids=["monitor", "functions", "meshes"])
 def test_nothing_is_compiled_after_the_warm_up(session: str) -> None:
     subprocess.run([sys.executable, "-m", "collision_monitor.warm_up"], check=True)
-    told = subprocess.run([sys.executable, "-c", session], check=True, capture_output=True, text=True).stdout
-    answer = json.loads(told)
+    output = subprocess.run([sys.executable, "-c", session], check=True, capture_output=True, text=True).stdout
+    answer = json.loads(output)
     assert answer["compiled"] == []
     assert answer["contacts"] > 10
 

@@ -39,6 +39,8 @@ MESH_GAP: Final = 0.1
 MODELS: Final = ("sphere", "obb", "kdop26", "convex_hull")
 """Models from coarse to fine."""
 
+THREADS: Final = (2, 4, 8, 16, 32, 64)
+
 ANY_ERROR: Final = 1e6
 """Value of model_error (m) with which a chosen model is always used."""
 
@@ -114,6 +116,11 @@ class Space:
             yield with_horizon(profile, self.horizon)
         if self.demands.budget_ms is not None:
             yield {"budget_ms": min(max(BUDGET_PART * self.demands.budget_ms, 0.05), NO_BUDGET)}
+
+
+def with_threads(profile: Profile, cores: int) -> list[Profile]:
+    """Return the profile with more threads, at most one for each core."""
+    return [_changed(profile, threads=n) for n in THREADS if profile.threads < n <= cores]
 
 
 def models_of(descriptions: Iterable[ObjectDescription]) -> dict[str, tuple[str, ...]]:

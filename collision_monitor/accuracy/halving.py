@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -9,13 +10,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.accuracy.candidates import Space
+from collision_monitor.accuracy.candidates import Space, with_threads
 from collision_monitor.accuracy.measurement import Measurement
 from collision_monitor.accuracy.playback import play
 from collision_monitor.accuracy.tally import Tally
 from collision_monitor.accuracy.tiles import Workers
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.settings.profile import Profile
+from collision_monitor.settings.profile import NO_BUDGET, Profile
 
 RUN_SECONDS: Final = 0.4
 """Longest time of the steps of one profile on one tile (s). A slower profile is measured on fewer steps."""
@@ -58,7 +59,10 @@ class Halving:
         self._order = team.recording.spread()
 
     def run(self) -> None:
-        """Measure the first generation, its variations, the better halves, and the finalists until one is good."""
+        """Measure the first generation, its variations, the better halves, and the finalists until one is good.
+
+        If all are too slow, the fastest one is timed with more threads.
+        """
         rungs = rungs_of(self._team.recording.tiles, self._team.jobs)
         first = self._space.first_generation()
         self.measure(first, rungs[0])
@@ -67,14 +71,23 @@ class Halving:
             self.measure([each for each in self._space.variations(best) if each not in self._tiles], rungs[0])
         for height, tiles in enumerate(rungs[1:-1], 1):
             self.measure(self.best(max(len(first) >> height, FINALISTS)), tiles)
-        while True:
-            finalists = [each for each in self.best(FINALISTS) if each not in self._alone]
-            if not finalists:
-                return
+        while finalists := [each for each in self.best(FINALISTS) if each not in self._alone]:
             self.measure(finalists, rungs[-1])
             self.time_alone(finalists)
             if any(each.timed and not each.failures for each in self.trials()):
                 return
+        self._time_with_threads()
+
+    def _time_with_threads(self) -> None:
+        """Time the fastest of the profiles that are good but too slow with more threads, which change no answer."""
+        demands = replace(self._space.demands, budget_ms=None)
+        slow = [each for each in self.trials() if each.timed and not demands.failures(each.measurement)]
+        slow = [each for each in slow if each.profile.budget_ms == NO_BUDGET]
+        for trial in sorted(slow, key=lambda each: each.measurement.step_ms_p99)[:1]:
+            more = with_threads(trial.profile, len(os.sched_getaffinity(0)))
+            for each in more:
+                self._tallies[each], self._tiles[each] = self._tallies[trial.profile], trial.tiles
+            self.time_alone(more)
 
     def measure(self, profiles: Sequence[Profile], tiles: int) -> None:
         """Measure each profile on those of the first tiles that it lacks."""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 START_PATIENCE = 180.0
 """Time for the monitor to answer (s). Its first start on a machine may have to compile the kernels."""
-TELL = 5.0
+SILENCE = 5.0
 """Time after which the demo prints why it waits for the monitor (s)."""
 FRAME = 0.25
 """Time between two pictures (s)."""
@@ -138,12 +138,12 @@ def _settings(args: argparse.Namespace) -> list[str]:
 
 def _wait_for_answer(viewer: Viewer, monitor: Child, stop: StopRequest) -> None:
     """Wait for the first status, which the monitor publishes as soon as it listens. Raises ProcessError."""
-    began, is_told = time.monotonic(), False
+    began, is_reported = time.monotonic(), False
     while viewer.status is None and not stop.received:
         viewer.listen(until=time.monotonic() + FRAME)
         monitor.running()
-        if time.monotonic() > began + TELL and not is_told:
-            is_told = True
+        if time.monotonic() > began + SILENCE and not is_reported:
+            is_reported = True
             print("waiting for the monitor, which compiles kernels, once for this machine and version", flush=True)
         if time.monotonic() > began + START_PATIENCE:
             raise ProcessError(f"collision-monitor run: expected a status within {START_PATIENCE:g} s, got none")

@@ -120,5 +120,5 @@ def _as_text(result: Imported, output: Path) -> str:
     lines += [f"refused    {count:8d}  {reason.replace('_', ' ')}" for reason, count in result.refused.items()]
     if result.refused:
         lines.append(f"last       {result.last_refusal}")
-    lines += [f"unseen     {name}: the bag tells nothing of it that could be used" for name in result.unseen]
+    lines += [f"unseen     {name}: the bag has no message of it that could be used" for name in result.unseen]
     return "\n".join([*lines, f"written    {result.messages} messages, {result.steps} steps to {output}"])

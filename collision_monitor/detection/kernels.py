@@ -364,6 +364,21 @@ def _finish(frame: Any, hits: Any, pairs: Any) -> int:
     return _sort_hits(frame, hits)
 
 
+@device
+def _into_cells(positions: Any, grid: Any, frame: Any) -> bool:
+    """Sort the bodies by cell, on one thread. Return whether all positions are finite, without which none is sorted."""
+    blocks = frame.bounds.shape[0]
+    for b in range(blocks):
+        _bounds(positions, frame, b)
+    if not frame.good.all():
+        return False
+    cells = _cells(grid, frame)
+    for b in range(blocks):
+        _buckets(positions, grid, frame, b)
+    sort_by_cell(positions.shape[0], cells, grid)
+    return True
+
+
 @kernel
 def detect(path: int, limit: float, positions: Any, quaternions: Any, pairs: Any, contacts: Any, *memory: Any) -> int:
     """Detect on one thread; return the number of contacts or a negative code (BAD_POSITION, BAD_QUATERNION, `_finish`).
@@ -374,14 +389,8 @@ def detect(path: int, limit: float, positions: Any, quaternions: Any, pairs: Any
     table, grid = ShapeTable(*memory[:_GRID]), Grid(*memory[_GRID:_FRAME])
     frame, hits = Frame(*memory[_FRAME:_HITS]), Hits(*memory[_HITS:_END])
     blocks = frame.bounds.shape[0]
-    for b in range(blocks):
-        _bounds(positions, frame, b)
-    if not frame.good.all():
+    if not _into_cells(positions, grid, frame):
         return BAD_POSITION
-    cells = _cells(grid, frame)
-    for b in range(blocks):
-        _buckets(positions, grid, frame, b)
-    sort_by_cell(positions.shape[0], cells, grid)
     for b in range(blocks):
         _gather(path, positions, quaternions, grid, frame, b)
     if not frame.good.all():
@@ -405,14 +414,8 @@ def detect_parallel(
     table, grid = ShapeTable(*memory[:_GRID]), Grid(*memory[_GRID:_FRAME])
     frame, hits = Frame(*memory[_FRAME:_HITS]), Hits(*memory[_HITS:_END])
     blocks = frame.bounds.shape[0]
-    for b in range(blocks):
-        _bounds(positions, frame, b)
-    if not frame.good.all():
+    if not _into_cells(positions, grid, frame):
         return BAD_POSITION
-    cells = _cells(grid, frame)
-    for b in range(blocks):
-        _buckets(positions, grid, frame, b)
-    sort_by_cell(positions.shape[0], cells, grid)
     for b in prange(blocks):
         _gather(path, positions, quaternions, grid, frame, np.int64(b))
     if not frame.good.all():

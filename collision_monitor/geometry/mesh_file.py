@@ -49,7 +49,8 @@ def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
     except (TypeError, ValueError):
         factor = 0.0
     if not 0.0 < factor <= LARGEST_INPUT:
-        raise ShapeError(f"load_mesh, scale: expected a positive number of metres, got {scale!r}")
+        expected = f"a positive number of metres up to {LARGEST_INPUT:g}"
+        raise ShapeError(f"load_mesh, scale: expected {expected}, got {scale!r}")
     vertices, faces, unit = _read(file)
     try:
         mesh = Mesh(vertices * (unit * factor), faces)

@@ -23,13 +23,14 @@ MOST_CLOUD_POINTS: Final = 500_000
 """Points of one cloud. Larger: its tree takes longer than the 100 ms for which one message may hold the answers."""
 
 
-def _positive(value: float, what: str) -> float:
+def _positive(value: float, what: str, *, or_zero: bool = False) -> float:
+    expected = f"{'0 or ' if or_zero else ''}a positive number of metres up to {LARGEST_INPUT:g}"
     try:
         number = float(value)
     except (TypeError, ValueError):
-        raise ShapeError(f"{what}: expected a positive number of metres, got {value!r}") from None
-    if not 0.0 < number <= LARGEST_INPUT:
-        raise ShapeError(f"{what}: expected a positive number of metres up to {LARGEST_INPUT:g}, got {number!r}")
+        raise ShapeError(f"{what}: expected {expected}, got {value!r}") from None
+    if not (0.0 < number <= LARGEST_INPUT or (or_zero and number == 0.0)):
+        raise ShapeError(f"{what}: expected {expected}, got {number!r}")
     return number
 
 
@@ -250,7 +251,7 @@ class Points(Shape):
                 f"Points: expected at most {MOST_CLOUD_POINTS} points, got {len(points)}; "
                 "keep one for each cube of a grid, or only those within reach"
             )
-        radius = self.radius if self.radius == 0.0 else _positive(self.radius, "Points radius")
+        radius = _positive(self.radius, "Points radius", or_zero=True)
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "radius", float(radius))
 
@@ -328,7 +329,7 @@ class Polygon(Shape):
     radius: float = 0.0
 
     def __post_init__(self) -> None:
-        radius = self.radius if self.radius == 0.0 else _positive(self.radius, "Polygon radius")
+        radius = _positive(self.radius, "Polygon radius", or_zero=True)
         points = _points(self.points, "Polygon points", 2, 2 if radius else 3)
         if len(points) == 2 and (points[0] == points[1]).all():
             raise ShapeError("Polygon points: expected two different points, got the same twice (use a Circle)")

@@ -9,6 +9,7 @@ import numpy as np
 
 from collision_monitor._jit import device
 from collision_monitor.meshes.layout import AXES, CENTER, HALF
+from collision_monitor.meshes.supports import extend, write_supports
 from collision_monitor.tolerances import EPSILON
 
 JACOBI_SWEEPS: Final = 6
@@ -19,8 +20,11 @@ CONTAINED: Final = 64 * EPSILON
 
 
 @device
-def fit_box(corners, radius, order, begin, end, axes, half, center, blocks, block, member):
-    """Write the box around the triangles order[begin:end], which are enlarged by radii, to a member of a block."""
+def fit_box(corners, radius, order, begin, end, axes, half, center, reach, blocks, block, member):
+    """Write the box around the triangles order[begin:end], which are enlarged by radii, to a member of a block.
+
+    axes (2, 3, 3), half, center (2, 3), reach (REACHES,): scratch memory.
+    """
     mx = my = mz = 0.0
     origin = corners[order[begin], 0]
     ox, oy, oz = origin[0], origin[1], origin[2]
@@ -66,6 +70,20 @@ def fit_box(corners, radius, order, begin, end, axes, half, center, blocks, bloc
         along = R[r, 0] * center[best, 0] + R[r, 1] * center[best, 1] + R[r, 2] * center[best, 2]
         blocks[block, CENTER + r, member] = origin[r] + along
         blocks[block, HALF + r, member] = half[best, r] + CONTAINED * scale
+    reach[:] = -np.inf
+    for k in range(begin, end):
+        for i in range(3):
+            x = corners[order[k], i, 0] - ox, corners[order[k], i, 1] - oy, corners[order[k], i, 2] - oz
+            extend(
+                (
+                    R[0, 0] * x[0] + R[1, 0] * x[1] + R[2, 0] * x[2] - center[best, 0],
+                    R[0, 1] * x[0] + R[1, 1] * x[1] + R[2, 1] * x[2] - center[best, 1],
+                    R[0, 2] * x[0] + R[1, 2] * x[1] + R[2, 2] * x[2] - center[best, 2],
+                ),
+                radius[order[k]],
+                reach,
+            )
+    write_supports(reach, CONTAINED * scale, blocks, block, member)
 
 
 @device

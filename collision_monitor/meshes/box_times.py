@@ -1,7 +1,8 @@
-"""Times until which a moving box stays apart from the eight boxes, or the eight triangles, of a moving block."""
+"""Times until which a moving box stays apart from the eight boxes of a moving block."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from numba import types
@@ -11,9 +12,10 @@ from numba.extending import intrinsic
 from collision_monitor._jit import device, inlined
 from collision_monitor._jit.lanes import Lanes, store
 from collision_monitor.meshes.approach import STRETCH, Approach
-from collision_monitor.meshes.boxes import Block, half_of, inner, seen_from
-from collision_monitor.meshes.layout import AXES, CENTER, CORNERS, HALF, RADIUS
+from collision_monitor.meshes.boxes import Block, inner, seen_from
+from collision_monitor.meshes.layout import AXES, CENTER, ROWS, WIDTH
 from collision_monitor.meshes.placing import turned_back
+from collision_monitor.meshes.supports import Supports
 
 
 def norm(a: list[Lanes]) -> Lanes:
@@ -25,22 +27,26 @@ def _cross(a: list[Lanes], b: list[Lanes]) -> list[Lanes]:
     return [a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3] for k in range(3)]
 
 
-def times_until(gap: Lanes, speed: Lanes, curvatures: tuple[Lanes, Lanes, Lanes], until: Lanes) -> Lanes:
-    """Times until which eight gaps stay open. curvatures: the largest of any time, that now, its change per second."""
+def times_open(gap: Lanes, speed: Lanes, curvature: Lanes) -> Lanes:
+    """`time_until` of eight gaps."""
     zero, tiny = Lanes.constant(gap.builder, 0.0), Lanes.constant(gap.builder, 1e-300)
-    largest, bent, change = curvatures
     gap = gap.largest(zero)
+    root = (speed * speed + (curvature + curvature) * gap).root()
+    length = (gap + gap).where(speed, (root - speed).largest(tiny))
+    return (length / (speed + root).where(speed, curvature)).where(gap, zero)
 
-    def time(curvature: Lanes) -> Lanes:  # `time_until`
-        root = (speed * speed + (curvature + curvature) * gap).root()
-        closing = (gap + gap) / (speed + root).largest(tiny)
-        opening = (root - speed).largest(tiny) / curvature
-        return closing.where(speed, opening).where(gap, zero)
 
-    first = time(largest)
+def curvature_until(until: Lanes, largest: Lanes, bent: Lanes, change: Lanes) -> Lanes:
+    """Largest curvature within a time, from the largest of any time, that now, and its change per second."""
+    within = bent + until * change * Lanes.constant(until.builder, 1.0 / 3.0)
+    return largest.least(within.largest(Lanes.constant(until.builder, 0.0)))
+
+
+def _times(gap: Lanes, speed: Lanes, curvatures: tuple[Lanes, Lanes, Lanes], until: Lanes) -> Lanes:
+    """Times until which eight gaps stay open. curvatures: as for `curvature_until`."""
+    first = times_open(gap, speed, curvatures[0])
     later = (first * Lanes.constant(gap.builder, STRETCH)).least(until)
-    within = bent + later * change * Lanes.constant(gap.builder, 1.0 / 3.0)
-    return first.largest(later.least(time(largest.least(within.largest(zero)))))
+    return first.largest(later.least(times_open(gap, speed, curvature_until(later, *curvatures))))
 
 
 class _Motion:
@@ -56,47 +62,67 @@ class _Motion:
         self._bends, self._jerks = [number(each) for each in fields[4:7]], [number(each) for each in fields[7:10]]
         self.start, self.growth, self.until = (number(each) for each in fields[10:])
 
-    def times(self, n: list[Lanes], gap: Lanes, a: _Reach, b: _Reach) -> Lanes:
+    def times(self, n: list[Lanes], gap: Lanes, a: _Boxes, b: _Boxes) -> Lanes:
         """Times until which gaps (m) along n stay open."""
         k, m = _cross(n, self.w_a), _cross(n, self.w_b)
-        speed = a.most(k) + b.most([b.zero - each for each in m]) - inner(n, self.v) + self.growth
+        speed = a.most(k) + b.most(_negative(m)) - inner(n, self.v) + self.growth
         u_a, u_b = _cross(k, self.w_a), _cross(m, self.w_b)
-        bent = a.most(u_a) + b.most([b.zero - each for each in u_b]) - inner(n, self.a)
+        bent = a.most(u_a) + b.most(_negative(u_b)) - inner(n, self.a)
         largest, change = (
             origin + of_a * a.radius + of_b * b.radius for of_a, of_b, origin in (self._bends, self._jerks)
         )
-        return times_until(gap - self.start, speed, (largest, bent, change), self.until)
+        return _times(gap - self.start, speed, (largest, bent, change), self.until)
 
 
-class _Reach:
-    """Eight boxes or triangles about the origin of their tree: how far they extend."""
+class _Boxes:
+    """Eight boxes in the axes of the one that all lanes share, with their centres from the origin of their tree."""
 
-    def __init__(self, zero: Lanes, points: list[list[Lanes]], half: list[Lanes], axes: list[list[Lanes]]) -> None:
-        """points: the centre of a box, or the corners of a triangle; half, axes: of the box, none for a triangle."""
-        self.zero, self._points, self._half, self._axes = zero, points, half, axes
-        lengths = [norm(point) for point in points]
-        self.radius = lengths[0] + norm(half) if half else lengths[0].largest(lengths[1]).largest(lengths[2])
+    def __init__(self, supports: Supports, center: list[Lanes], axes: list[list[Lanes]] | None) -> None:
+        """axes: of the boxes, if others."""
+        self._supports, self._center, self._axes = supports, center, axes
+        self.radius = norm(center) + norm(supports.half)
+
+    def reach(self, d: list[Lanes]) -> Lanes:
+        """Bound on the largest d . x of their points x from their centres."""
+        return self._supports.reach([inner(axis, d) for axis in self._axes] if self._axes else d)
 
     def most(self, d: list[Lanes]) -> Lanes:
-        """Largest d . x of their points x."""
-        far = inner(self._points[0], d)
-        for point in self._points[1:]:
-            far = far.largest(inner(point, d))
-        return far + inner([abs(inner(axis, d)) for axis in self._axes], self._half) if self._half else far
+        """The same from the origin of their tree."""
+        return inner(self._center, d) + self.reach(d)
+
+
+def _negative(a: list[Lanes]) -> list[Lanes]:
+    zero = Lanes.constant(a[0].builder, 0.0)
+    return [zero - each for each in a]
+
+
+def _rows_of(context: Any, builder: Any, array_type: Any, array: Any, place: Any) -> Callable[[int], Lanes]:
+    """The rows of one box, WIDTH * block + member, in every lane."""
+    shift = place.type(WIDTH.bit_length() - 1)
+    block, member = builder.ashr(place, shift), builder.and_(place, place.type(WIDTH - 1))
+    first = builder.add(builder.mul(block, block.type(ROWS * WIDTH)), member)
+    data = context.make_array(array_type)(context, builder, array).data
+
+    def row(k: int) -> Lanes:
+        return Lanes.constant(builder, builder.load(builder.gep(data, [builder.add(first, first.type(WIDTH * k))])))
+
+    return row
 
 
 @intrinsic
-def _box_times(typing_context, half, M, center, move, blocks, block, out, at):
-    signature = types.void(half, M, center, move, blocks, types.int64, out, types.int64)
+def _box_times(typing_context, blocks_a, place, M, center, move, blocks, block, out, at):
+    signature = types.void(blocks_a, types.int64, M, center, move, blocks, types.int64, out, types.int64)
 
     def codegen(context, builder, signature, arguments):
         def vectors(k: int) -> list[Lanes]:
             return [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[k])]
 
-        zero, one = Lanes.constant(builder, 0.0), Lanes.constant(builder, 1.0)
-        e, M, own = vectors(0), vectors(1), vectors(2)
-        members = Block(context, builder, signature.args[4], arguments[4], arguments[5])
-        axes, f = members.matrix(AXES), members.vector(HALF)
+        zero = Lanes.constant(builder, 0.0)
+        first = Supports(_rows_of(context, builder, signature.args[0], arguments[0], arguments[1]))
+        e, M = first.half, vectors(2)
+        members = Block(context, builder, signature.args[5], arguments[5], arguments[6])
+        second = Supports(members.row)
+        axes, f = members.matrix(AXES), second.half
         R = [[inner(M[3 * r : 3 * r + 3], [axes[k][c] for k in range(3)]) for c in range(3)] for r in range(3)]
         columns = [[R[r][c] for r in range(3)] for c in range(3)]
         arm = [inner(M[3 * r : 3 * r + 3], members.vector(CENTER)) for r in range(3)]  # from B's origin
@@ -114,47 +140,19 @@ def _box_times(typing_context, half, M, center, move, blocks, block, out, at):
         h = [inner(R[r], h) for r in range(3)]
         better = inner(g, g) - inner(h, h)
         w = [g[k].where(better, h[k]) for k in range(3)]
-        length, far, tiny = norm(w), norm(x), Lanes.constant(builder, 1e-300)
-        n = [each / length.largest(tiny) for each in w]
-        gap = inner(n, x) - inner([abs(each) for each in n], e)
-        gap = gap - inner([abs(inner(column, n)) for column in columns], f)
-        # the line of both centres is often better, and takes little more
-        wide = far - (inner([abs(each) for each in x], e) + inner([abs(each) for each in y], f)) / far.largest(tiny)
-        n = [(x[k] / far.largest(tiny)).where(wide - gap, n[k]) for k in range(3)]
+        a, b = _Boxes(first, vectors(3), None), _Boxes(second, arm, columns)
+
+        def toward(w: list[Lanes]) -> tuple[list[Lanes], Lanes]:
+            """Unit direction along w, and the gap along it."""
+            length = norm(w).largest(Lanes.constant(builder, 1e-300))
+            n = [each / length for each in w]
+            return n, inner(n, x) - a.reach(n) - b.reach(_negative(n))
+
+        (n, gap), (m, wide) = toward(w), toward(x)  # the line of both centres is often better
+        n = [m[k].where(wide - gap, n[k]) for k in range(3)]
         gap = wide.largest(gap)
-        unit = [[one if r == c else zero for r in range(3)] for c in range(3)]
-        a, b = _Reach(zero, [own], e, unit), _Reach(zero, [arm], f, columns)
-        time = _Motion(builder, arguments[3]).times(n, gap, a, b)
-        store(context, builder, time, signature.args[6], arguments[6], arguments[7])
-        return context.get_dummy_value()
-
-    return signature, codegen
-
-
-@intrinsic
-def _triangle_times(typing_context, half, M, center, move, blocks, block, out, at):
-    signature = types.void(half, M, center, move, blocks, types.int64, out, types.int64)
-
-    def codegen(context, builder, signature, arguments):
-        def vectors(k: int) -> list[Lanes]:
-            return [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[k])]
-
-        zero, one = Lanes.constant(builder, 0.0), Lanes.constant(builder, 1.0)
-        e, M, own = vectors(0), vectors(1), vectors(2)
-        members = Block(context, builder, signature.args[4], arguments[4], arguments[5])
-        corners, radius = [members.vector(CORNERS + 3 * i) for i in range(3)], members.row(RADIUS)
-        arms = [[inner(M[3 * r : 3 * r + 3], corner) for r in range(3)] for corner in corners]  # from B's origin
-        w = []
-        for r in range(3):
-            x, y, z = (arm[r] + M[9 + r] for arm in arms)
-            above = (x.least(y).least(z) - radius - e[r]).largest(zero)
-            w.append(above + (x.largest(y).largest(z) + radius + e[r]).least(zero))
-        gap = norm(w)
-        n = [each / gap.largest(Lanes.constant(builder, 1e-300)) for each in w]
-        unit = [[one if r == c else zero for r in range(3)] for c in range(3)]
-        box, triangle = _Reach(zero, [own], e, unit), _Reach(zero, arms, [], [])
-        time = _Motion(builder, arguments[3]).times(n, gap, box, triangle)
-        store(context, builder, time, signature.args[6], arguments[6], arguments[7])
+        time = _Motion(builder, arguments[4]).times(n, gap, a, b)
+        store(context, builder, time, signature.args[7], arguments[7], arguments[8])
         return context.get_dummy_value()
 
     return signature, codegen
@@ -188,11 +186,4 @@ def box_times(blocks_a, a, member, blocks_b, b, X, move, out, at):
     blocks_a, a, member: the box. X: pose of the tree of b in the frame of the box's tree; move (Approach): in its axes.
     """
     own, turned = _turned(blocks_a, a, member, move)
-    _box_times(half_of(blocks_a, a, member), seen_from(blocks_a, a, member, X), own, turned, blocks_b, b, out, at)
-
-
-@device
-def triangle_times(blocks_a, a, member, blocks_b, b, X, move, out, at):
-    """As `box_times`, for the triangles of block b."""
-    own, turned = _turned(blocks_a, a, member, move)
-    _triangle_times(half_of(blocks_a, a, member), seen_from(blocks_a, a, member, X), own, turned, blocks_b, b, out, at)
+    _box_times(blocks_a, WIDTH * a + member, seen_from(blocks_a, a, member, X), own, turned, blocks_b, b, out, at)

@@ -1,8 +1,5 @@
-"""Lower bounds on the distances of a box from eight boxes, or from eight triangles, of a block at once.
+"""The gaps between a box and the eight boxes of a block, and lower bounds on its distances from eight triangles.
 
-In the axes of either box, the other one has an axis-aligned bound; the gaps of the two along the axes give a lower
-bound on the distance. Further bounds are the gap along the line of the two centres, and the gap along a given
-direction, such as that between the nearest points so far.
 LLVM does not vectorise these loops, so the formulas are written in vectors (`_jit.lanes`).
 """
 
@@ -17,7 +14,7 @@ from numba.extending import intrinsic
 from collision_monitor._jit import device, inlined
 from collision_monitor._jit.lanes import Lanes, load, store
 from collision_monitor.meshes.layout import AXES, CENTER, CORNERS, HALF, RADIUS, ROWS, WIDTH
-from collision_monitor.meshes.placing import Placing, turned_back
+from collision_monitor.meshes.placing import Placing
 from collision_monitor.tolerances import SAT_ROUND_OFF
 
 
@@ -82,36 +79,24 @@ def _gaps(x: list[Lanes], own: list[Lanes], shadow: list[Lanes], zero: Lanes) ->
     return inner(gap, gap)
 
 
-def _between_centers(x: list[Lanes], y: list[Lanes], e: list[Lanes], f: list[Lanes], zero: Lanes) -> Lanes:
-    """Squared gap of two boxes along the line of their centres, which is x in the axes of one and y in the other's."""
-    xx = inner(x, x)
-    gap = xx - inner([abs(each) for each in x], e) - inner([abs(each) for each in y], f)
-    return (gap * (gap / xx)).where(gap, zero)
-
-
 @intrinsic
-def _bounds(typing_context, half, M, n, blocks, block, out, at):
-    signature = types.void(half, M, n, blocks, types.int64, out, types.int64)
+def _gap_bounds(typing_context, half, M, blocks, block, out, at):
+    signature = types.void(half, M, blocks, types.int64, out, types.int64)
 
     def codegen(context, builder, signature, arguments):
-        def vectors(k: int) -> list[Lanes]:
-            return [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[k])]
-
         zero = Lanes.constant(builder, 0.0)
-        e, placing, n = vectors(0), vectors(1), vectors(2)
-        turn, shift = [placing[0:3], placing[3:6], placing[6:9]], placing[9:12]
-        members = Block(context, builder, signature.args[3], arguments[3], arguments[4])
+        e = [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[0])]
+        placing = [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[1])]
+        members = Block(context, builder, signature.args[2], arguments[2], arguments[3])
         axes, center, f = members.matrix(AXES), members.vector(CENTER), members.vector(HALF)
-        R = [[inner(turn[r], _column(axes, c)) for c in range(3)] for r in range(3)]
-        x = [inner(turn[r], center) + shift[r] for r in range(3)]
+        R = [[inner(placing[3 * r : 3 * r + 3], _column(axes, c)) for c in range(3)] for r in range(3)]
+        x = [inner(placing[3 * r : 3 * r + 3], center) + placing[9 + r] for r in range(3)]
         size = [[abs(R[r][c]) for c in range(3)] for r in range(3)]
         bound = _gaps(x, e, [inner(size[r], f) for r in range(3)], zero)
         y = [inner(_column(R, c), x) for c in range(3)]
         bound = bound.largest(_gaps(y, f, [inner(_column(size, c), e) for c in range(3)], zero))
-        bound = bound.largest(_between_centers(x, y, e, f, zero))
-        along = [abs(inner(_column(R, c), n)) for c in range(3)]
-        gap = (inner(n, x) - inner([abs(each) for each in n], e) - inner(along, f)).largest(zero)
-        store(context, builder, bound.largest(gap * gap), signature.args[5], arguments[5], arguments[6])
+        known = load(context, builder, signature.args[4], arguments[4], arguments[5])
+        store(context, builder, known.largest(bound), signature.args[4], arguments[4], arguments[5])
         return context.get_dummy_value()
 
     return signature, codegen
@@ -175,21 +160,19 @@ def _triangle_bounds(typing_context, half, M, blocks, block, out, at):
 
 
 @device
-def box_bounds(blocks_a, a, member, blocks_b, b, X, n, out, at):
-    """Write lower bounds on the squared distances of a box from the eight boxes of block b to out[at: at + 8] (m^2).
-
-    blocks_a, a, member: the box. X: pose of the tree of b in the frame of the box's tree. n: unit direction from the
-    box's tree to that of b in the former's frame, or 0. A bound of 0 says that the boxes may overlap.
+def raise_by_gaps(blocks_a, a, member, blocks_b, b, X, out, at):
+    """Raise bounds on the squared distances of a box from the eight boxes of block b, out[at: at + 8], to those along
+    the axes of either (m^2). Arguments as for `box_separations`.
     """
-    m = turned_back(blocks_a, a, member, n)
-    _bounds(half_of(blocks_a, a, member), seen_from(blocks_a, a, member, X), m, blocks_b, b, out, at)
+    _gap_bounds(half_of(blocks_a, a, member), seen_from(blocks_a, a, member, X), blocks_b, b, out, at)
 
 
 @device
 def box_separations(blocks_a, a, member, blocks_b, b, X, out, at):
     """Write the largest gaps of a box and the eight boxes of block b along an axis of either to out[at: at + 8] (m).
 
-    Arguments as for `box_bounds`. A gap above 0 separates them; the more it is below 0, the deeper they overlap.
+    blocks_a, a, member: the box. X: pose of the tree of b in the frame of the box's tree. A gap above 0 separates them;
+    the more it is below 0, the deeper they overlap.
     """
     _separations(half_of(blocks_a, a, member), seen_from(blocks_a, a, member, X), blocks_b, b, out, at)
 

@@ -16,6 +16,7 @@ from collision_monitor._jit import allocating_kernel, device, inlined, kernel
 from collision_monitor.meshes.box_fit import CONTAINED
 from collision_monitor.meshes.layout import (
     AXES,
+    BOXES,
     CENTER,
     CHILD,
     CORNERS,
@@ -29,6 +30,8 @@ from collision_monitor.meshes.layout import (
     ROWS,
     WIDTH,
 )
+from collision_monitor.meshes.supports import REACHES, extend, extend_by_box, write_supports
+from collision_monitor.narrow_phase.vector import minus
 
 Array = NDArray[np.float64]
 
@@ -44,10 +47,10 @@ def cloud_tree(points: Array) -> Array:
     """Build the tree (n, ROWS, WIDTH) over points (m, 3) in m, m >= 1. A point is a triangle with equal corners."""
     points = np.ascontiguousarray(points, dtype=np.float64)
     sizes = _levels(len(points))
-    blocks = np.zeros((1 + sum(sizes), ROWS, WIDTH))
+    blocks = np.zeros((_blocks_above(sizes) + sizes[-1], ROWS, WIDTH))
     order = np.empty(len(points), np.int32)
     _sort_along_curve(points, order)
-    far = _fill(points, order, np.array(sizes), blocks)
+    far = _fill(points, order, np.array(sizes), blocks, np.empty(REACHES))
     blocks[0, REACH, 1] = np.nextafter(np.sqrt(far) * (1.0 + CONTAINED), np.inf)
     blocks[0, COUNT, 1] = len(points)
     blocks[0, PARTS, 1] = max(len(points), MOST_PARTS + 1)  # more than are stored, so that each point is examined
@@ -60,7 +63,7 @@ def cloud_points(blocks: Array, root: int) -> Array:
     """The points (n, 3) of the cloud with a tree that begins at a block, in the user's order."""
     number = int(blocks[root, COUNT, 1])
     sizes = _levels(number)
-    first = root + 1 + sum(sizes[:-1])
+    first = root + _blocks_above(sizes)
     leaves = blocks[first : first + sizes[-1]]
     points = np.empty((number, 3))
     number_of = leaves[:, FACE].ravel().astype(np.int64)
@@ -74,6 +77,11 @@ def _levels(points: int) -> list[int]:
     while sizes[0] > 1:
         sizes.insert(0, -(-sizes[0] // WIDTH))
     return sizes
+
+
+def _blocks_above(sizes: list[int]) -> int:
+    """Number of blocks above the leaves, for these numbers of blocks of the levels."""
+    return BOXES * (1 + sum(sizes[:-1]))
 
 
 @inlined
@@ -122,8 +130,8 @@ def _sort_along_curve(points: Any, order: Any) -> None:
 
 
 @device
-def _write_box(blocks: Any, block: int, member: int, low: Any, high: Any, child: int) -> None:
-    """Write the box from low to high (m), enlarged against round-off."""
+def _write_box(blocks: Any, block: int, member: int, low: Any, high: Any, child: int) -> float:
+    """Write the box from low to high (m), enlarged against round-off by the returned length (m)."""
     scale = 0.0
     for c in range(3):
         scale += max(abs(low[c]), abs(high[c]))
@@ -133,18 +141,20 @@ def _write_box(blocks: Any, block: int, member: int, low: Any, high: Any, child:
         blocks[block, CENTER + c, member] = low[c] + half
         blocks[block, HALF + c, member] = half + CONTAINED * scale
     blocks[block, CHILD, member] = child
+    return CONTAINED * scale
 
 
 @kernel
-def _fill(points: Any, order: Any, sizes: Any, blocks: Any) -> float:
+def _fill(points: Any, order: Any, sizes: Any, blocks: Any, reach: Any) -> float:
     """Write the blocks level by level, from the leaves upward; return the largest squared distance from the origin.
 
-    The boxes of a level lie in the blocks of the level above; the topmost box in block 0.
+    The boxes of a level lie in the blocks of the level above; the topmost box in block 0. reach (REACHES,): scratch
+    memory.
     """
     n, levels = len(points), len(sizes)
-    first = 1
+    first = BOXES
     for level in range(levels - 1):
-        first += sizes[level]
+        first += BOXES * sizes[level]
     far = 0.0
     for leaf in range(sizes[levels - 1]):
         block = first + leaf
@@ -159,9 +169,9 @@ def _fill(points: Any, order: Any, sizes: Any, blocks: Any) -> float:
             blocks[block, FACE, lane] = k
     above = first
     for level in range(levels - 1, -1, -1):
-        first, above = above, above - sizes[level - 1] if level > 0 else 0
+        first, above = above, above - BOXES * sizes[level - 1] if level > 0 else 0
         for k in range(sizes[level]):
-            block = first + k
+            block = first + (k if level == levels - 1 else BOXES * k)
             lx = ly = lz = np.inf
             hx = hy = hz = -np.inf
             for lane in range(WIDTH):
@@ -175,5 +185,16 @@ def _fill(points: Any, order: Any, sizes: Any, blocks: Any) -> float:
                 lx, ly, lz = min(lx, x - a), min(ly, y - b), min(lz, z - c)
                 hx, hy, hz = max(hx, x + a), max(hy, y + b), max(hz, z + c)
             child = -block if level == levels - 1 else block
-            _write_box(blocks, above + k // WIDTH, k % WIDTH, (lx, ly, lz), (hx, hy, hz), child)
+            box, member = above + BOXES * (k // WIDTH), k % WIDTH
+            slack = _write_box(blocks, box, member, (lx, ly, lz), (hx, hy, hz), child)
+            own = blocks[box, CENTER, member], blocks[box, CENTER + 1, member], blocks[box, CENTER + 2, member]
+            reach[:] = -np.inf
+            for lane in range(WIDTH):
+                at = CORNERS if level == levels - 1 else CENTER
+                arm = blocks[block, at, lane], blocks[block, at + 1, lane], blocks[block, at + 2, lane]
+                if level == levels - 1:
+                    extend(minus(arm, own), 0.0, reach)
+                elif blocks[block, CHILD, lane] != 0.0:
+                    extend_by_box(minus(arm, own), blocks, block, lane, reach)
+            write_supports(reach, slack, blocks, box, member)
     return far

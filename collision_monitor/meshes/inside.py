@@ -6,7 +6,7 @@ from math import sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.meshes.boxes import box_bounds, half_of
+from collision_monitor.meshes.boxes import box_separations, half_of
 from collision_monitor.meshes.layout import CENTER, CHILD, CLOSED, FIRST_PART, MOST_PARTS, PARTS, WIDTH
 from collision_monitor.meshes.nearest import BOUNDS, PAIRS, triangle_at
 from collision_monitor.meshes.placing import Placing, inverse, place_point, turned_back
@@ -91,7 +91,7 @@ def _is_some_in(blocks: Any, root: int, other: Any, other_root: int, X: Placing,
         child = other[place // WIDTH, CHILD, place % WIDTH]
         block = other_root + int(abs(child))
         if child > 0.0:
-            box_bounds(blocks, root, 0, other, block, X, (0.0, 0.0, 0.0), work, BOUNDS)
+            box_separations(blocks, root, 0, other, block, X, work, BOUNDS)
         for k in range(WIDTH):
             if child > 0.0:
                 if other[block, CHILD, k] == 0.0 or work[BOUNDS + k] > 0.0:

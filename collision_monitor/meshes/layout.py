@@ -1,7 +1,8 @@
 """Layout of a tree: one array (n, ROWS, WIDTH) of float64, in blocks of WIDTH boxes or WIDTH triangles.
 
 A kernel computes with all members of a block at once, because equal numbers of the members lie side by side.
-Block 0 holds only the box of the whole tree. All lengths are in m, in the mesh's frame.
+Block 0 holds only the box of the whole tree. All lengths are in m, in the mesh's frame. A block of boxes, block 0 too,
+is followed by two blocks with the supports of its boxes.
 """
 
 from __future__ import annotations
@@ -21,6 +22,15 @@ HALF: Final = 12
 """Half extents along the box's axes. They include the radii of the triangles, and round-off."""
 CHILD: Final = 15
 """Block of the box's content relative to block 0: > 0 boxes, < 0 triangles (its negative), 0: the member is unused."""
+
+BOXES: Final = 3
+"""Number of blocks that boxes take, with those of their supports."""
+
+EDGES: Final = 1
+"""Distance of the block, behind that of the boxes, whose rows hold how far the content of a box reaches from its centre
+along the sums of two of its axes: x y, x z, y z, each with the signs + +, + -, - +, - -. Of its 16 rows 12 are used."""
+CORNERS_OF_BOX: Final = 2
+"""Distance of the block with the same along the sums of all three axes: + + +, + + -, ..., - - -. 8 rows are used."""
 
 # rows of a block of triangles; unused members repeat the last triangle
 CORNERS: Final = 0

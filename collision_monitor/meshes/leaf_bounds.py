@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import inf
 from typing import Any, Final
 
+from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
@@ -19,6 +20,12 @@ from collision_monitor.narrow_phase.vector import Vector, opposite
 PAIRS_OF_LEAVES: Final = WIDTH * WIDTH
 
 
+def _reach(n: list[Lanes], members: Block) -> Lanes:
+    """How far the triangles of a block reach along n, with their radii (m)."""
+    x, y, z = (inner(n, members.vector(CORNERS + 3 * i)) for i in range(3))
+    return x.largest(y).largest(z) + members.row(RADIUS)
+
+
 @intrinsic
 def _reach_along(typing_context, n, blocks, block, out, at):
     """Write how far the triangles of a block reach along n, with their radii, to out[at: at + 8] (m)."""
@@ -27,9 +34,7 @@ def _reach_along(typing_context, n, blocks, block, out, at):
     def codegen(context, builder, signature, arguments):
         n = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
         members = Block(context, builder, signature.args[1], arguments[1], arguments[2])
-        x, y, z = (inner(n, members.vector(CORNERS + 3 * i)) for i in range(3))
-        reach = x.largest(y).largest(z) + members.row(RADIUS)
-        store(context, builder, reach, signature.args[3], arguments[3], arguments[4])
+        store(context, builder, _reach(n, members), signature.args[3], arguments[3], arguments[4])
         return context.get_dummy_value()
 
     return signature, codegen
@@ -69,6 +74,33 @@ def raise_bounds(
             _raise_bounds((work[near + k], gap - work[far + k]), work, far + WIDTH, near + WIDTH, row)
         else:
             _raise_bounds((0.0, gap - work[far + k]), work, far + WIDTH, row, row)
+
+
+def _largest_lane(lanes: Lanes) -> Any:
+    """The largest of eight numbers, as a number."""
+    number, best = ir.IntType(32), lanes
+    for width in (4, 2, 1):
+        order = ir.Constant(ir.VectorType(number, WIDTH), [(k + width) % WIDTH for k in range(WIDTH)])
+        best = best.largest(Lanes(lanes.builder, lanes.builder.shuffle_vector(best.value, best.value, order)))
+    return lanes.builder.extract_element(best.value, number(0))
+
+
+@intrinsic
+def _farthest(typing_context, n, blocks, block):
+    signature = types.float64(n, blocks, types.int64)
+
+    def codegen(context, builder, signature, arguments):
+        n = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
+        reach = _reach(n, Block(context, builder, signature.args[1], arguments[1], arguments[2]))
+        return _largest_lane(reach)
+
+    return signature, codegen
+
+
+@device
+def farthest_along(n: Vector, blocks: Any, leaf: int) -> float:
+    """How far the triangles of a leaf reach along n, with their radii (m)."""
+    return _farthest(n, blocks, leaf)
 
 
 @inlined

@@ -1,7 +1,7 @@
 """Time until which the triangles of two leaves stay apart, while both move: one step of conservative advancement.
 
-The direction between the closest points of one pair of triangles bounds the times of all 64 pairs at once. The pair
-with the least bound is looked at next, until it has been.
+The direction between the closest points of one pair of triangles bounds the times of all 64 pairs at once, as does the
+line of the centres of both boxes. The pair with the least bound is looked at next, until it has been.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from numba.extending import intrinsic
 
 from collision_monitor._jit import device
 from collision_monitor._jit.lanes import Lanes, load, store
-from collision_monitor.meshes.approach import Approach, seen_from_b
-from collision_monitor.meshes.box_times import norm, times_until, triangle_times
+from collision_monitor.meshes.approach import Approach
+from collision_monitor.meshes.box_times import curvature_until, norm, times_open
 from collision_monitor.meshes.boxes import Block, inner
 from collision_monitor.meshes.layout import CORNERS, RADIUS, WIDTH
 from collision_monitor.meshes.leaf_bounds import least_of_pairs
-from collision_monitor.meshes.nearest import NEAR_A, NEAR_B, triangle_at
-from collision_monitor.meshes.placing import Placing, inverse, place_triangle, turn_back
+from collision_monitor.meshes.nearest import toward, triangle_at
+from collision_monitor.meshes.placing import Placing, place_triangle, turn_back
 from collision_monitor.meshes.triangle_pair import closest_points
 from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus, opposite
 
@@ -67,8 +67,8 @@ def _raise_times(typing_context, numbers, work, other, times):
         far, forth, curving, reach = (
             load(context, builder, signature.args[1], arguments[1], arguments[2], WIDTH * k) for k in range(FACTS)
         )
-        curvatures = largest + bend * reach, bent + curving, change + jerk * reach
-        time = times_until(gap - far, speed + forth, curvatures, until)
+        curvature = curvature_until(until, largest + bend * reach, bent + curving, change + jerk * reach)
+        time = times_open(gap - far, speed + forth, curvature)
         known = load(context, builder, signature.args[1], arguments[1], arguments[3])
         store(context, builder, known.largest(time), signature.args[1], arguments[1], arguments[3])
         return context.get_dummy_value()
@@ -134,13 +134,8 @@ def leaf_time(
                 best, first = work[_TIMES + pair], pair
         elif not is_bounded:
             is_bounded = True
-            triangle_times(blocks_a, place_a // WIDTH, place_a % WIDTH, blocks_b, leaf_b, X, move, work, NEAR_B)
-            b, j, back = place_b // WIDTH, place_b % WIDTH, seen_from_b(X, move)
-            triangle_times(blocks_b, b, j, blocks_a, leaf_a, inverse(X), back, work, NEAR_A)
-            for i in range(WIDTH):
-                for j in range(WIDTH):
-                    at = _TIMES + WIDTH * i + j
-                    work[at] = max(work[at], max(work[NEAR_A + i], work[NEAR_B + j]))
+            n = toward(blocks_a, place_a // WIDTH, place_a % WIDTH, blocks_b, place_b // WIDTH, place_b % WIDTH, X)
+            _raise_along(n, blocks_a, leaf_a, blocks_b, leaf_b, X, move, 0.5 * tolerance, work)
         soon, pair = least_of_pairs(work, _TIMES)
         if soon >= SHARE * best or soon > enough or soon >= move.until or (seen >> pair) & 1:
             return soon, first

@@ -1,6 +1,8 @@
 """Nearest triangles of two trees, and whether two trees have a point in common.
 
 Pairs of boxes wait on a stack, the nearest on top; a pair is dropped if its bound exceeds the best distance so far.
+The bounds are gaps along two directions, that between the nearest points so far, and that between the centres of the
+boxes; where these leave many pairs, also the gaps along the axes of the boxes.
 (Larsen, Gottschalk, Lin, Manocha, 1999; Ericson, Real-Time Collision Detection, 6.3)
 """
 
@@ -13,10 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.meshes.boxes import box_bounds, triangle_bounds
+from collision_monitor.meshes.below import boxes_below, count_of, first_of
+from collision_monitor.meshes.boxes import raise_by_gaps, triangle_bounds
 from collision_monitor.meshes.layout import CENTER, CHILD, CORNERS, FACE, HALF, RADIUS, WIDTH
-from collision_monitor.meshes.leaf_bounds import least_of_pairs, raise_bounds
+from collision_monitor.meshes.leaf_bounds import farthest_along, least_of_pairs, raise_bounds
 from collision_monitor.meshes.placing import inverse, place_point, place_triangle, relative, turn_back
+from collision_monitor.meshes.supports import reach_along, support_bounds
 from collision_monitor.meshes.triangle_pair import Triangle, closest_points
 from collision_monitor.narrow_phase.vector import dot, minus, opposite
 from collision_monitor.tolerances import EPSILON
@@ -54,6 +58,10 @@ CLOSER: Final = 1.0 - 32.0 * EPSILON
 """Factor to the best squared distance below which another one counts. Less: distances are less exact. 1: round-off
 makes all triangles of a mesh that is very far away equally near, and nothing is pruned."""
 
+MANY: Final = 4
+"""Boxes of a block that may be nearer, along both directions, for which the gaps along the axes are computed too. More:
+pairs of surfaces that are close in many places are opened in vain. Fewer: these gaps rarely leave fewer pairs."""
+
 MOST_LEAVES: Final = 50_000
 """Most pairs of leaves to examine, up to 0.7 s. Hostile meshes, such as a million triangles in a point, need more; the
 lower bound then is that of the boxes."""
@@ -86,16 +94,16 @@ def size_of(blocks, block, member):
 def push_nearest_last(blocks, block, work, waiting, limit, fixed, fixed_is_a):
     """Push the pairs of a box and the members of a block with bounds below the limit; return the stack's new length."""
     first = waiting
-    for k in range(WIDTH):
-        bound = work[BOUNDS + k]
-        if blocks[block, CHILD, k] == 0.0 or not bound < limit:
-            continue
-        place = float(WIDTH * block + k)
-        at = waiting
+    bits = boxes_below(limit, work, BOUNDS, blocks, block)
+    while bits != 0:
+        k = first_of(bits)
+        bits &= bits - 1
+        bound, at = work[BOUNDS + k], waiting
         while at > first and work[3 * (at - 1)] < bound:
             for c in range(3):
                 work[3 * at + c] = work[3 * (at - 1) + c]
             at -= 1
+        place = float(WIDTH * block + k)
         work[3 * at] = bound
         work[3 * at + 1] = fixed if fixed_is_a else place
         work[3 * at + 2] = place if fixed_is_a else fixed
@@ -128,16 +136,22 @@ def _direction(answer, distance):
 
 
 @inlined
-def _toward(blocks_a, root_a, blocks_b, root_b, X):
-    """Unit vector from the middle of A to that of B; 0 if they are one point."""
-    w = minus(place_point(X, _middle(blocks_b, root_b)), _middle(blocks_a, root_a))
+def toward(blocks_a, a, i, blocks_b, b, j, X):
+    """Unit vector from the centre of a box of A to that of a box of B; 0 if they are one point."""
+    w = minus(place_point(X, _center(blocks_b, b, j)), _center(blocks_a, a, i))
     return _unit(w) if dot(w, w) > 0.0 else (0.0, 0.0, 0.0)
 
 
 @inlined
-def _middle(blocks, root):
-    """Centre of the box of a whole tree."""
-    return blocks[root, CENTER, 0], blocks[root, CENTER + 1, 0], blocks[root, CENTER + 2, 0]
+def _center(blocks, block, member):
+    """Centre of a box (m)."""
+    return blocks[block, CENTER, member], blocks[block, CENTER + 1, member], blocks[block, CENTER + 2, member]
+
+
+@inlined
+def _shift(X, n):
+    """Distance of B's origin from A's along n (m)."""
+    return n[0] * X.x + n[1] * X.y + n[2] * X.z
 
 
 @inlined
@@ -150,11 +164,27 @@ def _least(work, at):
 
 
 @device
+def _bounds_of(blocks_a, a, i, blocks_b, block, X, n, u, limit, work):
+    """Write lower bounds on the squared distances of a box of A from the boxes of a block of B (m^2).
+
+    n, u: unit directions from A to B, in A's frame. limit: bounds above it are as good as any (m^2).
+    """
+    gaps = _shift(X, n) - reach_along(blocks_a, a, i, n), _shift(X, u) - reach_along(blocks_a, a, i, u)
+    support_bounds(opposite(turn_back(X, n)), opposite(turn_back(X, u)), gaps, blocks_b, block, work, BOUNDS)
+    if limit < inf and count_of(boxes_below(limit, work, BOUNDS, blocks_b, block)) >= MANY:
+        raise_by_gaps(blocks_a, a, i, blocks_b, block, X, work, BOUNDS)
+
+
+@device
 def _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, n, best, answer, work):
     """Improve the answer by the triangles of two leaves; return the best distance. a, i and b, j: their boxes.
 
-    The pair with the least bound is examined; its direction raises the bounds of the others.
+    n: a unit direction from A to B, along which the leaves may be apart. The pair with the least bound is examined; its
+    direction raises the bounds of the others.
     """
+    gap = _shift(X, n) - farthest_along(n, blocks_a, leaf_a)
+    if not gap - farthest_along(opposite(turn_back(X, n)), blocks_b, leaf_b) < best:
+        return best
     triangle_bounds(blocks_a, a, i, blocks_b, leaf_b, X, work, NEAR_B)
     if not _least(work, NEAR_B) < best * best:
         return best
@@ -212,7 +242,7 @@ def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
     Y = inverse(X)
     work[0], work[1], work[2] = 0.0, WIDTH * root_a, WIDTH * root_b
     waiting, leaves = 1, 0
-    n = _direction(answer, found) if found < inf else _toward(blocks_a, root_a, blocks_b, root_b, X)
+    n = _direction(answer, found) if found < inf else toward(blocks_a, root_a, 0, blocks_b, root_b, 0, X)
     while waiting > 0 and best > 0.0:  # terminates: each pair of boxes is opened once
         waiting -= 1
         limit = CLOSER * best * best
@@ -231,13 +261,16 @@ def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
             if distance < best:
                 best = found = distance
                 n = _direction(answer, found)
-        elif opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
+            continue
+        u = toward(blocks_a, a, i, blocks_b, b, j, X)
+        if opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
             block = root_b + int(child_b)
-            box_bounds(blocks_a, a, i, blocks_b, block, X, n, work, BOUNDS)
+            _bounds_of(blocks_a, a, i, blocks_b, block, X, n, u, limit, work)
             waiting = push_nearest_last(blocks_b, block, work, waiting, limit, float(place_a), True)
         else:
             block = root_a + int(child_a)
-            box_bounds(blocks_b, b, j, blocks_a, block, Y, opposite(turn_back(X, n)), work, BOUNDS)
+            m, v = opposite(turn_back(X, n)), opposite(turn_back(X, u))
+            _bounds_of(blocks_b, b, j, blocks_a, block, Y, m, v, limit, work)
             waiting = push_nearest_last(blocks_a, block, work, waiting, limit, float(place_b), False)
     least = found * found
     for k in range(waiting):  # of a search that ended early

@@ -79,7 +79,7 @@ def _middle(T: Triangle) -> tuple[Vector, float]:
 
 
 @inlined
-def _push(work: Any, first: int, waiting: int, bound: float, place: float) -> None:
+def push_box(work: Any, first: int, waiting: int, bound: float, place: float) -> None:
     """Push a box between those from `first` on, the one with the least bound last."""
     at = waiting
     while at > first and work[2 * (at - 1)] < bound:
@@ -89,7 +89,13 @@ def _push(work: Any, first: int, waiting: int, bound: float, place: float) -> No
 
 
 @inlined
-def _reach_along(blocks: Any, block: int, k: int, n: Vector) -> float:
+def center_of(blocks: Any, block: int, k: int) -> Vector:
+    """Centre of a box."""
+    return blocks[block, CENTER, k], blocks[block, CENTER + 1, k], blocks[block, CENTER + 2, k]
+
+
+@inlined
+def reach_along(blocks: Any, block: int, k: int, n: Vector) -> float:
     """How far a box reaches from its centre along n, of any length, in the frame of its tree (m)."""
     e, m = half_of(blocks, block, k), turned_back(blocks, block, k, n)
     return abs(m[0]) * e[0] + abs(m[1]) * e[1] + abs(m[2]) * e[2]
@@ -107,7 +113,7 @@ def _is_point(T: Triangle) -> bool:
 def _point_contact(
     table: Any, b: int, pose: PairPose, x: Vector, radius: float, limit: float, out: Any, memory: SolidMemory
 ) -> bool:
-    """As `_triangle_contact`, for a point of A: in closed form where there is one, otherwise by GJK and EPA."""
+    """As `triangle_contact`, for a point of A: in closed form where there is one, otherwise by GJK and EPA."""
     y = place_point(inverse(relative(pose.R_A, pose.R_B, pose.p)), x)
     distance, d, is_exact = point_distance(table, b, y)
     x = rotate(pose.R_A, x)
@@ -132,7 +138,7 @@ def _point_contact(
 
 
 @device
-def _triangle_contact(
+def triangle_contact(
     table: Any, b: int, pose: PairPose, T: Triangle, radius: float, limit: float, out: Any, memory: SolidMemory
 ) -> bool:
     """Write the contact of a triangle of A, enlarged by a radius, and the solid b; False if beyond the limit."""
@@ -191,12 +197,12 @@ def solid_contact(
             if child > 0.0:
                 if blocks[block, CHILD, k] == 0.0:
                     continue
-                c = blocks[block, CENTER, k], blocks[block, CENTER + 1, k], blocks[block, CENTER + 2, k]
+                c = center_of(blocks, block, k)
                 bound, n, _ = point_distance(table, b, place_point(Y, c))
                 n = minus(place_point(X, n), (X.x, X.y, X.z))
-                bound -= _reach_along(blocks, block, k, n) + margin + table.margin[b]
+                bound -= reach_along(blocks, block, k, n) + margin + table.margin[b]
                 if bound <= enough:
-                    _push(work, first, waiting, bound, float(WIDTH * block + k))
+                    push_box(work, first, waiting, bound, float(WIDTH * block + k))
                     waiting += 1
                 continue
             if repeats(blocks, block, k):
@@ -209,7 +215,7 @@ def solid_contact(
                 continue
             examined += 1
             within = inf if examined > MOST_EXAMINED and not found else best
-            is_near = _triangle_contact(table, b, pose, T, radius, within, row, memory)
+            is_near = triangle_contact(table, b, pose, T, radius, within, row, memory)
             if is_near and (not found or row[DISTANCE] < best):
                 best, found, enough = row[DISTANCE], True, row[DISTANCE] - row[BOUND]
                 for i in range(CONTACT_SIZE):
@@ -228,7 +234,7 @@ def solid_contact(
 
 
 @device
-def _solid_time(
+def solid_time(
     table: Any, b: int, X: Placing, n: Vector, gap: float, x: Vector, size: float, turn: float, move: Approach
 ) -> float:
     """Time until which the points of A in a ball (centre x, radius size) keep their gap along n from the solid b.
@@ -262,12 +268,11 @@ class MovingSolid(NamedTuple):
 @device
 def box_time(blocks: Any, block: int, k: int, solid: MovingSolid) -> float:
     """Time until which a box of the tree stays apart from the solid."""
-    c = blocks[block, CENTER, k], blocks[block, CENTER + 1, k], blocks[block, CENTER + 2, k]
-    e = half_of(blocks, block, k)
+    c, e = center_of(blocks, block, k), half_of(blocks, block, k)
     bound, n = _distance_along(solid, c)
-    gap, turn = bound - _reach_along(blocks, block, k, n), _reach_along(blocks, block, k, cross(n, solid.move.w_a))
+    gap, turn = bound - reach_along(blocks, block, k, n), reach_along(blocks, block, k, cross(n, solid.move.w_a))
     X, move = solid.X, solid.move
-    return _solid_time(solid.table, solid.b, X, n, gap - move.start, c, sqrt(dot(e, e)), turn, move)
+    return solid_time(solid.table, solid.b, X, n, gap - move.start, c, sqrt(dot(e, e)), turn, move)
 
 
 @device
@@ -291,8 +296,8 @@ def leaf_solid_time(
         bound, n = _distance_along(solid, c)
         across = cross(n, move.w_a)
         turn = size * sqrt(dot(across, across))
-        time = _solid_time(table, b, X, n, bound - size - radius - move.start, c, size, turn, move)
-        if time < min(soon, enough) and _triangle_contact(table, b, pose, T, radius, inf, row, memory):
+        time = solid_time(table, b, X, n, bound - size - radius - move.start, c, size, turn, move)
+        if time < min(soon, enough) and triangle_contact(table, b, pose, T, radius, inf, row, memory):
             examined += 1
             gap = row[DISTANCE] - row[BOUND] - start
             if gap <= tolerance:
@@ -300,7 +305,7 @@ def leaf_solid_time(
             n = rotate_back(pose.R_A, (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2]))
             across = cross(n, move.w_a)
             turn = size * sqrt(dot(across, across))
-            time = max(time, _solid_time(table, b, X, n, gap - 0.5 * tolerance, c, size, turn, move))
+            time = max(time, solid_time(table, b, X, n, gap - 0.5 * tolerance, c, size, turn, move))
         soon = min(soon, time)
     return soon, examined
 

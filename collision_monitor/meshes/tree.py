@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from collision_monitor._jit import allocating_kernel, device, inlined, kernel
 from collision_monitor.meshes.box_fit import CONTAINED, fit_box
 from collision_monitor.meshes.layout import (
+    BOXES,
     CHILD,
     CLOSED,
     CORNERS,
@@ -32,6 +33,7 @@ from collision_monitor.meshes.layout import (
     ROWS,
     WIDTH,
 )
+from collision_monitor.meshes.supports import REACHES
 
 Array = NDArray[np.float64]
 
@@ -60,9 +62,9 @@ def tree_of(
     n = len(corners)
     radii = np.broadcast_to(np.asarray(radius, dtype=np.float64), n).copy()
     inner = corners[:1, 0] if parts is None else parts
-    behind = 1 + _blocks_of(n)
+    behind = BOXES + _blocks_of(n)
     tree = np.empty((behind + -(-min(len(inner), MOST_PARTS) // WIDTH), ROWS, WIDTH))
-    tree[0] = tree[behind:] = 0.0
+    tree[:BOXES] = tree[behind:] = 0.0
     middle = np.empty((n, 3))
     far = _measure(corners, radii, middle)
     _grow_all((corners, radii, middle, np.arange(n), tree))
@@ -78,7 +80,7 @@ def _grow_all(arrays: tuple[Array, Array, Array, NDArray[np.int64], Array]) -> N
     """Write all blocks. The parts of a large tree grow on threads; each writes its own blocks, known in advance."""
     stack = np.zeros((STACK, PART), np.int64)
     n = len(arrays[0])
-    stack[0] = 0, n, 0, 0, 1
+    stack[0] = 0, n, 0, 0, BOXES
     if n < PARALLEL:
         _grow(*arrays, stack, 1, n)
         return
@@ -93,8 +95,8 @@ def _blocks_of(triangles: int) -> int:
     while triangles > WIDTH:
         unit, full = WIDTH, 1
         while triangles > WIDTH * unit:
-            unit, full = WIDTH * unit, WIDTH * full + 1
-        count += 1 + triangles // unit * full
+            unit, full = WIDTH * unit, WIDTH * full + BOXES
+        count += BOXES + triangles // unit * full
         triangles %= unit
     return count + 1 if triangles > 0 else count
 
@@ -124,18 +126,18 @@ def _grow(corners, radius, middle, order, blocks, stack, waiting, steps):
     A part: begin and end in the order, block and member for its box, and its first block.
     """
     axes, half, center = np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((2, 3))
-    some = np.empty(SAMPLE, np.int64)
+    some, reach = np.empty(SAMPLE, np.int64), np.empty(REACHES)
     while waiting > 0 and steps > 0:
         waiting -= 1
         steps -= 1
         begin, end, parent, member, block = stack[waiting]
-        fit_box(corners, radius, order, begin, end, axes, half, center, blocks, parent, member)
+        fit_box(corners, radius, order, begin, end, axes, half, center, reach, blocks, parent, member)
         if end - begin <= WIDTH:
             blocks[parent, CHILD, member] = -block
             _write_leaf(corners, radius, order, begin, end, blocks, block)
         else:
             blocks[parent, CHILD, member] = block
-            blocks[block] = 0.0
+            blocks[block : block + BOXES] = 0.0
             waiting = _push_parts(corners, middle, order, begin, end, block, stack, waiting, some)
     return waiting
 
@@ -172,7 +174,7 @@ def _push_parts(corners, middle, order, begin, end, block, stack, first, some):
         stack[last, 0], stack[last, 1] = cut, stack[widest, 1]
         stack[widest, 1] = cut
         last += 1
-    own = block + 1
+    own = block + BOXES
     for k in range(first, last):
         stack[k, 2], stack[k, 3], stack[k, 4] = block, k - first, own
         own += _number_of_blocks(stack[k, 1] - stack[k, 0])

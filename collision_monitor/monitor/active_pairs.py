@@ -14,18 +14,19 @@ from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.candidates import is_checked
 from collision_monitor.monitor.carried_contacts import CARRIED, Carrying, carry, has_answer, keep, no_answers, saved
-from collision_monitor.monitor.carried_triangles import overlap_of_trees
+from collision_monitor.monitor.carried_triangles import APART, NONE, overlap_of_trees
 from collision_monitor.monitor.contact_depth import depth_of_boxes
 from collision_monitor.monitor.contact_details import complete_contact
 from collision_monitor.monitor.event_list import NO_EVENTS
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.solid_overlap import overlap_of_solid
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.narrow_phase.contact_row import DISTANCE
 from collision_monitor.prediction.body_contact import RESULT, body_contact
 from collision_monitor.prediction.body_impact import Scratch, Window, body_impact
-from collision_monitor.prediction.coarse_impact import are_trees, coarse_impact
-from collision_monitor.prediction.impact_record import CLEAR, HIT, IMPACT, holds, ids_of_keys, pair_key
+from collision_monitor.prediction.coarse_impact import coarse_impact, has_bounds
+from collision_monitor.prediction.impact_record import BOUND_ONLY, CLEAR, HIT, IMPACT, holds, ids_of_keys, pair_key
 from collision_monitor.prediction.pair_impacts import cover_of
 from collision_monitor.records import Model, Phase
 
@@ -49,7 +50,9 @@ UNITE_AHEAD: Final = 16
 """The same in `_unite`, which does little with each pair."""
 
 SOON: Final = 5.0
-"""Steps for which a pair of bounded meshes that certainly meets is only tested, which takes a tenth of a search."""
+WAIT: Final = 4.0
+"""Steps for which a pair of bounded meshes that certainly meets, or that a search found to be near, is only tested. A
+test takes a fifth of a search."""
 
 Rows = NDArray[np.void]
 
@@ -294,7 +297,7 @@ def _examine(multibody, active, which, now, queries, scratch, later):
     The pairs keep their indices. A pair that does not touch and is certified apart for a while returns to the event
     list: it is marked as leaving, and its event goes into `later` (IMPACT). A pair without a further impact, or one
     that this step predicted anew, is marked as leaving too. queries: ImpactQuery, ContactQuery, Carrying,
-    whether contacts have details, and the gap (m) to which impacts of meshes are bounded, or 0.
+    whether contacts have details, and Nearness.
     Returns (number of events in `later`, narrow-phase tests, impact queries).
     """
     bodies = multibody.bodies
@@ -311,21 +314,22 @@ def _examine(multibody, active, which, now, queries, scratch, later):
             pair.touching, pair.leaving = 1, 0
             continue
         is_complete = not has_details and depth_of_boxes(multibody, i, j, now, contact, scratch, results[k])
-        touching, count, spread = True, 1, 0.0
+        touching, count, found = True, 1, NONE
         if not is_complete and carrying.tolerance > 0.0:
             found = overlap_of_trees(multibody, i, j, now, contact, carrying, scratch, results[k])
-            is_complete, spread = found >= 0.0, max(found, 0.0)
-        if not is_complete:
+            if found == NONE:
+                found = overlap_of_solid(multibody, i, j, now, contact, carrying.tolerance, scratch, results[k])
+            is_complete, touching = is_complete or found >= 0.0, found != APART
+        if touching and not is_complete:
             touching, count = body_contact(multibody, i, j, now, contact, scratch, results[k])
         tests += count
         stays = touching
-        if not touching and coarse > 0.0 and _meets_soon(bodies, event, now, SOON * carrying.period):
+        bounded = not touching and coarse.tolerance > 0.0 and has_bounds(multibody, i, j)
+        if bounded and _can_wait(bodies, event, now, carrying.period):
             stays = True
         elif not touching and not is_predicted_anew(bodies, i, j, now, event):
             window = Window(now, cover_of(bodies, i, j))
-            bounded = coarse > 0.0 and pair.touched == 1 and are_trees(multibody, i, j)
-            bounded = bounded and coarse_impact(multibody, i, j, window, impact, coarse, scratch, event)
-            if not bounded or (event.status != CLEAR and event.lower <= now):
+            if not (bounded and coarse_impact(multibody, i, j, window, impact, coarse, scratch, event)):
                 made += body_impact(multibody, i, j, window, impact, scratch, event)
             if event.status != CLEAR:
                 if event.lower > now:
@@ -336,7 +340,7 @@ def _examine(multibody, active, which, now, queries, scratch, later):
         if touching and not is_complete:
             complete_contact(multibody, i, j, now, scratch, results[k])
         if carrying.tolerance > 0.0:
-            keep(multibody, i, j, touching, now, contact, carrying, scratch, results[k], carried[k], spread)
+            keep(multibody, i, j, touching, now, contact, carrying, scratch, results[k], carried[k], max(found, 0.0))
         if touching and pair.touched == 0:
             pair.since = now
         pair.touching = 1 if touching else 0
@@ -345,9 +349,13 @@ def _examine(multibody, active, which, now, queries, scratch, later):
 
 
 @inlined
-def _meets_soon(bodies, event, now, wait):
-    """Whether the pair of an event certainly meets within `wait` (s), so that its interval needs no better begin."""
-    return event.status == HIT and now < event.upper <= now + wait and holds(bodies.version, event)
+def _can_wait(bodies, event, now, period):
+    """Whether a pair of bounded meshes is only tested: it certainly meets soon, or was found to be near just before."""
+    if not holds(bodies.version, event):
+        return False
+    if event.status == HIT and now < event.upper:
+        return event.upper <= now + SOON * period
+    return event.method == BOUND_ONLY and now - WAIT * period < event.lower < now - 0.5 * period
 
 
 @inlined

@@ -15,6 +15,7 @@ from typing import Final
 from collision_monitor._jit import device, inlined
 from collision_monitor.meshes.boxes import half_of
 from collision_monitor.meshes.depth_range import depth_range
+from collision_monitor.meshes.inside import OUTSIDE
 from collision_monitor.meshes.layout import CENTER, WIDTH
 from collision_monitor.meshes.nearest import PAIRS, PLACE_A, PLACE_B
 from collision_monitor.meshes.placing import relative, turned_back
@@ -34,7 +35,7 @@ from collision_monitor.prediction.body_contact import (
     widening,
 )
 from collision_monitor.prediction.body_impact import CLOSING
-from collision_monitor.prediction.mesh_pair import has_mesh, have_trees, root_of, triangles_contact
+from collision_monitor.prediction.mesh_pair import enclosure, has_mesh, have_trees, root_of, triangles_contact
 from collision_monitor.prediction.motion import position_now, rotation_now
 
 PLACE_I: Final = RESULT + 11
@@ -56,9 +57,13 @@ SMALL: Final = 0.1
 NONE: Final = -1.0
 NO_MESH: Final = -2.0
 
+APART: Final = -2.0
+"""In place of a spread: the bodies certainly do not touch."""
+
 
 @inlined
-def _has_one_shape(multibody, i):
+def has_one_shape(multibody, i):
+    """Whether body i is one shape."""
     return multibody.parts.next[multibody.bodies.first_shape[i]] < 0
 
 
@@ -67,7 +72,7 @@ def meets_by_trees(multibody, i, j):
     """Whether bodies i and j are one shape each, no models of objects, that meet by trees, one of them a mesh."""
     table, bodies = multibody.table, multibody.bodies
     a, b = bodies.first_shape[i], bodies.first_shape[j]
-    if not (_has_one_shape(multibody, i) and _has_one_shape(multibody, j) and has_mesh(table, a, b)):
+    if not (has_one_shape(multibody, i) and has_one_shape(multibody, j) and has_mesh(table, a, b)):
         return False
     return have_trees(table, a, b) and bodies.excess[i] + bodies.excess[j] == 0.0
 
@@ -93,7 +98,7 @@ def _meet(table, a, b, pose, row, scratch):
 
 
 @inlined
-def _placed(multibody, i, j, now, there, scratch):
+def placed_shapes(multibody, i, j, now, there, scratch):
     """Offset of the shape of body i from its origin in world axes, and the pose of the pair of shapes at `now` (s)."""
     table, parts, bodies = multibody
     a, b = bodies.first_shape[i], bodies.first_shape[j]
@@ -105,7 +110,7 @@ def _placed(multibody, i, j, now, there, scratch):
 
 
 @inlined
-def _reach(table, s, R, n):
+def reach_of_tree(table, s, R, n):
     """How far the box of a whole tree reaches from its shape's origin along n (m). R: rotation of the shape."""
     blocks, root, d = table.blocks, root_of(table, s), rotate_back(R, n)
     m, e = turned_back(blocks, root, 0, d), half_of(blocks, root, 0)
@@ -118,15 +123,15 @@ def _write(multibody, i, j, there, placed, known, query, out, result):
     """Write a contact of triangles (`out`) into a result row; the deepest ones have a distance in known (m, m).
 
     A translation along the normal that parts both solids may be longer than the depth; the bound holds that of their
-    boxes. placed: of `_placed`. Returns half of the width of the known range.
+    boxes. placed: of `placed_shapes`. Returns half of the width of the known range.
     """
     table, bodies = multibody.table, multibody.bodies
     oa, pose = placed
     least, most = known
     half = max(0.5 * (most - least), 0.0)
     n = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
-    parting = _reach(table, bodies.first_shape[i], pose.R_A, n) - dot(n, pose.p)
-    parting += _reach(table, bodies.first_shape[j], pose.R_B, opposite(n))
+    parting = reach_of_tree(table, bodies.first_shape[i], pose.R_A, n) - dot(n, pose.p)
+    parting += reach_of_tree(table, bodies.first_shape[j], pose.R_B, opposite(n))
     for c in range(CONTACT_SIZE):
         result[c] = out[c]
     for c in range(3):
@@ -152,7 +157,7 @@ def carry_triangles(multibody, i, j, now, there, moved, query, tolerance, scratc
     query: ContactQuery. tolerance: largest error (m) that this may add. Returns whether that suffices.
     """
     table, bodies = multibody.table, multibody.bodies
-    placed = _placed(multibody, i, j, now, there, scratch)
+    placed = placed_shapes(multibody, i, j, now, there, scratch)
     pose = placed[1]
     if not _meet(table, bodies.first_shape[i], bodies.first_shape[j], pose, row, scratch):
         return False
@@ -183,13 +188,21 @@ def lasts(bodies, i, j, v, carrying):
     return small and speed * carrying.period <= LASTING * carrying.tolerance
 
 
+@inlined
+def apart_or_none(multibody, a, b, pose, there, query, scratch):
+    """APART if two shapes with surfaces that do not meet do not touch either; else NONE."""
+    if query.margin + widening(there, query.stale_acceleration) > 0.0:
+        return NONE
+    return APART if enclosure(multibody.table, a, b, pose, scratch) == OUTSIDE else NONE
+
+
 @device
 def overlap_of_trees(multibody, i, j, now, query, carrying, scratch, result):
     """Write the contact of bodies i and j at `now` (s) into a result row, if triangles of both meet.
 
     The search for the deepest triangles ends when the depth is known within the tolerance, or within a quarter of it if
-    the answer is carried over. Returns by how much the distance of the deepest triangles may differ (m); NONE if none
-    meet. query: ContactQuery. carrying: see carried_contacts.py.
+    the answer is carried over. Returns by how much the distance of the deepest triangles may differ (m); APART; or NONE
+    if only `body_contact` can tell. query: ContactQuery. carrying: see carried_contacts.py.
     """
     if not meets_by_trees(multibody, i, j):
         return NONE
@@ -199,13 +212,14 @@ def overlap_of_trees(multibody, i, j, now, query, carrying, scratch, result):
     p, reach = there.p, bodies.motion[i].radius + bodies.motion[j].radius
     if dot(p, p) > reach * reach:
         return NONE
-    placed = _placed(multibody, i, j, now, there, scratch)
+    placed = placed_shapes(multibody, i, j, now, there, scratch)
     pose = placed[1]
     X, out, answer = relative(pose.R_A, pose.R_B, pose.p), scratch.out, scratch.answer
     wanted = (LASTS if lasts(bodies, i, j, there.v, carrying) else WHOLE) * carrying.tolerance
     least, most = depth_range(table.blocks, root_of(table, a), root_of(table, b), X, wanted, answer, scratch.tree)
     if least < 0.0:
-        return NONE
+        is_known = most == 0.0 and table.margin[a] + table.margin[b] == 0.0
+        return apart_or_none(multibody, a, b, pose, there, query, scratch) if is_known else NONE
     triangles_contact(table, a, b, pose, (int(answer[PLACE_A]), int(answer[PLACE_B])), out)
     if not out[DISTANCE] <= 0.0:
         return NONE

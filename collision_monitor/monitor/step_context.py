@@ -12,6 +12,7 @@ from collision_monitor.monitor.result import Work
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.prediction.body_contact import ContactQuery
 from collision_monitor.prediction.body_impact import ImpactQuery
+from collision_monitor.prediction.coarse_trees import Nearness
 from collision_monitor.settings.by_name import classes_of
 from collision_monitor.settings.profile import Profile
 
@@ -71,10 +72,11 @@ class StepContext:
     samples: int = 0  # of the states of uncertain pairs, see StepResult
 
     @property
-    def coarse(self) -> float:
-        """Gap (m) to which impacts of meshes are only bounded. 0: all are exact, as those of uncertain states are."""
+    def coarse(self) -> Nearness:
+        """Gap to which impacts of meshes are only bounded. 0: all are exact, as those of uncertain states are."""
         p = self.profile
-        return 0.0 if p.uncertainty or not self.roster.has_trees else p.mesh_impact_tolerance
+        exact = p.uncertainty or not self.roster.has_trees
+        return Nearness(0.0 if exact else p.mesh_impact_tolerance, self.period)
 
     @property
     def horizons(self) -> NDArray[np.float64]:

@@ -208,12 +208,12 @@ def contact_within(table: Any, a: int, b: int, pose: PairPose, limit: float, out
     if not (_contact(table, a, b, pose, limit, out, work) and out[DISTANCE] <= limit):
         return False
     if is_swapped:
-        _mirror(out, p)
+        mirror(out, p)
     return True
 
 
 @inlined
-def _mirror(out: Any, p: Vector) -> None:
+def mirror(out: Any, p: Vector) -> None:
     """Turn the contact of the swapped pair (b, a) in out into that of (a, b); p: B's origin relative to A's (m)."""
     for i in range(3):
         by = p[0] if i == 0 else (p[1] if i == 1 else p[2])

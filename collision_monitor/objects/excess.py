@@ -75,7 +75,7 @@ def _excess_around_concave(
     block = _grid(BLOCKS)
     bound = distance((block + 0.5) * (BLOCK * cell) + low) + diagonal * (BLOCK - 1) / 2
     order = np.argsort(-bound)
-    farthest = -np.inf
+    farthest = -slack  # the model nowhere exceeds a cell that is deeper in the object
     begin = 0
     while begin < len(order) and bound[order[begin]] > farthest:
         some = order[begin : 2 * begin + AT_ONCE]
@@ -86,7 +86,7 @@ def _excess_around_concave(
         if not isinstance(model, Box):
             centres = centres[_distances(centres, [(model, pose)]) <= slack]
         farthest = max(farthest, _farthest_outside(centres, distance(centres), shapes, farthest))
-    return slack + (farthest if farthest > -np.inf else 0.0)
+    return slack + (farthest if farthest > -slack else 0.0)
 
 
 def _grid(count: int) -> NDArray[np.intp]:

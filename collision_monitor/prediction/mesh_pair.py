@@ -25,7 +25,7 @@ from collision_monitor.narrow_phase.contact_row import (
     VERTEX,
     write,
 )
-from collision_monitor.narrow_phase.dispatch import contact_within
+from collision_monitor.narrow_phase.dispatch import contact_within, mirror
 from collision_monitor.narrow_phase.pair_pose import swapped
 from collision_monitor.narrow_phase.vector import along, dot, opposite, rotate, rotate_back, sum_of_sizes
 from collision_monitor.tolerances import SAT_ROUND_OFF
@@ -144,13 +144,7 @@ def mesh_within(table, a, b, pose, limit, out, scratch):
         elif not found:
             return False
     if is_swapped:
-        for c in range(3):
-            out[NORMAL + c] = -out[NORMAL + c]
-            witness = out[POINT_A + c]
-            out[POINT_A + c] = out[POINT_B + c] + p[c]
-            out[POINT_B + c] = witness + p[c]
-        for c in range(2):
-            out[FEATURE_TYPE_A + c], out[FEATURE_TYPE_B + c] = out[FEATURE_TYPE_B + c], out[FEATURE_TYPE_A + c]
+        mirror(out, p)
     return True
 
 

@@ -26,7 +26,7 @@ from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.impact_record import CLEAR, HIT, UNRESOLVED
 from collision_monitor.prediction.motion import relative_position, relative_velocity, rotation_at
 
-KEEP: Final = 0.1
+KEEP: Final = 0.2
 """A pair of boxes is kept while its next step allows a motion longer than this part of the box that would be opened.
 Larger: more boxes are opened. Smaller: more steps."""
 

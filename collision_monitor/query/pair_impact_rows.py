@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import inlined, kernel
+from collision_monitor._jit.direct import direct
 from collision_monitor.geometry.shape_table import SPHERE
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE
 from collision_monitor.prediction.bodies import Bodies, Multibody, Parts, make_bodies, make_parts
@@ -54,6 +55,7 @@ def set_motion(bodies, slot, states, n, table, horizon):
     bodies.spin_radius[slot] = 0.0 if table.kind[slot] == SPHERE else table.radius[slot]
 
 
+@direct
 @kernel
 def pair_impact_rows(a, at_a, states_a, b, at_b, states_b, query, own, memory, rows):
     """Write the first impacts of N pairs to rows (N, 3): lower and upper (s), infinite for none, and a code.

@@ -67,10 +67,13 @@ def _possible_impact(
     certain that the boxes are apart, or overlap, now.
     """
     whole_a, whole_b = _with_filling(shape_a), _with_filling(shape_b)
-    if whole_a and whole_b and boxes_apart(whole_a, motion_a.pose, whole_b, motion_b.pose):  # neither is in the other
-        times = quick_impact(whole_a, motion_a, whole_b, motion_b, query)
-        if times is not None:
-            return times[0], True
+    if whole_a and whole_b:
+        # of two meshes, one may be in the other; convex solids that overlap have their impact at 0
+        solid = not isinstance(whole_a, Mesh) and not isinstance(whole_b, Mesh)
+        if solid or boxes_apart(whole_a, motion_a.pose, whole_b, motion_b.pose):
+            times = quick_impact(whole_a, motion_a, whole_b, motion_b, query)
+            if times is not None and (times[0] > 0.0 or not solid):
+                return times[0], True
     boxes = [filled_box(shape) if isinstance(shape, Mesh) else None for shape in (shape_a, shape_b)]
     # the solid is in the hull of its surface, so that a box around the surface replaces it
     parts_a, parts_b = (

@@ -152,7 +152,7 @@ def _entry(name: str, content: dict[str, Any], object_id: int) -> ObjectEntry:
         if not _shapes_given(name, content):
             raise InputError(f"{name}, shape: expected one of {', '.join(SHAPES)}, got none")
     elif not topic:
-        raise InputError(f"{name}, topic: expected the topic that tells where it is, or `static: true`, got none")
+        raise InputError(f"{name}, topic: expected the topic of its pose, or `static: true`, got none")
     elif stands_at is not None:
         raise InputError(f"{name}, pose: expected one of static objects only; `at` places a shape in its object")
     allowed, without = content.get("allowed", []), content.get("without", [])

@@ -43,9 +43,9 @@ def test_a_rotation_is_one_in_all_digits() -> None:
 
 
 def test_every_truth_is_within_its_bound() -> None:
-    told = []
-    rows = extremes.run(samples=2, progress=told.append)
-    assert sum(told) == extremes.steps()
+    done = []
+    rows = extremes.run(samples=2, progress=done.append)
+    assert sum(done) == extremes.steps()
     assert {row.sweep for row in rows} == {*extremes.SWEEPS, "stamp"}
     assert [f"{row.sweep}, {row.quantity}: {row.ratio}" for row in rows if not row.holds] == []
     assert all(

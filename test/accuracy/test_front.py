@@ -16,9 +16,9 @@ from collision_monitor.cli.main import main
 def front() -> Front:
     (work,) = simulated(["clutter"], objects=30, noise=0.005, duration=1.0)
     settings = front_settings(work)
-    told: list[int] = []
-    found = measure_front(work, settings, told.append)
-    assert sum(told) == len(settings) + 2
+    done: list[int] = []
+    found = measure_front(work, settings, done.append)
+    assert sum(done) == len(settings) + 2
     return found
 
 

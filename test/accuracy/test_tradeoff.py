@@ -66,8 +66,8 @@ def test_what_may_happen_by_what_is_uncertain_is_no_alarm() -> None:
     monitor = Monitor("exact")
     for description in TWO:
         monitor.describe(description)
-    told = [prediction["status"] for stamp, states in steps for prediction in monitor.step(stamp, states).predictions]
-    assert told and set(told) == {PredictionStatus.POSSIBLE}
+    found = [each["status"] for stamp, states in steps for each in monitor.step(stamp, states).predictions]
+    assert found and set(found) == {PredictionStatus.POSSIBLE}
     (row,) = profile_tradeoff("pass", TWO, steps, ["exact"])
     assert (row.alarms, row.misses, row.compared) == (0, 0, 0) and np.isnan(row.within_bound)
 

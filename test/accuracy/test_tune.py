@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from contextlib import nullcontext
@@ -12,7 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from collision_monitor.accuracy.candidates import Space, models_of
+from collision_monitor.accuracy.candidates import Space, models_of, with_threads
 from collision_monitor.accuracy.demands import Demands
 from collision_monitor.accuracy.halving import rungs_of
 from collision_monitor.accuracy.inputs import Workload, recorded
@@ -38,10 +39,10 @@ def work() -> Workload:
 
 @pytest.fixture(scope="module")
 def tuned(work: Workload):
-    told = []
+    done = []
     space = space_of(work, Profile(), Demands(ttc_error=0.01))
-    found = tune(work, space, lambda name, total: nullcontext(told.append), jobs=1)
-    assert sum(told) > len(found.trials)
+    found = tune(work, space, lambda name, total: nullcontext(done.append), jobs=1)
+    assert sum(done) > len(found.trials)
     return found
 
 
@@ -109,6 +110,12 @@ def test_models_are_tried_only_where_all_objects_of_a_class_have_them() -> None:
     objects = [ObjectDescription(1, Sphere(1)), ObjectDescription(2, HalfSpace((0, 0, 1), 0), static=True, pose=Pose())]
     objects += [ObjectDescription(3, Box((1, 1, 1))), ObjectDescription(4, hull, model="obb")]
     assert models_of(objects) == {"primitive": ("sphere", "obb", "kdop26", "convex_hull")}
+
+
+def test_more_threads_are_at_most_one_for_each_core() -> None:
+    assert [each.threads for each in with_threads(Profile(), 4)] == [2, 4]
+    assert [each.threads for each in with_threads(Profile(threads=4), 16)] == [8, 16]
+    assert with_threads(Profile(), 1) == []
 
 
 def test_rungs_grow_to_all_tiles() -> None:
@@ -190,13 +197,14 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     assert "→ " in good.stdout and "\nchosen: " in good.stdout and "written balanced.yaml" in good.stdout
     check_parameter_file(tmp_path / "balanced.yaml")
     assert (tmp_path / "tried.png").read_bytes().startswith(b"\x89PNG")
-    code, _, told = run("--max-ttc-error", 0.05)
-    assert code == 1 and "--force" in told
+    code, _, error = run("--max-ttc-error", 0.05)
+    assert code == 1 and "--force" in error
     code, out, _ = run("--budget-ms", 1e-6, "--json", "-o", "none.yaml")
     assert code == 3
     answer = json.loads(out)
     assert answer["chosen"] is None and answer["reasons"][0].startswith("none of")
     assert all("step time" in each["failures"][-1] for each in answer["rows"])
+    assert any(each["profile"].endswith(", threads 2") for each in answer["rows"]) == (len(os.sched_getaffinity(0)) > 1)
     assert not (tmp_path / "none.yaml").exists()
     with pytest.raises(SystemExit) as wrong:
         run("--budget-ms", 0)

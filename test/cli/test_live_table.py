@@ -65,7 +65,7 @@ def test_the_line_names_the_soonest_pair():
     assert "1 touching, 2 predicted, next: rack_7 – person_3 in 0.25 s (unresolved)" in picture().line()
 
 
-def test_nothing_heard_yet():
+def test_before_the_first_message():
     empty = Picture("test", 0.0, None, None, codec.MonitorStatus())
     assert "0 touching, 0 predicted" in empty.line()
     assert "not recording" in drawn(empty)

@@ -89,7 +89,7 @@ def test_region_of_interest() -> None:
     region = Profile(region_min=LOW, region_max=HIGH)
     answers = zip(play(ReferenceMonitor, Profile()), play(ReferenceMonitor, region), play(Monitor, region), strict=True)
     before: set[tuple[int, int]] = set()
-    left_out = told = 0
+    left_out = reported = 0
     for (full, states), (plain, _), (mine, _) in answers:
         ids = inside(states, radius)
         expected = full.predictions[both_in(ids, full.predictions)]
@@ -109,9 +109,9 @@ def test_region_of_interest() -> None:
         before = pairs
         assert disagreements(mine, plain, 2.0) == []
         left_out += len(full.predictions) - len(plain.predictions)
-        told += len(plain.predictions)
+        reported += len(plain.predictions)
         assert mine.status.candidate_pairs <= full.status.candidate_pairs
-    assert left_out > 50 and told > 50
+    assert left_out > 50 and reported > 50
 
 
 def test_a_region_that_changes_takes_objects_in_and_out() -> None:

@@ -121,7 +121,7 @@ def test_a_motion_that_is_kept_is_continued_not_started_anew(shapes: tuple[Shape
         monitor.add(object_id, shape)
     twists = np.zeros((2, 6))
     twists[:, 0] = speed, -speed
-    told: list[float] = []
+    reported: list[float] = []
     touched = queries = 0
     for step in range(12 * rate):
         t = step / rate
@@ -129,20 +129,20 @@ def test_a_motion_that_is_kept_is_continued_not_started_anew(shapes: tuple[Shape
         assert result.status.objects_moved == (2 if step == 0 else 0)
         assert len(result.predictions) + len(result.contacts) <= 1
         for prediction in result.predictions:
-            told.append(t + prediction["lower"])
+            reported.append(t + prediction["lower"])
             certain = prediction["status"] == records.PredictionStatus.HIT
             assert certain or prediction["lower"] > 1.8  # near the horizon it may still be uncertain
             assert prediction["lower"] <= 6.5 - t <= prediction["upper"] or prediction["lower"] == 0.0
         touched += len(touching(result))
         queries += result.status.impact_queries
-    assert len(told) >= 18
-    assert max(told) - min(told) < 0.01
+    assert len(reported) >= 18
+    assert max(reported) - min(reported) < 0.01
     assert touched >= 10
     assert queries < 60
 
 
 @pytest.mark.parametrize("shape", [Sphere(0.5), Box((1, 1, 1))])
-def test_a_pair_is_told_once_after_a_pause_longer_than_what_was_predicted(shape: Shape) -> None:
+def test_a_pair_is_reported_once_after_a_pause_longer_than_what_was_predicted(shape: Shape) -> None:
     """A pair keeps its motion, and its next update comes when it touches and its prediction has expired."""
     monitor, speed = Monitor(), 0.4
     monitor.add(0, shape)
@@ -370,7 +370,7 @@ class TestRefusals:
         assert touching(monitor.step(SECOND // 10, [1, 2], still(0, 0.9))) == {(1, 2)}
 
 
-def test_an_object_that_is_not_heard_of_is_never_clear() -> None:
+def test_an_object_without_updates_is_never_clear() -> None:
     monitor = Monitor(Profile(stale_after=0.35, stale_acceleration=2.0))
     monitor.add(1, Sphere(0.5))
     monitor.add(2, Sphere(0.5))

@@ -102,7 +102,7 @@ def test_it_counts_what_is_left_out() -> None:
 def test_leaving_it_out_changes_no_answer(name: str) -> None:
     """Compare with the same scene with the item forced on, at every step."""
     item = scene_plan.ITEMS[name](80)
-    told = 0
+    reported = 0
     for _, (stamp, states) in zip(range(40), item.states, strict=False):
         off, on = item.off.step(stamp, states), item.on.step(stamp, item.states_on(states))
         contacts = [r.contacts[r.contacts["phase"] != Phase.END] for r in (off, on)]
@@ -121,8 +121,8 @@ def test_leaving_it_out_changes_no_answer(name: str) -> None:
             if pair in mine and pair in forced:
                 assert mine[pair]["lower"] <= forced[pair]["upper"] + 1e-9
                 assert forced[pair]["lower"] <= mine[pair]["upper"] + 1e-9
-        told += len(contacts[0]) + len(mine)
-    assert told > 40
+        reported += len(contacts[0]) + len(mine)
+    assert reported > 40
 
 
 def test_people_can_read_it() -> None:

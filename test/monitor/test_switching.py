@@ -89,7 +89,7 @@ def test_every_setting_can_change_and_holds_from_then_on(setting: Any) -> None:
         monitor.describe(description)
         plain.describe(description)
     changed = Profile().replace(**{setting.name: OTHER[setting.name]})
-    told = 0
+    reported = 0
     for step in range(60):
         if step == 30:
             monitor.profile = changed
@@ -100,9 +100,9 @@ def test_every_setting_can_change_and_holds_from_then_on(setting: Any) -> None:
         if setting.name == "pairs_per_step" and step >= 30:
             continue  # see test_time_critical.py
         assert disagreements(mine, truth, monitor.profile.horizon) == []
-        told += len(mine.predictions) + len(mine.contacts)
+        reported += len(mine.predictions) + len(mine.contacts)
         scene.step(0.05)
-    assert told > 50
+    assert reported > 50
     assert monitor.profile == changed
 
 

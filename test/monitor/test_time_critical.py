@@ -63,11 +63,11 @@ def play(profile: Profile, mode: str, steps: int = 25, *, long: bool = False) ->
 def test_no_collision_is_reported_clear_and_every_interval_holds(mode: str, limit: int, long: bool) -> None:
     deferred = unresolved = 0
     for mine, truth in play(Profile(pairs_per_step=limit), mode, long=long):
-        told = by_pair(mine.contacts[mine.contacts["phase"] != records.Phase.END])
+        reported = by_pair(mine.contacts[mine.contacts["phase"] != records.Phase.END])
         touching = by_pair(truth.contacts[truth.contacts["phase"] != records.Phase.END])
         stated, true = by_pair(mine.predictions), by_pair(truth.predictions)
-        assert touching.keys() <= told.keys() | stated.keys()
-        for pair, contact in told.items():
+        assert touching.keys() <= reported.keys() | stated.keys()
+        for pair, contact in reported.items():
             if pair in touching:
                 really = touching[pair]["signed_distance"]
                 assert abs(contact["signed_distance"] - really) <= contact["error_bound"] + 1e-9
@@ -75,7 +75,7 @@ def test_no_collision_is_reported_clear_and_every_interval_holds(mode: str, limi
                 assert contact["status"] == records.ContactStatus.UNRESOLVED
         for pair, event in true.items():
             if event["status"] == records.PredictionStatus.HIT and event["upper"] < 2.0:
-                assert pair in told or pair in stated, f"{pair} collides in {event['lower']} s"
+                assert pair in reported or pair in stated, f"{pair} collides in {event['lower']} s"
             if pair in stated:
                 assert stated[pair]["lower"] <= event["upper"]
                 assert stated[pair]["upper"] >= event["lower"]
@@ -85,7 +85,7 @@ def test_no_collision_is_reported_clear_and_every_interval_holds(mode: str, limi
         assert (mine.predictions["status"][bounds] == records.PredictionStatus.UNRESOLVED).all()
         assert (
             np.isfinite(mine.predictions["point"]).all()
-            and np.isfinite([contact["error_bound"] for contact in told.values()]).all()
+            and np.isfinite([contact["error_bound"] for contact in reported.values()]).all()
         )
         assert (mine.cut is None) == (mine.status.deferred == 0)
         deferred += mine.status.deferred
@@ -96,13 +96,13 @@ def test_no_collision_is_reported_clear_and_every_interval_holds(mode: str, limi
 @pytest.mark.parametrize("mode", MODES)
 def test_sphere_trees_tell_more_than_bounding_spheres(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the same number of pairs in a step, trees report fewer pairs that do not collide."""
-    told = []
+    reported = []
     for corners in (sphere_trees.MOST_CORNERS, 0):
         monkeypatch.setattr(sphere_trees, "MOST_CORNERS", corners)
         played = play(Profile(pairs_per_step=200), mode, 10, long=True)
-        told.append(sum(len(mine.contacts) + len(mine.predictions) for mine, _ in played))
+        reported.append(sum(len(mine.contacts) + len(mine.predictions) for mine, _ in played))
     true = sum(len(truth.contacts) + len(truth.predictions) for _, truth in played)
-    assert true <= told[0] < 0.8 * told[1]
+    assert true <= reported[0] < 0.8 * reported[1]
 
 
 @pytest.mark.parametrize("mode", MODES)

@@ -97,9 +97,9 @@ def test_the_number_of_pairs_of_a_timed_step_repeats_it() -> None:
             monitor.add(k, Cylinder(0.25, 1.75))
     cuts = []
     for step in range(6):
-        told = live.step(step * 50_000_000, hall(step))
-        cuts.append(told.cut)
-        again.profile = again.profile.replace(pairs_per_step=told.cut or 1_000_000_000)
-        assert again.step(step * 50_000_000, hall(step)).predictions.tobytes() == told.predictions.tobytes()
+        reported = live.step(step * 50_000_000, hall(step))
+        cuts.append(reported.cut)
+        again.profile = again.profile.replace(pairs_per_step=reported.cut or 1_000_000_000)
+        assert again.step(step * 50_000_000, hall(step)).predictions.tobytes() == reported.predictions.tobytes()
     assert any(cut is not None for cut in cuts)
     assert live.digest == again.digest

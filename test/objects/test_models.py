@@ -44,8 +44,8 @@ def test_a_coarse_model_hides_nothing_and_states_its_error(model):
     wider = 0
     for step in range(30):
         poses, twists = crowd(rng, len(shapes))
-        told, true = (m.step(step * SECOND // 10, ids, poses, twists) for m in (coarse, exact))
-        contacts, events = pairs(told.contacts), pairs(told.predictions)
+        reported, true = (m.step(step * SECOND // 10, ids, poses, twists) for m in (coarse, exact))
+        contacts, events = pairs(reported.contacts), pairs(reported.predictions)
         for pair, contact in pairs(true.contacts).items():
             if contact["phase"] != records.Phase.END:
                 row = contacts[pair]
@@ -53,16 +53,16 @@ def test_a_coarse_model_hides_nothing_and_states_its_error(model):
                 assert wrong <= row["error_bound"] + contact["error_bound"]
         for pair, event in pairs(true.predictions).items():
             assert pair in contacts or events[pair]["lower"] <= event["upper"]
-        assert (told.predictions["model_a"] == model).all()
-        for row in told.contacts[told.contacts["phase"] != records.Phase.END]:
+        assert (reported.predictions["model_a"] == model).all()
+        for row in reported.contacts[reported.contacts["phase"] != records.Phase.END]:
             assert row["model_a"] == row["model_b"] == model
             if row["status"] == ContactStatus.TOUCHING:
                 assert (row["id_a"], row["id_b"]) in pairs(true.contacts)
             wider += row["status"] == ContactStatus.UNRESOLVED
-        sure = told.predictions["status"] == PredictionStatus.HIT
+        sure = reported.predictions["status"] == PredictionStatus.HIT
         if model is not Model.CONVEX_HULL:
             assert not sure.any()
-            assert np.isinf(told.predictions["upper"]).all()
+            assert np.isinf(reported.predictions["upper"]).all()
     assert wider > 0 or model is Model.CONVEX_HULL  # the hull is exact for these shapes
 
 

@@ -319,7 +319,7 @@ def test_a_profile_with_other_models_holds_for_what_is_described_already() -> No
     boxes = [ObjectDescription(k, Box((1, 1, 1)), name=f"box {k}") for k in (1, 2)]
     own = ObjectDescription(3, Box((1, 1, 1)), model=Model.OBB)
     run, other = Run(*boxes, own), Run(*boxes, own)
-    told = []
+    reported = []
     changes: list[dict[str, Any]] = [{}, {"model_primitive": "sphere"}, {"threads": 2}, {"model_primitive": "auto"}]
     for models in changes:
         change = run.pipeline.change_settings(run.pipeline.monitor.profile.replace(**models), run.stamp)
@@ -332,8 +332,8 @@ def test_a_profile_with_other_models_holds_for_what_is_described_already() -> No
         assert answers[0] is not None and answers[1] is not None
         assert answers[0].contacts == answers[1].contacts
         assert answers[0].predictions == answers[1].predictions
-        told.append(answers[0].result.contacts[0])
-    assert [Model(row["model_a"]) for row in told] == [Model.EXACT, Model.SPHERE, Model.SPHERE, Model.EXACT]
+        reported.append(answers[0].result.contacts[0])
+    assert [Model(row["model_a"]) for row in reported] == [Model.EXACT, Model.SPHERE, Model.SPHERE, Model.EXACT]
     begin, persist = records.Phase.BEGIN, records.Phase.PERSIST
-    assert [row["phase"] for row in told] == [begin, persist, persist, persist]
-    assert np.all(np.diff([row["duration"] for row in told]) > 0.0)
+    assert [row["phase"] for row in reported] == [begin, persist, persist, persist]
+    assert np.all(np.diff([row["duration"] for row in reported]) > 0.0)

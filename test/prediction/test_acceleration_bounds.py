@@ -30,18 +30,18 @@ def head_on(speed: float, gap: float, uncertain: bool = True, **bounds: float) -
 def test_the_ends_are_those_of_accelerating_and_of_braking(
     speed: float, gap: float, bound: float, uncertain: bool
 ) -> None:
-    told = head_on(speed, gap, uncertain, max_linear_acceleration=bound)
+    reported = head_on(speed, gap, uncertain, max_linear_acceleration=bound)
     accelerating = (sqrt(speed**2 + 2 * bound * gap) - speed) / bound
-    assert told["lower"] <= accelerating
-    assert told["lower"] == pytest.approx(accelerating, rel=0.02)
+    assert reported["lower"] <= accelerating
+    assert reported["lower"] == pytest.approx(accelerating, rel=0.02)
     if speed**2 > 2 * bound * gap:
         braking = (speed - sqrt(speed**2 - 2 * bound * gap)) / bound
-        assert braking <= told["upper"] <= braking + HORIZON / 12
-        assert told["status"] == PredictionStatus.HIT
+        assert braking <= reported["upper"] <= braking + HORIZON / 12
+        assert reported["status"] == PredictionStatus.HIT
     else:
-        assert told["upper"] == inf
-        assert told["status"] == PredictionStatus.UNRESOLVED
-    assert np.isfinite(told["probability"]) == uncertain
+        assert reported["upper"] == inf
+        assert reported["status"] == PredictionStatus.UNRESOLVED
+    assert np.isfinite(reported["probability"]) == uncertain
 
 
 def test_turning_harder_reaches_sooner() -> None:
@@ -53,8 +53,8 @@ def test_turning_harder_reaches_sooner() -> None:
         monitor.add(1, cm.Sphere(0.1))
         poses = [[0, 0, 0, 0, 0, 0, 1], [1.0, 0, 1.7, 0, 0, 0, 1]]
         twists = [[0, 0, 0, 0, 0.5, 0], [0] * 6]
-        (told,) = monitor.step(0, [0, 1], poses, twists).predictions
-        lowers.append(float(told["lower"]))
+        (reported,) = monitor.step(0, [0, 1], poses, twists).predictions
+        lowers.append(float(reported["lower"]))
     turned = 0.5 * lowers[0]  # rad, until it meets the ball
     assert lowers[1] <= (sqrt(0.5**2 + 2 * turned) - 0.5) / 1.0  # with the declared acceleration in the same sense
     assert lowers[1] > 0.3 * lowers[0]
@@ -64,7 +64,7 @@ def test_no_driver_within_the_bounds_touches_before_the_lower_end() -> None:
     """Balls choose a new acceleration within their bounds every 50 ms; small steps follow them."""
     rng = np.random.default_rng(3)
     drivers, dt, radius = 500, 0.01, 0.5
-    told = 0
+    reported = 0
     for _ in range(12):
         bound = rng.uniform(0.2, 3.0)
         velocity = rng.normal(0, 1, 3) * 1.5
@@ -78,7 +78,7 @@ def test_no_driver_within_the_bounds_touches_before_the_lower_end() -> None:
         found = monitor.step(0, [0, 1], poses, [[0] * 6, [*velocity, 0, 0, 0]]).predictions
         if not len(found) or found["status"][0] == PredictionStatus.POSSIBLE:
             continue
-        told += 1
+        reported += 1
         p, v, a = np.tile(start, (drivers, 1)), np.tile(velocity, (drivers, 1)), np.zeros((drivers, 3))
         for step in range(int(found["lower"][0] / dt)):
             if step % 5 == 0:  # half of them towards the other ball, half in random directions
@@ -87,7 +87,7 @@ def test_no_driver_within_the_bounds_touches_before_the_lower_end() -> None:
             p += v * dt + 0.5 * a * dt * dt
             v += a * dt
             assert np.linalg.norm(p, axis=1).min() > 2 * radius
-    assert told >= 5
+    assert reported >= 5
 
 
 def test_a_twist_estimated_from_poses_has_the_error_of_their_difference() -> None:
@@ -103,10 +103,10 @@ def test_a_twist_estimated_from_poses_has_the_error_of_their_difference() -> Non
     rows["velocity_stddev"] = np.nan
     assert len(monitor.step(0, rows).predictions) == 0
     rows["position"][1] = 3.8, 0.0, 0.0
-    (told,) = monitor.step(int(dt * SECOND), rows).predictions
-    assert told["upper"] == pytest.approx(1.4, abs=0.01)  # 2.8 m at 2 m/s
+    (reported,) = monitor.step(int(dt * SECOND), rows).predictions
+    assert reported["upper"] == pytest.approx(1.4, abs=0.01)  # 2.8 m at 2 m/s
     rng = np.random.default_rng(1)
     p = np.array([3.8, 0, 0]) + rng.normal(0, sigma, (50_000, 3))
     v = np.array([-2.0, 0, 0]) + rng.normal(0, sqrt(2) * sigma / dt, (50_000, 3))
     t = np.clip(-(p * v).sum(1) / (v * v).sum(1), 0, HORIZON)  # nearest
-    assert told["probability"] == pytest.approx((np.linalg.norm(p + v * t[:, None], axis=1) < 1.0).mean(), abs=0.02)
+    assert reported["probability"] == pytest.approx((np.linalg.norm(p + v * t[:, None], axis=1) < 1.0).mean(), abs=0.02)

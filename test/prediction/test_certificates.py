@@ -80,11 +80,11 @@ def meeting(offset: float, sigma: float) -> np.void:
 def test_a_pair_that_surely_meets_has_the_times_of_the_normal_distribution(offset: float) -> None:
     """The faces meet at 2 m / 1.5 m/s; the error of that time is sigma / 1.5 m/s."""
     sigma = 0.02
-    told = meeting(offset, sigma)
+    reported = meeting(offset, sigma)
     certain = offset < 0.9
-    assert told["probability"] == pytest.approx(1.0 if certain else 0.994, abs=1e-9 if certain else 0.005)
+    assert reported["probability"] == pytest.approx(1.0 if certain else 0.994, abs=1e-9 if certain else 0.005)
     if certain:
         spread, middle = sigma / 1.5, 2.0 / 1.5
-        assert middle - 2.4 * spread < told["earliest"] < middle - 1.645 * spread
-        assert middle + 1.645 * spread < told["latest"] < middle + 2.4 * spread
-        assert told["most_likely"] == pytest.approx(middle, abs=0.2 * spread)
+        assert middle - 2.4 * spread < reported["earliest"] < middle - 1.645 * spread
+        assert middle + 1.645 * spread < reported["latest"] < middle + 2.4 * spread
+        assert reported["most_likely"] == pytest.approx(middle, abs=0.2 * spread)

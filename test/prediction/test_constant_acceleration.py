@@ -134,7 +134,7 @@ def test_the_monitor_predicts_along_the_acceleration() -> None:
     rows, _ = scene(count, VALID)
     start = rows.copy()
     monitor, shapes = monitor_of(count)
-    told = 0
+    reported = 0
     for step in range(steps):
         t = 0.1 * step
         moved(rows, start, t)
@@ -155,11 +155,11 @@ def test_the_monitor_predicts_along_the_acceleration() -> None:
                 ]  # fmt: skip
                 alone = time_of_impact(shapes[i % 2], motions[0], shapes[j % 2], motions[1])
                 if alone.status == "hit" and alone.upper < 1.999:
-                    told += 1
+                    reported += 1
                     assert found[i, j]["lower"] <= alone.upper and alone.lower <= found[i, j]["upper"]
                 elif alone.status == "clear":
                     assert (i, j) not in found or found[i, j]["lower"] > 1.99
-    assert told > 12
+    assert reported > 12
 
 
 def test_without_the_flag_it_is_not_read() -> None:

@@ -105,8 +105,8 @@ def random_pair(rng: np.random.Generator, first: str, second: str, case: Case) -
     rows["quaternion"] = q / np.linalg.norm(q, axis=1, keepdims=True)
     rows["position_stddev"], rows["velocity_stddev"] = rng.uniform(*case.noise, 2)
     rows["orientation_stddev"] = rows["angular_velocity_stddev"] = case.turned
-    told = monitor.step(0, rows)
-    stated = bool((told.predictions["status"] != 2).any())
+    reported = monitor.step(0, rows)
+    stated = bool((reported.predictions["status"] != 2).any())
     return monitor, stated
 
 
@@ -154,10 +154,10 @@ def test_meshes_and_clouds_are_left_to_the_exact_method(change: str, distance: f
     rows["id"], rows["quaternion"][:, 3] = (0, 1), 1.0
     rows["position"][1], rows["linear"][1] = (distance, 0.2, 0.1), (-1.5, 0, 0)
     rows["position_stddev"] = 0.05
-    told = monitor.step(0, rows).predictions
+    reported = monitor.step(0, rows).predictions
     exact, planes = both_methods(monitor, distance == 3.0)
     assert planes[0, 3] == LEFT
-    assert told["probability"][0] == pytest.approx(exact[0, 3], abs=0.02)  # with an eighth of the samples
+    assert reported["probability"][0] == pytest.approx(exact[0, 3], abs=0.02)  # with an eighth of the samples
     assert (exact[0, 3] > 0.9) == (distance == 3.0)
 
 
@@ -171,9 +171,9 @@ def test_absurd_errors_have_bounded_answers(stddev: float) -> None:
     rows["position"][:, 0] = 3.0 * np.arange(4)
     for name in ("position", "orientation", "velocity", "angular_velocity"):
         rows[f"{name}_stddev"] = stddev
-    told = monitor.step(0, rows).predictions
-    assert not np.isnan(told["probability"]).any()
-    assert ((told["probability"] >= 0.0) & (told["probability"] <= 1.0)).all()
+    reported = monitor.step(0, rows).predictions
+    assert not np.isnan(reported["probability"]).any()
+    assert ((reported["probability"] >= 0.0) & (reported["probability"] <= 1.0)).all()
 
 
 def test_the_columns_are_the_same_samples() -> None:
@@ -194,8 +194,8 @@ def test_another_number_of_samples_is_possible() -> None:
     for count in (1024, 64, 4096, 1024):
         monitor.profile = monitor.profile.replace(uncertainty_samples=count)
         rows = np.zeros(0, STATE)
-        told = monitor.step(0, rows).predictions
-        answers.append(float(told["probability"][0]) if len(told) else 0.0)
+        reported = monitor.step(0, rows).predictions
+        answers.append(float(reported["probability"][0]) if len(reported) else 0.0)
     assert uncertain_predictions.ANSWERS[3] == "probability"
     assert answers[0] == answers[3]
     assert np.ptp(answers) < 0.05

@@ -14,7 +14,7 @@ HORIZON = 2.0
 NAMES = ("position", "orientation", "velocity", "angular_velocity")
 
 
-def told_and_true(shapes: tuple[cm.Shape, cm.Shape], rows: NDArray[np.void], futures: int) -> tuple[float, float]:
+def stated_and_true(shapes: tuple[cm.Shape, cm.Shape], rows: NDArray[np.void], futures: int) -> tuple[float, float]:
     """Stated probability of contact of two objects with the states `rows`, and that of their futures."""
     monitor = cm.Monitor(cm.Profile.named("balanced").replace(horizon=HORIZON))
     motions, rng = [], np.random.default_rng(0)
@@ -24,9 +24,9 @@ def told_and_true(shapes: tuple[cm.Shape, cm.Shape], rows: NDArray[np.void], fut
         turned = multiply(from_rotation_vector(off[1]), np.tile(row["quaternion"], (futures, 1)))
         poses = np.column_stack([row["position"] + off[0], turned])
         motions.append((poses, np.column_stack([row["linear"] + off[2], row["angular"] + off[3]])))
-    told = monitor.step(0, rows).predictions
+    reported = monitor.step(0, rows).predictions
     true = cm.time_of_impact_batch(shapes[0], *motions[0], shapes[1], *motions[1], HORIZON, tolerance=1e-5)
-    return float(told["probability"][0]), float(np.mean(true.status != "clear"))
+    return float(reported["probability"][0]), float(np.mean(true.status != "clear"))
 
 
 def test_a_rod_that_turns_past_a_box() -> None:
@@ -39,8 +39,8 @@ def test_a_rod_that_turns_past_a_box() -> None:
     rows["angular"] = (-1.293, 0.926, -0.433), (0.081, 0.866, -0.181)
     for name, both in zip(NAMES, ((0.039, 0.030), (0.022, 0.012), (0.008, 0.041), (0.007, 0.005)), strict=True):
         rows[f"{name}_stddev"] = both
-    told, true = told_and_true((cm.Cylinder(0.24, 1.75), cm.Box((0.58, 1.2, 0.99))), rows, 20_000)
-    assert told == pytest.approx(true, abs=0.02)
+    reported, true = stated_and_true((cm.Cylinder(0.24, 1.75), cm.Box((0.58, 1.2, 0.99))), rows, 20_000)
+    assert reported == pytest.approx(true, abs=0.02)
 
 
 def test_a_person_that_reaches_a_long_wall_at_the_horizon() -> None:
@@ -50,8 +50,8 @@ def test_a_person_that_reaches_a_long_wall_at_the_horizon() -> None:
     rows["position"][1], rows["linear"][0] = (2.893, 78.49, 1.13), (1.264, -0.15, 0.0)
     for name in NAMES:
         rows[f"{name}_stddev"][0] = 0.005
-    told, true = told_and_true((cm.Cylinder(0.25, 1.25), cm.Box((0.2, 219.4, 4.0))), rows, 20_000)
-    assert told == pytest.approx(true, abs=0.02)
+    reported, true = stated_and_true((cm.Cylinder(0.25, 1.25), cm.Box((0.2, 219.4, 4.0))), rows, 20_000)
+    assert reported == pytest.approx(true, abs=0.02)
 
 
 @pytest.mark.parametrize("turned", [0.05, 0.1])
@@ -62,5 +62,5 @@ def test_people_that_pass_soon_and_may_lean_towards_each_other(turned: float) ->
     rows["position"][1], rows["linear"][1] = (0.635, 0.367, 0.0), (-2.166, 1.393, 0.0)
     for name, off in zip(NAMES, (0.05, turned, 0.15, 0.0), strict=True):
         rows[f"{name}_stddev"] = off
-    told, true = told_and_true((cm.Cylinder(0.25, 1.75), cm.Cylinder(0.25, 1.75)), rows, 20_000)
-    assert told == pytest.approx(true, abs=0.015)
+    reported, true = stated_and_true((cm.Cylinder(0.25, 1.75), cm.Cylinder(0.25, 1.75)), rows, 20_000)
+    assert reported == pytest.approx(true, abs=0.015)

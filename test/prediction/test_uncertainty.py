@@ -50,7 +50,7 @@ def sphere_impacts(reach: float, p: Array, v: Array) -> Array:
 @pytest.mark.parametrize("with_covariance", [False, True])
 def test_spheres_agree_with_monte_carlo(with_covariance: bool) -> None:
     rng = np.random.default_rng(5 + with_covariance)
-    told = possible = 0
+    reported = possible = 0
     errors = []
     for _ in range(40):
         reach = rng.uniform(0.3, 1.2)
@@ -73,7 +73,7 @@ def test_spheres_agree_with_monte_carlo(with_covariance: bool) -> None:
         if answer is None:
             assert truth < 0.015
             continue
-        told += 1
+        reported += 1
         possible += answer["status"] == PredictionStatus.POSSIBLE
         errors.append(answer["probability"] - truth)
         hits = times[np.isfinite(times)]
@@ -83,7 +83,7 @@ def test_spheres_agree_with_monte_carlo(with_covariance: bool) -> None:
             assert 0.92 <= (times <= answer["latest"]).mean() <= 0.98
         else:
             assert truth < 0.98
-    assert told >= 15
+    assert reported >= 15
     assert possible >= 3
     assert np.abs(errors).max() < 0.03
     assert np.sqrt(np.mean(np.square(errors))) < 0.01
@@ -121,11 +121,11 @@ def test_pairs_far_from_meeting_are_not_told() -> None:
     rows = np.concatenate([state(k, (*at, 0), (0, 0, 0), 0.05, 0.05) for k, at in enumerate(grid)])
     assert len(monitor.step(0, rows).predictions) == 0
     rows["velocity_stddev"] = 0.5  # 1 m after two seconds: only neighbours may meet
-    told = monitor.step(SECOND // 100, rows).predictions
-    assert len(told) == 2 * side * (side - 1) + 2 * (side - 1) ** 2
-    assert (told["status"] == PredictionStatus.POSSIBLE).all()
-    assert (told["lower"] == told["earliest"]).all()
-    assert (told["upper"] == inf).all()
+    reported = monitor.step(SECOND // 100, rows).predictions
+    assert len(reported) == 2 * side * (side - 1) + 2 * (side - 1) ** 2
+    assert (reported["status"] == PredictionStatus.POSSIBLE).all()
+    assert (reported["lower"] == reported["earliest"]).all()
+    assert (reported["upper"] == inf).all()
 
 
 def test_it_grows_while_an_object_is_not_heard_of() -> None:
@@ -140,8 +140,8 @@ def test_it_grows_while_an_object_is_not_heard_of() -> None:
         result = monitor.step(k * SECOND // 20, rows)
         if len(result.contacts):
             break
-        told = result.predictions
-        probabilities.append(float(told["probability"][0]) if len(told) else 0.0)
+        reported = result.predictions
+        probabilities.append(float(reported["probability"][0]) if len(reported) else 0.0)
     assert result.contacts["status"][0] == ContactStatus.UNRESOLVED
     assert probabilities[0] == 0.0
     assert probabilities[-1] > 0.03
@@ -155,17 +155,17 @@ def test_a_declared_acceleration_widens_it() -> None:
         monitor.add(0, cm.Sphere(0.5), max_linear_acceleration=bound)
         monitor.add(1, cm.Sphere(0.5))
         rows = np.concatenate([state(0, (0, 0, 0), (1, 0, 0), 0.05, 0.0), state(1, (2, 1.4, 0), (0, 0, 0), 0.05, 0.0)])
-        told = monitor.step(0, rows).predictions
-        answers.append(float(told["probability"][0]) if len(told) else 0.0)
+        reported = monitor.step(0, rows).predictions
+        answers.append(float(reported["probability"][0]) if len(reported) else 0.0)
     # 2 m/s^2 in any direction: 0.9 along an axis, which is 0.45 m after a second, when the gap of 0.4 m is smallest
     assert answers[0] < 0.01
     assert answers[1] > 0.1
 
 
-def test_who_declares_uncertainty_now_and_then_is_told_of() -> None:
+def test_uncertainty_declared_now_and_then_is_answered() -> None:
     """The other object comes near in a step without a declaration; the next step declares an uncertainty again."""
     monitor = cm.Monitor()
-    told = []
+    reported = []
     monitor.add(1, cm.Sphere(0.5))
     monitor.add(2, cm.Sphere(0.5))
     for step, sigma in enumerate((0.3, 0.3, np.nan, 0.3, np.nan, 0.3)):
@@ -173,8 +173,8 @@ def test_who_declares_uncertainty_now_and_then_is_told_of() -> None:
         first = state(1, (t, 0, 0), (1, 0, 0), sigma, 0.0)
         second = state(2, (3 - t, 1.4, 0) if step >= 2 else (30, 30, 0), (-1 if step >= 2 else 0, 0, 0), 0.0, 0.0)
         predictions = monitor.step(step * SECOND // 50, np.concatenate([first, second])).predictions
-        told.append([int(status) for status in predictions["status"]])
-    assert told == [[], [], [], [PredictionStatus.POSSIBLE], [], [PredictionStatus.POSSIBLE]]
+        reported.append([int(status) for status in predictions["status"]])
+    assert reported == [[], [], [], [PredictionStatus.POSSIBLE], [], [PredictionStatus.POSSIBLE]]
 
 
 def test_covariances_that_cannot_be_are_refused() -> None:
@@ -213,8 +213,8 @@ def test_the_answers_are_the_same_bytes_on_two_threads_and_when_replayed() -> No
             monitor.add(object_id, cm.Box((0.5, 0.4, 0.3)) if object_id % 2 else cm.Capsule(0.1, 0.5))
         rows = np.concatenate([state(k, rng.uniform(0, 4, 3), rng.normal(0, 1, 3), 0.05, 0.1) for k in range(30)])
         for step in range(5):
-            told = monitor.step(step * SECOND // 20, rows).predictions
+            reported = monitor.step(step * SECOND // 20, rows).predictions
             rows["position"] += 0.05 * rows["linear"]
         digests.append(monitor.digest)
-    assert len(told) > 10
+    assert len(reported) > 10
     assert len(set(digests)) == 1

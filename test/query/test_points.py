@@ -190,8 +190,8 @@ def test_its_text_and_features():
         (np.zeros((0, 3)), 0.1, "Points: expected at least 1 points"),
         (np.zeros((4, 2)), 0.1, r"Points: expected at least 1 points, shape \(n, 3\), got shape \(4, 2\)"),
         ("cloud", 0.1, "Points: expected an array"),
-        ([(0, 0, 0)], -1.0, "Points radius: expected a positive number"),
-        ([(0, 0, 0)], np.nan, "Points radius: expected a positive number"),
+        ([(0, 0, 0)], -1.0, "Points radius: expected 0 or a positive number"),
+        ([(0, 0, 0)], np.nan, "Points radius: expected 0 or a positive number"),
         (np.zeros((MOST_CLOUD_POINTS + 1, 3)), 0.1, f"expected at most {MOST_CLOUD_POINTS} points, got"),
     ],
 )

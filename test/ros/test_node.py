@@ -170,9 +170,9 @@ def test_silence_is_never_clear(start, team):
     team.ask(*APPROACHING)
     status = team.status(lambda s: s.objects_stale == 2)
     assert (status.objects_unseen, status.predictions) == (1, 1)
-    heard = len(team.statuses)
+    received = len(team.statuses)
     team.listen(2.2)
-    assert len(team.statuses) - heard >= 2
+    assert len(team.statuses) - received >= 2
     assert team.statuses[-1].rate == 0.0
     assert team.statuses[-1].step == 1
 
@@ -345,15 +345,15 @@ def test_a_budget_that_is_too_small_leaves_pairs_unresolved_and_none_clear(start
         contacts, predictions = team.ask(*states, stamp=stamp)
         found = truth.step(stamp, states)
         status = team.status(lambda s: s.step == contacts.step)
-        told = {(c.id_a, c.id_b): c for c in contacts.contacts if c.phase != Contact.END}
+        reported = {(c.id_a, c.id_b): c for c in contacts.contacts if c.phase != Contact.END}
         stated = {(p.id_a, p.id_b): p for p in predictions.predictions}
-        assert _pairs(found.contacts[found.contacts["phase"] != records.Phase.END]) <= told.keys() | stated.keys()
+        assert _pairs(found.contacts[found.contacts["phase"] != records.Phase.END]) <= reported.keys() | stated.keys()
         for row in found.contacts[found.contacts["phase"] != records.Phase.END]:
-            if (mine := told.get((int(row["id_a"]), int(row["id_b"])))) is not None:
+            if (mine := reported.get((int(row["id_a"]), int(row["id_b"])))) is not None:
                 assert abs(mine.signed_distance - row["signed_distance"]) <= mine.error_bound + 1e-9
         for row in found.predictions[found.predictions["status"] == records.PredictionStatus.HIT]:
             mine = stated.get((int(row["id_a"]), int(row["id_b"])))
-            assert mine is not None or row["upper"] >= 2.0 or (row["id_a"], row["id_b"]) in told
+            assert mine is not None or row["upper"] >= 2.0 or (row["id_a"], row["id_b"]) in reported
             assert mine is None or (mine.lower <= row["upper"] and row["lower"] <= mine.upper)
         bounds = [p for p in stated.values() if p.method == records.Method.BOUND]
         assert {p.status for p in bounds} <= {int(records.PredictionStatus.UNRESOLVED)}

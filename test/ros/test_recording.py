@@ -125,7 +125,7 @@ def test_a_removed_folder_fails_the_recording_once_and_the_monitoring_goes_on(st
     assert not (tmp_path / "runs").exists()
 
 
-def test_a_full_disk_is_told_and_does_not_stop_the_monitor(start, team, tmp_path):
+def test_a_full_disk_is_reported_and_does_not_stop_the_monitor(start, team, tmp_path):
     """RLIMIT_FSIZE makes the kernel refuse to grow the file, as a full disk does."""
     monitor = start("run", "--record", "run.mcap")
     team.meet()

@@ -155,13 +155,13 @@ def test_a_simulation_that_restarts_is_followed_and_logged(start, team):
     for k in range(50):
         contacts, _ = team.ask(state(1), state(2, 50.0), stamp=5 * SECOND + k * SECOND // 50)
         assert len(contacts.contacts) == 0
-    heard = len(team.contacts)
+    before = len(team.contacts)
     for k in range(3):  # the simulation starts again at 0 s, and now they touch
         team.say(state(1), state(2, 0.8), stamp=k * SECOND // 50)
-        team.until(lambda: len(team.contacts) == heard + k + 1)  # noqa: B023
-    stamps = [m.header.stamp.sec * SECOND + m.header.stamp.nanosec for m in team.contacts[heard:]]
+        team.until(lambda: len(team.contacts) == before + k + 1)  # noqa: B023
+    stamps = [m.header.stamp.sec * SECOND + m.header.stamp.nanosec for m in team.contacts[before:]]
     assert stamps == [5 * SECOND + 49 * SECOND // 50, SECOND // 50, 2 * SECOND // 50]
-    assert [len(m.contacts) for m in team.contacts[heard:]] == [0, 1, 1]
+    assert [len(m.contacts) for m in team.contacts[before:]] == [0, 1, 1]
     ticks = itertools.count(3)
 
     def go_on():  # or else the status may come after a silence that makes the objects stale

@@ -88,7 +88,7 @@ def test_the_diagnostics_follow_what_happens(start, team):
     }
 
 
-def test_a_dead_or_hanging_node_is_noticed_and_silence_is_told_apart(start, team):
+def test_a_dead_or_hanging_node_is_noticed_and_silence_is_distinguished(start, team):
     monitor = start("run", "--ros-args", "-p", "diagnostic_updater.use_fqn:=true", "-r", "__ns:=/")
     supervisor = Supervisor(team)
     team.meet()

@@ -14,19 +14,19 @@ from collision_monitor_msgs.msg import ObjectDescriptionArray
 
 
 def test_a_scene_is_published_at_a_steady_rate(start, team):
-    heard = []
+    arrived = []
     described = []
-    subscription(team.node, Topic.STATES, lambda m: heard.append((team.now, m)), Topic.STATES.of())
+    subscription(team.node, Topic.STATES, lambda m: arrived.append((team.now, m)), Topic.STATES.of())
     team.node.create_subscription(ObjectDescriptionArray, Topic.SHAPES.of(), described.append, quality_of(Topic.SHAPES))
     world = start("world", "fleet", "--objects", "20", "--rate", "50", "--duration", "2", "--seed", "7")
     team.until(lambda: not world.running, 30.0)
-    assert heard, world.words
+    assert arrived, world.words
     assert world.wait() == 0
     team.until(lambda: described, 3.0)
     assert described[0].snapshot
     assert {o.id for o in described[0].objects if not o.is_static} == set(range(1, 21))
 
-    messages = [codec.decode_states(data) for _, data in heard]
+    messages = [codec.decode_states(data) for _, data in arrived]
     assert len(messages) > 50
     assert all(len(m.states) == 20 and m.frame_id == "world" for m in messages)
     sequence = np.array([m.sequence for m in messages])
@@ -34,7 +34,7 @@ def test_a_scene_is_published_at_a_steady_rate(start, team):
     assert (np.diff(sequence) >= 1).all()
     periods = np.diff(stamps) / 20_000_000  # if the machine was too slow, whole periods are skipped
     assert periods == pytest.approx(np.round(periods), abs=1e-6)
-    late = np.array([received for received, _ in heard]) - stamps
+    late = np.array([received for received, _ in arrived]) - stamps
     assert late.min() > 0
     assert np.median(late) < 0.1e9
 
@@ -45,15 +45,15 @@ def test_a_scene_is_published_at_a_steady_rate(start, team):
 
 
 def test_messages_larger_than_the_default_shared_memory_of_fast_dds_arrive(start, team):
-    heard = []
-    subscription(team.node, Topic.STATES, lambda m: heard.append(len(m)), Topic.STATES.of())
+    arrived = []
+    subscription(team.node, Topic.STATES, lambda m: arrived.append(len(m)), Topic.STATES.of())
     world = start("world", "clutter", "--objects", "10000", "--rate", "10", "--duration", "2")
     team.until(lambda: not world.running, 60.0)
     assert world.wait() == 0
     published = int(re.search(r"published (\d+) messages", world.words)[1])
     assert published > 5
-    assert min(heard) > 1_680_000
-    assert len(heard) >= published - 1  # best effort; with the default segment only one in twenty arrives
+    assert min(arrived) > 1_680_000
+    assert len(arrived) >= published - 1  # best effort; with the default segment only one in twenty arrives
 
 
 @pytest.mark.parametrize(

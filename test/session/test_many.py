@@ -73,7 +73,7 @@ def test_ray_gives_what_processes_give(monkeypatch: pytest.MonkeyPatch) -> None:
     assert list(for_each(work, paths, failed, Engine("ray", jobs=2))) == list(for_each(work, paths, failed))
 
 
-def test_an_address_where_no_cluster_listens_is_told_at_once() -> None:
+def test_an_address_where_no_cluster_listens_is_reported_at_once() -> None:
     pytest.importorskip("ray")
     for address, words in (("127.0.0.1:1", "expected a cluster that listens"), ("here", "expected HOST:PORT")):
         with pytest.raises(InputError, match=words):

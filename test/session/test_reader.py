@@ -145,13 +145,13 @@ def write(path: Path, *, metadata: dict[str, str] | None, schema: str, encoding:
         writer.finish()
 
 
-def test_a_foreign_recording_is_told_by_its_topics(tmp_path: Path) -> None:
+def test_a_foreign_recording_is_recognized_by_its_topics(tmp_path: Path) -> None:
     write(tmp_path / "a.mcap", metadata=None, schema="sensor_msgs/msg/Image")
     with pytest.raises(SessionError, match="topics /camera/image; record one with"):
         Session(tmp_path / "a.mcap")
 
 
-def test_topics_without_a_schema_are_told(tmp_path: Path) -> None:
+def test_topics_without_a_schema_are_reported(tmp_path: Path) -> None:
     write(tmp_path / "a.mcap", metadata=None, schema="")
     with pytest.raises(SessionError, match="/camera/image, 1 of them without the schema that says what type"):
         Session(tmp_path / "a.mcap")

@@ -220,8 +220,8 @@ def test_markers_bring_their_shapes_appear_change_and_go(tmp_path: Path) -> None
     assert sorted(done.skipped.values()) == [1, 1]
     assert all("a `shape` in the mapping takes its place" in reason for reason in done.skipped)
     changes = [decode_descriptions(m.data) for m in messages_of(tmp_path / "a.mcap", "ObjectDescriptionArray")]
-    told = [[(getattr(o, "name", "gone"), o.object_id) for o in each.objects] for each in changes]
-    assert told == [
+    reported = [[(getattr(o, "name", "gone"), o.object_id) for o in each.objects] for each in changes]
+    assert reported == [
         [],
         [("crate", 1), ("ball_3", 4), ("wall_1", 5)],
         [("crate", 1)],
@@ -265,7 +265,7 @@ def test_what_is_wrong_is_left_out_counted_and_named(tmp_path: Path, capsys: pyt
     assert "expected a new file" in capsys.readouterr().err
     assert main([*command, "--force"]) == 3
     out = capsys.readouterr().out
-    assert "unseen     b: the bag tells nothing of it" in out
+    assert "unseen     b: the bag has no message of it" in out
     assert "written    7 messages" in out
     assert main(["replay", str(tmp_path / "a.mcap")]) == 0
 
@@ -283,7 +283,7 @@ OBJECT = {"topic": "/person", "shape": {"sphere": 1}}
         ({"frame": "map", "object": {}}, "the file: 'object' is unknown: did you mean 'objects'?"),
         ({"frame": "map", "objects": {"a": {"topc": "/a"}}}, "a: 'topc' is unknown: did you mean 'topic'?"),
         ({"frame": "map", "objects": {"a": {"static": True}}}, "a, shape: expected one of sphere, box,"),
-        ({"frame": "map", "objects": {"a": {"shape": {"sphere": 1}}}}, "a, topic: expected the topic that tells where"),
+        ({"frame": "map", "objects": {"a": {"shape": {"sphere": 1}}}}, "a, topic: expected the topic of its pose"),
         ({"frame": "map", "objects": {"a": {**OBJECT, "shape": {"ball": 1}}}}, "a, shape: 'ball' is unknown"),
         ({"frame": "map", "objects": {"a": {**OBJECT, "shape": {"box": [1, 2]}}}}, "expected 3 dimensions (x, y, z)"),
         ({"frame": "map", "objects": {"a": {**OBJECT, "shape": {"sphere": -1}}}}, "a, shape: Sphere"),

@@ -158,7 +158,7 @@ def test_the_example_of_the_help_is_one() -> None:
         ({"expect": [{"complete": False}]}, "expected true"),
     ],
 )
-def test_bad_expectations_are_told(content: object, words: str) -> None:
+def test_bad_expectations_are_reported(content: object, words: str) -> None:
     with pytest.raises(InputError, match=words):
         parse_expectations(content)
 
@@ -214,12 +214,12 @@ def test_the_command_and_its_exit_codes(yard: Path, tmp_path: Path, capsys: pyte
         ("expect: [{no_contact: any, no_contact: [cart, cat]}]", "the same key twice"),
         ("expect: " + "[" * 2000, "expected YAML"),
     ):
-        code, _, told = run(text, str(yard))
+        code, _, error = run(text, str(yard))
         assert code == 2
-        assert told.count("\n") == 1 and words in told
-    code, _, told = run("expect: [{no_contact: any}]", str(yard), "--junit", str(tmp_path / "nowhere" / "junit.xml"))
+        assert error.count("\n") == 1 and words in error
+    code, _, error = run("expect: [{no_contact: any}]", str(yard), "--junit", str(tmp_path / "nowhere" / "junit.xml"))
     assert code == 1
-    assert "expected a file that can be written" in told
+    assert "expected a file that can be written" in error
 
 
 def test_the_example_of_the_docs_is_what_it_prints(yard: Path, tmp_path: Path) -> None:

@@ -88,7 +88,7 @@ def test_rosbags_reads_the_folder(recorded: Path, tmp_path: Path) -> None:
             assert len(list(reader.messages())) == reader.message_count == count > 0
 
 
-def test_a_missing_file_and_two_recordings_in_one_folder_are_told(tmp_path: Path) -> None:
+def test_a_missing_file_and_two_recordings_in_one_folder_are_reported(tmp_path: Path) -> None:
     record(tmp_path / "run", splitting=BY_TIME)
     record(tmp_path / "other", splitting=BY_TIME)
     last = tmp_path / "run" / "run_2.mcap"

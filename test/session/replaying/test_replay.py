@@ -103,7 +103,7 @@ def test_a_missing_answer_is_a_difference(recorded: Path, tmp_path: Path, topic:
     assert (report.first_difference.field, report.first_difference.recorded) == ("presence", "nothing")
 
 
-def test_messages_out_of_order_are_told(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_out_of_order_are_reported(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     messages = list(Session(recorded).messages())
     session = Session(recorded)
     turned = [*messages[:60], *messages[62:64], *messages[60:62], *messages[64:]]

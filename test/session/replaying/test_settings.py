@@ -72,7 +72,7 @@ def test_each_file_of_a_split_recording_has_the_settings_in_force(switched: Path
     assert (report.verdict, report.digest) == (Verdict.IDENTICAL, replay(Session(switched)).digest)
 
 
-def test_a_history_follows_the_changes_unless_it_is_told_a_profile(switched: Path) -> None:
+def test_a_history_follows_the_changes_unless_a_profile_is_given(switched: Path) -> None:
     recorded, again = (read_history(Session(switched), profile) for profile in (None, AS_RECORDED))
     assert [changed["profile"] for _, changed in recorded.settings] == ["fast", "exact"]
     assert recorded.settings == again.settings
