@@ -324,11 +324,11 @@ def _examine(multibody, active, which, now, queries, scratch, later):
             touching, count = body_contact(multibody, i, j, now, contact, scratch, results[k])
         tests += count
         stays = touching
-        if not touching and coarse.tolerance > 0.0 and _can_wait(bodies, event, now, carrying.period):
+        bounded = not touching and coarse.tolerance > 0.0 and has_bounds(multibody, i, j)
+        if bounded and _can_wait(bodies, event, now, carrying.period):
             stays = True
         elif not touching and not is_predicted_anew(bodies, i, j, now, event):
             window = Window(now, cover_of(bodies, i, j))
-            bounded = coarse.tolerance > 0.0 and has_bounds(multibody, i, j)
             if not (bounded and coarse_impact(multibody, i, j, window, impact, coarse, scratch, event)):
                 made += body_impact(multibody, i, j, window, impact, scratch, event)
             if event.status != CLEAR:

@@ -110,7 +110,7 @@ def placed_shapes(multibody, i, j, now, there, scratch):
 
 
 @inlined
-def _reach(table, s, R, n):
+def reach_of_tree(table, s, R, n):
     """How far the box of a whole tree reaches from its shape's origin along n (m). R: rotation of the shape."""
     blocks, root, d = table.blocks, root_of(table, s), rotate_back(R, n)
     m, e = turned_back(blocks, root, 0, d), half_of(blocks, root, 0)
@@ -130,8 +130,8 @@ def _write(multibody, i, j, there, placed, known, query, out, result):
     least, most = known
     half = max(0.5 * (most - least), 0.0)
     n = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
-    parting = _reach(table, bodies.first_shape[i], pose.R_A, n) - dot(n, pose.p)
-    parting += _reach(table, bodies.first_shape[j], pose.R_B, opposite(n))
+    parting = reach_of_tree(table, bodies.first_shape[i], pose.R_A, n) - dot(n, pose.p)
+    parting += reach_of_tree(table, bodies.first_shape[j], pose.R_B, opposite(n))
     for c in range(CONTACT_SIZE):
         result[c] = out[c]
     for c in range(3):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.prediction.body_impact import Scratch, make_scratch
-from collision_monitor.prediction.coarse_impact import bound_meshes
+from collision_monitor.prediction.coarse_impact import predict_coarsely
 from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.prediction.pair_impacts import bound_pairs, predict_pairs, refine
 from collision_monitor.records import joined
@@ -85,13 +85,9 @@ class FirstImpacts(Stage):
 
 def _coarse_impacts(step: StepContext, pairs: Pairs, scratch: Scratch) -> tuple[Events, int]:
     """As `_impacts` of `predict_pairs`, but with bounds on those of meshes."""
-    events, rest = np.empty(len(pairs) + 1, IMPACT), np.empty_like(pairs)
-    query = step.settings.impact
-    n, left, made = bound_meshes(step.roster.multibody, pairs, step.now, query, step.coarse, events, rest, scratch)
-    if not left:
-        return events[:n], made
-    others, queries = _impacts(predict_pairs, step, rest[:left], scratch)
-    return joined([events[:n], others]), made + queries
+    events, query = np.empty(len(pairs) + 1, IMPACT), step.settings.impact
+    n, queries = predict_coarsely(step.roster.multibody, pairs, step.now, query, step.coarse, events, scratch)
+    return events[:n], queries
 
 
 def _impacts(

@@ -9,14 +9,24 @@ from __future__ import annotations
 from math import inf
 from typing import Any
 
-from collision_monitor._jit import device
+from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.shape_table import HALF_SPACE
 from collision_monitor.meshes.solid import SolidMemory
 from collision_monitor.meshes.solid_range import solid_range
-from collision_monitor.monitor.carried_triangles import NONE, WHOLE, apart_or_none, has_one_shape, placed_shapes
-from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, POINT_A, POINT_B
+from collision_monitor.monitor.carried_triangles import (
+    NONE,
+    WHOLE,
+    apart_or_none,
+    has_one_shape,
+    placed_shapes,
+    reach_of_tree,
+)
+from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
+from collision_monitor.narrow_phase.core import rounding
 from collision_monitor.narrow_phase.dispatch import mirror
-from collision_monitor.narrow_phase.pair_pose import swapped
-from collision_monitor.narrow_phase.vector import dot
+from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
+from collision_monitor.narrow_phase.support_value import core_support
+from collision_monitor.narrow_phase.vector import dot, opposite, rotate_back
 from collision_monitor.prediction.body_contact import (
     SHAPE_I,
     SHAPE_J,
@@ -31,12 +41,24 @@ from collision_monitor.prediction.mesh_pair import has_mesh, have_trees, is_mesh
 from collision_monitor.prediction.motion import position_now
 
 
+@inlined
+def _parting(table: Any, a: int, b: int, pose: PairPose, out: Any) -> float:
+    """Length of a translation along the normal of a contact that parts a tree and a solid (m), by the tree's box."""
+    n = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
+    if table.kind[b] == HALF_SPACE:  # the only way out is along its normal
+        return -float(out[DISTANCE])
+    d = rotate_back(pose.R_B, opposite(n))
+    reach: float = reach_of_tree(table, a, pose.R_A, n) + core_support(table, b, d[0], d[1], d[2]) + rounding(table, b)
+    return reach - dot(n, pose.p)
+
+
 @device
 def overlap_of_solid(
     multibody: Any, i: int, j: int, now: float, query: Any, tolerance: float, scratch: Any, result: Any
 ) -> float:
     """Write the contact of bodies i and j at `now` (s) into a result row, if one is a mesh that overlaps a solid.
 
+    A translation along the normal that parts both may be longer than the depth; the bound holds that of the tree's box.
     query: ContactQuery. tolerance: largest error (m) that this may add. The contact names no features. Returns 0; or
     APART; or NONE if only `body_contact` can tell.
     """
@@ -60,17 +82,18 @@ def overlap_of_solid(
     least, most = solid_range(table.blocks, root_of(table, a), table.margin[a], table, b, pose, wanted, out, memory)
     if not most <= 0.0:
         return apart_or_none(multibody, a, b, pose, there, query, scratch) if least == inf else NONE
+    half = 0.5 * (most - least)
+    out[BOUND] += max(half, _parting(table, a, b, pose, out) + most - half)
     if is_swapped:
         mirror(out, p)
     for c in range(CONTACT_SIZE):
         result[c] = out[c]
-    half = 0.5 * (most - least)
     for c in range(3):
         result[POINT_A + c] += origin[c]
         result[POINT_B + c] += origin[c]
     result[CLOSING] = closing_now(bodies, i, j, there, result)
     result[DISTANCE] = most - half
-    result[BOUND] += half + widening(there, query.stale_acceleration)
+    result[BOUND] += widening(there, query.stale_acceleration)
     result[STATUS] = TOUCHING
     result[SHAPE_I], result[SHAPE_J] = bodies.first_shape[i], bodies.first_shape[j]
     for c in range(3):

@@ -1,9 +1,9 @@
 """First impacts of meshes that are not due yet: only until when their boxes stay apart (`mesh_impact_tolerance`).
 
-The search of tree_impact.py, ended as soon as two boxes are so small and so near that their triangles are within a gap
-of some cm. The lower end is as certain as that of a full search. A collision is certain if triangles meet at one of a
-few later times; else the upper end is open. Pairs that are due get a full search, so far pairs are coarse and near
-pairs exact.
+The search of tree_impact.py or solid_impact.py, ended as soon as boxes are so small and so near that their triangles
+are within a gap of some cm. The lower end is as certain as that of a full search. A collision is certain if triangles
+meet at one of a few later times; else the upper end is open. Pairs that are due are searched again from there, with a
+gap of at least the motion in a step.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from collision_monitor.geometry.shape_table import HALF_SPACE
 from collision_monitor.meshes.inside import OUTSIDE
 from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.vector import dot
-from collision_monitor.prediction.body_impact import ShapePair, Tube, closing_speed, tube_of
+from collision_monitor.prediction.body_impact import ShapePair, Tube, body_impact, closing_speed, tube_of
 from collision_monitor.prediction.coarse_solid import solid_near, solid_overlaps
 from collision_monitor.prediction.coarse_trees import TOO_MANY, Nearness, pose_at, trees_near, trees_overlap
 from collision_monitor.prediction.impact_record import (
@@ -69,6 +69,15 @@ def _overlap(table, parts, pair, t, allowed, scratch):
     return solid_overlaps(table, parts, pair, t, allowed, scratch)
 
 
+@inlined
+def _together(A, B, window, margin):
+    """First and last time (s) after the begin of a window at which the bounding spheres of two motions may overlap."""
+    begin, end = window
+    tube, approach = tube_of(A, B, begin), approach_at(A, B, begin)
+    growth = tube.growth + half_acceleration(A, B) * (end - begin)
+    return sphere_interval(approach.p, approach.v, A.radius + B.radius + margin + tube.start, growth, end - begin, 1.0)
+
+
 @outlined
 def coarse_impact(multibody, i, j, window, query, near, scratch, event):
     """Write a bound on the first impact of two bodies with `has_bounds` into the IMPACT record `event`.
@@ -77,15 +86,13 @@ def coarse_impact(multibody, i, j, window, query, near, scratch, event):
     bodies may be inside the other. near: Nearness; the radius of the smaller body limits its gap too.
     """
     table, parts, bodies = multibody
-    begin, end = window
+    begin = window.begin
     if bodies.id[i] > bodies.id[j]:
         i, j = j, i
     A, B = bodies.motion[i], bodies.motion[j]
     event.status = CLEAR
     tube, approach = tube_of(A, B, begin), approach_at(A, B, begin)
-    bent = half_acceleration(A, B) * (end - begin)
-    reach = A.radius + B.radius + query.margin
-    first, last = sphere_interval(approach.p, approach.v, reach + tube.start, tube.growth + bent, end - begin, 1.0)
+    first, last = _together(A, B, window, query.margin)
     if first > last:
         return True
     pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
@@ -131,27 +138,27 @@ def has_bounds(multibody, i, j):
 
 @direct
 @kernel
-def bound_meshes(multibody, pairs, now, query, near, events, rest, scratch):
-    """Write bounds on the first impacts of pairs (P, 2) into events (IMPACT), and the pairs without bounds into rest.
-
-    rest (P, 2). Times as for `predict_pairs`. near: Nearness. Returns (number of impacts, number of other pairs, number
-    of searches).
-    """
-    n = left = made = 0
+def predict_coarsely(multibody, pairs, now, query, near, events, scratch):
+    """As `predict_pairs`, but with bounds on the impacts of pairs with `has_bounds`. near: Nearness."""
+    bodies = multibody.bodies
+    n = queries = 0
     for k in range(pairs.shape[0]):
         ahead = min(k + PREFETCH_AHEAD, pairs.shape[0] - 1)
-        prefetch(multibody.bodies.motion, np.intp(pairs[ahead, 0]))
-        prefetch(multibody.bodies.motion, np.intp(pairs[ahead, 1]))
+        prefetch(bodies.motion, np.intp(pairs[ahead, 0]))
+        prefetch(bodies.motion, np.intp(pairs[ahead, 1]))
         i, j = pairs[k, 0], pairs[k, 1]
+        window = window_of(bodies, i, j, now)
+        if window.begin > now and window.begin >= window.end:
+            continue
+        is_known = False
         if has_bounds(multibody, i, j):
-            window = window_of(multibody.bodies, i, j, now)
-            if window.begin > now and window.begin >= window.end:
+            first, last = _together(bodies.motion[i], bodies.motion[j], window, query.margin)
+            if first > last:
                 continue
-            made += 1
-            if coarse_impact(multibody, i, j, window, query, near, scratch, events[n]):
-                if events[n].status != CLEAR:
-                    n += 1
-                continue
-        rest[left, 0], rest[left, 1] = i, j
-        left += 1
-    return n, left, made
+            queries += 1
+            is_known = coarse_impact(multibody, i, j, window, query, near, scratch, events[n])
+        if not is_known:
+            queries += body_impact(multibody, i, j, window, query, scratch, events[n])
+        if events[n].status != CLEAR:
+            n += 1
+    return n, queries

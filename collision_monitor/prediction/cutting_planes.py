@@ -9,7 +9,8 @@ from __future__ import annotations
 from math import inf
 from typing import Any, Final, NamedTuple
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import inlined
+from collision_monitor.prediction.flat_sides import has_side
 from collision_monitor.prediction.obstacle_planes import (
     AT_REST,
     MOST_PLANES,
@@ -26,6 +27,14 @@ first one if the search is careful, so that all planes of a segment are compared
 
 BLOCK: Final = 256
 """Number of samples among which the one that passes most briefly is sought; all if the search is careful."""
+
+
+NO_MODE: Final = -1
+"""In place of a mode, see obstacle_planes.py: all are to be tried."""
+
+COARSER: Final = 4.0
+"""Factor by which the tolerance of a segment may grow, to the largest gap that no plane closes: the gaps there are not
+straight enough for less."""
 
 
 class CutSettings(NamedTuple):
@@ -65,23 +74,43 @@ def _entering(entry, leave, checked, first, last):
     return -1
 
 
-@device
+@inlined
+def _sole_mode(table, pair, n, settings, obstacle):
+    """Mode of a plane along n (3,) where obstacle.placed has the shapes; NO_MODE: any, both have a side along it."""
+    has_a = settings.follows[0] and has_side(table, pair.a, obstacle.placed[0], n)
+    has_b = settings.follows[1] and has_side(table, pair.b, obstacle.placed[1], n)
+    if (has_a and has_b) or settings.careful:
+        return NO_MODE
+    return 0 if has_a else 1 if has_b else AT_REST
+
+
+@inlined
 def _cut(table, pair, n, samples, direction, k, settings, memory):
     """Add the plane along the direction that separates sample n. Its normal may turn with a body.
 
     The gap counts as a straight line between the ends of the segment. Where another corner of a long body comes nearest
     on the way, it is larger, and the plane separates nothing. So the normal has to shorten the time of sample n inside.
-    Of those that do, the best is the one behind which TRIED samples spend the least time. Returns whether there is one.
+    If only one shape has a side along the plane, the normal turns with it, and is at rest if none has. Otherwise, or if
+    that separates nothing, the best one is that behind which TRIED samples spend the least time. Returns whether there
+    is one.
     """
     obstacle, rows, entry, leave = memory.obstacle, memory.rows, memory.entry, memory.leave
-    first = 0 if settings.careful else n // TRIED * TRIED
-    last = min(first + TRIED, samples)
     count, nodes = obstacle.count[k], obstacle.node[k : k + 2]
     planes, margin, before = obstacle.planes[k, count : count + 1], plane_margin(settings), leave[n] - entry[n]
+    turning, tried = settings.turning, _sole_mode(table, pair, direction, settings, obstacle)
+    if tried != NO_MODE:
+        set_plane(direction, tried, obstacle, planes[0])
+        enter_planes(table, pair, planes, margin, turning, nodes, n, n + 1, rows, entry, leave)
+        if leave[n] - entry[n] < before:
+            enter_planes(table, pair, planes, margin, turning, nodes, 0, samples, rows, entry, leave)
+            obstacle.count[k] += 1
+            return True
+    first = 0 if settings.careful else n // TRIED * TRIED
+    last = min(first + TRIED, samples)
     best, latest, span = -1, -inf, nodes[1].time - nodes[0].time
-    trial_entry, trial_leave, turning = memory.trial[0], memory.trial[1], settings.turning
+    trial_entry, trial_leave = memory.trial[0], memory.trial[1]
     for mode in (AT_REST, 0, 1):
-        if mode != AT_REST and not settings.follows[mode]:
+        if mode == tried or (mode != AT_REST and not settings.follows[mode]):
             continue
         set_plane(direction, mode, obstacle, planes[0])
         for m in range(first, last):
@@ -106,7 +135,7 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
     return True
 
 
-@device
+@inlined
 def _separation_of(table, parts, pair, n, t, k, turning, memory, scratch):
     """Separation (m) of sample n at time t in segment k."""
     obstacle, off, first, last = memory.obstacle, memory.off, memory.rows.node[0], memory.rows.node[1]
@@ -128,15 +157,18 @@ def _between(first, last, row, n, share):
     )
 
 
-@device
-def _check(table, parts, pair, n, at, samples, k, settings, memory, scratch):
-    """Add a plane to segment k if sample n is apart at that time. Return whether that shortens its time inside."""
+@inlined
+def _check(table, parts, pair, n, at, samples, k, tolerance, settings, memory, scratch):
+    """Add a plane to segment k if sample n is apart at that time by more than the tolerance (m).
+
+    Returns whether that shortens its time inside, and the gap (m).
+    """
     gap = _separation_of(table, parts, pair, n, at, k, settings.turning, memory, scratch) - settings.margin
     direction = (scratch.out[0], scratch.out[1], scratch.out[2])
-    return gap > settings.tolerance and _cut(table, pair, n, samples, direction, k, settings, memory)
+    return gap > tolerance and _cut(table, pair, n, samples, direction, k, settings, memory), gap
 
 
-@device
+@inlined
 def cut_extremes(table, parts, pair, k, extremes, settings, memory, scratch):
     """Add planes to segment k of memory.obstacle where some samples of the pilot, the farthest ones, need them.
 
@@ -145,11 +177,12 @@ def cut_extremes(table, parts, pair, k, extremes, settings, memory, scratch):
     obstacle, entry, leave = memory.obstacle, memory.entry, memory.leave
     for n in extremes:
         while entry[n] <= leave[n] and obstacle.count[k] < MOST_PLANES:
-            if not _check(table, parts, pair, n, entry[n], settings.pilot, k, settings, memory, scratch):
+            at, tolerance = entry[n], settings.tolerance
+            if not _check(table, parts, pair, n, at, settings.pilot, k, tolerance, settings, memory, scratch)[0]:
                 break
 
 
-@device
+@inlined
 def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch):
     """Add planes to segment k of memory.obstacle for a pair of shapes (ShapePair), where the first `samples` need them.
 
@@ -163,6 +196,7 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
     size = samples if settings.careful else min(BLOCK, samples)
     blocks = -(-samples // size)
     block, cursor, verified, idle = k, 0, 0, 0
+    tolerance, coarsest = settings.tolerance, COARSER * settings.tolerance
     is_brief = False
     while verified < wanted and idle < 2 * blocks and obstacle.count[k] < MOST_PLANES:
         is_brief = not is_brief
@@ -178,14 +212,16 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
             continue
         idle, checked[n] = 0, 1.0
         at = 0.5 * (entry[n] + leave[n]) if is_brief else entry[n]
-        if _check(table, parts, pair, n, at, samples, k, settings, memory, scratch):
+        is_cut, gap = _check(table, parts, pair, n, at, samples, k, tolerance, settings, memory, scratch)
+        if is_cut:
             checked[n] = 0.0
             verified //= 2
         else:
             verified += 1
+            tolerance = min(max(tolerance, gap), coarsest)
 
 
-@device
+@inlined
 def carry_planes(table, pair, k, settings, memory):
     """Start segment k + 1 with those planes of segment k that keep most apart a sample of the pilot at its end."""
     obstacle, rows, pilot, turning = memory.obstacle, memory.rows, settings.pilot, settings.turning
@@ -208,7 +244,7 @@ def carry_planes(table, pair, k, settings, memory):
             obstacle.count[k + 1] += 1
 
 
-@device
+@inlined
 def begin_segment(table, pair, k, settings, memory, points, first, last):
     """Set the intervals of the samples first:last to those behind the planes of segment k.
 
@@ -224,7 +260,7 @@ def begin_segment(table, pair, k, settings, memory, points, first, last):
     enter_planes(table, pair, planes, margin, settings.turning, nodes, first, last, rows, entry, leave)
 
 
-@device
+@inlined
 def end_segment(entry, leave, times, first, last):
     """Set the times (S,) of the samples first:last that met in a segment; return the number of those that never met."""
     left = 0

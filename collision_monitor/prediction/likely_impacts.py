@@ -132,7 +132,11 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
             continue
         followed += samples
         answer = answers[k]
-        weights, sums = (lattice.even, lattice.even_sums) if sure else (lattice.weights, lattice.sums)
+        weights, sums = (memory.chosen.weights, memory.chosen.sums)
+        if sure:
+            weights, sums = lattice.even, lattice.even_sums
+        elif form != NOT_ROUND:
+            weights, sums = lattice.weights, lattice.sums
         outward = EVENLY_OUTWARD if sure else OUTWARD
         first = summarise_by_bins(memory.times[0:samples], weights, sums, outward, sampling.confidence, memory, answer)
         if answer[EARLIEST] == NOT_FOUND:

@@ -80,7 +80,7 @@ def begin_term(row, along, size):
     row[ALONG], row[SIZE] = along, size
 
 
-@device
+@inlined
 def add_reach(table, s, body, R, o, n, plane, turn, terms, count):
     """Subtract the support value of shape s of a body, along n for A and -n for B, from the gap in terms[LINEAR].
 

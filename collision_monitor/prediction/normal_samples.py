@@ -25,6 +25,10 @@ WIDENED: Final = 1.5
 FURTHEST: Final = 4.5
 """Standard deviations beyond which errors are neglected; 7 of a million are larger."""
 
+BASE: Final = 256
+"""Number of samples of the coarser lattice that each pair has that may meet, see chosen_samples.py. Of fewer, because
+of their weights, the earliest time would have to be that of grown bodies."""
+
 _GOLDEN_RATIO: Final = 0.6180339887498949
 
 
@@ -101,6 +105,14 @@ class SampleColumns(NamedTuple):
     """(2, n): their sums, and of their squares."""
     pilot: int
     """Number of samples of the coarser lattice."""
+    order: NDArray[np.int64]
+    """(pilot,): sorts the coarser lattice by its first coordinate."""
+    ranked: NDArray[np.int64]
+    """The samples after the first BASE, sorted by their first coordinate."""
+    ranked_sums: NDArray[np.float64]
+    """Sum of the weights of those before each of them, and of all."""
+    place: NDArray[np.int64]
+    """(pilot + 1,): index in `ranked` at which the samples begin that lie beyond each rank of the coarser lattice."""
     extremes: NDArray[np.int64]
     """The samples of the coarser lattice that are farthest in some directions of position and velocity: axes first."""
 
@@ -118,7 +130,22 @@ def sample_columns(count: int) -> SampleColumns:
     sums = np.cumsum([weights[order], weights[order] ** 2], axis=1)
     even = np.full(count, 1.0 / count)
     even_sums = np.cumsum([even, even**2], axis=1)
-    columns = SampleColumns(ordered, weights[order], sums, even, even_sums, pilot, _extremes(ordered[:6, :pilot]))
+    first = ordered[0]
+    by_first, base = np.argsort(first[:pilot], kind="stable"), min(BASE, count)
+    ranked = base + np.argsort(first[base:], kind="stable")
+    columns = SampleColumns(
+        ordered,
+        weights[order],
+        sums,
+        even,
+        even_sums,
+        pilot,
+        by_first,
+        ranked,
+        np.concatenate([[0.0], np.cumsum(weights[order][ranked])]),
+        np.concatenate([[0], np.searchsorted(first[ranked], first[by_first[1:]]), [count - base]]),
+        _extremes(ordered[:6, :pilot]),
+    )
     columns.points.flags.writeable = columns.weights.flags.writeable = False
     return columns
 

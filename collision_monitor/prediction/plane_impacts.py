@@ -11,6 +11,7 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.shape_table import HALF_SPACE
 from collision_monitor.prediction.bodies import next_pair
 from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
+from collision_monitor.prediction.chosen_samples import choose_samples
 from collision_monitor.prediction.cutting_planes import (
     CutSettings,
     begin_segment,
@@ -30,7 +31,8 @@ from collision_monitor.prediction.pair_errors import (
     turned_at,
     turning_order,
 )
-from collision_monitor.prediction.sample_count import latest, samples_needed
+from collision_monitor.prediction.quiet_segments import stay_apart
+from collision_monitor.prediction.sample_count import latest
 from collision_monitor.prediction.screening import meeting
 from collision_monitor.prediction.straight_samples import draw_evenly, set_errors
 from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE
@@ -139,8 +141,11 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
     is_rough = segments > MOST_PARTS and large and spins
     if is_rough and not sampling.stated:
         return Laid(segments, settings, False)
-    left = samples
+    left, skips = samples, not flat and search.verified > 0
     for k in range(segments):
+        if skips and stay_apart(table, parts, pair, k, errors, margin, memory.obstacle, work):
+            memory.obstacle.is_quiet[k] = True
+            continue
         begin_segment(table, pair, k, settings, memory, search.points, 0, samples)
         cut_extremes(table, parts, pair, k, search.extremes, settings, memory, scratch)
         cut_planes(table, parts, pair, k, samples, (1 + careful) * search.verified, settings, memory, scratch)
@@ -160,9 +165,7 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
     verified: number of samples of all that must need no new plane; tolerance (m): see CutSettings.
     """
     segments, pilots, _ = laid
-    settings = CutSettings(
-        pilots.margin, tolerance, pilots.pilot, pilots.follows, pilots.turning, pilots.careful
-    )
+    settings = CutSettings(pilots.margin, tolerance, pilots.pilot, pilots.follows, pilots.turning, pilots.careful)
     alone, times = memory.alone, memory.times
     for n in range(samples):
         alone[n] = inf
@@ -182,7 +185,7 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
 def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
     """Write the times of the samples' impacts of bodies i and j into memory.times.
 
-    work.joint: root of the covariance of the pair. Returns the number of samples, see `samples_needed`, or TOO_FAST.
+    work.joint: root of the covariance of the pair. Returns the number of samples, see `choose_samples`, or TOO_FAST.
     """
     table, parts, bodies = multibody
     A, B = work.motion[0], work.motion[1]
@@ -205,10 +208,11 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
         pair = ShapePair(A, B, a, b)
         until = min(end, latest(times, pilot))
         laid = _lay_planes(table, parts, pair, errors, search, until, sampling, memory, work)
-    samples, until = samples_needed(times, lattice, sampling, laid.settings.careful), latest(times, pilot)
+    until = latest(times, pilot)
+    samples = choose_samples(times, lattice, sampling, laid.settings.careful, memory.chosen)
     if samples == 0:
         return 0
-    meets = until < inf
+    meets, points = until < inf, memory.chosen.points
     set_errors(work.joint, work.frame, errors.time, points, pilot, samples, memory.off)
     for n in range(times.size):
         times[n] = inf

@@ -8,9 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.prediction.impact_histogram import BINS
+from collision_monitor.prediction.normal_samples import DIMENSIONS
 from collision_monitor.prediction.obstacle_planes import Obstacle, make_obstacle
 from collision_monitor.prediction.sample_gaps import APART, SampleRows, make_sample_rows
 from collision_monitor.prediction.straight_samples import ERRORS
+
+
+class ChosenSamples(NamedTuple):
+    """Samples of one pair, see chosen_samples.py. Scratch memory of one thread for S samples."""
+
+    points: Any  # (DIMENSIONS, S)
+    weights: Any  # (S,)
+    sums: Any  # (2, S): sum of the weights up to the last chosen sample, and of their squares; no others
 
 
 class PlaneMemory(NamedTuple):
@@ -26,6 +35,7 @@ class PlaneMemory(NamedTuple):
     checked: Any  # (S,)
     trial: Any  # (2, S)
     bins: Any  # (BINS,)
+    chosen: ChosenSamples
 
 
 def make_plane_memory(samples: int) -> PlaneMemory:
@@ -45,4 +55,5 @@ def make_plane_memory(samples: int) -> PlaneMemory:
         checked=numbers(),
         trial=np.zeros((2, samples)),
         bins=np.zeros(BINS),
+        chosen=ChosenSamples(np.zeros((DIMENSIONS, samples + APART)), numbers(), np.zeros((2, samples))),
     )

@@ -44,14 +44,20 @@ def _axis(R, side):
 
 
 @inlined
-def _levels(table, pair, t, axis, offsets):
-    """Lowest and highest point that two cylinders share at time t, and the origin of B, over that of A (m)."""
+def _ends(table, pair, t, axis, offsets):
+    """Lowest and highest points of both cylinders at time t, and the height of B's origin, over the origin of A (m)."""
     A, B, a, b = pair
     x, y, z = B.x - A.x + t * (B.vx - A.vx), B.y - A.y + t * (B.vy - A.vy), B.z - A.z + t * (B.vz - A.vz)
     up = dot((x, y, z), axis)
     middle_a, middle_b = dot(offsets[0], axis), up + dot(offsets[1], axis)
     half_a, half_b = table.size[a, 1], table.size[b, 1]
-    return max(middle_a - half_a, middle_b - half_b), min(middle_a + half_a, middle_b + half_b), up
+    return (middle_a - half_a, middle_a + half_a), (middle_b - half_b, middle_b + half_b), up
+
+
+@inlined
+def _shared(ends):
+    """Height (m) that two cylinders with these ends share; negative: one is above the other."""
+    return min(ends[0][1], ends[1][1]) - max(ends[0][0], ends[1][0])
 
 
 @device
@@ -79,14 +85,33 @@ def round_form(table, parts, pair, errors, margin, work):
         across = cross(o, axis)
         if sqrt(dot(across, across)) * (turned_at(errors, side) + spin_rate(m)) > 0.0:
             return NOT_ROUND
-    low, high, _ = _levels(table, pair, errors.time, other, (oa, ob))
-    now_low, now_high, _ = _levels(table, pair, 0.0, other, (oa, ob))
+    then, now = _ends(table, pair, errors.time, other, (oa, ob)), _ends(table, pair, 0.0, other, (oa, ob))
     aslant += sqrt(turned_at(errors, 0) ** 2 + turned_at(errors, 1) ** 2)
-    if min(high - low, now_high - now_low) < 2.0 * FURTHEST * errors.sigma and aslant > 0.5 * SAGGING:
-        return NOT_ROUND  # one may pass over the other, and the heights that they share matter
-    between = (high - low) / (LEVELS - 1) * aslant
-    flat = 0.125 * between * between / (table.size[a, 0] + table.size[b, 0])
-    return TILTED if flat < SAGGING * errors.sigma else NOT_ROUND
+    reach, most = table.size[a, 0] + table.size[b, 0], SAGGING * errors.sigma
+    if min(_shared(then), _shared(now)) < 2.0 * FURTHEST * errors.sigma and aslant > 0.5 * SAGGING:
+        rim = 0.5 * max(table.size[a, 0], table.size[b, 0])
+        if max(abs(then[2] - now[2]), rim) * aslant > most:
+            return NOT_ROUND  # one may pass over the other, and touch its rim
+    between = _shared(then) / (LEVELS - 1) * aslant
+    return TILTED if max(0.125 * between * between / reach, 0.5 * reach * aslant * aslant) < most else NOT_ROUND
+
+
+@inlined
+def _set_lowest(then, t, axis, first, last, off, lifts, step):
+    """Write the ways (m) from the origins of A, down, and of B, up, to the lowest height that the samples first:last
+    share, into lifts (2, S), and the way to the next level into step (S,).
+
+    then: see `_ends`, at time t (s). The heights are those of the stated motion, moved by each sample's error.
+    """
+    (low_a, high_a), (low_b, high_b), stated = then
+    ax, ay, az = axis
+    x, y, z = off[0, first:last], off[1, first:last], off[2, first:last]
+    u, v, w = off[3, first:last], off[4, first:last], off[5, first:last]
+    down, up, step = lifts[0, first:last], lifts[1, first:last], step[first:last]
+    for n in range(step.size):
+        above = (x[n] + t * u[n]) * ax + (y[n] + t * v[n]) * ay + (z[n] + t * w[n]) * az
+        low, high = max(low_a, low_b + above), min(high_a, high_b + above)
+        down[n], up[n], step[n] = -low, low - stated - above, (high - low) / (LEVELS - 1)
 
 
 @device
@@ -96,33 +121,23 @@ def _enter_tilted(table, parts, pair, errors, end, first, last, points, memory, 
     R, off, times = work.scratch.rotation, memory.off, memory.times
     offsets = place_shape(table, parts, a, A.rotation, R[0]), place_shape(table, parts, b, B.rotation, R[1])
     one, other, reach = _axis(R, 0), _axis(R, 1), table.size[a, 0] + table.size[b, 0]
-    slow_a, slow_b = cross((A.wx, A.wy, A.wz), one), cross((B.wx, B.wy, B.wz), other)
-    low, high, up = _levels(table, pair, errors.time, other, offsets)
+    lean_a = (one[0] - other[0], one[1] - other[1], one[2] - other[2]), cross((A.wx, A.wy, A.wz), one)
+    lean_b = (0.0, 0.0, 0.0), cross((B.wx, B.wy, B.wz), other)
+    then, half = _ends(table, pair, errors.time, other, offsets), table.size[a, 1] + table.size[b, 1]
     middle = dot(offsets[1], other) - dot(offsets[0], other)
-    half = table.size[a, 1] + table.size[b, 1]
+    p = (B.x - A.x + middle * other[0], B.y - A.y + middle * other[1], B.z - A.z + middle * other[2])
+    v = (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
+    lifts, step = memory.trial, memory.entry
+    _set_lowest(then, errors.time, other, first, last, off, lifts, step)
     for n in range(first, last):
         times[n] = inf
-    known_a = known_b = 0.0
-    for level in range(LEVELS):
-        height_a = low + level * (high - low) / (LEVELS - 1)
-        height_b = height_a - up
-        tilt(points, 6, one, known_a - height_a, errors.turning[0], first, last, off)
-        tilt(points, 9, other, height_b - known_b, errors.turning[1], first, last, off)
-        known_a, known_b = height_a, height_b
-        down = middle + height_a - height_b  # the height of B's middle over that of A counts, not that of the level
-        p = (
-            B.x - A.x + (height_b + down) * other[0] - height_a * one[0],
-            B.y - A.y + (height_b + down) * other[1] - height_a * one[1],
-            B.z - A.z + (height_b + down) * other[2] - height_a * one[2],
-        )
-        v = (
-            B.vx - A.vx + height_b * slow_b[0] - height_a * slow_a[0],
-            B.vy - A.vy + height_b * slow_b[1] - height_a * slow_a[1],
-            B.vz - A.vz + height_b * slow_b[2] - height_a * slow_a[2],
-        )
+    for _level in range(LEVELS):
+        tilt(points, 6, one, lifts[0], errors.turning[0], lean_a, first, last, off)
+        tilt(points, 9, other, lifts[1], errors.turning[1], lean_b, first, last, off)
         enter_cylinder(p, v, other, reach, half, end, off, first, last, memory.alone)
         for n in range(first, last):
             times[n] = min(times[n], memory.alone[n])
+            lifts[0, n], lifts[1, n] = -step[n], step[n]
 
 
 @device

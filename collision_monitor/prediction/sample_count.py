@@ -6,10 +6,7 @@ from math import inf
 from typing import Final
 
 from collision_monitor._jit import device, inlined
-
-SURE_SAMPLES: Final = 256
-"""Number of samples of a pair that meets in all of the pilot: they differ only in their times. With fewer, because of
-their weights, the earliest time would have to be that of grown bodies."""
+from collision_monitor.prediction.normal_samples import BASE
 
 PILOT_PART: Final = 0.3
 """A pair of shapes that is stated to pass is left out if it meets in the pilot with less than this fraction of
@@ -33,7 +30,7 @@ def latest(times, count):
 def samples_needed(times, lattice, sampling, careful):
     """Number of samples for bodies with these times (S,) of the pilot's samples; infinite: they do not meet.
 
-    0: the bodies are stated to pass, and hardly meet in the pilot. SURE_SAMPLES: they meet in all of it.
+    0: the bodies are stated to pass, and hardly meet in the pilot. BASE: they meet in all of it.
     careful: take all samples also if nearly all of the pilot meets.
     """
     weights, pilot = lattice.weights, lattice.pilot
@@ -44,5 +41,5 @@ def samples_needed(times, lattice, sampling, careful):
     if seen < part * PILOT_PART * sampling.min_probability and not sampling.stated:
         return 0
     if latest(times, pilot) < inf:
-        return min(SURE_SAMPLES, weights.size)
+        return min(BASE, weights.size)
     return max(pilot, weights.size // 2) if part - seen < RARE * part and not careful else weights.size

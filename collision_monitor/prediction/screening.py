@@ -76,8 +76,8 @@ def _quadratic(block, row, column, n):
 
 
 @device
-def _least_beta(gaps, n, turning, joint, t, window):
-    """Smallest number of standard deviations between a pair and contact along n (3,); its time; a bound.
+def _least_beta(gaps, n, turning, joint, t, at, window):
+    """Standard deviations between a pair and contact along n (3,) at a time; when they are fewest; a bound.
 
     gaps: at both ends of the window (m). turning: standard deviation of the surfaces from errors of orientation (m now,
     m/s). joint (6, 6): covariance of position at time t and of velocity. The gap is linear in time, so that it closes
@@ -102,7 +102,8 @@ def _least_beta(gaps, n, turning, joint, t, window):
             if between < beta:
                 beta, when = between, s
     both_signs = 2.0 if turning[0] + turning[1] > 0.0 else 1.0  # a turn either way closes the gap
-    return beta, when, both_signs * (_tail(at_begin) + _tail(at_end))
+    here = (g + r * at) / sqrt(max(c + at * (2.0 * d + at * e), 1e-300))
+    return here, when, both_signs * (_tail(at_begin) + _tail(at_end))
 
 
 @inlined
@@ -123,11 +124,14 @@ def _set_window(table, parts, pair, window, bend, work, obstacle):
 
 @inlined
 def _bound(table, pair, n, times, turning, margin, obstacle, work):
-    """`_least_beta` along n (3,) in the window that is set. times: see work.joint, and both ends of the window (s)."""
-    t, begin, end = times
+    """`_least_beta` along n (3,) in the window that is set.
+
+    times: see work.joint, that of the deviations, and both ends of the window (s).
+    """
+    t, at, begin, end = times
     first = stated_gap(table, pair, n, obstacle.node[0], margin)
     last = stated_gap(table, pair, n, obstacle.node[1], margin) if begin < end else first
-    return _least_beta((first, last), n, turning, work.joint, t, Window(begin, end))
+    return _least_beta((first, last), n, turning, work.joint, t, at, Window(begin, end))
 
 
 @inlined
@@ -154,8 +158,9 @@ def design_point(multibody, i, j, tube, turning, bend, sampling, t, obstacle, wo
             own = 1.0
             if A.radius + B.radius < inf:
                 bent = _set_window(table, parts, pair, Window(begin, end), bend, work, obstacle)
-                n = _towards(A, B, min(max(t, begin), end))
-                own = _bound(table, pair, n, (t, begin, end), turning, margin + bent, obstacle, work)[2]
+                at = min(max(t, begin), end)
+                n = _towards(A, B, at)
+                own = _bound(table, pair, n, (t, at, begin, end), turning, margin + bent, obstacle, work)[2]
         if own >= ENOUGH * sampling.min_probability:
             status = HIT
             if bend > 0.0 and begin < end:
@@ -174,11 +179,11 @@ def design_point(multibody, i, j, tube, turning, bend, sampling, t, obstacle, wo
                         break
                     n = (scratch.out[0], scratch.out[1], scratch.out[2])
                     beta, when, outside = _bound(
-                        table, pair, n, (t, begin, end), turning, margin + bent, obstacle, work
+                        table, pair, n, (t, at, begin, end), turning, margin + bent, obstacle, work
                     )
                     own = min(own, outside)
-                    if beta < least:
-                        least, likeliest = beta, when
+                    if beta < least:  # at `when`, another direction may keep the bodies farther apart
+                        least, likeliest = beta, at
                         frame[0, 0], frame[0, 1], frame[0, 2] = n
                     if abs(when - at) <= SAME_TIME * (end - begin):
                         break

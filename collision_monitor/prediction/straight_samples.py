@@ -110,20 +110,21 @@ def enter_cylinder(p, v, axis, radius, half, end, off, first, last, times):
 
 
 @device
-def tilt(points, row, axis, up, turning, first, last, off):
-    """Move the samples first:last as errors of orientation move a point on a body's axis.
+def tilt(points, row, axis, lift, turning, lean, first, last, off):
+    """Move the samples first:last with a point that moves up a body's axis, as errors of orientation tilt it.
 
-    axis (3,): unit vector; up: height (m) of the point over the body's origin along it; turning: error of orientation
-    now (rad) and its rate (rad/s), one standard deviation. points (DIMENSIONS, S): unit errors, three rows from `row`.
+    axis (3,): unit vector; lift (S,): way (m) of the point along it; turning: error of orientation now (rad) and its
+    rate (rad/s), one standard deviation; lean: way of the point for each metre (3,), and its rate (3,) in 1/s. points
+    (DIMENSIONS, S): unit errors, three rows from `row`.
     """
     ax, ay, az = axis
-    x, y, z = points[row, first:last], points[row + 1, first:last], points[row + 2, first:last]
+    x, y, z, by = points[row, first:last], points[row + 1, first:last], points[row + 2, first:last], lift[first:last]
     for part in range(2):
-        by = up * turning[part]
+        off_by, (lx, ly, lz) = turning[part], lean[part]
         u, v, w = off[3 * part, first:last], off[3 * part + 1, first:last], off[3 * part + 2, first:last]
         for n in range(u.size):
-            u[n] += by * (y[n] * az - z[n] * ay)
+            u[n] += by[n] * (lx + off_by * (y[n] * az - z[n] * ay))
         for n in range(v.size):
-            v[n] += by * (z[n] * ax - x[n] * az)
+            v[n] += by[n] * (ly + off_by * (z[n] * ax - x[n] * az))
         for n in range(w.size):
-            w[n] += by * (x[n] * ay - y[n] * ax)
+            w[n] += by[n] * (lz + off_by * (x[n] * ay - y[n] * ax))

@@ -26,6 +26,7 @@ from collision_monitor.prediction.body_impact import (
     contact_at,
     shape_impact,
 )
+from collision_monitor.prediction.chosen_samples import open_ranks
 from collision_monitor.prediction.error_samples import (
     add_covariance,
     orientation_spread,
@@ -59,6 +60,13 @@ sample of a disc of 100 km that turns beside a mesh took 20 ms."""
 PILOT_PART: Final = 0.2
 """A pair that is stated to pass is left out if it meets with less than this fraction of min_probability in the first
 coarse lattice of samples. The test is repeated after each further one."""
+
+
+FEW_STRIDE: Final = 4
+"""Part of so few samples, one in so many, that decides which of the others are needed."""
+
+FEW_SPARE: Final = 3
+"""SPARE of these, see chosen_samples.py."""
 
 
 @device
@@ -276,7 +284,9 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
         )
         work.axes[:, 3] = inf  # no axis is known yet
         stride = max(1, weights.size // PILOT)
-        stride = 2 if stride == 1 and sampling.stops_early and weights.size >= PILOT else stride
+        few = stride == 1 and sampling.stops_early and weights.size >= PILOT
+        stride = FEW_STRIDE if few else stride
+        order, share, is_open = np.arange(0, weights.size, stride), weights.copy(), (0, stride, stride, stride)
         seen, met, begun = 0.0, 0, followed
         likely, surely = True, False
         for first in range(stride):
@@ -284,7 +294,15 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
             surely = stated and sampling.stops_early and first == 1 and met == followed - begun
             if not likely or surely:
                 break
+            if few and first == 1:
+                is_open = open_ranks(times, order, FEW_SPARE)
             for n in range(first, weights.size, stride):
+                rank = n // stride
+                if few and first > 0 and not (is_open[0] <= rank < is_open[1] or is_open[2] <= rank < is_open[3]):
+                    share[order[rank]] += weights[n]
+                    share[n], times[n] = 0.0, inf
+                    seen += weights[n] if times[order[rank]] < inf else 0.0
+                    continue
                 followed += 1
                 z = points[n]
                 shift(work, z, t, p, v)
@@ -309,5 +327,5 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
             some, part = times[0::stride].copy(), weights[0::stride].copy()
             summarise(some, part, np.argsort(some), sampling.confidence, safe, answers[k], part.sum())
         elif likely:
-            summarise(times, weights, np.argsort(times), sampling.confidence, safe, answers[k], 1.0)
+            summarise(times, share, np.argsort(times), sampling.confidence, safe, answers[k], 1.0)
     return followed

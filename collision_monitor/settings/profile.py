@@ -105,7 +105,7 @@ class Profile:
         0.0,
         1e3,
         "m",
-        "Gap up to which a predicted impact of two meshes is only bounded, until it is due. With 0, impact_tolerance.",
+        "Gap up to which a predicted impact of a mesh is only bounded, until it is due. With 0, impact_tolerance.",
         predictions=True,
     )
     impact_iterations: int = number(

@@ -1,0 +1,59 @@
+"""Quiet segments: parts of the time in which one plane keeps two uncertain shapes apart, so that no sample meets there.
+
+Along one direction the gap of a sample is linear in time, so that it closes in a segment only if it is closed at one of
+its ends. There it is compared with its standard deviation: the separation of the stated motion in the middle of the
+segment gives the direction, which is at rest.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from collision_monitor._jit import device, inlined
+from collision_monitor.prediction.normal_samples import FURTHEST
+from collision_monitor.prediction.obstacle_planes import NOT_OFF, separation_at
+from collision_monitor.prediction.sample_gaps import stated_gap
+
+
+@inlined
+def _deviation(n, root, since, errors, t):
+    """Standard deviation (m) of the gap along n (3,), in the axes of the root, at time t; since (s): errors.time.
+
+    root (6, 6): lower Cholesky factor of the covariance of position at errors.time and of velocity.
+    """
+    variance = 0.0
+    for c in range(6):
+        factor = 0.0
+        for r in range(3):
+            factor += n[r] * (root[r, c] + since * root[3 + r, c])
+        variance += factor * factor
+    for body in range(2):
+        swing = errors.radius[body] * (errors.turning[body][0] + t * errors.turning[body][1])
+        variance += swing * swing
+    return sqrt(variance)
+
+
+@device
+def stay_apart(table, parts, pair, k, errors, margin, obstacle, work):
+    """Whether a pair of shapes stays apart in segment k of the obstacle, with errors of FURTHEST standard deviations.
+
+    work.joint: see `_deviation`, along work.frame.
+    """
+    first, last = obstacle.node[k], obstacle.node[k + 1]
+    scratch, frame = work.scratch, work.frame
+    middle, length = 0.5 * (first.time + last.time), last.time - first.time
+    if separation_at(table, parts, pair, middle, NOT_OFF, (NOT_OFF, NOT_OFF), obstacle, scratch) <= margin:
+        return False
+    n = (scratch.out[0], scratch.out[1], scratch.out[2])
+    along = (
+        frame[0, 0] * n[0] + frame[0, 1] * n[1] + frame[0, 2] * n[2],
+        frame[1, 0] * n[0] + frame[1, 1] * n[1] + frame[1, 2] * n[2],
+        frame[2, 0] * n[0] + frame[2, 1] * n[1] + frame[2, 2] * n[2],
+    )
+    margin += 0.125 * errors.bend * length * length
+    for end in range(2):
+        node = last if end else first
+        away = FURTHEST * _deviation(along, work.joint, node.time - errors.time, errors, node.time)
+        if not stated_gap(table, pair, n, node, margin) > away:
+            return False
+    return True
