@@ -54,4 +54,4 @@ MOST_PARTS: Final = 64
 COUNT: Final = 6
 """Number of points of a cloud; 0 for triangles."""
 KEY: Final = 4
-"""Digest of the tree, 16 bytes in this row and the next; equal trees of triangles have equal digests."""
+"""Digest of what a tree of triangles is made of, 16 bytes in this row and the next; so equal trees have equal ones."""

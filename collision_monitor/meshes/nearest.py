@@ -163,7 +163,7 @@ def _least(work, at):
     return least
 
 
-@device
+@inlined
 def _bounds_of(blocks_a, a, i, blocks_b, block, X, n, u, limit, work):
     """Write lower bounds on the squared distances of a box of A from the boxes of a block of B (m^2).
 

@@ -72,7 +72,10 @@ def tree_of(
         tree[behind + k // WIDTH, :3, k % WIDTH] = point
     tree[0, CLOSED, 1], tree[0, REACH, 1] = closed, np.nextafter(far * (1.0 + CONTAINED), np.inf)
     tree[0, PARTS, 1], tree[0, FIRST_PART, 1] = len(inner), behind
-    tree[0, KEY : KEY + 2, 1] = np.frombuffer(blake2b(tree.data, digest_size=16).digest())
+    digest = blake2b(digest_size=16)
+    for source in (corners, radii, tree[0, : FIRST_PART + 1, 1], tree[behind:]):  # what the tree is made of: half of it
+        digest.update(np.ascontiguousarray(source).data)
+    tree[0, KEY : KEY + 2, 1] = np.frombuffer(digest.digest())
     return tree
 
 
