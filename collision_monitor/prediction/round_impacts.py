@@ -88,8 +88,8 @@ def round_form(table, parts, pair, errors, margin, work):
     then, now = _ends(table, pair, errors.time, other, (oa, ob)), _ends(table, pair, 0.0, other, (oa, ob))
     aslant += sqrt(turned_at(errors, 0) ** 2 + turned_at(errors, 1) ** 2)
     reach, most = table.size[a, 0] + table.size[b, 0], SAGGING * errors.sigma
-    if min(_shared(then), _shared(now)) < 2.0 * FURTHEST * errors.sigma and aslant > 0.5 * SAGGING:
-        rim = 0.5 * max(table.size[a, 0], table.size[b, 0])
+    if min(_shared(then), _shared(now)) < FURTHEST * errors.sigma:
+        rim = max(table.size[a, 0], table.size[b, 0])
         if max(abs(then[2] - now[2]), rim) * aslant > most:
             return NOT_ROUND  # one may pass over the other, and touch its rim
     between = _shared(then) / (LEVELS - 1) * aslant

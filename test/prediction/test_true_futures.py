@@ -64,3 +64,17 @@ def test_people_that_pass_soon_and_may_lean_towards_each_other(turned: float) ->
         rows[f"{name}_stddev"] = off
     reported, true = stated_and_true((cm.Cylinder(0.25, 1.75), cm.Cylinder(0.25, 1.75)), rows, 20_000)
     assert reported == pytest.approx(true, abs=0.015)
+
+
+def test_flat_drones_of_which_one_passes_below_the_other() -> None:
+    """Their rims touch, so that errors of orientation matter though they are small."""
+    rows = np.zeros(2, STATE)
+    rows["id"] = 0, 1
+    rows["position"][1], rows["linear"][1] = (-1.8802, 0.3254, -0.316), (4.3897, -1.9395, 0.3768)
+    rows["quaternion"] = (0.00066, 0.00347, 0.81821, -0.57491), (0.0015, 0.00494, 0.88121, -0.47269)
+    rows["quaternion"] /= np.linalg.norm(rows["quaternion"], axis=1, keepdims=True)
+    rows["angular"] = (0.0115, -0.0017, -1.9676), (0.0077, -0.0013, 0.4217)
+    for name in NAMES:
+        rows[f"{name}_stddev"] = 0.005
+    reported, true = stated_and_true((cm.Cylinder(0.3, 0.15), cm.Cylinder(0.3, 0.15)), rows, 20_000)
+    assert reported == pytest.approx(true, abs=0.015)
