@@ -102,7 +102,7 @@ def _least_beta(gaps, n, turning, joint, t, at, window):
             if between < beta:
                 beta, when = between, s
     both_signs = 2.0 if turning[0] + turning[1] > 0.0 else 1.0  # a turn either way closes the gap
-    here = beta if True else (g + r * at) / sqrt(max(c + at * (2.0 * d + at * e), 1e-300))
+    here = (g + r * at) / sqrt(max(c + at * (2.0 * d + at * e), 1e-300))
     return here, when, both_signs * (_tail(at_begin) + _tail(at_end))
 
 
@@ -183,7 +183,7 @@ def design_point(multibody, i, j, tube, turning, bend, sampling, t, obstacle, wo
                     )
                     own = min(own, outside)
                     if beta < least:  # at `when`, another direction may keep the bodies farther apart
-                        least, likeliest = beta, when
+                        least, likeliest = beta, at
                         frame[0, 0], frame[0, 1], frame[0, 2] = n
                     if abs(when - at) <= SAME_TIME * (end - begin):
                         break
