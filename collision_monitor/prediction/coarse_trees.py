@@ -9,21 +9,19 @@ from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.meshes.approach import seen_from_b
-from collision_monitor.meshes.box_times import box_times
 from collision_monitor.meshes.contact import reach_in
 from collision_monitor.meshes.depth_range import depth_range
 from collision_monitor.meshes.layout import CENTER, CHILD, HALF, WIDTH
 from collision_monitor.meshes.leaf_times import leaf_time
-from collision_monitor.meshes.nearest import BOUNDS, PAIRS, PLACE_A, PLACE_B, opens_b, size_of
-from collision_monitor.meshes.placing import inverse, place_point, relative
+from collision_monitor.meshes.nearest import BOUNDS, PAIRS, PLACE_A, PLACE_B, size_of
+from collision_monitor.meshes.placing import place_point, relative
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.vector import dot
 from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.prediction.mesh_pair import root_of, triangles_contact
-from collision_monitor.prediction.tree_impact import HEAP, approach_at, pop_first, push_pair
+from collision_monitor.prediction.tree_impact import HEAP, approach_at, open_box, pop_first, push_pair
 
 KEEP: Final = 1.0
 """A pair of boxes is kept while its next step allows a motion longer than this part of the box that would be opened."""
@@ -106,17 +104,7 @@ def trees_near(table, parts, pair, now, window, tube, query, near, scratch):
             if t + soon < end:
                 waiting = push_pair(work, waiting, t + soon, place_a, place_b, float(triangles))
             continue
-        in_b = opens_b(blocks, a, i, child_a, blocks, b, j, child_b)
-        if in_b:
-            block, size = root_b + int(child_b), size_of(blocks, b, j)
-            box_times(blocks, a, i, blocks, block, X, move, work, BOUNDS)
-        else:
-            block, size = root_a + int(child_a), size_of(blocks, a, i)
-            box_times(blocks, b, j, blocks, block, inverse(X), seen_from_b(X, move), work, BOUNDS)
-        soon = inf
-        for k in range(WIDTH):
-            if blocks[block, CHILD, k] != 0.0:
-                soon = min(soon, work[BOUNDS + k])
+        in_b, block, size, soon = open_box(blocks, (root_a, a, i, child_a), (root_b, b, j, child_b), X, move, work)
         if soon * speed > KEEP * size and t + soon > t:
             if t + soon < end:
                 waiting = push_pair(work, waiting, t + soon, place_a, place_b, -1.0)

@@ -131,6 +131,28 @@ def spins(A, B, duration):
     return (rate_a + rate_b) * duration > MOST_TURNED or swept * duration > MOST_SWEPT * smaller
 
 
+@inlined
+def open_box(blocks, box_a, box_b, X, move, work):
+    """Open one of two boxes: write to work[BOUNDS:] until when its members stay apart from the other box (s).
+
+    box_a, box_b: root of the tree, block, member and child of each. Returns whether it is B's box, the block of its
+    members, its size (m), and the least of these times (s).
+    """
+    (root_a, a, i, child_a), (root_b, b, j, child_b) = box_a, box_b
+    in_b = opens_b(blocks, a, i, child_a, blocks, b, j, child_b)
+    if in_b:
+        block, size = root_b + int(child_b), size_of(blocks, b, j)
+        box_times(blocks, a, i, blocks, block, X, move, work, BOUNDS)
+    else:
+        block, size = root_a + int(child_a), size_of(blocks, a, i)
+        box_times(blocks, b, j, blocks, block, inverse(X), seen_from_b(X, move), work, BOUNDS)
+    soon = inf
+    for k in range(WIDTH):
+        if blocks[block, CHILD, k] != 0.0:
+            soon = min(soon, work[BOUNDS + k])
+    return in_b, block, size, soon
+
+
 @outlined
 def tree_impact(table, parts, pair, window, tube, query, scratch):
     """`shape_impact` of two shapes with trees; scratch.answer then has the places of the triangles that meet."""
@@ -177,17 +199,7 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
             if t + d < end:
                 waiting = push_pair(work, waiting, t + d, place_a, place_b, float(triangles))
             continue
-        in_b = opens_b(blocks, a, i, child_a, blocks, b, j, child_b)
-        if in_b:
-            block, size = root_b + int(child_b), size_of(blocks, b, j)
-            box_times(blocks, a, i, blocks, block, X, move, work, BOUNDS)
-        else:
-            block, size = root_a + int(child_a), size_of(blocks, a, i)
-            box_times(blocks, b, j, blocks, block, inverse(X), seen_from_b(X, move), work, BOUNDS)
-        soon = inf
-        for k in range(WIDTH):
-            if blocks[block, CHILD, k] != 0.0:
-                soon = min(soon, work[BOUNDS + k])
+        in_b, block, size, soon = open_box(blocks, (root_a, a, i, child_a), (root_b, b, j, child_b), X, move, work)
         if soon * speed > KEEP * size and t + soon > t:  # else the time has no finer resolution
             if t + soon < end:
                 waiting = push_pair(work, waiting, t + soon, place_a, place_b, -1.0)
