@@ -17,9 +17,10 @@ from collision_monitor.prediction.obstacle_planes import (
     NOT_OFF,
     PLANE_SIZE,
     separation_at,
+    set_middle,
     set_plane,
 )
-from collision_monitor.prediction.sample_gaps import NOT_TURNED, enter_planes, gaps_at_end, set_samples
+from collision_monitor.prediction.sample_gaps import NOT_TURNED, enter_planes, gaps_at_end, set_bow, set_samples
 
 TRIED: Final = 32
 """Number of samples that decide how the normal of a plane turns: a block of the samples, which are spread out. The
@@ -32,9 +33,12 @@ BLOCK: Final = 256
 NO_MODE: Final = -1
 """In place of a mode, see obstacle_planes.py: all are to be tried."""
 
+LEAST_BOW: Final = 0.1
+"""Part of the tolerance by which the gap of a plane may bend if it counts as a straight line."""
+
 COARSER: Final = 4.0
-"""Factor by which the tolerance of a segment may grow, to the largest gap that no plane closes: the gaps there are not
-straight enough for less."""
+"""Factor by which the tolerance of a segment may grow, to the largest gap that no plane closes: the gaps there
+deviate too far from parabolas for less."""
 
 
 class CutSettings(NamedTuple):
@@ -88,8 +92,8 @@ def _sole_mode(table, pair, n, settings, obstacle):
 def _cut(table, pair, n, samples, direction, k, settings, memory):
     """Add the plane along the direction that separates sample n. Its normal may turn with a body.
 
-    The gap counts as a straight line between the ends of the segment. Where another corner of a long body comes nearest
-    on the way, it is larger, and the plane separates nothing. So the normal has to shorten the time of sample n inside.
+    The gap counts as a parabola that bends as the stated one does. Where another corner of a long body comes nearest on
+    the way, it is larger, and the plane separates nothing. So the normal has to shorten the time of sample n inside.
     If only one shape has a side along the plane, the normal turns with it, and is at rest if none has. Otherwise, or if
     that separates nothing, the best one is that behind which TRIED samples spend the least time. Returns whether there
     is one.
@@ -97,9 +101,11 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
     obstacle, rows, entry, leave = memory.obstacle, memory.rows, memory.entry, memory.leave
     count, nodes = obstacle.count[k], obstacle.node[k : k + 2]
     planes, margin, before = obstacle.planes[k, count : count + 1], plane_margin(settings), leave[n] - entry[n]
+    middle, least = obstacle.middle[0], LEAST_BOW * settings.tolerance
     turning, tried = settings.turning, _sole_mode(table, pair, direction, settings, obstacle)
     if tried != NO_MODE:
         set_plane(direction, tried, obstacle, planes[0])
+        set_bow(table, pair, planes[0], nodes, middle, least)
         enter_planes(table, pair, planes, margin, turning, nodes, n, n + 1, rows, entry, leave)
         if leave[n] - entry[n] < before:
             enter_planes(table, pair, planes, margin, turning, nodes, 0, samples, rows, entry, leave)
@@ -113,6 +119,7 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
         if mode == tried or (mode != AT_REST and not settings.follows[mode]):
             continue
         set_plane(direction, mode, obstacle, planes[0])
+        set_bow(table, pair, planes[0], nodes, middle, least)
         for m in range(first, last):
             trial_entry[m] = entry[m]
             trial_leave[m] = leave[m]
@@ -131,6 +138,7 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
         return False
     obstacle.count[k] += 1
     set_plane(direction, best, obstacle, planes[0])
+    set_bow(table, pair, planes[0], nodes, middle, least)
     enter_planes(table, pair, planes, margin, turning, nodes, 0, samples, rows, entry, leave)
     return True
 
@@ -245,7 +253,7 @@ def carry_planes(table, pair, k, settings, memory):
 
 
 @inlined
-def begin_segment(table, pair, k, settings, memory, points, first, last):
+def begin_segment(table, parts, pair, k, settings, memory, points, first, last, scratch):
     """Set the intervals of the samples first:last to those behind the planes of segment k.
 
     memory.alone (S,): times of the samples that met in an earlier segment, whose intervals are empty, else infinite.
@@ -257,6 +265,9 @@ def begin_segment(table, pair, k, settings, memory, points, first, last):
         entry[n] = begin if times[n] == inf else inf
         leave[n] = end
     planes, nodes, margin = obstacle.planes[k, 0 : obstacle.count[k]], obstacle.node[k : k + 2], plane_margin(settings)
+    set_middle(table, parts, pair, k, scratch, obstacle)
+    for m in range(obstacle.count[k]):
+        set_bow(table, pair, planes[m], nodes, obstacle.middle[0], LEAST_BOW * settings.tolerance)
     enter_planes(table, pair, planes, margin, settings.turning, nodes, first, last, rows, entry, leave)
 
 

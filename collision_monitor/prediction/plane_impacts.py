@@ -146,7 +146,7 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
         if skips and stay_apart(table, parts, pair, k, errors, margin, memory.obstacle, work):
             memory.obstacle.is_quiet[k] = True
             continue
-        begin_segment(table, pair, k, settings, memory, search.points, 0, samples)
+        begin_segment(table, parts, pair, k, settings, memory, search.points, 0, samples, scratch)
         cut_extremes(table, parts, pair, k, search.extremes, settings, memory, scratch)
         cut_planes(table, parts, pair, k, samples, (1 + careful) * search.verified, settings, memory, scratch)
         before, left = left, end_segment(memory.entry, memory.leave, alone, 0, samples)
@@ -174,7 +174,7 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
     for k in range(segments):
         if memory.obstacle.is_quiet[k]:
             continue
-        begin_segment(table, pair, k, settings, memory, points, 0, samples)
+        begin_segment(table, parts, pair, k, settings, memory, points, 0, samples, work.scratch)
         cut_planes(table, parts, pair, k, samples, each, settings, memory, work.scratch)
         if end_segment(memory.entry, memory.leave, alone, 0, samples) == 0:
             break
@@ -241,7 +241,8 @@ def enter_surely(multibody, i, j, errors, sampling, lattice, memory, work):
     set_errors(work.joint, work.frame, errors.time, points, 0, samples, memory.off)
     for n in range(samples):
         times[n] = inf
-    search = Search(points, samples, lattice.extremes[0:SURE_EXTREMES], 0, FACETS_IN_PILOT, SURE_BENDING)
+    extremes = lattice.extremes[0:SURE_EXTREMES]
+    search = Search(points, samples, extremes, VERIFIED_IN_PILOT, FACETS_IN_PILOT, SURE_BENDING)
     a, first_b = bodies.first_shape[i], bodies.first_shape[j]
     b = first_b
     while a >= 0:

@@ -35,7 +35,7 @@ from collision_monitor.prediction.linear_gaps import (
     make_terms,
     sum_terms,
 )
-from collision_monitor.prediction.obstacle_planes import AT_REST, MODE, from_plane
+from collision_monitor.prediction.obstacle_planes import AT_REST, BOW, MODE, from_plane
 
 TURNED_FARTHEST: Final = 0.7
 """Largest standard deviation of an orientation (rad) for which the series of `_turn` are exact to 0.001 rad."""
@@ -254,6 +254,62 @@ def gaps_at_end(table, pair, plane, margin, turning, node, count, rows):
     _gaps_at(table, pair, plane, node, margin, turning, 0, count, rows.node[1], rows, rows.gap[1, 0:count])
 
 
+@inlined
+def set_bow(table, pair, plane, nodes, middle, least):
+    """Set column BOW of a plane in a segment with these ends and this middle (NODE); 0 if it is below `least` (m)."""
+    bow = stated_gap(table, pair, from_plane(plane, middle.rotation), middle, 0.0)
+    for end in range(2):
+        bow -= 0.5 * stated_gap(table, pair, from_plane(plane, nodes[end].rotation), nodes[end], 0.0)
+    plane[BOW] = bow if abs(bow) > least else 0.0
+
+
+@inlined
+def _enter_line(g, h, begin, length, entry, leave):
+    """Restrict [entry, leave] (n,) to the time when gaps are closed that change evenly from g to h (n,).
+
+    begin, length: of the segment (s).
+    """
+    for n in range(entry.size):
+        change = h[n] - g[n] + 0.0  # -0.0 becomes 0.0
+        at = begin + length * (-g[n] / change)
+        closes = change < 0.0
+        entry[n] = at if closes and at > entry[n] else entry[n]
+        leave[n] = at if not closes and at < leave[n] else leave[n]
+
+
+@inlined
+def _enter_dip(g, h, bow, begin, length, entry, leave):
+    """`_enter_line` for parabolas: at a share s of the segment, gaps deviate from a line by bow s (1 - s), bow < 0 (m).
+
+    Roots as in Press et al., Numerical Recipes, section 5.6, without cancellation.
+    """
+    for n in range(entry.size):
+        slope = h[n] - g[n] + bow
+        inside = slope * slope + 4.0 * bow * g[n]
+        root = sqrt(max(inside, 0.0))
+        half = 0.5 * (slope + (root if slope >= 0.0 else -root))
+        one, other = half / bow, -g[n] / half
+        first, last = (one, other) if one < other else (other, one)
+        first, last = begin + length * first, begin + length * last
+        meets = inside >= 0.0
+        entry[n] = inf if not meets else first if first > entry[n] else entry[n]
+        leave[n] = last if last < leave[n] else leave[n]
+
+
+@inlined
+def _enter_rise(g, h, bow, begin, length, entry, leave):
+    """`_enter_dip` for bow > 0. A gap that is closed at both ends counts as closed in the whole segment."""
+    for n in range(entry.size):
+        slope = h[n] - g[n] + bow
+        root = sqrt(max(slope * slope + 4.0 * bow * g[n], 0.0))
+        half = 0.5 * (slope + (root if slope >= 0.0 else -root))
+        one, other = half / bow, -g[n] / half
+        first, last = (one, other) if one < other else (other, one)
+        first, last = begin + length * first, begin + length * last
+        entry[n] = last if g[n] > 0.0 and last > entry[n] else entry[n]
+        leave[n] = first if h[n] > 0.0 and first < leave[n] else leave[n]
+
+
 @device
 def enter_planes(table, pair, planes, margin, turning, nodes, first, last, rows, entry, leave):
     """Restrict the intervals [entry, leave] (S,) of samples first:last in a segment to the time behind planes.
@@ -268,9 +324,10 @@ def enter_planes(table, pair, planes, margin, turning, nodes, first, last, rows,
         for end in range(2):
             gap = rows.gap[end, first:last]
             _gaps_at(table, pair, planes[m], nodes[end], margin, turning, first, last, rows.node[end], rows, gap)
-        for n in range(entry.size):
-            change = h[n] - g[n] + 0.0  # -0.0 becomes 0.0
-            at = begin + length * (-g[n] / change)
-            closes = change < 0.0
-            entry[n] = at if closes and at > entry[n] else entry[n]
-            leave[n] = at if not closes and at < leave[n] else leave[n]
+        bow = 4.0 * planes[m, BOW]
+        if bow < 0.0:
+            _enter_dip(g, h, bow, begin, length, entry, leave)
+        elif bow > 0.0:
+            _enter_rise(g, h, bow, begin, length, entry, leave)
+        else:
+            _enter_line(g, h, begin, length, entry, leave)
