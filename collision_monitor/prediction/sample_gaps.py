@@ -278,34 +278,35 @@ def _enter_line(g, h, begin, length, entry, leave):
 
 
 @inlined
-def _enter_dip(g, h, bow, begin, length, entry, leave):
-    """`_enter_line` for parabolas: at a share s of the segment, gaps deviate from a line by bow s (1 - s), bow < 0 (m).
+def _crossings(g, h, bow, begin, length):
+    """Both times (s) at which a gap from g to h (m) is 0, in order, and whether it is at all.
 
-    Roots as in Press et al., Numerical Recipes, section 5.6, without cancellation.
+    At a share s of the segment it deviates from a straight line by bow s (1 - s). Roots without cancellation, as in
+    Press et al., Numerical Recipes, section 5.6.
     """
+    slope = h - g + bow
+    inside = slope * slope + 4.0 * bow * g
+    root = sqrt(max(inside, 0.0))
+    half = 0.5 * (slope + (root if slope >= 0.0 else -root))
+    one, other = half / bow, -g / half
+    first, last = (one, other) if one < other else (other, one)
+    return begin + length * first, begin + length * last, inside >= 0.0
+
+
+@inlined
+def _enter_dip(g, h, bow, begin, length, entry, leave):
+    """`_enter_line` for the gaps of `_crossings` with bow < 0."""
     for n in range(entry.size):
-        slope = h[n] - g[n] + bow
-        inside = slope * slope + 4.0 * bow * g[n]
-        root = sqrt(max(inside, 0.0))
-        half = 0.5 * (slope + (root if slope >= 0.0 else -root))
-        one, other = half / bow, -g[n] / half
-        first, last = (one, other) if one < other else (other, one)
-        first, last = begin + length * first, begin + length * last
-        meets = inside >= 0.0
-        entry[n] = inf if not meets else first if first > entry[n] else entry[n]
+        first, last, closes = _crossings(g[n], h[n], bow, begin, length)
+        entry[n] = inf if not closes else first if first > entry[n] else entry[n]
         leave[n] = last if last < leave[n] else leave[n]
 
 
 @inlined
 def _enter_rise(g, h, bow, begin, length, entry, leave):
-    """`_enter_dip` for bow > 0. A gap that is closed at both ends counts as closed in the whole segment."""
+    """`_enter_line` for the gaps of `_crossings` with bow > 0; closed in the whole segment if closed at both ends."""
     for n in range(entry.size):
-        slope = h[n] - g[n] + bow
-        root = sqrt(max(slope * slope + 4.0 * bow * g[n], 0.0))
-        half = 0.5 * (slope + (root if slope >= 0.0 else -root))
-        one, other = half / bow, -g[n] / half
-        first, last = (one, other) if one < other else (other, one)
-        first, last = begin + length * first, begin + length * last
+        first, last, _ = _crossings(g[n], h[n], bow, begin, length)
         entry[n] = last if g[n] > 0.0 and last > entry[n] else entry[n]
         leave[n] = first if h[n] > 0.0 and first < leave[n] else leave[n]
 
