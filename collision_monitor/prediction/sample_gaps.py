@@ -272,5 +272,8 @@ def enter_planes(table, pair, planes, margin, turning, nodes, first, last, rows,
             change = h[n] - g[n] + 0.0  # -0.0 becomes 0.0
             at = begin + length * (-g[n] / change)
             closes = change < 0.0
-            entry[n] = at if closes and at > entry[n] else entry[n]
-            leave[n] = at if not closes and at < leave[n] else leave[n]
+            enters, leaves = at if closes else -inf, inf if closes else at
+            # with + 0.0, LLVM stores every lane; to leave some unchanged took twice the time of all the rest
+            before, after = entry[n] + 0.0, leave[n] + 0.0
+            entry[n] = enters if enters > before else before
+            leave[n] = leaves if leaves < after else after
