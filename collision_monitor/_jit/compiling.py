@@ -12,7 +12,7 @@ from numba.core.types.misc import unliteral
 
 from collision_monitor._jit.compilation import Announcement
 from collision_monitor._jit.kernel_cache import KernelCache
-from collision_monitor._jit.libraries import DeviceCompiler, OutlinedCompiler
+from collision_monitor._jit.libraries import DeviceCompiler, KernelCompiler, OutlinedCompiler
 
 _COMPILERS = {"device": DeviceCompiler, "outlined": OutlinedCompiler}
 
@@ -45,6 +45,8 @@ def make_dispatcher(function: Callable[..., Any], options: dict[str, Any], kind:
     options = {**options, "no_cfunc_wrapper": True}
     if kind in _COMPILERS:
         options |= {"no_cpython_wrapper": True, "pipeline_class": _COMPILERS[kind]}
+    elif not options.get("parallel"):
+        options |= {"pipeline_class": KernelCompiler}
     dispatcher = numba.njit(**options)(function)
     if kind in _COMPILERS:
         # numba would compile f(0) and f(1) apart; LLVM inserts the numbers where it inlines

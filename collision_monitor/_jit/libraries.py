@@ -43,7 +43,22 @@ def callees(library: Any) -> list[Callee]:
     return list(found)
 
 
-class _WithoutEntry(JITCodeLibrary):  # type: ignore[misc]
+class WholeLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """Code of a function with all functions inside of it, which no other library calls.
+
+    Because LLVM knows that, it drops the arguments that they do not read. An array is seven numbers, most of them
+    unread, and a kernel's tuples of arrays are passed on the stack: the steps of `clutter` with 1,000 noisy objects
+    took 1.3 times as long. They are private, not internal: other code would find an internal one by its name.
+    """
+
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
+                function.linkage = llvm.Linkage.private
+        super()._optimize_final_module()
+
+
+class _WithoutEntry(WholeLibrary):
     """Code of a function that Python cannot call."""
 
     @property
@@ -104,6 +119,17 @@ class OutlinedLibrary(_WithoutEntry):
         library._set_compiled_object(code)
         library._finalize_final_module()
         return library
+
+
+class KernelCompiler(CompilerBase):  # type: ignore[misc]
+    """Numba's compiler, which writes into a WholeLibrary."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return numba's own passes; they use the library that they find."""
+        state = self.state
+        state.library = WholeLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return [DefaultPassBuilder.define_nopython_pipeline(state)]
 
 
 class DeviceCompiler(CompilerBase):  # type: ignore[misc]

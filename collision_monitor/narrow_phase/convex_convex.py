@@ -6,7 +6,7 @@ are exactly those of the cores minus the radii. (van den Bergen, 2003, 4.5)
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 from typing import Any
 
 from collision_monitor._jit import inlined
@@ -14,7 +14,7 @@ from collision_monitor.geometry.shape_table import CONE, CYLINDER, ELLIPSOID
 from collision_monitor.narrow_phase.contact_row import write
 from collision_monitor.narrow_phase.core import CorePair, core_length, core_pair, core_radius, rounding
 from collision_monitor.narrow_phase.epa import epa
-from collision_monitor.narrow_phase.gjk import gjk, point_on_a, simplex_point
+from collision_monitor.narrow_phase.gjk import EXACT, Accuracy, gjk, point_on_a, simplex_point
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.parallel_axes import axes_are_parallel, parallel_axes_depth
 from collision_monitor.narrow_phase.support_point import support_difference
@@ -41,16 +41,14 @@ def _is_curved(kind: int) -> bool:
 
 
 @inlined
-def convex_separation(table: Any, a: int, b: int, pose: PairPose, limit: float, out: Any, work: Any) -> float:
-    """Certified lower bound of the distance (m), <= 0 if they overlap or touch; its direction is in out[0:3].
-
-    The search ends as soon as the bound passes `limit` (m).
-    """
+def convex_separation(table: Any, a: int, b: int, pose: PairPose, accuracy: Accuracy, out: Any, work: Any) -> float:
+    """Certified lower bound of the distance (m), <= 0 if they overlap or touch; its direction is in out[0:3]."""
     _place(pose, work)
     px, py, pz = pose.p
     radii = table.margin[a] + table.margin[b] + core_radius(table, a) + core_radius(table, b)
     size = core_length(table, a) + core_length(table, b)
-    _, lower, normal = gjk(core_pair(table, a, b), work, size, limit + radii)
+    wanted = Accuracy(accuracy.near + radii, accuracy.slack)
+    _, lower, normal = gjk(core_pair(table, a, b), work, size, inf, wanted)
     out[0], out[1], out[2] = rotate(pose.R_A, normal)
     slack = SAT_ROUND_OFF * (size + abs(px) + abs(py) + abs(pz))
     return max(lower, 0.0) - radii - slack
@@ -72,7 +70,7 @@ def cores_contact(
     px, py, pz = pose.p
     A, B = cores.A, cores.B
     ra, rb = radii
-    count, lower, normal = gjk(cores, work, size, limit + ra + rb)
+    count, lower, normal = gjk(cores, work, size, limit + ra + rb, EXACT)
     if count == 0:
         return False
     curved = _is_curved(A.kind) or _is_curved(B.kind)

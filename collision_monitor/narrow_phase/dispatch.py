@@ -40,6 +40,7 @@ from collision_monitor.narrow_phase.contact_row import (
 from collision_monitor.narrow_phase.convex_convex import convex_contact, convex_separation
 from collision_monitor.narrow_phase.core import half_extents
 from collision_monitor.narrow_phase.cylinder_cylinder import is_parallel, parallel_cylinders_contact
+from collision_monitor.narrow_phase.gjk import EXACT, Accuracy
 from collision_monitor.narrow_phase.half_space import half_space_contact, half_spaces_contact
 from collision_monitor.narrow_phase.pair_pose import PairPose, pair_pose, swapped
 from collision_monitor.narrow_phase.polygon_polygon import planar_contact
@@ -153,17 +154,18 @@ def _is_swapped(table: Any, a: int, b: int) -> bool:
 
 
 @inlined
-def separation(table: Any, a: int, b: int, pose: PairPose, out: Any, work: Any) -> float:
+def separation(table: Any, a: int, b: int, pose: PairPose, out: Any, work: Any, accuracy: Accuracy = EXACT) -> float:
     """Certified lower bound (m) of the distance of shapes a and b, with its unit direction from A to B in out[0:3].
 
     The bound is <= 0 if the shapes overlap or touch. Their projections on the direction are apart by the bound. It is
-    exact for all pairs except separated boxes, whose bound is the largest SAT gap.
+    as accurate as wanted for all pairs except separated boxes, whose bound is the largest SAT gap. The direction of a
+    bound of at most accuracy.near is undefined.
     """
     is_swapped = _is_swapped(table, a, b)
     if is_swapped:
         a, b = b, a
         pose = swapped(pose)
-    gap = _separation(table, a, b, pose, out, work)
+    gap = _separation(table, a, b, pose, accuracy, out, work)
     if is_swapped:
         out[0] = -out[0]
         out[1] = -out[1]
@@ -172,7 +174,7 @@ def separation(table: Any, a: int, b: int, pose: PairPose, out: Any, work: Any) 
 
 
 @inlined
-def _separation(table: Any, a: int, b: int, pose: PairPose, out: Any, work: Any) -> float:
+def _separation(table: Any, a: int, b: int, pose: PairPose, accuracy: Accuracy, out: Any, work: Any) -> float:
     test = _TEST_OF[table.kind[a], table.kind[b]]
     if test == BOX_BOX:
         margin = table.margin[a] + table.margin[b]
@@ -191,7 +193,7 @@ def _separation(table: Any, a: int, b: int, pose: PairPose, out: Any, work: Any)
         out[1] = answer[NORMAL + 1]
         out[2] = answer[NORMAL + 2]
         return answer[DISTANCE] - answer[BOUND]
-    return convex_separation(table, a, b, pose, inf, out, work)
+    return convex_separation(table, a, b, pose, accuracy, out, work)
 
 
 @inlined

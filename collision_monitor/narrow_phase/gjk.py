@@ -7,7 +7,7 @@ The scratch memory stores the simplex in rows as `support_difference` writes the
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.narrow_phase.core import CorePair
@@ -17,6 +17,17 @@ from collision_monitor.narrow_phase.work_memory import NEW_WEIGHTS, ON_A, P_AB, 
 from collision_monitor.tolerances import EPSILON, FLAT, GJK_RELATIVE, GJK_TOUCHING, THIN_SIN2
 
 MAX_ITERATIONS: Final = 64
+
+
+class Accuracy(NamedTuple):
+    """How exact a distance has to be."""
+
+    near: Any  # m: a distance that is at most this need not be known any better
+    slack: Any  # m: by how much a lower bound of a larger one may be too small
+
+
+EXACT: Final = Accuracy(0.0, 0.0)
+"""As exact as numbers allow."""
 
 
 @inlined
@@ -170,12 +181,12 @@ def _closest(work: Any, count: int, size: float) -> tuple[bool, Vector]:
 
 
 @inlined
-def gjk(cores: CorePair, work: Any, size: float, limit: float) -> tuple[int, float, Vector]:
+def gjk(cores: CorePair, work: Any, size: float, limit: float, accuracy: Accuracy) -> tuple[int, float, Vector]:
     """Distance between two cores, with the pose of B in A's frame in the scratch memory.
 
     Returns (points in the simplex, certified lower bound (m), unit direction from A to B in A's frame that proves it).
     0 points: the search ended early because the lower bound passed `limit` (m). A lower bound <= 0 means that the
-    cores overlap or touch within round-off.
+    cores overlap or touch within round-off, or that their distance is at most accuracy.near.
     """
     _, toward = direction((work[P_AB], work[P_AB + 1], work[P_AB + 2]))
     length = 1.0
@@ -191,7 +202,7 @@ def gjk(cores: CorePair, work: Any, size: float, limit: float) -> tuple[int, flo
             normal = (toward[0] / length, toward[1] / length, toward[2] / length)
             if lower > limit:
                 return 0, lower, normal
-        if count > 0 and length - lower <= GJK_RELATIVE * length + 4.0 * EPSILON * size:
+        if count > 0 and length - lower <= GJK_RELATIVE * length + 4.0 * EPSILON * size + accuracy.slack:
             break
         if count == 0:
             inside, nearest = False, w
@@ -208,6 +219,6 @@ def gjk(cores: CorePair, work: Any, size: float, limit: float) -> tuple[int, flo
         toward = nearest
         squared = shorter
         length = sqrt(squared)
-        if length <= GJK_TOUCHING * size:
+        if length <= max(GJK_TOUCHING * size, accuracy.near):
             return count, 0.0, (0.0, 0.0, 1.0)
     return count, lower, normal

@@ -10,6 +10,7 @@ from math import inf
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import inlined
+from collision_monitor.narrow_phase.gjk import Accuracy
 from collision_monitor.prediction.flat_sides import has_side
 from collision_monitor.prediction.obstacle_planes import (
     AT_REST,
@@ -36,6 +37,9 @@ NO_MODE: Final = -1
 LEAST_BOW: Final = 0.1
 """Part of the tolerance by which the gap of a plane may bend if it counts as a straight line."""
 
+SLACK: Final = 0.1
+"""Part of the tolerance by which a plane may be farther from the obstacle than one that touches it."""
+
 COARSER: Final = 4.0
 """Factor by which the tolerance of a segment may grow, to the largest gap that no plane closes: the gaps there
 deviate too far from parabolas for less."""
@@ -59,22 +63,26 @@ def plane_margin(settings):
 
 
 @inlined
-def _briefest(entry, leave, checked, first, last):
-    """Sample of first:last that enters, is not checked, and leaves soonest; -1: none."""
-    chosen, shortest = -1, inf
-    for n in range(first, last):
+def _briefest(entry, leave, checked, first, last, inside):
+    """Sample of first:last that enters, is not checked, and leaves soonest; -1: none. inside (S,): scratch."""
+    entry, leave, checked, inside = entry[first:last], leave[first:last], checked[first:last], inside[first:last]
+    for n in range(inside.size):  # without branches, see sample_gaps.py
         length = leave[n] - entry[n]
-        if length >= 0.0 and length < shortest and checked[n] == 0.0:
-            chosen, shortest = n, length
-    return chosen
+        inside[n] = (length if length >= 0.0 else inf) + checked[n]
+    chosen, shortest = -1 - first, inf
+    for n in range(inside.size):
+        if inside[n] < shortest:
+            chosen, shortest = n, inside[n]
+    return first + chosen
 
 
 @inlined
 def _entering(entry, leave, checked, first, last):
     """First sample of first:last that enters and is not checked; -1: none."""
-    for n in range(first, last):
+    entry, leave, checked = entry[first:last], leave[first:last], checked[first:last]
+    for n in range(entry.size):
         if leave[n] >= entry[n] and checked[n] == 0.0:
-            return n
+            return first + n
     return -1
 
 
@@ -144,15 +152,15 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
 
 
 @inlined
-def _separation_of(table, parts, pair, n, t, k, turning, memory, scratch):
-    """Separation (m) of sample n at time t in segment k."""
+def _separation_of(table, parts, pair, n, t, k, turning, accuracy, memory, scratch):
+    """Separation (m) of sample n at time t in segment k; accuracy: see `separation`."""
     obstacle, off, first, last = memory.obstacle, memory.off, memory.rows.node[0], memory.rows.node[1]
     begin, end = obstacle.node[k].time, obstacle.node[k + 1].time
     share = (t - begin) / (end - begin)
     error = (off[0, n] + t * off[3, n], off[1, n] + t * off[4, n], off[2, n] + t * off[5, n])
     turned_a = _between(first, last, 3, n, share) if turning[0] != NOT_TURNED else NOT_OFF
     turned_b = _between(first, last, 6, n, share) if turning[1] != NOT_TURNED else NOT_OFF
-    return separation_at(table, parts, pair, t, error, (turned_a, turned_b), obstacle, scratch)
+    return separation_at(table, parts, pair, t, error, (turned_a, turned_b), accuracy, obstacle, scratch)
 
 
 @inlined
@@ -171,7 +179,9 @@ def _check(table, parts, pair, n, at, samples, k, tolerance, settings, memory, s
 
     Returns whether that shortens its time inside, and the gap (m).
     """
-    gap = _separation_of(table, parts, pair, n, at, k, settings.turning, memory, scratch) - settings.margin
+    accuracy = Accuracy(settings.margin + tolerance, SLACK * tolerance)
+    separated = _separation_of(table, parts, pair, n, at, k, settings.turning, accuracy, memory, scratch)
+    gap = separated - settings.margin
     direction = (scratch.out[0], scratch.out[1], scratch.out[2])
     return gap > tolerance and _cut(table, pair, n, samples, direction, k, settings, memory), gap
 
@@ -210,7 +220,7 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
         is_brief = not is_brief
         if is_brief:
             first = block % blocks * size
-            n = _briefest(entry, leave, checked, first, min(first + size, samples))
+            n = _briefest(entry, leave, checked, first, min(first + size, samples), memory.trial[0])
             block += 1
         else:
             n = _entering(entry, leave, checked, cursor, samples)
@@ -218,7 +228,7 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
         if n < 0:
             idle += 1
             continue
-        idle, checked[n] = 0, 1.0
+        idle, checked[n] = 0, inf
         at = 0.5 * (entry[n] + leave[n]) if is_brief else entry[n]
         is_cut, gap = _check(table, parts, pair, n, at, samples, k, tolerance, settings, memory, scratch)
         if is_cut:
@@ -234,14 +244,18 @@ def carry_planes(table, pair, k, settings, memory):
     """Start segment k + 1 with those planes of segment k that keep most apart a sample of the pilot at its end."""
     obstacle, rows, pilot, turning = memory.obstacle, memory.rows, settings.pilot, settings.turning
     margin, end = plane_margin(settings), obstacle.node[k + 1]
-    widest, winner = memory.trial[0], memory.checked
+    widest, winner = memory.trial[0, 0:pilot], memory.checked[0:pilot]
     for n in range(pilot):
         widest[n], winner[n] = -inf, -1.0
     for m in range(obstacle.count[k]):
         gaps_at_end(table, pair, obstacle.planes[k, m], margin, turning, end, pilot, rows)
-        for n in range(pilot):
-            if memory.alone[n] == inf and rows.gap[1, n] > widest[n]:
-                widest[n], winner[n] = rows.gap[1, n], float(m)
+        gap = rows.gap[1, 0:pilot]
+        for n in range(gap.size):
+            before, widest_before = winner[n] + 0.0, widest[n] + 0.0  # see enter_planes
+            winner[n] = m if gap[n] > widest_before else before
+            widest[n] = gap[n] if gap[n] > widest_before else widest_before
+    for n in range(pilot):
+        winner[n] = winner[n] if memory.alone[n] == inf else -1.0
     for m in range(obstacle.count[k]):
         kept = False
         for n in range(pilot):

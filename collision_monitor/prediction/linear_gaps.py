@@ -163,15 +163,24 @@ def sum_terms(n, mode, turned, terms, count, state, first, last, local, gap):
     (3, S): scratch. The plane and the relative position may both be off: their product is exact.
     """
     nx, ny, nz = n
-    _project(terms[LINEAR], state, first, last, gap)
     x, y, z = state[0, first:last], state[1, first:last], state[2, first:last]
     if turned:
-        row = 3 + 3 * mode
-        u, v, w = state[row, first:last], state[row + 1, first:last], state[row + 2, first:last]
+        total, own, other = terms[LINEAR], 3 * mode, 3 - 3 * mode
+        along, ax, ay, az = total[ALONG], total[OWN + own], total[OWN + own + 1], total[OWN + own + 2]
+        bx, by, bz = total[OWN + other], total[OWN + other + 1], total[OWN + other + 2]
+        u, v, w = state[3 + own, first:last], state[4 + own, first:last], state[5 + own, first:last]
+        p, q, r = state[3 + other, first:last], state[4 + other, first:last], state[5 + other, first:last]
         for k in range(gap.size):
-            a, b, c = nx + (v[k] * nz - w[k] * ny), ny + (w[k] * nx - u[k] * nz), nz + (u[k] * ny - v[k] * nx)
-            gap[k] += a * x[k] + b * y[k] + c * z[k]
+            lever_x = ax + (ny * z[k] - nz * y[k])
+            lever_y = ay + (nz * x[k] - nx * z[k])
+            lever_z = az + (nx * y[k] - ny * x[k])
+            stated = along + (nx * x[k] + ny * y[k] + nz * z[k])
+            gap[k] = stated + (lever_x * u[k] + lever_y * v[k] + lever_z * w[k])
+        if bx != 0.0 or by != 0.0 or bz != 0.0:
+            for k in range(gap.size):
+                gap[k] += bx * p[k] + by * q[k] + bz * r[k]
     else:
+        _project(terms[LINEAR], state, first, last, gap)
         for k in range(gap.size):
             gap[k] += nx * x[k] + ny * y[k] + nz * z[k]
     one, other = local[0, first:last], local[1, first:last]

@@ -201,11 +201,11 @@ def _turn_by(R, v):
 
 
 @device
-def separation_at(table, parts, pair, t, error, turned, obstacle, scratch):
+def separation_at(table, parts, pair, t, error, turned, accuracy, obstacle, scratch):
     """Return the separation (m) of a pair of shapes at time t, with B off by `error` (3,).
 
-    turned: rotation vectors (3,) of the errors of orientation of A and of B. Writes the direction of the separation
-    into scratch.out, and the rotations of the shapes into obstacle.placed.
+    turned: rotation vectors (3,) of the errors of orientation of A and of B; accuracy: see `separation`. Writes the
+    direction of the separation into scratch.out, and the rotations of the shapes into obstacle.placed.
     """
     A, B, a, b = pair
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], obstacle.placed[0], obstacle.placed[1]
@@ -218,4 +218,4 @@ def separation_at(table, parts, pair, t, error, turned, obstacle, scratch):
     x, y, z = relative_position(A, B, t)
     x, y, z = x + error[0], y + error[1], z + error[2]
     pose = PairPose(R_a, R_b, (x + ob[0] - oa[0], y + ob[1] - oa[1], z + ob[2] - oa[2]))
-    return separation(table, a, b, pose, scratch.out, scratch.work)
+    return separation(table, a, b, pose, scratch.out, scratch.work, accuracy)

@@ -32,7 +32,7 @@ class PlaneMemory(NamedTuple):
     alone: Any  # (S,): those of one pair of shapes
     entry: Any  # (S,)
     leave: Any  # (S,)
-    checked: Any  # (S,)
+    checked: Any  # (S,): 0 or infinite
     trial: Any  # (2, S)
     bins: Any  # (BINS,)
     chosen: ChosenSamples

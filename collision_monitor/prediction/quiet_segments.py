@@ -8,11 +8,16 @@ segment gives the direction, which is at rest.
 from __future__ import annotations
 
 from math import sqrt
+from typing import Final
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.narrow_phase.gjk import Accuracy
 from collision_monitor.prediction.normal_samples import FURTHEST
 from collision_monitor.prediction.obstacle_planes import NOT_OFF, separation_at
 from collision_monitor.prediction.sample_gaps import stated_gap
+
+SLACK: Final = 0.02
+"""Part of the standard deviation of the gap by which the plane may be farther from the shapes than one that touches."""
 
 
 @inlined
@@ -42,7 +47,8 @@ def stay_apart(table, parts, pair, k, errors, margin, obstacle, work):
     first, last = obstacle.node[k], obstacle.node[k + 1]
     scratch, frame = work.scratch, work.frame
     middle, length = 0.5 * (first.time + last.time), last.time - first.time
-    if separation_at(table, parts, pair, middle, NOT_OFF, (NOT_OFF, NOT_OFF), obstacle, scratch) <= margin:
+    wanted = Accuracy(margin, SLACK * errors.sigma)
+    if separation_at(table, parts, pair, middle, NOT_OFF, (NOT_OFF, NOT_OFF), wanted, obstacle, scratch) <= margin:
         return False
     n = (scratch.out[0], scratch.out[1], scratch.out[2])
     along = (

@@ -264,6 +264,14 @@ def set_bow(table, pair, plane, nodes, middle, least):
 
 
 @inlined
+def _restrict(n, enters, leaves, entry, leave):
+    """Restrict [entry, leave] of sample n. With + 0.0, LLVM stores every lane; to leave some unchanged takes longer."""
+    before, after = entry[n] + 0.0, leave[n] + 0.0
+    entry[n] = enters if enters > before else before
+    leave[n] = leaves if leaves < after else after
+
+
+@inlined
 def _enter_line(g, h, begin, length, entry, leave):
     """Restrict [entry, leave] (n,) to the time when gaps are closed that change evenly from g to h (n,).
 
@@ -273,8 +281,8 @@ def _enter_line(g, h, begin, length, entry, leave):
         change = h[n] - g[n] + 0.0  # -0.0 becomes 0.0
         at = begin + length * (-g[n] / change)
         closes = change < 0.0
-        entry[n] = at if closes and at > entry[n] else entry[n]
-        leave[n] = at if not closes and at < leave[n] else leave[n]
+        enters, leaves = at if closes else -inf, inf if closes else at
+        _restrict(n, enters, leaves, entry, leave)
 
 
 @inlined
@@ -298,8 +306,8 @@ def _enter_dip(g, h, bow, begin, length, entry, leave):
     """`_enter_line` for the gaps of `_crossings` with bow < 0."""
     for n in range(entry.size):
         first, last, closes = _crossings(g[n], h[n], bow, begin, length)
-        entry[n] = inf if not closes else first if first > entry[n] else entry[n]
-        leave[n] = last if last < leave[n] else leave[n]
+        enters, leaves = first if closes else inf, last if closes else -inf
+        _restrict(n, enters, leaves, entry, leave)
 
 
 @inlined
@@ -307,8 +315,8 @@ def _enter_rise(g, h, bow, begin, length, entry, leave):
     """`_enter_line` for the gaps of `_crossings` with bow > 0; closed in the whole segment if closed at both ends."""
     for n in range(entry.size):
         first, last, _ = _crossings(g[n], h[n], bow, begin, length)
-        entry[n] = last if g[n] > 0.0 and last > entry[n] else entry[n]
-        leave[n] = first if h[n] > 0.0 and first < leave[n] else leave[n]
+        enters, leaves = last if g[n] > 0.0 else -inf, first if h[n] > 0.0 else inf
+        _restrict(n, enters, leaves, entry, leave)
 
 
 @device

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.narrow_phase.gjk import Accuracy
 from collision_monitor.prediction.bodies import next_pair, place_shape
 from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
 from collision_monitor.prediction.impact_record import CLEAR, HIT
@@ -30,6 +31,9 @@ SAME_TIME: Final = 0.02
 
 DESIGN_STEPS: Final = 3
 """Largest number of separations towards a design point. The line between the origins is tried before them."""
+
+SLACK: Final = 0.02
+"""Part of the standard deviation of the surfaces by which a plane may be farther from a shape than one that touches."""
 
 ENOUGH: Final = 0.2
 """Fraction of min_probability below which the bound along that line suffices, also of a body of several shapes."""
@@ -173,8 +177,10 @@ def design_point(multibody, i, j, tube, turning, bend, sampling, t, obstacle, wo
             else:
                 bent = _set_window(table, parts, pair, Window(begin, end), bend, work, obstacle)
                 at = min(max(t, begin), end)
+                wanted = Accuracy(margin, SLACK * tube.start)
+                stated = (NOT_OFF, NOT_OFF)
                 for _ in range(DESIGN_STEPS):
-                    if separation_at(table, parts, pair, at, NOT_OFF, (NOT_OFF, NOT_OFF), obstacle, scratch) <= margin:
+                    if separation_at(table, parts, pair, at, NOT_OFF, stated, wanted, obstacle, scratch) <= margin:
                         own = 1.0
                         break
                     n = (scratch.out[0], scratch.out[1], scratch.out[2])
