@@ -266,7 +266,6 @@ def _ask_for_body(table, parts, bodies, i):
     prefetch(bodies.acceleration, row)
     prefetch(bodies.time, row)
     prefetch(bodies.excess, row)
-    prefetch(bodies.motion, row)
     shape = np.intp(bodies.first_shape[i])
     prefetch(table.size, shape)
     prefetch(table.margin, shape)
@@ -287,6 +286,9 @@ def _ask_for(multibody, pairs, which, at):
         near = pairs[which[at + PREFETCH_AHEAD]]
         _ask_for_body(table, parts, bodies, near.i)
         _ask_for_body(table, parts, bodies, near.j)
+        if near.touched == 0:  # unless it touches, its next impact is searched for
+            prefetch(bodies.motion, np.intp(near.i))
+            prefetch(bodies.motion, np.intp(near.j))
 
 
 @direct
