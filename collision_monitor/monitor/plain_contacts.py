@@ -54,17 +54,20 @@ def plain_contact(
         return False
     table, _, bodies = multibody
     a, b = bodies.first_shape[i], bodies.first_shape[j]
+    kind = table.kind[a]
+    if kind != table.kind[b] or not (kind == SPHERE or (kind == BOX and table.margin[a] + table.margin[b] == 0.0)):
+        return False
     result[SHAPE_I], result[SHAPE_J], result[STATUS] = a, b, TOUCHING
     relative = relative_now(bodies, i, j, now)
     is_swapped = a > b  # the order in which dispatch.py tests them
     if is_swapped:
         a, b = b, a
-    if table.kind[a] == SPHERE and table.kind[b] == SPHERE:
+    if kind == SPHERE:
         p = opposite(relative.p) if is_swapped else relative.p
         sphere_sphere_contact(table.size[a, 0] + table.margin[a], table.size[b, 0] + table.margin[b], p, result)
         if not result[DISTANCE] <= query.margin:
             return False
-    elif table.kind[a] == BOX and table.kind[b] == BOX and table.margin[a] == 0.0 and table.margin[b] == 0.0:
+    else:
         R = scratch.rotation
         rotation_now(bodies, i, now, scratch.quaternion, R[0])
         rotation_now(bodies, j, now, scratch.quaternion, R[1])
@@ -86,8 +89,6 @@ def plain_contact(
             result[BOUND] += widening(relative, query.stale_acceleration)
             return True
         touching_features(table.size[a], table.size[b], pose, gap, n, result, scratch.work)
-    else:
-        return False
     if is_swapped:
         mirror(result, relative.p)
     result[CLOSING] = closing_now(bodies, i, j, relative, result)
