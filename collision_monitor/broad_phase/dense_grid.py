@@ -414,11 +414,10 @@ def classify_bodies(size: Any, starts: Any, grid: Any) -> None:
     measure_classes(size, grid)
 
 
-@allocating_kernel
-def _box_pairs(centre: Any, half: Any, starts: Any, grid: Any, pairs: Any) -> int:
-    """Write pairs into pairs (P, 2), sorted unless there are more than P; return their number."""
+@device
+def _sort_boxes(centre: Any, half: Any, starts: Any, grid: Any, extent: Any, scratch: Any) -> None:
+    size, octave, cubes = scratch
     n = centre.shape[0]
-    size = np.empty(n)
     lx = ly = lz = np.inf
     hx = hy = hz = -np.inf
     for i in range(n):
@@ -432,17 +431,51 @@ def _box_pairs(centre: Any, half: Any, starts: Any, grid: Any, pairs: Any) -> in
         if size[i] <= LARGEST_BODY:
             lx, ly, lz = min(lx, x), min(ly, y), min(lz, z)
             hx, hy, hz = max(hx, x), max(hy, y), max(hz, z)
-    classify(size, starts, np.empty((_OCTAVES, 2), np.int64), np.empty((_OCTAVES, 2)), grid)
+    classify(size, starts, octave, cubes, grid)
     measure_classes(size, grid)
     cells = plan_cells(lx, ly, lz, hx, hy, hz, grid)
     find_buckets(centre, grid, 0, n)
     sort_by_cell(n, cells, grid)
     gather_centres(centre, grid, 0, n)
-    extent = np.zeros((3, n + PAD))
     for p in range(n):
         prefetch(half, np.intp(grid.order[min(p + AHEAD, n - 1)]))
         for c in range(3):
             extent[c, p] = half[grid.order[p], c]
+
+
+@allocating_kernel
+def sort_boxes(centre: Any, half: Any, starts: Any, grid: Any, extent: Any) -> None:
+    """Sort boxes with centre, half (N, 3) in m by cell: fill `grid`, and extent (3, N + PAD) in its order.
+
+    A box with a NaN or a negative half extent is absent. starts (N,) bool: those that search, see `box_pairs`.
+    """
+    scratch = np.empty(centre.shape[0]), np.empty((_OCTAVES, 2), np.int64), np.empty((_OCTAVES, 2))
+    _sort_boxes(centre, half, starts, grid, extent, scratch)
+
+
+@inlined
+def boxes_at(grid: Any, extent: Any, region: Any, found: Any) -> int:
+    """Write the places of all boxes of a grid that overlap the Region into found (N + 1,); return their number.
+
+    Uses the first place behind the last box.
+    """
+    p = grid.order.size
+    grid.centre[0, p], grid.centre[1, p], grid.centre[2, p] = region.x, region.y, region.z
+    extent[0, p], extent[1, p], extent[2, p] = region.hx, region.hy, region.hz
+    n = 0
+    for k in range(CLASSES):
+        if grid.layout[k, _COUNT] > 0:
+            n = partners(grid, Bounds(extent, False), _ABSENT, k, p, found, n)
+    return n
+
+
+@allocating_kernel
+def _box_pairs(centre: Any, half: Any, starts: Any, grid: Any, pairs: Any) -> int:
+    """Write pairs into pairs (P, 2), sorted unless there are more than P; return their number."""
+    n = centre.shape[0]
+    extent = np.zeros((3, n + PAD))
+    scratch = np.empty(n), np.empty((_OCTAVES, 2), np.int64), np.empty((_OCTAVES, 2))
+    _sort_boxes(centre, half, starts, grid, extent, scratch)
     found = np.empty(n + PAD, np.int32)
     total = 0
     for a in range(STARTING):

@@ -15,9 +15,9 @@ from collision_monitor.errors import InputError
 from collision_monitor.monitor.candidates import is_checked
 from collision_monitor.monitor.carried_contacts import CARRIED, Carrying, carry, has_answer, keep, no_answers, saved
 from collision_monitor.monitor.carried_triangles import APART, NONE, overlap_of_trees
-from collision_monitor.monitor.contact_depth import depth_of_boxes
 from collision_monitor.monitor.contact_details import complete_contact
 from collision_monitor.monitor.event_list import NO_EVENTS
+from collision_monitor.monitor.plain_contacts import plain_contact
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.solid_overlap import overlap_of_solid
@@ -266,7 +266,6 @@ def _ask_for_body(table, parts, bodies, i):
     prefetch(bodies.acceleration, row)
     prefetch(bodies.time, row)
     prefetch(bodies.excess, row)
-    prefetch(bodies.motion, row)
     shape = np.intp(bodies.first_shape[i])
     prefetch(table.size, shape)
     prefetch(table.margin, shape)
@@ -287,6 +286,9 @@ def _ask_for(multibody, pairs, which, at):
         near = pairs[which[at + PREFETCH_AHEAD]]
         _ask_for_body(table, parts, bodies, near.i)
         _ask_for_body(table, parts, bodies, near.j)
+        if near.touched == 0:  # unless it touches, its next impact is searched for
+            prefetch(bodies.motion, np.intp(near.i))
+            prefetch(bodies.motion, np.intp(near.j))
 
 
 @direct
@@ -313,7 +315,7 @@ def _examine(multibody, active, which, now, queries, scratch, later):
         if may_carry and carry(multibody, i, j, now, contact, carrying.tolerance, scratch, carried[k], results[k]):
             pair.touching, pair.leaving = 1, 0
             continue
-        is_complete = not has_details and depth_of_boxes(multibody, i, j, now, contact, scratch, results[k])
+        is_complete = plain_contact(multibody, i, j, now, contact, has_details, scratch, results[k])
         touching, count, found = True, 1, NONE
         if not is_complete and carrying.tolerance > 0.0:
             found = overlap_of_trees(multibody, i, j, now, contact, carrying, scratch, results[k])

@@ -11,15 +11,9 @@ from collision_monitor._jit import device, inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.broad_phase.dense_grid import box_pairs
-from collision_monitor.broad_phase.hashed_grid import (
-    HashedGrid,
-    make_hashed_grid,
-    query_box,
-    read_boxes,
-    regridded,
-    remove_boxes,
-)
+from collision_monitor.broad_phase.hashed_grid import HashedGrid, make_hashed_grid, read_boxes, regridded, remove_boxes
 from collision_monitor.broad_phase.region import regions_overlap
+from collision_monitor.broad_phase.sorted_boxes import SortedBoxes, note_changed, overlapping, sorted_boxes
 from collision_monitor.monitor.roster import FIRST_CAPACITY, Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
@@ -30,8 +24,8 @@ from collision_monitor.prediction.motion import swept_box
 MOST_TESTS: Final = 6_000
 """Up to this number of pairs of a body to predict and any body, each is tested. For more, there are the grids."""
 
-MOST_QUERIES: Final = 0.005
-"""Up to this fraction of the bodies, each is queried in the hashed grid. For more, a dense grid is built and swept."""
+MOST_QUERIES: Final = 0.02
+"""Up to this fraction of the bodies, each searches the sorted boxes. For more, all boxes are sorted anew and swept."""
 
 MOSTLY_NEW: Final = 0.5
 """From this fraction of the bodies on, the sweep does not sort out the others, which takes up to twice the time."""
@@ -43,14 +37,16 @@ Pairs = NDArray[np.int32]
 
 
 class Candidates(Stage):
-    """The hashed grid of the bodies' swept boxes; finds the pairs of bodies whose boxes overlap."""
+    """The bodies' swept boxes; finds the pairs of bodies whose boxes overlap."""
 
     SAVED = ("grid",)
-    CACHES = ("_found",)
+    CACHES = ("_found", "_sorted", "_changed")
 
     def __init__(self) -> None:
         self.grid: HashedGrid = make_hashed_grid(FIRST_CAPACITY)
         self._found = np.zeros((1024, 2), np.int32)
+        self._sorted: SortedBoxes | None = None
+        self._changed: list[NDArray[np.int32]] = []  # bodies with new boxes that are not in the list of `_sorted` yet
 
     def enlarge(self, capacity: int) -> None:
         """Make room for `capacity` bodies; the boxes stay."""
@@ -73,21 +69,38 @@ class Candidates(Stage):
         bodies, top, margin = step.roster.bodies, step.roster.top, step.profile.contact_margin
         is_new = np.zeros(len(self.grid.box), np.bool_)
         is_new[which] = True
+        self._note(which, top)
         is_small = len(which) * top <= MOST_TESTS
         if len(which) > MOST_QUERIES * top and not is_small:
             centre, half = np.empty((2, top, 3))
             read_boxes(self.grid.box, centre, half)
             pairs = box_pairs(centre, half, is_new[:top] if len(which) < MOSTLY_NEW * top else None)
             return pairs[: keep_new(bodies, self.grid.box, pairs, is_new, step.now, margin)]
-        search = Search(which, is_new, np.empty(len(self.grid.box), np.int32))
+        search = Search(which, is_new, np.empty(len(self.grid.box) + 1, np.int32))
+        changed = which[:0]
+        if not is_small:
+            self._sorted = self._sorted or sorted_boxes(self.grid.box, top)
+            changed, self._changed = np.concatenate([changed, *self._changed]), []
         while True:  # at most twice: the second time the array is large enough
             if is_small:
                 n = int(sweep(bodies, self.grid.box, search, top, step.now, margin, self._found))
             else:
-                n = int(find_partners(bodies, self.grid, search, step.now, margin, self._found))
+                boxes = self.grid.box, self._sorted, changed
+                n = int(find_partners(bodies, boxes, search, step.now, margin, self._found))
             if n <= len(self._found):
                 return self._found[:n]
             self._found = np.zeros((2 * n, 2), np.int32)
+
+    def _note(self, which: NDArray[np.int32], top: int) -> None:
+        """Note that the boxes of these bodies have changed. Drop the sorted boxes if their list has no room."""
+        boxes = self._sorted
+        if boxes is None:
+            return
+        self._changed.append(which)
+        count = boxes.count[0] + sum(map(len, self._changed))
+        fits = len(boxes.place) == len(self.grid.box) and boxes.grid.order.size == top
+        if not fits or count > len(boxes.changed):
+            self._sorted, self._changed = None, []
 
     def save(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
@@ -98,6 +111,7 @@ class Candidates(Stage):
         top = len(snapshot.arrays["bodies.used"])
         boxes = snapshot.array("boxes", self.grid.box, top)
         self.grid = regridded(boxes, max(top, len(self.grid.box)))
+        self._sorted, self._changed = None, []
 
 
 _NONE_ALLOWED: Final = np.zeros(0, np.uint64)
@@ -155,21 +169,27 @@ def _finds(bodies, is_new, i, j):
 
 @direct
 @kernel
-def find_partners(bodies, grid, search, now, margin, pairs):
+def find_partners(bodies, boxes, search, now, margin, pairs):
     """Write the pairs of each body of the search with all bodies whose swept box overlaps its own, each pair once.
 
     A body that is predicted further needs only the box that it sweeps after the time until which it was predicted
-    before: earlier impacts are known. pairs (P, 2). Returns the number of pairs; if it exceeds P, call again with a
-    larger array.
+    before: earlier impacts are known. boxes: all boxes (N,) GRID_BOX, SortedBoxes, and the bodies (K,) to note in their
+    list. pairs (P, 2). Returns the number of pairs; if it exceeds P, call again with a larger array.
     """
+    box, by_cell, changed = boxes
     which, is_new, found = search
+    note_changed(by_cell, box, changed)
     n = 0
     for k in range(which.size):
+        prefetch(bodies.motion, np.intp(which[min(k + 1, which.size - 1)]))
         i = which[k]
         swept = swept_box(bodies, i, max(now, bodies.motion[i].covered), margin)
-        for m in range(query_box(grid, swept, i, found)):
+        overlaps = overlapping(by_cell, swept, found)
+        for m in range(overlaps):
+            prefetch(bodies.motion, np.intp(found[m]))
+        for m in range(overlaps):
             j = found[m]
-            if not _finds(bodies, is_new, i, j):
+            if j == i or not _finds(bodies, is_new, i, j) or box[j].level < 0:
                 continue
             if n < pairs.shape[0]:
                 pairs[n, 0] = i

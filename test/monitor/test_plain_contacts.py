@@ -1,4 +1,4 @@
-"""Tests of contacts without details, against contacts with them."""
+"""Tests of contacts of plain boxes and balls, against `body_contact`, and of contacts without details."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from collision_monitor.errors import ProfileError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Cylinder, Sphere
 from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.monitor.plain_contacts import plain_contact
 from collision_monitor.narrow_phase.contact_row import UNKNOWN
+from collision_monitor.prediction.body_contact import RESULT, ContactQuery, body_contact
+from collision_monitor.prediction.body_impact import make_scratch
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
 
@@ -20,6 +23,7 @@ SHAPES = {
     "boxes": [BOX],
     "boxes in two slots each": [[(BOX, Pose()), (Sphere(0.1), Pose((0.2, 0, 0)))], BOX],
     "boxes beside their origin": [[(BOX, Pose((0.1, 0.2, 0.3), (0, 0, 0.6, 0.8)))], BOX],
+    "balls": [Sphere(0.2), Sphere(0.3)],
     "others": [BOX, Sphere(0.2), Capsule(0.15, 0.4), Cylinder(0.2, 0.4), ConvexHull(np.eye(4, 3) - 0.25)],
 }
 
@@ -59,6 +63,31 @@ def test_without_details_all_other_numbers_are_the_same_bytes(shapes: str, toler
         for name in FEATURES:
             assert (mine.contact_rows[name] == UNKNOWN).all()
         found += len(mine.contacts)
+    assert found > 300
+
+
+@pytest.mark.parametrize("shape", [BOX, Sphere(0.3)], ids=["boxes", "balls"])
+@pytest.mark.parametrize("age", [0.0, 0.1])
+def test_contacts_of_plain_bodies_are_the_same_bytes_as_those_of_any(shape: Box | Sphere, age: float) -> None:
+    rng = np.random.default_rng(2)
+    n = 60
+    monitor = Monitor()
+    for i in rng.permutation(n).tolist():
+        monitor.add(i, shape)
+    quaternion = rng.normal(size=(n, 4))
+    quaternion[: n // 4] = (0, 0, 0, 1)
+    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
+    pose = np.hstack([rng.uniform(0, 1, (n, 3)), quaternion])
+    monitor.step(0, np.arange(n), pose, rng.normal(size=(n, 6)))
+    multibody, query, scratch = monitor.roster.multibody, ContactQuery(0.01, 1.0), make_scratch()
+    plain, truth = np.zeros((2, RESULT))
+    found = 0
+    for i in range(n):
+        for j in range(i):
+            if plain_contact(multibody, i, j, age, query, True, scratch, plain):
+                assert body_contact(multibody, i, j, age, query, scratch, truth)[0]
+                assert plain.tobytes() == truth.tobytes()
+                found += 1
     assert found > 300
 
 
