@@ -41,6 +41,18 @@ def test_a_ball_in_a_soup_of_triangles_is_inside():
     assert ring.overlaps and ring.signed_distance - ring.error_bound < -0.5
 
 
+@pytest.mark.parametrize("again", [slice(None), slice(3)], ids=["all", "three"])
+def test_a_mesh_in_a_box_that_lists_faces_twice_is_inside(again):
+    """The box is convex, but the tree of a mesh with repeated faces does not tell what is inside."""
+    box = cm.Mesh(CUBE.vertices, np.concatenate([CUBE.faces, CUBE.faces[again]]))
+    ring = cm.Mesh(TORUS.vertices * 0.3, TORUS.faces)
+    at = Pose((0.1, 0.05, 0.02))
+    truth = cm.contact(soup(CUBE), Pose(), ring, at)
+    for c in (cm.contact(box, Pose(), ring, at), cm.contact(ring, at, box, Pose())):
+        assert c.signed_distance == pytest.approx(truth.signed_distance, abs=1e-12)
+    assert cm.overlap(box, Pose(), ring, at) and cm.overlap(ring, at, box, Pose())
+
+
 @pytest.mark.parametrize("mesh", [soup(CUBE, slice(2, None)), soup(CUBE, noise=1e-9)], ids=["no side", "cracks"])
 def test_a_ball_in_an_open_box_is_not_clear(mesh):
     at = Pose((0.3, 0, 0))
