@@ -21,6 +21,11 @@ SHEET: Final = 0.5
 Smaller: a solid that misses a large part counts as a sheet, which has no inside."""
 
 
+FLAT: Final = 1e-12
+"""Largest height over the plane of its largest face, as part of its size, at which a surface lies in that plane.
+Larger: a thin shell loses its inside. Smaller: round-off of a pose gives a flat surface an inside, but no hull."""
+
+
 class Surface:
     """Connectivity of a mesh with vertices (n, 3) in m and faces (m, 3).
 
@@ -89,12 +94,21 @@ class Surface:
 
     @cached_property
     def sheet(self) -> bool:
-        """Whether the open parts look mostly one way, as a terrain or a wall does; a sheet has no inside."""
-        if self.closed or not self.oriented:
-            return False
+        """Whether the open parts look mostly one way, as a terrain or a wall does; a sheet has no inside.
+
+        So is an open surface in one plane, whichever way its faces look.
+        """
+        if self.closed or not len(self.faces):
+            return not self.closed
+        points = self.vertices[np.unique(self.faces)]
+        extent = np.ptp(points, axis=0).max()  # by which lengths are divided, so that no area underflows
         a, b, c = np.moveaxis(self.vertices[self.faces[self.in_open_part]], 1, 0)
-        area = np.cross(b - a, c - a)
-        return bool(np.linalg.norm(area.sum(axis=0)) >= SHEET * np.linalg.norm(area, axis=1).sum())
+        area = np.cross((b - a) / extent, (c - a) / extent)
+        size = np.linalg.norm(area, axis=1)
+        if self.oriented and np.linalg.norm(area.sum(axis=0)) >= SHEET * size.sum():
+            return True
+        k = int(np.argmax(size))
+        return bool(np.abs((points - a[k]) / extent @ area[k]).max() <= FLAT * size[k])
 
     @cached_property
     def hole(self) -> Array:

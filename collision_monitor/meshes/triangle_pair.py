@@ -1,7 +1,7 @@
 """Two triangles: their distance with its closest points, and whether they meet. Flat triangles and points are allowed.
 
 The closest points lie on two edges, or on a corner and a face; otherwise an edge passes through a face. The search
-ends as soon as the vector between the closest points of two edges separates the triangles.
+ends as soon as the vector between the closest points of two edges separates the triangles by more than its round-off.
 (Larsen, Gottschalk, Lin, Manocha, Fast proximity queries with swept sphere volumes, 1999; Ericson, 5.1.9)
 """
 
@@ -11,8 +11,8 @@ from math import inf
 from typing import Any, NamedTuple
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.narrow_phase.vector import along, cross, dot, minus
-from collision_monitor.tolerances import SEGMENT_PARALLEL_SIN2
+from collision_monitor.narrow_phase.vector import along, cross, dot, minus, sum_of_sizes
+from collision_monitor.tolerances import SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2
 
 
 class Triangle(NamedTuple):
@@ -137,9 +137,12 @@ def closest_points(S, T):
             squared, x, y, w = _segments(p, d, q, e)
             if squared < best:
                 best, on_s, on_t = squared, x, y
-                other = _corner(T, (j + 2) % 3)
-                if squared > 0.0 and dot(minus(third, x), w) <= 0.0 and dot(minus(other, y), w) >= 0.0:
-                    return Closest(best, on_s, on_t)
+                up, down = minus(third, x), minus(y, _corner(T, (j + 2) % 3))
+                gap_s, gap_t = -dot(up, w), -dot(down, w)
+                if squared > 0.0 and gap_s >= 0.0 and gap_t >= 0.0:
+                    slack = SAT_ROUND_OFF * (sum_of_sizes(x) + sum_of_sizes(d) + sum_of_sizes(e))
+                    if gap_s >= slack * sum_of_sizes(up) and gap_t >= slack * sum_of_sizes(down):
+                        return Closest(best, on_s, on_t)
     n, m = _normal(S), _normal(T)
     nn, mm = dot(n, n), dot(m, m)
     g, h = _heights(T, S, n), _heights(S, T, m)

@@ -22,7 +22,7 @@ from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.coarse_trees import KEEP, STEPS, TOO_MANY, box_radius, nearness, pose_at
 from collision_monitor.prediction.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.prediction.mesh_pair import is_mesh, root_of
-from collision_monitor.prediction.tree_impact import HEAP, approach_at, pop_first, push_pair
+from collision_monitor.prediction.tree_impact import HEAP, approach_at, pop_first, push_pair, times_of
 
 
 @device
@@ -40,7 +40,7 @@ def _box_time(blocks, block, k, solid):
 def solid_near(table, parts, pair, now, window, tube, query, near, scratch):
     """`trees_near` of a tree and a solid, which may not be swapped: pair has both motions, then both slots."""
     a, b = pair[2], pair[3]
-    begin, end = window
+    begin, end = times_of(window)
     blocks, work, root = table.blocks, scratch.tree, root_of(table, a)
     memory, own = SolidMemory(scratch.triangle, scratch.work, work), core_length(table, b)
     waiting = push_pair(work, 0, begin, float(WIDTH * root), 0.0, 0.0)

@@ -21,7 +21,7 @@ from collision_monitor.narrow_phase.vector import dot
 from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.prediction.mesh_pair import root_of, triangles_contact
-from collision_monitor.prediction.tree_impact import HEAP, approach_at, open_box, pop_first, push_pair
+from collision_monitor.prediction.tree_impact import HEAP, approach_at, open_box, pop_first, push_pair, times_of
 
 KEEP: Final = 1.0
 """A pair of boxes is kept while its next step allows a motion longer than this part of the box that would be opened."""
@@ -71,7 +71,7 @@ def trees_near(table, parts, pair, now, window, tube, query, near, scratch):
     UNRESOLVED: at that time they may be within the gap, which is at most the tolerance (m), and shorter near `now` (s).
     pair: ShapePair. The tube's time begins with the window.
     """
-    begin, end = window
+    begin, end = times_of(window)
     blocks, work = table.blocks, scratch.tree
     root_a, root_b = root_of(table, pair.a), root_of(table, pair.b)
     waiting = push_pair(work, 0, begin, float(WIDTH * root_a), float(WIDTH * root_b), -1.0)

@@ -29,6 +29,7 @@ from collision_monitor.prediction.tree_impact import (
     pop_first,
     push_pair,
     spins,
+    times_of,
 )
 
 EXAMINED: Final = 30
@@ -40,7 +41,7 @@ than any limit."""
 def solid_impact(table, parts, pair, window, tube, query, scratch):
     """`shape_impact` of a tree and a solid, which may not be swapped: pair has both motions, then both slots."""
     A, B, a, b = pair
-    begin, end = window
+    begin, end = times_of(window)
     blocks, work, root = table.blocks, scratch.tree, root_of(table, a)
     memory = SolidMemory(scratch.triangle, scratch.work, work)
     own = 0.0 if table.kind[b] == HALF_SPACE else core_length(table, b)

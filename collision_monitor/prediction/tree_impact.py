@@ -25,6 +25,7 @@ from collision_monitor.narrow_phase.vector import cross, dot, minus, plus, rotat
 from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.impact_record import CLEAR, HIT, UNRESOLVED
 from collision_monitor.prediction.motion import relative_position, relative_velocity, rotation_at
+from collision_monitor.tolerances import EPSILON
 
 KEEP: Final = 0.2
 """A pair of boxes is kept while its next step allows a motion longer than this part of the box that would be opened.
@@ -48,6 +49,20 @@ ENTRY: Final = 4
 
 HEAP: Final = 2 * MOST_PAIRS // ENTRY
 """Most pairs of boxes that wait. The others are found again by a new search from the earliest time of any of them."""
+
+
+LEAST_DURATION: Final = 1e-300
+"""s: least duration of a search."""
+
+
+@inlined
+def times_of(window):
+    """Begin and end of a search in a window (s). The end is later than the begin, so that an instant is examined too.
+
+    Pairs of boxes wait only for times before the end. A window is an instant where the profile has no horizon.
+    """
+    begin, end = window
+    return begin, max(end, begin + EPSILON * abs(begin) + LEAST_DURATION)
 
 
 @device
@@ -156,7 +171,7 @@ def open_box(blocks, box_a, box_b, X, move, work):
 @outlined
 def tree_impact(table, parts, pair, window, tube, query, scratch):
     """`shape_impact` of two shapes with trees; scratch.answer then has the places of the triangles that meet."""
-    begin, end = window
+    begin, end = times_of(window)
     blocks, work, answer = table.blocks, scratch.tree, scratch.answer
     root_a, root_b = int(table.size[pair.a, TREE]) - 1, int(table.size[pair.b, TREE]) - 1
     place_a, place_b = float(WIDTH * root_a), float(WIDTH * root_b)

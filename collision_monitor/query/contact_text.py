@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from collision_monitor.errors import InputError
 from collision_monitor.geometry.contact_features import FeatureType
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Points, Shape
-from collision_monitor.query.features import feature_of
+from collision_monitor.query.features import feature_of, tie_of
 
 if TYPE_CHECKING:
     from collision_monitor.geometry.coordinates import Array
@@ -18,17 +19,21 @@ if TYPE_CHECKING:
 def contact_text(contact: Contact) -> str:
     """Text such as `Contact(0.0123 m ± 1e-12, box face 3 – capsule surface)`."""
     shape_a, pose_a, shape_b, pose_b = contact.arguments
-    a = _feature(shape_a, pose_a, contact.point_a, contact.normal)
-    b = _feature(shape_b, pose_b, contact.point_b, -contact.normal)
+    tie = tie_of(shape_a, shape_b)
+    a = _feature(shape_a, pose_a, contact.point_a, contact.normal, tie)
+    b = _feature(shape_b, pose_b, contact.point_b, -contact.normal, tie)
     return f"Contact({contact.signed_distance:.4g} m ± {contact.error_bound:.1g}, {a} – {b})"
 
 
-def _feature(shape: Compound, pose: Pose, point: Array, normal: Array) -> str:
+def _feature(shape: Compound, pose: Pose, point: Array, normal: Array, tie: float) -> str:
     if not isinstance(shape, Shape):
         return "compound"
     kind = type(shape).__name__.lower()
     if not isinstance(shape, Box | ConvexHull | Mesh | Points):
         return f"{kind} surface"
-    found = feature_of(shape, pose, point, normal)
+    try:
+        found = feature_of(shape, pose, point, normal, tie)
+    except InputError:  # the witness point is off the surface, by the error bound
+        return f"{kind} surface"
     number = found.face if found.type is FeatureType.FACE else "-".join(map(str, found.vertices))
     return f"{kind} {found.type.name.lower()} {number}"

@@ -127,7 +127,7 @@ def locate(inner: Posed, outer: Posed, offset: Array) -> int:
     It is UNKNOWN where more than MOST_TESTS are needed, as for two soups of 100,000 triangles.
     """
     found: int = Location.OUTSIDE
-    if outer.model is not Model.EXACT or not outer.is_concave:
+    if outer.model is not Model.EXACT or not (outer.is_concave or outer.is_uncertain):
         return found
     points = inner.inner @ inner.rotation.T - offset
     for shape, pose in outer.shapes:

@@ -56,12 +56,17 @@ def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Sh
     >>> cm.contact_features(cm.contact(box, pose, box, above), box, pose, box, above).a.type.name
     'FACE'
     """
-    curved = any(isinstance(shape, Cylinder | Cone | Ellipsoid) for shape in (shape_a, shape_b))
-    tie = ROUND_TIE if curved else FEATURE_TIE
+    tie = tie_of(shape_a, shape_b)
     return FeatureContact(
         feature_of(shape_a, pose_a, contact.point_a, contact.normal, tie),
         feature_of(shape_b, pose_b, contact.point_b, -contact.normal, tie),
     )
+
+
+def tie_of(shape_a: object, shape_b: object) -> float:
+    """Largest difference of equal heights, relative, for the witness points of two shapes."""
+    curved = any(isinstance(shape, Cylinder | Cone | Ellipsoid) for shape in (shape_a, shape_b))
+    return ROUND_TIE if curved else FEATURE_TIE
 
 
 def feature_of(shape: Shape, pose: Pose, point: Array, normal: Array, tie: float = FEATURE_TIE) -> Feature:

@@ -65,6 +65,18 @@ def all_pairs(a: Array, X: tuple[Array, Array], b: Array, Y: tuple[Array, Array]
     return max(float(rows[best, 0]), 0.0), float(rows[best, 10])
 
 
+def test_an_edge_through_the_diagonal_of_a_face_does_not_hide_that_triangles_meet() -> None:
+    """The edges are 1e-15 m apart, and the direction between them is round-off, which separates nothing."""
+    rng = np.random.default_rng(1)
+    for _ in range(300):
+        box = trimesh.creation.box(rng.uniform(0.5, 2.0, 3))
+        size = 10 ** rng.uniform(0.5, 4.0)
+        wedge = tree_of(np.array([[[size, size, size], [size, 0.0, 0.0], [0.0, 0.0, 0.0]]]))
+        pose = Rotation.random(rng=rng).as_matrix(), np.zeros(3)
+        solid = tree_of(box.vertices[box.faces], closed=True)
+        assert distance(wedge, pose, solid, pose) == distance(solid, pose, wedge, pose) == 0.0
+
+
 def random_pose(rng: np.random.Generator, far: float) -> tuple[Array, Array]:
     return Rotation.random(rng=rng).as_matrix(), far * rng.normal(size=3)
 

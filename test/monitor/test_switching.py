@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 from collision_monitor import records
 from collision_monitor.accuracy.reference_monitor import ReferenceMonitor, disagreements
 from collision_monitor.errors import ProfileError
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, Sphere
+from collision_monitor.geometry.shapes import Box, ConvexHull, Cylinder, HalfSpace, Mesh, Points, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.records import Model
@@ -138,6 +140,23 @@ def test_without_a_horizon_contacts_are_found() -> None:
         mine, expected = (each.step(step * SECOND // 50, states) for each in (contacts_only, full))
         assert np.array_equal(mine.contacts.view(np.uint8), expected.contacts.view(np.uint8))
         assert len(mine.contacts) > 5
+
+
+@pytest.mark.parametrize("profile", ["balanced", "fast"])
+def test_without_a_horizon_contacts_of_meshes_and_clouds_are_found(profile: str) -> None:
+    """The window in which an impact is sought is an instant then."""
+    ring = trimesh.creation.torus(0.5, 0.2, major_sections=12, minor_sections=6)
+    mesh, cloud = Mesh(ring.vertices, ring.faces), Points(ring.vertices, 0.01)
+    others = [mesh, cloud, Sphere(0.5), Box((1, 1, 1)), Cylinder(0.5, 1)]
+    monitor = Monitor(Profile.named(profile).replace(horizon=0.0))
+    poses = []
+    for k, (a, b) in enumerate(product((mesh, cloud), others)):  # ten pairs that overlap, far from each other
+        for shape, x in ((a, 10.0 * k), (b, 10.0 * k + 0.4)):
+            monitor.add(len(poses), shape)
+            poses.append([x, 0, 0, 0, 0, 0, 1])
+    for step in range(3):
+        result = monitor.step(step * SECOND // 50, range(len(poses)), poses)
+        assert len(np.unique(result.contacts[["id_a", "id_b"]])) == len(poses) // 2
 
 
 def test_a_horizon_that_shrinks_takes_back_what_is_beyond_it() -> None:

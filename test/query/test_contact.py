@@ -211,3 +211,11 @@ def test_models_that_there_are_not_are_named():
         contact(cm.Sphere(1), Pose(), cm.Sphere(1), Pose(), model="ellipsoid")
     with pytest.raises(cm.UnsupportedError, match="HalfSpace"):
         contact(cm.HalfSpace((0, 0, 1)), Pose(), cm.Sphere(1), Pose(), model="sphere")
+
+
+@pytest.mark.parametrize("solid", [cm.Cylinder(0.1, 0.1), cm.Cone(0.1, 0.1)])
+def test_the_text_of_a_deep_contact_with_a_round_solid(solid: cm.Shape) -> None:
+    """The witness point on the mesh is 1e-6 m off its surface, which the error bound states."""
+    box = trimesh.creation.box((2, 2, 2))
+    c = cm.contact(cm.Mesh(box.vertices, box.faces), cm.Pose(), solid, cm.Pose((0.1, 0.05, 0.02)))
+    assert repr(c).startswith("Contact(-1 m ± 1e-06, mesh ")

@@ -41,6 +41,18 @@ def test_a_ball_in_a_soup_of_triangles_is_inside():
     assert ring.overlaps and ring.signed_distance - ring.error_bound < -0.5
 
 
+@pytest.mark.parametrize("again", [slice(None), slice(3)], ids=["all", "three"])
+def test_a_mesh_in_a_box_that_lists_faces_twice_is_inside(again):
+    """The box is convex, but the tree of a mesh with repeated faces does not tell what is inside."""
+    box = cm.Mesh(CUBE.vertices, np.concatenate([CUBE.faces, CUBE.faces[again]]))
+    ring = cm.Mesh(TORUS.vertices * 0.3, TORUS.faces)
+    at = Pose((0.1, 0.05, 0.02))
+    truth = cm.contact(soup(CUBE), Pose(), ring, at)
+    for c in (cm.contact(box, Pose(), ring, at), cm.contact(ring, at, box, Pose())):
+        assert c.signed_distance == pytest.approx(truth.signed_distance, abs=1e-12)
+    assert cm.overlap(box, Pose(), ring, at) and cm.overlap(ring, at, box, Pose())
+
+
 @pytest.mark.parametrize("mesh", [soup(CUBE, slice(2, None)), soup(CUBE, noise=1e-9)], ids=["no side", "cracks"])
 def test_a_ball_in_an_open_box_is_not_clear(mesh):
     at = Pose((0.3, 0, 0))
@@ -49,6 +61,13 @@ def test_a_ball_in_an_open_box_is_not_clear(mesh):
         assert c.signed_distance - c.error_bound <= -0.9 + 1e-6
     i = cm.time_of_impact(mesh, Motion(Pose()), BALL, Motion(at))
     assert (i.status, i.lower) == ("unresolved", 0.0)
+
+
+def test_a_tiny_open_box_is_no_sheet():
+    """Its areas are below the smallest number."""
+    box = cm.Mesh(1e-110 * CUBE.vertices, CUBE.faces[2:])
+    c = cm.contact(box, Pose(), cm.Sphere(1e-111), Pose())
+    assert not box.surface.sheet and c.signed_distance - c.error_bound < 0.0
 
 
 def test_a_ball_that_flies_in_and_out_through_the_holes():
@@ -73,6 +92,20 @@ def test_a_terrain_is_a_surface_without_an_inside():
     assert c.signed_distance > 0.0 and c.error_bound < 1e-9
     drive = Motion(Pose((0.1, 0.2, 0.6)), (0.1, 0, 0))
     assert cm.time_of_impact(terrain, Motion(Pose()), BALL, drive).status == "clear"
+
+
+@pytest.mark.parametrize("faces", [[(0, 1, 2), (0, 3, 2)], [(0, 1, 2), (0, 3, 2), (1, 2, 4), (4, 2, 1)]])
+def test_a_plate_whose_faces_look_both_ways_has_no_inside(faces):
+    """A hull, which replaces a mesh with an uncertain inside in the monitor, needs a solid."""
+    corners = np.array([(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (3, 1, 0)])
+    corners = corners @ random_pose(np.random.default_rng(1), 1).rotation
+    plate = cm.Mesh(corners, faces)
+    assert plate.surface.sheet
+    assert cm.contact(plate, Pose(), BALL, Pose(corners[0])).signed_distance == pytest.approx(-0.2, abs=1e-9)
+    monitor = cm.Monitor()
+    monitor.add(1, plate)
+    monitor.add(2, BALL)
+    assert len(monitor.step(0, [1, 2], [(0, 0, 0, 0, 0, 0, 1), (*corners[0], 0, 0, 0, 1)]).contacts) == 1
 
 
 @settings(max_examples=60, deadline=None)
