@@ -47,6 +47,8 @@ LARGEST_RATIO: Final = 10.0
 EVENTS_AT_START: Final = 150
 """Events per sphere before time 0, in which the lattice of the start melts."""
 LOG_ROWS: Final = 100_000
+TOUCHING: Final = 1e-12
+"""Part of its radius by which a sphere that has just collided may overlap the other or a wall: round-off."""
 
 
 class HardSpheres:
@@ -104,7 +106,7 @@ class HardSpheres:
     ) -> HardSpheres:
         """Start with these positions (N, 3) (m) and velocities (N, 3) (m/s) in a cube from 0 to `side` (m).
 
-        Raises InputError, also if spheres overlap each other or a wall.
+        Raises InputError, also if spheres overlap each other or a wall by more than round-off.
         """
         at, moving = _rows(positions, "positions"), _rows(velocities, "velocities")
         if len(at) != len(moving) or not 1 <= len(at) <= MOST_SPHERES:
@@ -116,9 +118,10 @@ class HardSpheres:
         if not (math.isfinite(side) and side > 0.0):
             raise InputError(f"side: expected a finite length above 0 m, got {side!r}")
         _check_side(float(side), sizes, periodic, "side")
-        if not periodic and not ((at >= sizes[:, None]) & (at <= side - sizes[:, None])).all():
+        within = (1.0 - TOUCHING) * sizes
+        if not periodic and not ((at >= within[:, None]) & (at <= side - within[:, None])).all():
             raise InputError(f"positions: expected all spheres between the walls at 0 and {side:g} m, got some outside")
-        pairs = overlapping(at, sizes, float(side) if periodic else None)
+        pairs = overlapping(at, within, float(side) if periodic else None)
         if len(pairs):
             raise InputError(f"positions: expected no overlaps, spheres {pairs[0, 0]} and {pairs[0, 1]} overlap")
         spheres = cls.__new__(cls)

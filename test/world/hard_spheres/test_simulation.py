@@ -41,6 +41,15 @@ def test_collisions_are_those_of_a_plain_simulation(seed, periodic, restitution)
     assert [event[0] for event in found] == pytest.approx([event[0] for event in expected[:15]], rel=1e-6)
 
 
+@pytest.mark.parametrize("seed", [6, 12, 678])
+def test_spheres_that_have_just_collided_can_be_placed(seed):
+    """The last collision before the start leaves a sphere touching another or a wall, by round-off with an overlap."""
+    radii = np.random.default_rng(6678 if seed == 678 else seed).uniform(0.2, 0.6, 7)
+    spheres = HardSpheres(7, 0.02, seed, radii=radii, walls="reflecting")
+    again = HardSpheres.placed(spheres.positions, spheres.velocities, spheres.side, radii=radii, walls="reflecting")
+    assert np.allclose(again.positions, spheres.positions, rtol=1e-12, atol=0.0)
+
+
 @pytest.mark.parametrize("walls", ["reflecting", "periodic"])
 def test_the_runs_into_which_a_time_is_divided_do_not_matter(walls):
     whole, parts = (HardSpheres(150, 0.3, 5, walls=walls) for _ in range(2))
