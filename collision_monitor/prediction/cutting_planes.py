@@ -18,10 +18,9 @@ from collision_monitor.prediction.obstacle_planes import (
     NOT_OFF,
     PLANE_SIZE,
     separation_at,
-    set_middle,
     set_plane,
 )
-from collision_monitor.prediction.sample_gaps import NOT_TURNED, enter_planes, gaps_at_end, set_bow, set_samples
+from collision_monitor.prediction.sample_gaps import NOT_TURNED, enter_planes, gaps_at_end, set_bends, set_samples
 
 TRIED: Final = 32
 """Number of samples that decide how the normal of a plane turns: a block of the samples, which are spread out. The
@@ -34,8 +33,8 @@ BLOCK: Final = 256
 NO_MODE: Final = -1
 """In place of a mode, see obstacle_planes.py: all are to be tried."""
 
-LEAST_BOW: Final = 0.1
-"""Part of the tolerance by which the gap of a plane may bend if it counts as a straight line."""
+LEAST_BEND: Final = 0.1
+"""Part of the tolerance by which the stated gap along a plane may bend if all gaps count as straight lines."""
 
 SLACK: Final = 0.1
 """Part of the tolerance by which a plane may be farther from the obstacle than one that touches it."""
@@ -100,23 +99,22 @@ def _sole_mode(table, pair, n, settings, obstacle):
 def _cut(table, pair, n, samples, direction, k, settings, memory):
     """Add the plane along the direction that separates sample n. Its normal may turn with a body.
 
-    The gap counts as a parabola that bends as the stated one does. Where another corner of a long body comes nearest on
-    the way, it is larger, and the plane separates nothing. So the normal has to shorten the time of sample n inside.
-    If only one shape has a side along the plane, the normal turns with it, and is at rest if none has. Otherwise, or if
-    that separates nothing, the best one is that behind which TRIED samples spend the least time. Returns whether there
-    is one.
+    The gap counts as a parabola in the segment. Where another corner of a long body comes nearest on the way, it is
+    larger, and the plane separates nothing. So the normal has to shorten the time of sample n inside. If only one shape
+    has a side along the plane, the normal turns with it, and is at rest if none has. Otherwise, or if that separates
+    nothing, the best one is that behind which TRIED samples spend the least time. Returns whether there is one.
     """
     obstacle, rows, entry, leave = memory.obstacle, memory.rows, memory.entry, memory.leave
     count, nodes = obstacle.count[k], obstacle.node[k : k + 2]
     planes, margin, before = obstacle.planes[k, count : count + 1], plane_margin(settings), leave[n] - entry[n]
-    middle, least = obstacle.middle[0], LEAST_BOW * settings.tolerance
+    middle, least = obstacle.middle[k], LEAST_BEND * settings.tolerance
     turning, tried = settings.turning, _sole_mode(table, pair, direction, settings, obstacle)
     if tried != NO_MODE:
         set_plane(direction, tried, obstacle, planes[0])
-        set_bow(table, pair, planes[0], nodes, middle, least)
-        enter_planes(table, pair, planes, margin, turning, nodes, n, n + 1, rows, entry, leave)
+        set_bends(table, pair, planes[0], nodes, middle, least)
+        enter_planes(table, pair, planes, margin, turning, nodes, middle, n, n + 1, rows, entry, leave)
         if leave[n] - entry[n] < before:
-            enter_planes(table, pair, planes, margin, turning, nodes, 0, samples, rows, entry, leave)
+            enter_planes(table, pair, planes, margin, turning, nodes, middle, 0, samples, rows, entry, leave)
             obstacle.count[k] += 1
             return True
     first = 0 if settings.careful else n // TRIED * TRIED
@@ -127,14 +125,14 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
         if mode == tried or (mode != AT_REST and not settings.follows[mode]):
             continue
         set_plane(direction, mode, obstacle, planes[0])
-        set_bow(table, pair, planes[0], nodes, middle, least)
+        set_bends(table, pair, planes[0], nodes, middle, least)
         for m in range(first, last):
             trial_entry[m] = entry[m]
             trial_leave[m] = leave[m]
-        enter_planes(table, pair, planes, margin, turning, nodes, first, last, rows, trial_entry, trial_leave)
+        enter_planes(table, pair, planes, margin, turning, nodes, middle, first, last, rows, trial_entry, trial_leave)
         if n >= last:
             trial_entry[n], trial_leave[n] = entry[n], leave[n]
-            enter_planes(table, pair, planes, margin, turning, nodes, n, n + 1, rows, trial_entry, trial_leave)
+            enter_planes(table, pair, planes, margin, turning, nodes, middle, n, n + 1, rows, trial_entry, trial_leave)
         if not trial_leave[n] - trial_entry[n] < before:
             continue
         total = 0.0
@@ -146,8 +144,8 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
         return False
     obstacle.count[k] += 1
     set_plane(direction, best, obstacle, planes[0])
-    set_bow(table, pair, planes[0], nodes, middle, least)
-    enter_planes(table, pair, planes, margin, turning, nodes, 0, samples, rows, entry, leave)
+    set_bends(table, pair, planes[0], nodes, middle, least)
+    enter_planes(table, pair, planes, margin, turning, nodes, middle, 0, samples, rows, entry, leave)
     return True
 
 
@@ -267,7 +265,7 @@ def carry_planes(table, pair, k, settings, memory):
 
 
 @inlined
-def begin_segment(table, parts, pair, k, settings, memory, points, first, last, scratch):
+def begin_segment(table, pair, k, settings, memory, points, first, last):
     """Set the intervals of the samples first:last to those behind the planes of segment k.
 
     memory.alone (S,): times of the samples that met in an earlier segment, whose intervals are empty, else infinite.
@@ -279,10 +277,10 @@ def begin_segment(table, parts, pair, k, settings, memory, points, first, last, 
         entry[n] = begin if times[n] == inf else inf
         leave[n] = end
     planes, nodes, margin = obstacle.planes[k, 0 : obstacle.count[k]], obstacle.node[k : k + 2], plane_margin(settings)
-    set_middle(table, parts, pair, k, scratch, obstacle)
+    middle = obstacle.middle[k]
     for m in range(obstacle.count[k]):
-        set_bow(table, pair, planes[m], nodes, obstacle.middle[0], LEAST_BOW * settings.tolerance)
-    enter_planes(table, pair, planes, margin, settings.turning, nodes, first, last, rows, entry, leave)
+        set_bends(table, pair, planes[m], nodes, middle, LEAST_BEND * settings.tolerance)
+    enter_planes(table, pair, planes, margin, settings.turning, nodes, middle, first, last, rows, entry, leave)
 
 
 @inlined

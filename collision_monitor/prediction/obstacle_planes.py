@@ -2,8 +2,7 @@
 
 The shapes touch where their relative position lies in the Minkowski sum of A and -B. Each direction n gives a plane
 that bounds it: the gap along n is n . p - h_A(n) - h_B(-n), with the support functions h. Over a short time the gap is
-a parabola in time, which bends as that of the stated motion does. A normal that turns with one of the bodies goes on
-bounding a face that turns.
+a parabola in time. A normal that turns with one of the bodies goes on bounding a face that turns.
 """
 
 from __future__ import annotations
@@ -26,9 +25,9 @@ MOST_SEGMENTS: Final = 48
 MOST_PLANES: Final = 64
 """Largest number of planes in a segment. Each costs 1 to 10 ns per sample."""
 
-MODE, BOW, PLANE_SIZE = 3, 4, 5
-"""Columns of a plane behind its normal: mode; by how much (m) the gap of the stated motion in the middle of the segment
-exceeds the mean of those at its ends; number of columns."""
+MODE, BENDS, PLANE_SIZE = 3, 4, 5
+"""Columns of a plane behind its normal: mode; 1 if gaps bend in the segment, 0 if they are straight lines; number of
+columns."""
 
 AT_REST: Final = 2
 """Mode of a plane: its normal, in world axes, does not turn. 0 and 1: it turns with the first or the second shape, and
@@ -62,7 +61,7 @@ class Obstacle(NamedTuple):
     count: Any  # (MOST_SEGMENTS,) int64: planes of each segment
     is_quiet: Any  # (MOST_SEGMENTS,) bool: segments in which no sample of the pilot meets
     node: Any  # (MOST_SEGMENTS + 1,) NODE
-    middle: Any  # (1,) NODE: of the segment whose planes are sought, without its turn
+    middle: Any  # (MOST_SEGMENTS,) NODE: in the middle of each segment
 
 
 def make_obstacle() -> Obstacle:
@@ -73,13 +72,13 @@ def make_obstacle() -> Obstacle:
         np.zeros(MOST_SEGMENTS, np.int64),
         np.zeros(MOST_SEGMENTS, np.bool_),
         np.zeros(MOST_SEGMENTS + 1, NODE),
-        np.zeros(1, NODE),
+        np.zeros(MOST_SEGMENTS, NODE),
     )
 
 
 @inlined
-def _place(table, parts, pair, t, scratch, node):
-    """Place the shapes of the pair (ShapePair) at time t."""
+def _place(table, parts, pair, t, turning, planar, scratch, node):
+    """Set a node to time t, see `set_nodes`."""
     A, B, a, b = pair
     R_i, R_j = scratch.rotation[0], scratch.rotation[1]
     node.time = t
@@ -91,13 +90,16 @@ def _place(table, parts, pair, t, scratch, node):
     for c in range(3):
         node.position[c] = p[c]
         node.offset[0, c], node.offset[1, c] = oa[c], ob[c]
+    _set_turn(A, t, turning[0], planar, node.turn[0])
+    _set_turn(B, t, turning[1], planar, node.turn[1])
 
 
 @inlined
-def set_middle(table, parts, pair, k, scratch, obstacle):
-    """Place the shapes of the pair (ShapePair) in the middle of segment k."""
-    middle = 0.5 * (obstacle.node[k].time + obstacle.node[k + 1].time)
-    _place(table, parts, pair, middle, scratch, obstacle.middle[0])
+def set_middles(table, parts, pair, segments, turning, planar, scratch, obstacle):
+    """Place the shapes of the pair (ShapePair) in the middle of each segment. turning, planar: see `set_nodes`."""
+    for k in range(segments):
+        middle = 0.5 * (obstacle.node[k].time + obstacle.node[k + 1].time)
+        _place(table, parts, pair, middle, turning, planar, scratch, obstacle.middle[k])
 
 
 @device
@@ -112,10 +114,7 @@ def set_nodes(table, parts, pair, window, length, turning, planar, scratch, obst
     segments = 0
     for k in range(MOST_SEGMENTS + 1):
         t = min(begin + k * length, end)
-        node = obstacle.node[k]
-        _place(table, parts, pair, t, scratch, node)
-        _set_turn(pair.A, t, turning[0], planar, node.turn[0])
-        _set_turn(pair.B, t, turning[1], planar, node.turn[1])
+        _place(table, parts, pair, t, turning, planar, scratch, obstacle.node[k])
         segments = k
         if t >= end:
             break

@@ -22,7 +22,7 @@ from collision_monitor.prediction.cutting_planes import (
 )
 from collision_monitor.prediction.impact_record import CLEAR
 from collision_monitor.prediction.normal_samples import FURTHEST
-from collision_monitor.prediction.obstacle_planes import MOST_SEGMENTS, set_nodes
+from collision_monitor.prediction.obstacle_planes import MOST_SEGMENTS, set_middles, set_nodes
 from collision_monitor.prediction.pair_errors import (
     BENDING,
     TURNED,
@@ -141,12 +141,13 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
     is_rough = segments > MOST_PARTS and large and spins
     if is_rough and not sampling.stated:
         return Laid(segments, settings, False)
+    set_middles(table, parts, pair, segments, errors.turning, sampling.planar, scratch, memory.obstacle)
     left, skips = samples, not flat and search.verified > 0
     for k in range(segments):
         if skips and stay_apart(table, parts, pair, k, errors, margin, memory.obstacle, work):
             memory.obstacle.is_quiet[k] = True
             continue
-        begin_segment(table, parts, pair, k, settings, memory, search.points, 0, samples, scratch)
+        begin_segment(table, pair, k, settings, memory, search.points, 0, samples)
         cut_extremes(table, parts, pair, k, search.extremes, settings, memory, scratch)
         cut_planes(table, parts, pair, k, samples, (1 + careful) * search.verified, settings, memory, scratch)
         before, left = left, end_segment(memory.entry, memory.leave, alone, 0, samples)
@@ -174,7 +175,7 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
     for k in range(segments):
         if memory.obstacle.is_quiet[k]:
             continue
-        begin_segment(table, parts, pair, k, settings, memory, points, 0, samples, work.scratch)
+        begin_segment(table, pair, k, settings, memory, points, 0, samples)
         cut_planes(table, parts, pair, k, samples, each, settings, memory, work.scratch)
         if end_segment(memory.entry, memory.leave, alone, 0, samples) == 0:
             break

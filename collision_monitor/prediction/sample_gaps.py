@@ -35,7 +35,7 @@ from collision_monitor.prediction.linear_gaps import (
     make_terms,
     sum_terms,
 )
-from collision_monitor.prediction.obstacle_planes import AT_REST, BOW, MODE, from_plane
+from collision_monitor.prediction.obstacle_planes import AT_REST, BENDS, MODE, from_plane
 
 TURNED_FARTHEST: Final = 0.7
 """Largest standard deviation of an orientation (rad) for which the series of `_turn` are exact to 0.001 rad."""
@@ -51,12 +51,12 @@ APART: Final = 8
 
 
 class SampleRows(NamedTuple):
-    """Samples at both ends of a segment; scratch memory of one thread for S samples."""
+    """Samples at both ends and in the middle of a segment; scratch memory of one thread for S samples."""
 
-    node: Any  # (2, STATE, S)
+    node: Any  # (3, STATE, S): the last one in the middle
     normal: Any  # (3, S)
     local: Any  # (3, S): directions in the axes of a shape
-    gap: Any  # (3, S): gaps at both ends (m), and support values
+    gap: Any  # (4, S): gaps at both ends (m), support values, and gaps in the middle (m)
     terms: Any  # (TERMS, COLUMNS): see linear_gaps
 
 
@@ -64,23 +64,24 @@ def make_sample_rows(samples: int) -> SampleRows:
     """Make the scratch memory of one thread."""
     length = samples + APART
     return SampleRows(
-        np.zeros((2, STATE, length)),
+        np.zeros((3, STATE, length)),
         np.zeros((3, length)),
         np.zeros((3, length)),
-        np.zeros((3, length)),
+        np.zeros((4, length)),
         make_terms(),
     )
 
 
 @device
 def set_samples(obstacle, k, off, points, turning, first, last, rows):
-    """Write the samples first:last at both ends of segment k into rows.node.
+    """Write the samples first:last at both ends and in the middle of segment k into rows.node.
 
     off (6, S): errors of position and velocity; points (DIMENSIONS, S): the last six are unit errors of orientation;
     turning (int, int): NOT_TURNED, FIRST_ORDER or SERIES for both bodies.
     """
-    for end in range(2):
-        stated_node, node = obstacle.node[k + end], rows.node[end]
+    for place in range(3):
+        stated_node = obstacle.node[k + place] if place < 2 else obstacle.middle[k]
+        node = rows.node[place]
         t = stated_node.time
         for c in range(3):
             row, x, v = node[c, first:last], off[c, first:last], off[3 + c, first:last]
@@ -255,12 +256,15 @@ def gaps_at_end(table, pair, plane, margin, turning, node, count, rows):
 
 
 @inlined
-def set_bow(table, pair, plane, nodes, middle, least):
-    """Set column BOW of a plane in a segment with these ends and this middle (NODE); 0 if it is below `least` (m)."""
+def set_bends(table, pair, plane, nodes, middle, least):
+    """Set column BENDS of a plane in a segment with these ends and this middle (NODE).
+
+    Gaps count as straight lines if the stated one deviates from a line by at most `least` (m).
+    """
     bow = stated_gap(table, pair, from_plane(plane, middle.rotation), middle, 0.0)
     for end in range(2):
         bow -= 0.5 * stated_gap(table, pair, from_plane(plane, nodes[end].rotation), nodes[end], 0.0)
-    plane[BOW] = bow if abs(bow) > least else 0.0
+    plane[BENDS] = 1.0 if abs(bow) > least else 0.0
 
 
 @inlined
@@ -286,45 +290,33 @@ def _enter_line(g, h, begin, length, entry, leave):
 
 
 @inlined
-def _crossings(g, h, bow, begin, length):
-    """Both times (s) at which a gap from g to h (m) is 0, in order, and whether it is at all.
+def _enter_parabola(g, h, middle, begin, length, entry, leave):
+    """`_enter_line` for gaps with these values (n,) in the middle. One that is closed at both ends counts as closed.
 
-    At a share s of the segment it deviates from a straight line by bow s (1 - s). Roots without cancellation, as in
+    At a share s of the segment, a gap deviates from a straight line by bow s (1 - s). Roots without cancellation, as in
     Press et al., Numerical Recipes, section 5.6.
     """
-    slope = h - g + bow
-    inside = slope * slope + 4.0 * bow * g
-    root = sqrt(max(inside, 0.0))
-    half = 0.5 * (slope + (root if slope >= 0.0 else -root))
-    one, other = half / bow, -g / half
-    first, last = (one, other) if one < other else (other, one)
-    return begin + length * first, begin + length * last, inside >= 0.0
-
-
-@inlined
-def _enter_dip(g, h, bow, begin, length, entry, leave):
-    """`_enter_line` for the gaps of `_crossings` with bow < 0."""
     for n in range(entry.size):
-        first, last, closes = _crossings(g[n], h[n], bow, begin, length)
-        enters, leaves = first if closes else inf, last if closes else -inf
-        _restrict(n, enters, leaves, entry, leave)
-
-
-@inlined
-def _enter_rise(g, h, bow, begin, length, entry, leave):
-    """`_enter_line` for the gaps of `_crossings` with bow > 0; closed in the whole segment if closed at both ends."""
-    for n in range(entry.size):
-        first, last, _ = _crossings(g[n], h[n], bow, begin, length)
-        enters, leaves = last if g[n] > 0.0 else -inf, first if h[n] > 0.0 else inf
+        bow = 4.0 * middle[n] - 2.0 * (g[n] + h[n])
+        slope = h[n] - g[n] + bow
+        inside = slope * slope + 4.0 * bow * g[n]
+        root = sqrt(max(inside, 0.0))
+        half = 0.5 * (slope + (root if slope >= 0.0 else -root))
+        one, other = half / bow, -g[n] / half
+        first, last = (one, other) if one < other else (other, one)
+        first, last = begin + length * first, begin + length * last
+        dips, closes = bow < 0.0, inside >= 0.0
+        enters = (first if closes else inf) if dips else last if g[n] > 0.0 else -inf
+        leaves = last if dips else first if h[n] > 0.0 else inf
         _restrict(n, enters, leaves, entry, leave)
 
 
 @device
-def enter_planes(table, pair, planes, margin, turning, nodes, first, last, rows, entry, leave):
+def enter_planes(table, pair, planes, margin, turning, nodes, middle, first, last, rows, entry, leave):
     """Restrict the intervals [entry, leave] (S,) of samples first:last in a segment to the time behind planes.
 
-    planes (M, PLANE_SIZE); nodes (2,) NODE: both ends of the segment; rows: see `set_samples`. margin (m): the gap from
-    which on a sample is behind a plane.
+    planes (M, PLANE_SIZE); nodes (2,), middle: NODE at both ends and in the middle of the segment; rows: see
+    `set_samples`; margin (m): the gap from which on a sample is behind a plane.
     """
     begin, length = nodes[0].time, nodes[1].time - nodes[0].time
     entry, leave = entry[first:last], leave[first:last]
@@ -333,10 +325,9 @@ def enter_planes(table, pair, planes, margin, turning, nodes, first, last, rows,
         for end in range(2):
             gap = rows.gap[end, first:last]
             _gaps_at(table, pair, planes[m], nodes[end], margin, turning, first, last, rows.node[end], rows, gap)
-        bow = 4.0 * planes[m, BOW]
-        if bow < 0.0:
-            _enter_dip(g, h, bow, begin, length, entry, leave)
-        elif bow > 0.0:
-            _enter_rise(g, h, bow, begin, length, entry, leave)
+        if planes[m, BENDS] > 0.0:
+            gap = rows.gap[3, first:last]
+            _gaps_at(table, pair, planes[m], middle, margin, turning, first, last, rows.node[2], rows, gap)
+            _enter_parabola(g, h, gap, begin, length, entry, leave)
         else:
             _enter_line(g, h, begin, length, entry, leave)

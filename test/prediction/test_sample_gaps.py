@@ -14,14 +14,14 @@ from collision_monitor.prediction.body_impact import ShapePair, Window
 from collision_monitor.prediction.error_samples import make_workspace
 from collision_monitor.prediction.motion import carry_on
 from collision_monitor.prediction.normal_samples import sample_columns
-from collision_monitor.prediction.obstacle_planes import BOW, MODE, set_middle, set_nodes
+from collision_monitor.prediction.obstacle_planes import MODE, set_middles, set_nodes
 from collision_monitor.prediction.plane_memory import make_plane_memory
 from collision_monitor.prediction.sample_gaps import (
     FIRST_ORDER,
     NOT_TURNED,
     SERIES,
     enter_planes,
-    set_bow,
+    set_bends,
     set_samples,
 )
 
@@ -107,7 +107,8 @@ def test_gaps_are_those_of_the_turned_shapes(order: int, mode: int, axis: int | 
         planes = obstacle.planes[0, :1]
         planes[0, :3], planes[0, MODE] = n / np.linalg.norm(n), mode
         enter_planes(
-            table, pair, planes, 0.05, orders, obstacle.node[:2], 0, SAMPLES, rows, memory.entry, memory.leave
+            table, pair, planes, 0.05, orders, obstacle.node[:2], obstacle.middle[0], 0, SAMPLES, rows, memory.entry,
+            memory.leave,
         )
         for end in range(2):
             node, state = obstacle.node[end], rows.node[end]
@@ -168,15 +169,13 @@ def test_parabolas_give_the_times_behind_a_plane_of_bodies_that_turn(mode: int) 
             reach = SHAPES[name][1](R[0].T @ u) + ellipsoid(-R[1].T @ u)
             gap[:] = u @ (node["position"][:, None] + errors[:3] + node["time"] * errors[3:]) - reach
         set_nodes(table, parts, pair, window, end, still, False, work.scratch, obstacle)
-        set_middle(table, parts, pair, 0, work.scratch, obstacle)
+        set_middles(table, parts, pair, 1, still, False, work.scratch, obstacle)
         set_samples(obstacle, 0, memory.off, points, orders, 0, SAMPLES, rows)
-        ends = obstacle.node[:2]
+        ends, middle, planes = obstacle.node[:2], obstacle.middle[0], obstacle.planes[0, :1]
         for bends in (False, True):
-            plane[BOW] = 0.0
-            if bends:
-                set_bow(table, pair, plane, ends, obstacle.middle[0], 0.0)
+            set_bends(table, pair, plane, ends, middle, 0.0 if bends else np.inf)
             entry, leave = np.zeros(SAMPLES), np.full(SAMPLES, end)
-            enter_planes(table, pair, obstacle.planes[0, :1], 0.0, orders, ends, 0, SAMPLES, rows, entry, leave)
+            enter_planes(table, pair, planes, 0.0, orders, ends, middle, 0, SAMPLES, rows, entry, leave)
             for m in range(SAMPLES):
                 first, last = times_behind(gaps[:, m], times)
                 if first <= last and entry[m] <= leave[m]:
