@@ -58,8 +58,10 @@ def _step_certain(monitor: Monitor) -> tuple[Array, Array]:
     monitor.add(OBJECTS, Box((500, 10, 1)), static=True, pose=Pose((0, 0, -0.5)))
     for object_id in range(OBJECTS):
         monitor.add(object_id, Box((1, 1, 1)) if object_id % 2 else Sphere(0.5))
-    # the excess of a model has a kernel too; without this, the first concave mesh would hold up the answers
-    containing_model([(ConvexHull(np.vstack([np.zeros(3), np.eye(3)])), Pose())], Model.AABB)
+    # the excess of a model has kernels too; without this, the first concave mesh would hold up the answers
+    corners = np.vstack([np.zeros(3), np.eye(3)])
+    containing_model([(ConvexHull(corners), Pose())], Model.AABB)
+    containing_model([(Mesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]), Pose())], Model.AABB)
     poses = np.zeros((OBJECTS, 7))
     poses[:, 6] = 1.0
     poses[:, 0] = 0.9 * np.arange(OBJECTS)

@@ -41,14 +41,11 @@ def locate_in_surface(points: Array, surface: Surface) -> Signs:
     if len(sides):
         part[: kept.sum()][surface.in_open_part] = -1
     found = ray_crossings(points, vertices, faces)
-    in_part = _in_any_part(found, part, len(points))
-    if len(sides):
-        possible, certain = in_part, np.zeros(len(points), bool)
-    elif surface.oriented:
+    if surface.oriented and not len(sides):
         certain = possible = np.bincount(found.point, found.turn, len(points)) != 0.0
     else:
-        certain = np.bincount(found.point, minlength=len(points)) % 2 == 1
-        possible = in_part
+        certain = (np.bincount(found.point, minlength=len(points)) % 2 == 1) & (len(sides) == 0)
+        possible = _in_any_part(found, part, len(points))
     location = np.where(certain, Location.INSIDE, np.where(possible, UNKNOWN, Location.OUTSIDE))
     return np.where(found.on_face, Location.BOUNDARY, location).astype(np.int8)
 

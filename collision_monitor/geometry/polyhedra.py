@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from collision_monitor.errors import InputError, ShapeError
 from collision_monitor.geometry.coordinates import Array, Booleans, Indices, Signs, coordinates, triangles
+from collision_monitor.geometry.crossing_filter import UNDECIDED, tabulate_crossings
 from collision_monitor.geometry.lines import segments_intersect
 from collision_monitor.geometry.orientation import orient2d, orient3d
 from collision_monitor.geometry.point_in_polygon import Location
@@ -92,7 +93,8 @@ class Crossings(NamedTuple):
 def ray_crossings(points: Array, vertices: Array, faces: Indices) -> Crossings:
     """Faces (m, 3) that the rays from the points (n, 3) towards +z meet, as in `locate_in_polyhedron`."""
     a, b, c = (vertices[corner] for corner in faces.T)
-    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    x = vertices[faces, 0]
+    low, high = x.min(axis=1), x.max(axis=1)
     on_face = np.zeros(len(points), bool)
     order = np.argsort(points[:, 0])
     nothing = np.zeros(0, np.int64)
@@ -101,21 +103,30 @@ def ray_crossings(points: Array, vertices: Array, faces: Indices) -> Crossings:
     at_once = min(max(TESTS_AT_ONCE // len(faces), least), most)
     for first in range(0, len(points), at_once):  # points in order of x, so that few faces are near each batch
         some = order[first : first + at_once]
-        near = np.flatnonzero((low[:, 0] <= points[some[-1], 0]) & (points[some[0], 0] <= high[:, 0]))
-        beside = (low[near, :2] <= points[some, None, :2]) & (points[some, None, :2] <= high[near, :2])
-        below = points[some, None, 2] <= high[near, 2]
-        i, j = np.nonzero(beside.all(axis=-1) & below)
+        near = np.flatnonzero((low <= points[some[-1], 0]) & (points[some[0], 0] <= high))
+        table = np.empty((len(some), len(near)), np.int8)
+        tabulate_crossings(points[some], a[near], b[near], c[near], table)
+        i, j = np.nonzero(table)
+        turn = table[i, j].astype(np.float64)
         i, j = some[i], near[j]
-        q, corners = points[i], (a[j], b[j], c[j])
-        height = np.asarray(orient3d(*corners, q))
-        in_plane = height == 0.0
-        on_face[i[in_plane][_in_flat_triangle(q[in_plane], *(corner[in_plane] for corner in corners))]] = True
-        turn = _perturbed_turn(q, *corners)
-        # the ray meets the face if its point is behind a face that looks up, or in front of one that looks down
-        through = turn * height < 0.0
+        k = np.flatnonzero(turn == UNDECIDED)
+        if len(k):
+            turn[k], touches = _exact_crossings(points[i[k]], *(corner[j[k]] for corner in (a, b, c)))
+            on_face[i[k[touches]]] = True
+        through = turn != 0.0
         met.append((i[through], j[through], turn[through]))
     point, face, turn = (np.concatenate(column) for column in zip(*met, strict=True))
     return Crossings(point, face, turn, on_face)
+
+
+def _exact_crossings(p: Array, a: Array, b: Array, c: Array) -> tuple[Array, Booleans]:
+    """Turn (k,) of each face a, b, c (k, 3) that the ray from p (k, 3) meets, else 0, and whether p is on the face."""
+    height = np.asarray(orient3d(a, b, c, p))
+    on_face = height == 0.0
+    on_face[on_face] = _in_flat_triangle(*(point[on_face] for point in (p, a, b, c)))
+    turn = _perturbed_turn(p, a, b, c)
+    # the ray meets the face if its point is behind a face that looks up, or in front of one that looks down
+    return np.where(turn * height < 0.0, turn, 0.0), on_face
 
 
 class EdgeFace(NamedTuple):
@@ -168,24 +179,24 @@ _PLANES = ([0, 1], [1, 2], [2, 0])
 
 def _perturbed_turn(p: Array, a: Array, b: Array, c: Array) -> Array:
     """Orientation of the triangle seen from above (1 up, -1 down) if it contains p shifted by (e, e²), else 0."""
-    signs = []
-    for start, end in ((a, b), (b, c), (c, a)):
-        sign = np.sign(orient2d(start[:, :2], end[:, :2], p[:, :2]))
-        along = np.sign(end - start)
-        # d/de of the determinant, then d/de²
-        sign = np.where(sign == 0.0, -along[:, 1], sign)
-        signs.append(np.where(sign == 0.0, along[:, 0], sign))
-    same = (signs[0] == signs[1]) & (signs[1] == signs[2])
-    return np.where(same, signs[0], 0.0)
+    start, end = np.stack([a, b, c]), np.stack([b, c, a])
+    sign = np.sign(orient2d(start[..., :2], end[..., :2], p[:, :2]))
+    along = np.sign(end - start)
+    # d/de of the determinant, then d/de²
+    sign = np.where(sign == 0.0, -along[..., 1], sign)
+    sign = np.where(sign == 0.0, along[..., 0], sign)
+    same = (sign[0] == sign[1]) & (sign[1] == sign[2])
+    return np.where(same, sign[0], 0.0)
 
 
 def _in_flat_triangle(p: Array, a: Array, b: Array, c: Array) -> Booleans:
     """Whether p (m, 3) in the plane of a, b, c (m, 3) is in the triangle: all projections of p are in those of it."""
     low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     inside = ((low <= p) & (p <= high)).all(axis=1)
+    start, end = np.stack([a, b, c]), np.stack([b, c, a])
     for k in _PLANES:
-        turns = [orient2d(start[:, k], end[:, k], p[:, k]) for start, end in ((a, b), (b, c), (c, a))]
-        inside &= np.all([turn >= 0.0 for turn in turns], axis=0) | np.all([turn <= 0.0 for turn in turns], axis=0)
+        turn = orient2d(start[..., k], end[..., k], p[:, k])
+        inside &= (turn >= 0.0).all(axis=0) | (turn <= 0.0).all(axis=0)
     return np.asarray(inside)
 
 

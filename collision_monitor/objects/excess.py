@@ -6,7 +6,7 @@ within a cell. It changes as slowly between the cells of a block, so that most b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import product
 from typing import Final
 
@@ -34,7 +34,7 @@ The time grows at least with the square of BLOCKS."""
 AT_ONCE: Final = 16
 """Blocks that are searched first. The next search takes twice as many, and so on."""
 
-FARTHEST_FIRST: Final = 64
+FARTHEST_FIRST: Final = 256
 """Cells that are first tested for the inside of a mesh, which takes longest. The next test takes 8 times as many."""
 
 
@@ -72,6 +72,20 @@ def _excess_around_concave(
     diagonal = float(np.linalg.norm(cell))
     slack = diagonal / 2
     distance = _DistanceTo(pieces)
+    # a point in a hull takes longer than its nearest vertex, and than a point in a mesh, so it is asked last
+    is_asked_last = distance.is_to_vertices and isinstance(model, ConvexHull)
+
+    def in_model(points: Array) -> NDArray[np.bool_]:
+        if isinstance(model, Box) or not len(points):
+            return np.full(len(points), True)
+        return _distances(points, [(model, pose)]) <= slack
+
+    def counts(points: Array) -> NDArray[np.bool_]:
+        found = ~_inside_of_meshes(points, shapes)
+        if is_asked_last:
+            found[found] = in_model(points[found])
+        return found
+
     block = _grid(BLOCKS)
     bound = distance((block + 0.5) * (BLOCK * cell) + low) + diagonal * (BLOCK - 1) / 2
     order = np.argsort(-bound)
@@ -83,9 +97,9 @@ def _excess_around_concave(
         some = some[bound[some] > farthest]
         index = (block[some, None] * BLOCK + _grid(BLOCK)).reshape(-1, 3)
         centres = (index + 0.5) * cell + low
-        if not isinstance(model, Box):
-            centres = centres[_distances(centres, [(model, pose)]) <= slack]
-        farthest = max(farthest, _farthest_outside(centres, distance(centres), shapes, farthest))
+        if not is_asked_last:
+            centres = centres[in_model(centres)]
+        farthest = max(farthest, _farthest(centres, distance(centres), farthest, counts))
     return slack + (farthest if farthest > -slack else 0.0)
 
 
@@ -94,16 +108,16 @@ def _grid(count: int) -> NDArray[np.intp]:
     return np.stack(np.meshgrid(*[np.arange(count)] * 3, indexing="ij"), -1).reshape(-1, 3)
 
 
-def _farthest_outside(points: Array, distance: Array, shapes: Sequence[tuple[Shape, Pose]], beyond: float) -> float:
-    """Largest distance (n,) of a point (n, 3) that is above `beyond` (m) and not inside of a mesh; -inf if none is."""
+def _farthest(points: Array, distance: Array, beyond: float, counts: Callable[[Array], NDArray[np.bool_]]) -> float:
+    """Largest distance (n,) of a point (n, 3) that is above `beyond` (m) and counts; -inf if none is."""
     order = np.argsort(-distance)
     order = order[distance[order] > beyond]
     begin = 0
     while begin < len(order):
         some = order[begin : 8 * begin + FARTHEST_FIRST]
-        outside = ~_inside_of_meshes(points[some], shapes)
-        if outside.any():
-            return float(distance[some[np.argmax(outside)]])
+        found = counts(points[some])
+        if found.any():
+            return float(distance[some[np.argmax(found)]])
         begin += len(some)
     return -np.inf
 
@@ -130,6 +144,11 @@ class _DistanceTo:
 
             # the distance to the nearest vertex bounds that to the nearest face and is much faster to compute
             self._tree = cKDTree(corners(pieces))
+
+    @property
+    def is_to_vertices(self) -> bool:
+        """Whether the nearest vertex stands for the nearest piece."""
+        return self._tree is not None
 
     def __call__(self, points: Array) -> Array:
         if self._tree is not None:
