@@ -87,12 +87,18 @@ def _entering(entry, leave, checked, first, last):
 
 @inlined
 def _sole_mode(table, pair, n, settings, obstacle):
-    """Mode of a plane along n (3,) where obstacle.placed has the shapes; NO_MODE: any, both have a side along it."""
-    has_a = settings.follows[0] and has_side(table, pair.a, obstacle.placed[0], n)
-    has_b = settings.follows[1] and has_side(table, pair.b, obstacle.placed[1], n)
+    """Mode of a plane along n (3,) where obstacle.placed has the shapes; NO_MODE: any, both have a side along it.
+
+    A plane along a side of a body that does not turn is at rest. If it turned with the other body, and that with the
+    error of one sample, it would cut deep into a wall for all others.
+    """
+    has_a = has_side(table, pair.a, obstacle.placed[0], n)
+    has_b = has_side(table, pair.b, obstacle.placed[1], n)
     if (has_a and has_b) or settings.careful:
         return NO_MODE
-    return 0 if has_a else 1 if has_b else AT_REST
+    if has_a and settings.follows[0]:
+        return 0
+    return 1 if has_b and settings.follows[1] else AT_REST
 
 
 @inlined

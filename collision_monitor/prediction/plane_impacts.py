@@ -22,7 +22,7 @@ from collision_monitor.prediction.cutting_planes import (
 )
 from collision_monitor.prediction.impact_record import CLEAR
 from collision_monitor.prediction.normal_samples import FURTHEST
-from collision_monitor.prediction.obstacle_planes import MOST_SEGMENTS, set_middles, set_nodes
+from collision_monitor.prediction.obstacle_planes import MOST_PLANES, MOST_SEGMENTS, set_middles, set_nodes
 from collision_monitor.prediction.pair_errors import (
     BENDING,
     TURNED,
@@ -74,7 +74,7 @@ SURE_BENDING: Final = 0.3
 """In place of BENDING for bodies that surely meet, because only their times are sought."""
 
 TOO_FAST: Final = -1
-"""Number of samples of bodies that turn too fast for planes."""
+"""Number of samples of bodies that turn too fast for planes, or need too many."""
 
 
 class Search(NamedTuple):
@@ -93,7 +93,7 @@ class Laid(NamedTuple):
 
     segments: int
     settings: CutSettings
-    complete: bool  # whether the segments reach the end
+    complete: bool  # whether the segments reach the end, with planes enough
 
 
 @device
@@ -150,6 +150,8 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
         begin_segment(table, pair, k, settings, memory, search.points, 0, samples)
         cut_extremes(table, parts, pair, k, search.extremes, settings, memory, scratch)
         cut_planes(table, parts, pair, k, samples, (1 + careful) * search.verified, settings, memory, scratch)
+        if memory.obstacle.count[k] == MOST_PLANES:
+            return Laid(segments, settings, False)
         before, left = left, end_segment(memory.entry, memory.leave, alone, 0, samples)
         memory.obstacle.is_quiet[k] = left == before and not settings.careful
         if left == 0:
@@ -163,7 +165,8 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
 def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work):
     """Lower memory.times to the impacts of the first `samples` with the planes that are laid, and some more.
 
-    verified: number of samples of all that must need no new plane; tolerance (m): see CutSettings.
+    verified: number of samples of all that must need no new plane; tolerance (m): see CutSettings. Returns whether
+    there are planes enough.
     """
     segments, pilots, _ = laid
     settings = CutSettings(pilots.margin, tolerance, pilots.pilot, pilots.follows, pilots.turning, pilots.careful)
@@ -177,9 +180,12 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
             continue
         begin_segment(table, pair, k, settings, memory, points, 0, samples)
         cut_planes(table, parts, pair, k, samples, each, settings, memory, work.scratch)
+        if memory.obstacle.count[k] == MOST_PLANES:
+            return False
         if end_segment(memory.entry, memory.leave, alone, 0, samples) == 0:
             break
     _lower(times, alone, samples)
+    return True
 
 
 @device
@@ -219,13 +225,18 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
         times[n] = inf
     verified = 0 if meets else VERIFIED
     tolerance = max((FACETS_IN_PILOT if meets else FACETS) * errors.sigma, sampling.query.tolerance)
-    _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work)
+    if not _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work):
+        return TOO_FAST
     last_a, last_b = pair.a, pair.b  # its planes are still there; those of the others are laid again
     a, b = first_a, first_b
     while a != last_a or b != last_b:
         pair = ShapePair(A, B, a, b)
         laid = _lay_planes(table, parts, pair, errors, search, min(end, until), sampling, memory, work)
-        _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work)
+        if not (
+            laid.complete
+            and _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work)
+        ):
+            return TOO_FAST
         a, b = next_pair(parts, first_b, a, b)
     return samples
 

@@ -68,6 +68,21 @@ def test_a_person_that_reaches_a_long_wall_at_the_horizon() -> None:
     assert reported == pytest.approx(true, abs=0.02)
 
 
+@pytest.mark.parametrize("turned", [0.015, 0.02, 0.03])
+@pytest.mark.parametrize("x", [0.0, 29.0])
+def test_a_cart_that_reaches_a_long_wall_at_the_horizon(turned: float, x: float) -> None:
+    """A plane that turns with the cart, by the error of one sample, cuts deep into the wall for the others."""
+    rows = np.zeros(2, STATE)
+    rows["id"], rows["quaternion"][:, 3] = (0, 1), 1.0
+    rows["quaternion"][0] = -0.0023, 0.0213, 0.7072, -0.7067
+    rows["position"] = (-0.749 - x, 1.915, -0.014), (0.0, -1.6, 1.25)
+    rows["linear"][0], rows["angular"][0] = (-0.024, -1.479, 0.017), (-0.011, 0.003, -0.023)
+    for name, off in zip(NAMES, (0.02, turned, 0.02, turned), strict=True):
+        rows[f"{name}_stddev"][0] = off
+    reported, true = stated_and_true((cm.Box((0.8, 0.6, 0.9)), cm.Box((63.4, 0.2, 4.0))), rows, 20_000)
+    assert reported == pytest.approx(true, abs=0.02)
+
+
 @pytest.mark.parametrize("turned", [0.05, 0.1])
 def test_people_that_pass_soon_and_may_lean_towards_each_other(turned: float) -> None:
     """Along the gap at one time they seem to meet later, when another direction keeps them apart."""
