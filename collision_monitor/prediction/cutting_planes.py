@@ -44,6 +44,10 @@ COARSER: Final = 4.0
 deviate too far from parabolas for less."""
 
 
+MOST_APART: Final = 8
+"""See `cut_planes`. Cylinders that lean need more than MOST_PLANES for all samples, but few samples need the others."""
+
+
 class CutSettings(NamedTuple):
     """What counts as entered."""
 
@@ -210,7 +214,8 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
 
     Every second sample is the one that passes the planes most briefly in a BLOCK of samples, in turn, because it may
     miss the shapes. The search ends when `wanted` samples needed no plane, half of them after the last plane.
-    `begin_segment` comes before it.
+    `begin_segment` comes before it. Returns whether there are planes enough: once the segment is full of them, further
+    ones are used but not kept, and at most one in MOST_APART of the wanted samples may need one, beside the brief ones.
     """
     obstacle, entry, leave, checked = memory.obstacle, memory.entry, memory.leave, memory.checked
     for n in range(samples):
@@ -219,9 +224,10 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
     blocks = -(-samples // size)
     block, cursor, verified, idle = k, 0, 0, 0
     tolerance, coarsest = settings.tolerance, COARSER * settings.tolerance
-    is_brief = False
-    while verified < wanted and idle < 2 * blocks and obstacle.count[k] < MOST_PLANES:
-        is_brief = not is_brief
+    is_brief, apart = False, 0
+    while verified < wanted and idle < 2 * blocks:
+        is_brief, is_full = not is_brief, obstacle.count[k] >= MOST_PLANES
+        tolerance = coarsest if is_full else tolerance
         if is_brief:
             first = block % blocks * size
             n = _briefest(entry, leave, checked, first, min(first + size, samples), memory.trial[0])
@@ -235,12 +241,18 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
         idle, checked[n] = 0, inf
         at = 0.5 * (entry[n] + leave[n]) if is_brief else entry[n]
         is_cut, gap = _check(table, parts, pair, n, at, samples, k, tolerance, settings, memory, scratch)
-        if is_cut:
+        if is_cut and is_full:
+            obstacle.count[k] -= 1
+            apart += 0 if is_brief else 1
+            if apart > wanted // MOST_APART:
+                return False
+        if is_cut and not is_full:
             checked[n] = 0.0
             verified //= 2
         else:
             verified += 1
             tolerance = min(max(tolerance, gap), coarsest)
+    return True
 
 
 @inlined

@@ -9,9 +9,11 @@ import numpy as np
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.prediction.body_impact import Scratch, make_scratch
+from collision_monitor.prediction.foretold_samples import SIDES
 from collision_monitor.prediction.known_axes import AXES
 from collision_monitor.prediction.motion import MOTION
 from collision_monitor.prediction.spread import FIFTH_ROOT, unknown_acceleration
+from collision_monitor.prediction.trigonometry import sin_cos
 
 
 class Workspace(NamedTuple):
@@ -24,6 +26,7 @@ class Workspace(NamedTuple):
     joint: Any  # (6, 6): covariance of position at the time of closest approach and of velocity, then its root
     block: Any  # (3, 3)
     axes: Any  # (AXES, 4): directions that separated the bodies in other samples
+    sides: Any  # (1,) SIDES: what foretells the outcomes of samples
     scratch: Scratch
 
 
@@ -37,6 +40,7 @@ def make_workspace() -> Workspace:
         np.zeros((6, 6)),
         np.zeros((3, 3)),
         np.zeros((AXES, 4)),
+        np.zeros(1, SIDES),
         make_scratch(),
     )
 
@@ -164,6 +168,35 @@ def orientation_spread(spread, i, radius, age, t):
     if whole == 0.0:
         return 0.0, 0.0
     return (pose + (rate + turning * age * at) * age * at) / whole, (rate + turning * at * (at + age)) * at / whole
+
+
+@device
+def set_turn(m, t, off, planar, out):
+    """Write the matrix (3, 3) that maps a unit error to the rotation vector (rad) of motion m's error at time t.
+
+    off: error of orientation at time 0 (rad) and of the angular velocity (rad/s). The first turns with the body:
+    exp(w t). The second adds up in turning axes: the integral of exp(w s) for s from 0 to t.
+    """
+    if off[0] + off[1] == 0.0:
+        return
+    rate = sqrt(m.wx * m.wx + m.wy * m.wy + m.wz * m.wz)
+    angle = rate * t
+    sine, cosine = sin_cos(angle)
+    x, y, z = (m.wx / rate, m.wy / rate, m.wz / rate) if angle > 0.0 else (0.0, 0.0, 0.0)
+    whole = 1.0
+    mean = slow = 0.0
+    if angle > 1e-4:
+        whole, mean, slow = sine / angle, (1.0 - cosine) / angle, 1.0 - sine / angle
+    drift = off[1] * t
+    same = off[0] * cosine + drift * whole
+    along = off[0] * (1.0 - cosine) + drift * slow
+    across = off[0] * sine + drift * mean
+    out[0, 0], out[0, 1], out[0, 2] = same + along * x * x, along * x * y - across * z, along * x * z + across * y
+    out[1, 0], out[1, 1], out[1, 2] = along * x * y + across * z, same + along * y * y, along * y * z - across * x
+    out[2, 0], out[2, 1], out[2, 2] = along * x * z - across * y, along * y * z + across * x, same + along * z * z
+    if planar:
+        for c in range(3):
+            out[c, 0] = out[c, 1] = 0.0
 
 
 @device

@@ -16,6 +16,7 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.narrow_phase.dispatch import separation
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.bodies import place_shape
+from collision_monitor.prediction.error_samples import set_turn
 from collision_monitor.prediction.motion import relative_position, rotation_at
 from collision_monitor.prediction.trigonometry import sin_cos
 
@@ -90,8 +91,8 @@ def _place(table, parts, pair, t, turning, planar, scratch, node):
     for c in range(3):
         node.position[c] = p[c]
         node.offset[0, c], node.offset[1, c] = oa[c], ob[c]
-    _set_turn(A, t, turning[0], planar, node.turn[0])
-    _set_turn(B, t, turning[1], planar, node.turn[1])
+    set_turn(A, t, turning[0], planar, node.turn[0])
+    set_turn(B, t, turning[1], planar, node.turn[1])
 
 
 @inlined
@@ -121,35 +122,6 @@ def set_nodes(table, parts, pair, window, length, turning, planar, scratch, obst
     for k in range(segments):
         obstacle.count[k], obstacle.is_quiet[k] = 0, False
     return segments
-
-
-@device
-def _set_turn(m, t, off, planar, out):
-    """Write the matrix (3, 3) that maps a unit error to the rotation vector (rad) of motion m's error at time t.
-
-    off: error of orientation at time 0 (rad) and of the angular velocity (rad/s). The first turns with the body:
-    exp(w t). The second adds up in turning axes: the integral of exp(w s) for s from 0 to t.
-    """
-    if off[0] + off[1] == 0.0:
-        return
-    rate = sqrt(m.wx * m.wx + m.wy * m.wy + m.wz * m.wz)
-    angle = rate * t
-    sine, cosine = sin_cos(angle)
-    x, y, z = (m.wx / rate, m.wy / rate, m.wz / rate) if angle > 0.0 else (0.0, 0.0, 0.0)
-    whole = 1.0
-    mean = slow = 0.0
-    if angle > 1e-4:
-        whole, mean, slow = sine / angle, (1.0 - cosine) / angle, 1.0 - sine / angle
-    drift = off[1] * t
-    same = off[0] * cosine + drift * whole
-    along = off[0] * (1.0 - cosine) + drift * slow
-    across = off[0] * sine + drift * mean
-    out[0, 0], out[0, 1], out[0, 2] = same + along * x * x, along * x * y - across * z, along * x * z + across * y
-    out[1, 0], out[1, 1], out[1, 2] = along * x * y + across * z, same + along * y * y, along * y * z - across * x
-    out[2, 0], out[2, 1], out[2, 2] = along * x * z - across * y, along * y * z + across * x, same + along * z * z
-    if planar:
-        for c in range(3):
-            out[c, 0] = out[c, 1] = 0.0
 
 
 @inlined

@@ -22,7 +22,7 @@ from collision_monitor.prediction.cutting_planes import (
 )
 from collision_monitor.prediction.impact_record import CLEAR
 from collision_monitor.prediction.normal_samples import FURTHEST
-from collision_monitor.prediction.obstacle_planes import MOST_PLANES, MOST_SEGMENTS, set_middles, set_nodes
+from collision_monitor.prediction.obstacle_planes import MOST_SEGMENTS, set_middles, set_nodes
 from collision_monitor.prediction.pair_errors import (
     BENDING,
     TURNED,
@@ -52,8 +52,8 @@ SMALL: Final = 0.1
 shape, the pair is left to the exact method unless it surely meets: it needs so many planes that it is no faster."""
 
 CAREFUL: Final = 0.05
-"""Standard deviation of an orientation (rad) above which more samples are compared, and no part of the time is left
-out."""
+"""Standard deviation of an orientation (rad) above which more samples are compared, no part of the time is left out,
+and a pair with more than MOST_PARTS is left to the exact method."""
 
 SPINS: Final = 4.0
 """Standard deviations of the angular velocity above which a body counts as one that turns."""
@@ -139,7 +139,7 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
     large = TURNED * turned > SMALL or sigma > 2.0 * SMALL * min(table.radius[a], table.radius[b])
     spins = spin_rate(A) + spin_rate(B) > SPINS * (errors.turning[0][1] + errors.turning[1][1])
     is_rough = segments > MOST_PARTS and large and spins
-    if is_rough and not sampling.stated:
+    if segments > MOST_PARTS and (careful or (is_rough and not sampling.stated)):
         return Laid(segments, settings, False)
     set_middles(table, parts, pair, segments, errors.turning, sampling.planar, scratch, memory.obstacle)
     left, skips = samples, not flat and search.verified > 0
@@ -149,8 +149,8 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
             continue
         begin_segment(table, pair, k, settings, memory, search.points, 0, samples)
         cut_extremes(table, parts, pair, k, search.extremes, settings, memory, scratch)
-        cut_planes(table, parts, pair, k, samples, (1 + careful) * search.verified, settings, memory, scratch)
-        if memory.obstacle.count[k] == MOST_PLANES:
+        wanted = (1 + careful) * search.verified
+        if not cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch):
             return Laid(segments, settings, False)
         before, left = left, end_segment(memory.entry, memory.leave, alone, 0, samples)
         memory.obstacle.is_quiet[k] = left == before and not settings.careful
@@ -179,8 +179,7 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
         if memory.obstacle.is_quiet[k]:
             continue
         begin_segment(table, pair, k, settings, memory, points, 0, samples)
-        cut_planes(table, parts, pair, k, samples, each, settings, memory, work.scratch)
-        if memory.obstacle.count[k] == MOST_PLANES:
+        if not cut_planes(table, parts, pair, k, samples, each, settings, memory, work.scratch):
             return False
         if end_segment(memory.entry, memory.leave, alone, 0, samples) == 0:
             break

@@ -16,7 +16,7 @@ import numpy as np
 
 from collision_monitor._jit import allocating_kernel, device, inlined, kernel
 from collision_monitor.geometry.shape_table import MESH, POINTS
-from collision_monitor.narrow_phase.contact_row import NORMAL
+from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
 from collision_monitor.prediction.bodies import next_pair
 from collision_monitor.prediction.body_impact import (
     ImpactQuery,
@@ -31,18 +31,25 @@ from collision_monitor.prediction.error_samples import (
     add_covariance,
     orientation_spread,
     set_frame,
+    set_turn,
     shift,
     take_root,
     turn,
 )
+from collision_monitor.prediction.foretold_samples import (
+    OPEN,
+    find_ends,
+    foretell,
+    set_limits,
+    set_widening,
+    stand_for_skipped,
+    weigh_followed,
+)
 from collision_monitor.prediction.impact_distribution import summarise
 from collision_monitor.prediction.impact_record import CLEAR
 from collision_monitor.prediction.known_axes import parted_until, remember
-from collision_monitor.prediction.motion import (
-    carry_on,
-    half_acceleration,
-)
-from collision_monitor.prediction.normal_samples import PILOT
+from collision_monitor.prediction.motion import carry_on, half_acceleration, relative_position
+from collision_monitor.prediction.normal_samples import DIMENSIONS, PILOT
 from collision_monitor.prediction.sphere_interval import sphere_interval
 from collision_monitor.prediction.spread import is_uncertain, surface_spread
 from collision_monitor.prediction.tree_impact import spins
@@ -64,6 +71,9 @@ coarse lattice of samples. The test is repeated after each further one."""
 
 FEW_STRIDE: Final = 4
 """Part of so few samples, one in so many, that decides which of the others are needed."""
+
+FEWEST_FORETOLD: Final = 4
+"""Parts of the samples, of about PILOT each, from which on two of them foretell the outcome of others."""
 
 FEW_SPARE: Final = 3
 """SPARE of these, see chosen_samples.py."""
@@ -104,9 +114,13 @@ def first_contact(multibody, i, j, window, tube, query, work):
 
 @device
 def _gap_at(multibody, i, j, t, work):
-    """Signed distance (m) of the shapes of bodies i and j at t; writes its direction into work.block[0]."""
+    """Signed distance (m) of the shapes of bodies i and j at t.
+
+    Writes its direction into work.block[0], and the points where they touch, about both origins, into work.block[1:3].
+    """
     table, parts, bodies = multibody
-    A, B, out, normal = work.motion[0], work.motion[1], work.scratch.out, work.block[0]
+    A, B, out, block = work.motion[0], work.motion[1], work.scratch.out, work.block
+    origin = relative_position(A, B, t)
     best = inf
     a, first_b = bodies.first_shape[i], bodies.first_shape[j]
     b = first_b
@@ -114,7 +128,9 @@ def _gap_at(multibody, i, j, t, work):
         gap = contact_at(table, parts, ShapePair(A, B, a, b), t, work.scratch)
         if gap < best:
             best = gap
-            normal[0], normal[1], normal[2] = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
+            for c in range(3):
+                block[0, c] = out[NORMAL + c]
+                block[1, c], block[2, c] = out[POINT_A + c], out[POINT_B + c] - origin[c]
         a, b = next_pair(parts, first_b, a, b)
     return best
 
@@ -202,6 +218,45 @@ def _lay_along(multibody, i, j, tube, sampling, work):
     return t
 
 
+@inlined
+def _coset(nth, stride):
+    """Which part of the samples comes as the nth: first the coarser lattices of every stride-th and every half-th."""
+    half = stride // 2
+    if nth < 2:
+        return nth * half
+    return nth - 1 if nth <= half else nth
+
+
+@device
+def _set_sides(multibody, i, j, t, turns, times, stride, sampling, work, sides):
+    """Find out from the times (S,) of every stride-th sample what foretells those of the others; see `foretell`.
+
+    The motions are the stated ones, t the time (s) that matters most, and turns the errors of orientation.
+    """
+    points, planar = sampling.points, sampling.planar
+    A, B, L, F, block = work.motion[0], work.motion[1], work.joint, work.frame, work.block
+    ends = sides.ends
+    for r in range(3):
+        for c in range(3):
+            sides.turns[0, r, c] = sides.turns[1, r, c] = 0.0
+    set_turn(A, t, turns[0], planar, sides.turns[0])
+    set_turn(B, t, turns[1], planar, sides.turns[1])
+    middle = find_ends(points, times, stride, ends)
+    x, y, z = B.x, B.y, B.z
+    for side in range(2):
+        sides.widening[side, :] = 0.0
+        if not -inf < ends[side] < inf:
+            continue
+        a, b, c = ends[side] * L[0, 0], ends[side] * L[1, 0], ends[side] * L[2, 0]
+        B.x = x + a * F[0, 0] + b * F[1, 0] + c * F[2, 0]
+        B.y = y + a * F[0, 1] + b * F[1, 1] + c * F[2, 1]
+        B.z = z + a * F[0, 2] + b * F[1, 2] + c * F[2, 2]
+        _gap_at(multibody, i, j, t, work)
+        set_widening(block[0], block[1:3], sides.turns, L, F, sides.widening[side])
+    B.x, B.y, B.z = x, y, z
+    set_limits(points, times, stride, middle, sides)
+
+
 class Sampling(NamedTuple):
     """Settings and samples for the probabilities of pairs."""
 
@@ -232,7 +287,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
     query, horizon, stated = sampling.query, sampling.horizon, sampling.stated
     points, weights, stale_acceleration = sampling.points, sampling.weights, sampling.stale_acceleration
     times = np.empty(weights.size)
-    A, B = work.motion[0], work.motion[1]
+    A, B, sides = work.motion[0], work.motion[1], work.sides[0]
     followed = 0
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
@@ -287,15 +342,23 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
         few = stride == 1 and sampling.stops_early and weights.size >= PILOT
         stride = FEW_STRIDE if few else stride
         order, share, is_open = np.arange(0, weights.size, stride), weights.copy(), (0, stride, stride, stride)
+        foretells = sampling.stops_early and stride >= FEWEST_FORETOLD and not has_mesh
         seen, met, begun = 0.0, 0, followed
         likely, surely = True, False
-        for first in range(stride):
-            likely = stated or first == 0 or seen * stride >= PILOT_PART * sampling.min_probability * first
-            surely = stated and sampling.stops_early and first == 1 and met == followed - begun
+        for nth in range(stride):
+            first = _coset(nth, stride) if foretells else nth
+            likely = stated or first == 0 or seen * stride >= PILOT_PART * sampling.min_probability * nth
+            surely = stated and sampling.stops_early and nth == 1 and met == followed - begun
             if not likely or surely:
                 break
             if few and first == 1:
                 is_open = open_ranks(times, order, FEW_SPARE)
+            if foretells and nth == 2:
+                shift(work, np.zeros(DIMENSIONS), t, p, v)
+                turn(A, work.rotation[0], w_i, turn_i, (0.0, 0.0, 0.0))
+                turn(B, work.rotation[1], w_j, turn_j, (0.0, 0.0, 0.0))
+                _set_sides(multibody, i, j, t, (turn_i, turn_j), times, stride // 2, sampling, work, sides)
+                weigh_followed(points, weights, stride // 2, sides)
             for n in range(first, weights.size, stride):
                 rank = n // stride
                 if few and first > 0 and not (is_open[0] <= rank < is_open[1] or is_open[2] <= rank < is_open[3]):
@@ -303,8 +366,13 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                     share[n], times[n] = 0.0, inf
                     seen += weights[n] if times[order[rank]] < inf else 0.0
                     continue
-                followed += 1
                 z = points[n]
+                outcome = foretell(sides, z) if foretells and nth > 1 else OPEN
+                if outcome != OPEN and sides.followed[outcome] > 0.0:
+                    share[n], times[n] = 0.0, inf
+                    sides.skipped[outcome] += weights[n]
+                    continue
+                followed += 1
                 shift(work, z, t, p, v)
                 if turn_i[0] + turn_i[1] > 0.0:
                     turn(A, work.rotation[0], w_i, turn_i, (level * z[6], level * z[7], z[8]))
@@ -323,6 +391,8 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                     remember(table, parts, pair, times[n] == inf, n, work.scratch, work.axes)
                 met += 1 if times[n] < inf else 0
                 seen += weights[n] if times[n] < inf else 0.0
+        if foretells and likely and not surely:
+            stand_for_skipped(points, share, stride // 2, sides)
         if surely:
             some, part = times[0::stride].copy(), weights[0::stride].copy()
             summarise(some, part, np.argsort(some), sampling.confidence, safe, answers[k], part.sum())

@@ -49,15 +49,19 @@ DENTED = cm.Mesh(
 )  # fmt: skip
 
 
-def both_methods(monitor: cm.Monitor, stated: bool, *, swapped: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Answers (1, 4) for the pair of slots 0 and 1, or 1 and 0: exact samples, and planes."""
+def sampling_for(monitor: cm.Monitor, stated: bool) -> Sampling:
+    """Settings of the default profile."""
     p = Profile()
-    roster, spread = monitor._roster, monitor._uncertain.spread
-    sampling = Sampling(
+    return Sampling(
         monitor._settings.impact, p.horizon, p.stale_acceleration, stated, sigmas_for(p.min_probability),
-        sigmas_for(p.min_probability * (1.0 - p.confidence)), p.min_probability, p.confidence, roster.planar,
+        sigmas_for(p.min_probability * (1.0 - p.confidence)), p.min_probability, p.confidence, monitor._roster.planar,
         *normal_samples(SAMPLES),
     )  # fmt: skip
+
+
+def both_methods(monitor: cm.Monitor, stated: bool, *, swapped: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Answers (1, 4) for the pair of slots 0 and 1, or 1 and 0: exact samples, and planes."""
+    roster, spread, sampling = monitor._roster, monitor._uncertain.spread, sampling_for(monitor, stated)
     pairs, work, answers = np.array([[1, 0] if swapped else [0, 1]], np.int32), make_workspace(), np.empty((2, 1, 4))
     impact_probabilities(roster.multibody, spread, pairs, 0.0, sampling, work, answers[0])
     lattice, memory = sample_columns(SAMPLES), make_plane_memory(SAMPLES)
@@ -71,19 +75,20 @@ class Case(NamedTuple):
     shapes: tuple[str, ...] = tuple(SHAPES)
     spin: float = 0.0
     noise: tuple[float, float] = (0.02, 0.2)  # m and m/s
-    turned: float = 0.0  # rad and rad/s
+    turned: float = 0.0  # rad
+    turning: float = 0.0  # rad/s
     upright: bool = False
     fewest: int = 25  # pairs to compare; the others are certain, or left to the exact method
 
 
 CASES = {
     "straight": Case(),
-    "turned": Case(turned=0.03),
+    "turned": Case(turned=0.03, turning=0.03),
     "much turned": Case(turned=0.15),
-    "turning": Case(spin=1.0, noise=(0.003, 0.01), turned=0.005),
+    "turning": Case(spin=1.0, noise=(0.003, 0.01), turned=0.005, turning=0.005),
     "people": Case(("person",), upright=True),
-    "tilted people": Case(("person",), upright=True, spin=0.3, turned=0.02),
-    "plane": Case(("disc", "polygon"), spin=0.3, noise=(0.01, 0.03), turned=0.02, upright=True, fewest=20),
+    "tilted people": Case(("person",), upright=True, spin=0.3, turned=0.02, turning=0.02),
+    "plane": Case(("disc", "polygon"), 0.3, (0.01, 0.03), turned=0.02, turning=0.02, upright=True, fewest=20),
 }
 
 
@@ -104,7 +109,7 @@ def random_pair(rng: np.random.Generator, first: str, second: str, case: Case) -
     q = np.array([[0.0, 0.0, 0.0, 1.0]] * 2) if case.upright else rng.normal(0, 1, (2, 4))
     rows["quaternion"] = q / np.linalg.norm(q, axis=1, keepdims=True)
     rows["position_stddev"], rows["velocity_stddev"] = rng.uniform(*case.noise, 2)
-    rows["orientation_stddev"] = rows["angular_velocity_stddev"] = case.turned
+    rows["orientation_stddev"], rows["angular_velocity_stddev"] = case.turned, case.turning
     reported = monitor.step(0, rows)
     stated = bool((reported.predictions["status"] != 2).any())
     return monitor, stated
@@ -129,6 +134,33 @@ def test_planes_agree_with_exact_samples(name: str) -> None:
     assert np.sqrt(np.mean(np.square(errors))) < 0.006
     assert np.abs(errors).max() < 0.03
     assert abs(np.median(earliest)) < 0.01
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.05, 0.2])
+def test_samples_that_are_foretold_are_as_good_as_those_that_are_followed(turned: float) -> None:
+    rng, case = np.random.default_rng(4), Case(spin=1.0, noise=(0.03, 0.2), turned=turned, turning=turned)
+    pairs, work, answers = np.array([[0, 1]], np.int32), make_workspace(), np.empty((2, 1, 4))
+    errors, earlier, counts = [], [], []
+    for _ in range(60):
+        first, second = rng.choice(case.shapes, 2)
+        monitor, stated = random_pair(rng, str(first), str(second), case)
+        roster, spread, sampling = monitor._roster, monitor._uncertain.spread, sampling_for(monitor, stated)
+        followed = [
+            impact_probabilities(
+                roster.multibody, spread, pairs, 0.0, sampling._replace(stops_early=early), work, answers[int(early)]
+            )
+            for early in (False, True)
+        ]
+        all_followed, some_followed = np.nan_to_num(answers[:, 0], posinf=inf)
+        if all_followed[3] > 0.01:
+            errors.append(some_followed[3] - all_followed[3])
+            counts.append(followed[1] / followed[0])
+            earlier.append(all_followed[0] - some_followed[0])
+    assert len(errors) > 20
+    assert 0.0 <= np.median(earlier) < 0.02
+    assert np.sqrt(np.mean(np.square(errors))) < 0.004
+    assert np.abs(errors).max() < 0.02
+    assert np.mean(counts) < 0.7
 
 
 def test_swapped_bodies_have_nearly_the_same_answers() -> None:

@@ -111,7 +111,7 @@ def test_what_nobody_declares_is_not_computed() -> None:
     assert all(np.isnan(answer[name]) for name in ("earliest", "most_likely", "latest", "probability"))
 
 
-def test_pairs_far_from_meeting_are_not_told() -> None:
+def test_pairs_far_from_meeting_are_not_reported() -> None:
     """A crowd stands 2 m apart, known to 5 cm: no pair may meet, although the boxes are widened."""
     side = 8
     monitor = cm.Monitor()
@@ -128,7 +128,7 @@ def test_pairs_far_from_meeting_are_not_told() -> None:
     assert (reported["upper"] == inf).all()
 
 
-def test_it_grows_while_an_object_is_not_heard_of() -> None:
+def test_it_grows_while_an_object_is_not_observed() -> None:
     """Two objects stand 1 m apart: the probability grows with the age of one state, until they may touch."""
     monitor = cm.Monitor()
     for object_id in (0, 1):
