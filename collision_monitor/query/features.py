@@ -58,8 +58,8 @@ def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Sh
     """
     tie = tie_of(shape_a, shape_b)
     return FeatureContact(
-        feature_of(shape_a, pose_a, contact.point_a, contact.normal, tie),
-        feature_of(shape_b, pose_b, contact.point_b, -contact.normal, tie),
+        feature_of(shape_a, pose_a, contact.point_a, contact.normal, tie, contact.error_bound),
+        feature_of(shape_b, pose_b, contact.point_b, -contact.normal, tie, contact.error_bound),
     )
 
 
@@ -69,22 +69,23 @@ def tie_of(shape_a: object, shape_b: object) -> float:
     return ROUND_TIE if curved else FEATURE_TIE
 
 
-def feature_of(shape: Shape, pose: Pose, point: Array, normal: Array, tie: float = FEATURE_TIE) -> Feature:
+def feature_of(shape: Shape, pose: Pose, point: Array, normal: Array, tie: float, off: float) -> Feature:
     """Feature of a shape at a point (3,) in m with an outward normal (3,), both in the world frame.
 
     Numbered as in `contact_features`, with the same errors. tie: largest difference of equal heights, relative.
+    off: error of the point (m).
     """
     at, towards = (point - pose.position) @ pose.rotation, normal @ pose.rotation
     match shape:
         case Mesh():
-            return feature_at(at, towards, shape.vertices, shape.faces, tie)
+            return feature_at(at, towards, shape.vertices, shape.faces, tie, off)
         case ConvexHull():
             hull = convex_hull(shape.points)
-            found = feature_at(at, towards, hull.vertices, hull.faces, tie)
+            found = feature_at(at, towards, hull.vertices, hull.faces, tie, off)
             same = (shape.points == hull.vertices[list(found.vertices), None]).all(axis=-1)
             return found._replace(vertices=tuple(same.argmax(axis=1).tolist()))
         case Box():
-            found = feature_at(at, towards, _SIDES * shape.size, _TRIANGLES, tie)
+            found = feature_at(at, towards, _SIDES * shape.size, _TRIANGLES, tie, off)
             if found.type is FeatureType.FACE:
                 return Feature(FeatureType.FACE, tuple(_QUADS[found.face // 2].tolist()), found.face // 2)
             return found
