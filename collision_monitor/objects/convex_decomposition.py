@@ -88,8 +88,10 @@ def convex_decomposition(mesh: Mesh, concavity: float = CONCAVITY) -> Decomposit
     >>> len(convex_decomposition(cube).parts)  # with CoACD installed
     1
     """
-    if not 0.01 <= concavity <= 1.0:
-        raise InputError(f"concavity: expected a number from 0.01 to 1, got {concavity}")
+    if not isinstance(mesh, Mesh):
+        raise ShapeError(f"convex decomposition: expected a Mesh, got {mesh!r:.100}")
+    if not isinstance(concavity, int | float) or not 0.01 <= concavity <= 1.0:
+        raise InputError(f"concavity: expected a number from 0.01 to 1, got {concavity!r:.100}")
     try:
         coacd: Any = import_module("coacd")
     except ImportError:

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.errors import UnsupportedError
+from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.contact_features import Feature, FeatureContact, FeatureType, feature_at
 from collision_monitor.geometry.pose import Pose
@@ -30,6 +30,7 @@ from collision_monitor.geometry.shapes import (
     Polygon,
     Shape,
 )
+from collision_monitor.query.arguments import checked_pose
 from collision_monitor.query.contact import Contact
 from collision_monitor.tolerances import FEATURE_TIE
 
@@ -56,6 +57,10 @@ def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Sh
     >>> cm.contact_features(cm.contact(box, pose, box, above), box, pose, box, above).a.type.name
     'FACE'
     """
+    checked_pose(pose_a, "pose_a")
+    checked_pose(pose_b, "pose_b")
+    if not isinstance(contact, Contact):
+        raise InputError(f"contact: expected the result of `contact` of the two shapes, got {contact!r:.100}")
     tie = tie_of(shape_a, shape_b)
     return FeatureContact(
         feature_of(shape_a, pose_a, contact.point_a, contact.normal, tie, contact.error_bound),

@@ -80,7 +80,7 @@ class Setting:
     def checked(self, value: Any) -> Value:
         """Return the value in the setting's type. Raises ProfileError, which names what was expected."""
         if self.choices:
-            if value not in self.choices:
+            if not isinstance(value, str) or value not in self.choices:
                 raise ProfileError(f"{self.name}: expected one of {', '.join(self.choices)}, got {value!r}")
             return str(value)
         if self.type is tuple:
@@ -105,7 +105,7 @@ class Setting:
     def _check_range(self, value: float) -> None:
         if not self.minimum <= value <= self.maximum:
             wanted = f"{self.minimum:g} to {self.maximum:g}{self._in_unit}"
-            raise ProfileError(f"{self.name}: expected {wanted}, got {value:g}")
+            raise ProfileError(f"{self.name}: expected {wanted}, got {value!r:.100}")
 
     @property
     def _in_unit(self) -> str:
