@@ -71,7 +71,7 @@ REMEMBERED_DECOMPOSITIONS: Final = 32 << 20
 """Bytes of meshes and their parts that are remembered. Less: a mesh that is described again is decomposed again."""
 
 
-def _memory(found: Decomposition, mesh: Mesh, *_: float) -> int:
+def _memory(found: Decomposition, mesh: Mesh, concavity: float = CONCAVITY) -> int:
     return array_bytes(mesh) + sum(map(array_bytes, found.parts))
 
 
