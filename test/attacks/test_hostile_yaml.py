@@ -53,9 +53,9 @@ HOSTILE: dict[str, tuple[bytes, str]] = {
 
 DOORS = {
     "check --expect": (["check", "SESSION", "--expect", "FILE"], 2),
-    "import --map": (["import", "SESSION", "--map", "FILE", "-o", "OUT"], 1),
-    "import --profile": (["import", "SESSION", "--profile", "FILE", "-o", "OUT"], 1),
-    "run --params": (["run", "--params", "FILE"], 1),
+    "import --map": (["import", "SESSION", "--map", "FILE", "-o", "OUT"], 2),
+    "import --profile": (["import", "SESSION", "--profile", "FILE", "-o", "OUT"], 2),
+    "run --params": (["run", "--params", "FILE"], 2),
 }
 
 
