@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.coordinates import Array, Indices, coordinates, triangles
+from collision_monitor.geometry.coordinates import Indices, coordinates, triangles
 from collision_monitor.geometry.point_triangle import closest_point_on_triangle
 from collision_monitor.geometry.points import closest_point_on_segment, distance
 from collision_monitor.tolerances import FEATURE_TIE
@@ -105,33 +105,33 @@ def feature_at(
     that is off the surface by no more stands for the nearest point of the surface. Raises InputError if it is further.
     """
     vertices, faces = triangles(vertices, faces)
-    point, normal = coordinates(point, "point", 3), coordinates(normal, "normal", 3)
+    at, normal = coordinates(point, "point", 3), coordinates(normal, "normal", 3)
     reach = tolerance * float(np.ptp(vertices, axis=0).max())
     normal = normal / np.linalg.norm(normal)
     corner = vertices[faces]
-    foot, away = closest_point_on_triangle(point, *np.moveaxis(corner, 1, 0))
+    foot, away = closest_point_on_triangle(at, *np.moveaxis(corner, 1, 0))
     nearest = int(away.argmin())
     if away[nearest] > max(reach, off):
-        raise InputError(f"contact: expected a point on the mesh's surface, got {point.tolist()}")
+        raise InputError(f"contact: expected a point on the mesh's surface, got {at.tolist()}")
     if away[nearest] > reach:
-        point = foot[nearest]
-        away = closest_point_on_triangle(point, *np.moveaxis(corner, 1, 0))[1]
+        at = foot[nearest]
+        away = closest_point_on_triangle(at, *np.moveaxis(corner, 1, 0))[1]
     near = np.flatnonzero(away <= reach)
-    height = (vertices - point) @ normal
+    height = (vertices - at) @ normal
     touching = np.abs(height) <= reach
     upward = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) @ normal > 0.0
     whole = near[touching[faces[near]].all(axis=1) & upward[near]]
     if len(whole):
         return _face(faces, int(whole[0]))
     edges = np.unique(np.sort(faces[near][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
-    on_edge = distance(point, closest_point_on_segment(point, *np.moveaxis(vertices[edges], 1, 0))[0]) <= reach
+    on_edge = distance(at, closest_point_on_segment(at, *np.moveaxis(vertices[edges], 1, 0))[0]) <= reach
     across = edges[on_edge & touching[edges].all(axis=1)]
     if len(across):
         return Feature(FeatureType.EDGE, (int(across[0, 0]), int(across[0, 1])), -1)
     corners = np.unique(faces[near])
-    at = corners[distance(point, vertices[corners]) <= reach]
-    if len(at):
-        return Feature(FeatureType.VERTEX, (int(at[0]),), -1)
+    at_corner = corners[distance(at, vertices[corners]) <= reach]
+    if len(at_corner):
+        return Feature(FeatureType.VERTEX, (int(at_corner[0]),), -1)
     if on_edge.any():
         edge = edges[np.flatnonzero(on_edge)[0]]
         return Feature(FeatureType.EDGE, (int(edge[0]), int(edge[1])), -1)

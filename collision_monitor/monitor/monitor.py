@@ -176,7 +176,7 @@ class Monitor:
         Raises InputError, ShapeError; UnsupportedError for an unsupported shape or model.
         """
         if not isinstance(description, ObjectDescription):
-            raise InputError(f"describe: expected an ObjectDescription, got {description!r:.100}; or use add(id, shape)")
+            raise InputError(f"describe: expected an ObjectDescription, got {description!r:.99}; or use add(id, shape)")
         model = self.model_of(description)
         if model is not description.model:
             prepared = prepared or monitored_model(description.shapes, model)

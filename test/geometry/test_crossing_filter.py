@@ -19,7 +19,7 @@ def tabulate(points, a, b, c):
 
 
 def exactly(p, a, b, c):
-    """1 or -1 if the ray from p to +z meets the inner part of a face above p, 0 if it misses, None on an edge or the face."""
+    """1 or -1 if the ray from p to +z meets the inner part of a face above p, 0 if not, None on an edge or the face."""
     p, a, b, c = ([Fraction(x) for x in point] for point in (p, a, b, c))
     turns = [(v[0] - u[0]) * (p[1] - u[1]) - (v[1] - u[1]) * (p[0] - u[0]) for u, v in ((a, b), (b, c), (c, a))]
     if min(turns) < 0 < max(turns):
