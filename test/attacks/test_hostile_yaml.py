@@ -144,7 +144,7 @@ def test_all_yaml_goes_through_the_one_loader() -> None:
     assert loaders == ["yaml_file.py"]
 
 
-@pytest.mark.parametrize("value", [10**400, -(10**400), math.inf, math.nan, True, "1"], ids=lambda value: f"{value!r:.5}")
+@pytest.mark.parametrize("value", [10**400, -(10**400), math.inf, math.nan, True, "1"], ids=lambda x: f"{x!r:.5}")
 def test_numbers_that_no_float_holds_are_refused(value: object) -> None:
     with pytest.raises(InputError, match="a number of metres"):
         number(value, "padding", "metres")
