@@ -109,6 +109,7 @@ def tradeoff_command(args: argparse.Namespace) -> int:
     from collision_monitor.accuracy.front import summaries
     from collision_monitor.accuracy.inputs import recorded
     from collision_monitor.accuracy.tradeoff import tradeoff
+    from collision_monitor.objects.models import parse_model
     from collision_monitor.settings.profile import Profile
 
     if args.session is not None and args.scene:
@@ -124,6 +125,9 @@ def tradeoff_command(args: argparse.Namespace) -> int:
             f"tradeoff, --noise: a session is measured as it was recorded, leave it out (got {args.noise:g})"
         )
     check_profiles(args.profile or ())
+    with usage():
+        for name in args.model or ():
+            parse_model(name)
     profiles = [Profile.named(name) for name in args.profile or Profile.names()]
     if not args.profile:
         profiles.sort(key=lambda profile: -profile.position_tolerance)
