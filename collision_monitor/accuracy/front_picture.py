@@ -42,7 +42,8 @@ def draw_fronts(
     peers: of each column, drawn beside the fronts. chosen: name of a profile to mark.
     """
     peers = peers or {}
-    marks = MARKS | ({} if chosen is None else {chosen: "*"})
+    tried = {row.profile for fronts in columns.values() for front in fronts for row in front.rows}
+    marks = {name: mark for name, mark in (MARKS | {chosen: "*"}).items() if name in tried}
     names = list(dict.fromkeys(peer.name for each in peers.values() for peer in each))
     style: Any = {"font.size": 10, "axes.spines.top": False, "axes.spines.right": False}
     with mpl.rc_context(style):

@@ -10,7 +10,7 @@ from typing import Any
 from collision_monitor.accuracy.detection_time import WARM_UP_FRAMES
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.quantities import positive, whole
-from collision_monitor.errors import InputError
+from collision_monitor.cli.usage import UsageError, usage
 
 HARD_SPHERES = ("hard-spheres", "hard_spheres")
 
@@ -35,7 +35,8 @@ examples:
 
 exit codes:
   0  done
-  1  the scene, the file or the number of threads cannot be used
+  1  the file of the scene cannot be used
+  2  wrong usage
 """
 
 
@@ -79,7 +80,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def bench_command(args: argparse.Namespace) -> int:
-    """Run the benchmark, print the result and return the exit code. Raises InputError."""
+    """Run the benchmark, print the result and return the exit code. Raises UsageError, InputError."""
     from collision_monitor.accuracy.detection_time import time_detection
     from collision_monitor.detection.detector import default_threads
     from collision_monitor.detection.partitioned import BROAD_PHASES, MOST_FOR_BRUTE_FORCE
@@ -88,20 +89,24 @@ def bench_command(args: argparse.Namespace) -> int:
     if args.scene_file is None and args.scene in HARD_SPHERES:
         return _bench_hard_spheres(args)
     if args.packing is not None:
-        raise InputError("--packing: expected the scene hard-spheres, other scenes have a fixed density")
+        raise UsageError("--packing: expected the scene hard-spheres, other scenes have a fixed density")
     if args.scene_file is None:
-        scene = make_moving_bodies(args.scene, args.n, args.seed, args.frames or FRAMES)
+        with usage():
+            scene = make_moving_bodies(args.scene, args.n, args.seed, args.frames or FRAMES)
     else:
         scene = load_moving_bodies(args.scene_file)
     threads = default_threads() if args.threads is None else args.threads
     if args.broad_phase is None:
-        _print(time_detection(scene, threads, args.frames), args.json)
+        with usage():
+            result = time_detection(scene, threads, args.frames)
+        _print(result, args.json)
         return ExitCode.DONE
     names = BROAD_PHASES if args.broad_phase == "all" else (args.broad_phase,)
     for name in names:
         if args.broad_phase == "all" and name == "brute-force" and len(scene.shapes) > MOST_FOR_BRUTE_FORCE:
             continue
-        result = time_detection(scene, threads if name == "grid" else 1, args.frames, name)
+        with usage():
+            result = time_detection(scene, threads if name == "grid" else 1, args.frames, name)
         _print({**result, "broad_phase": name}, args.json)
     return ExitCode.DONE
 
@@ -112,8 +117,9 @@ def _bench_hard_spheres(args: argparse.Namespace) -> int:
     for name in ("frames", "threads", "broad_phase"):
         if getattr(args, name) is not None:
             option = name.replace("_", "-")
-            raise InputError(f"--{option}: expected no value with hard-spheres: one event list, one thread")
-    result = measure_collision_rate(args.n, PACKING if args.packing is None else args.packing, args.seed)
+            raise UsageError(f"--{option}: expected no value with hard-spheres: one event list, one thread")
+    with usage():
+        result = measure_collision_rate(args.n, PACKING if args.packing is None else args.packing, args.seed)
     if args.json:
         print(json.dumps(result))
     else:

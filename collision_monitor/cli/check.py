@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.engines import add_engine, engine_of
-from collision_monitor.cli.error_line import print_error
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.output_file import writing
 from collision_monitor.cli.progress import progress_bar
-from collision_monitor.errors import InputError
+from collision_monitor.cli.usage import check_profiles, usage
 
 if TYPE_CHECKING:
     from collision_monitor.alerts.rules import Rules
@@ -89,20 +88,15 @@ def add_parser(subparsers: Any) -> None:
 
 
 def check_command(args: argparse.Namespace) -> int:
-    """Run the command and return the exit code. Raises InputError, UnsupportedError."""
+    """Run the command and return the exit code. Raises UsageError, InputError, UnsupportedError."""
     from collision_monitor.session.history.check import check_sessions, junit_xml
     from collision_monitor.session.history.expectations import read_expectations
     from collision_monitor.session.many import find_sessions
-    from collision_monitor.settings.profile import Profile
 
-    try:
+    check_profiles([args.replay or ""])
+    with usage():
         expectations = read_expectations(args.expect)
-        if args.replay:
-            Profile.named(args.replay)
         rules = None if args.rules is None else Rules.given(args.rules)
-    except InputError as error:
-        print_error(error)
-        return ExitCode.USAGE
     paths = find_sessions(args.sessions)
     if args.junit is not None:
         with writing(args.junit):  # report an error before the long work, not after it

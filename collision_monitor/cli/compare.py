@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.progress import session_bar
 from collision_monitor.cli.quantities import positive, whole
-from collision_monitor.errors import InputError
+from collision_monitor.cli.usage import UsageError, check_profiles
 
 if TYPE_CHECKING:
     from collision_monitor.session.history.changes import Changes, Event, EventChange
@@ -36,6 +36,7 @@ times of B count from its own first step. Step times are shown but never count a
 exit codes:
   0  the same collisions and warnings
   1  a session cannot be read
+  2  wrong usage
   3  the sessions differ
   4  no difference was found, but a session is incomplete
 """
@@ -73,9 +74,10 @@ def add_parser(subparsers: Any) -> None:
 
 
 def compare_command(args: argparse.Namespace) -> int:
-    """Run the command and return the exit code. Raises InputError, ProfileError, SessionError."""
+    """Run the command and return the exit code. Raises UsageError, SessionError."""
     from collision_monitor.session.history.changes import changes
 
+    check_profiles(args.profile)
     a, b = (_history(path, profile) for path, profile in _sides(args))
     found = changes(a, b, args.tolerance)
     print(json.dumps(_as_json(found), indent=2) if args.json else _as_text(found, args.limit))
@@ -94,7 +96,7 @@ def _sides(args: argparse.Namespace) -> list[tuple[Path, str | None]]:
             return [(paths[0], "" if args.replay else None), (paths[0], profiles[0])]
         case 1, 2:
             return [(paths[0], profile) for profile in profiles]
-    raise InputError(
+    raise UsageError(
         f"compare: expected two sessions, or one session and one or two --profile; got {len(paths)} and {len(profiles)}"
     )
 

@@ -199,13 +199,15 @@ def _capture(picture: Picture, path: Path) -> None:
 
 
 def _new_file(chosen: Path | None, scene: str) -> Path:
-    """Return the path of a new file and create its folder. Raises InputError if that is not possible."""
+    """Return the path of a new file and create the usual folder. Raises InputError if that is not possible."""
     if chosen is None:
         chosen = Path("sessions") / f"{scene}-{datetime.now():%Y%m%d-%H%M%S}.mcap"
+    elif not chosen.parent.is_dir():
+        raise InputError(f"--output: expected to be able to write {chosen}, got no folder {chosen.parent}")
     if chosen.exists():
         raise InputError(f"--output: expected the name of a new file, {chosen} is there already")
     try:
-        chosen.parent.mkdir(parents=True, exist_ok=True)
+        chosen.parent.mkdir(exist_ok=True)
     except OSError as error:
         raise InputError(f"--output: expected to be able to write {chosen.parent}, got: {error.strerror}") from None
     return chosen

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.usage import check_profiles, usage
 
 if TYPE_CHECKING:
     from collision_monitor.sources import Imported
@@ -42,6 +43,7 @@ examples:
 exit codes:
   0  everything was imported
   1  the bag cannot be imported
+  2  wrong usage, or the mapping, the profile or the rules are not valid
   3  something was skipped or refused, or an object has no state
 """
 
@@ -74,18 +76,21 @@ def add_parser(subparsers: Any) -> None:
 
 
 def import_command(args: argparse.Namespace) -> int:
-    """Run the command and return the exit code. Raises SessionError, InputError."""
+    """Run the command and return the exit code. Raises UsageError, SessionError, InputError."""
     from collision_monitor.alerts.rules import Rules
     from collision_monitor.sources import import_bag, load_mapping
 
-    mapping = None if args.map is None else load_mapping(args.map)
+    check_profiles([args.profile])
+    with usage():
+        mapping = None if args.map is None else load_mapping(args.map)
+        rules = Rules.given(args.rules)
     with _progress() as progress:
         result = import_bag(
             args.bag,
             args.output,
             mapping,
             profile=args.profile,
-            rules=Rules.given(args.rules),
+            rules=rules,
             node=args.node,
             overwrite=args.force,
             progress=progress,

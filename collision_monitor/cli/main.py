@@ -13,6 +13,7 @@ from typing import Final
 from collision_monitor._version import VERSION
 from collision_monitor.cli.error_line import print_error
 from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.usage import UsageError
 from collision_monitor.errors import CollisionMonitorError
 
 COMMANDS: Final = (
@@ -49,7 +50,7 @@ examples:
 exit codes:
   0    done
   1    error; one line on stderr explains it
-  2    wrong usage
+  2    wrong usage: an option, a name or a file of settings that does not exist or cannot be used
   3    the result is not as expected, for example: answers differ, an expectation fails
   4    the result is not known, for example: a recording is incomplete
   130  interrupted
@@ -84,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return code
     except CollisionMonitorError as error:
         print_error(error)
-        return ExitCode.ERROR
+        return ExitCode.USAGE if isinstance(error, UsageError) else ExitCode.ERROR
     except MemoryError as error:
         print_error(f"there is not enough memory for that: {error}")
         return ExitCode.ERROR

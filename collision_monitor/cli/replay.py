@@ -16,7 +16,7 @@ from collision_monitor.cli.engines import add_engine, engine_of
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.progress import progress_bar
 from collision_monitor.cli.quantities import not_negative, positive
-from collision_monitor.errors import InputError
+from collision_monitor.cli.usage import UsageError, usage
 
 if TYPE_CHECKING:
     from collision_monitor.session import Session
@@ -32,6 +32,7 @@ examples:
 exit codes:
   0  the answers are identical
   1  a session cannot be read
+  2  wrong usage
   3  the answers differ
   4  the answers cannot be compared: they differ and were recorded by another version or machine, or
      messages are missing
@@ -77,15 +78,19 @@ def add_parser(subparsers: Any) -> None:
 
 
 def replay_command(args: argparse.Namespace) -> int:
-    """Run the command and return the exit code. Raises InputError, SessionError."""
+    """Run the command and return the exit code. Raises UsageError, InputError, SessionError."""
     from collision_monitor.session import Session
     from collision_monitor.session.many import find_sessions
     from collision_monitor.session.replaying.replay import replay
+    from collision_monitor.settings.profile import Profile
 
+    if args.threads is not None:
+        with usage():
+            Profile(threads=args.threads)
     paths = find_sessions(args.sessions)
     if len(paths) > 1:
         if args.cut is not None:
-            raise InputError(f"--cut: expected one session, got {len(paths)}")
+            raise UsageError(f"--cut: expected one session, got {len(paths)}")
         return _replay_many(paths, args)
     session = Session(paths[0])
     with _progress_bar(session) as progress:

@@ -8,6 +8,7 @@ from typing import Any
 
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.progress import session_bar
+from collision_monitor.cli.usage import check_profiles, usage
 from collision_monitor.errors import SessionError
 
 DESCRIPTION = """\
@@ -24,6 +25,7 @@ examples:
 exit codes:
   0  the page was written
   1  the session cannot be read, or a file cannot be written
+  2  wrong usage
 """
 
 
@@ -53,13 +55,15 @@ def add_parser(subparsers: Any) -> None:
 
 
 def report_command(args: argparse.Namespace) -> int:
-    """Run the command and return the exit code. Raises SessionError, ProfileError."""
+    """Run the command and return the exit code. Raises UsageError, SessionError."""
     from collision_monitor.alerts.rules import Rules
     from collision_monitor.report import check_outputs, write_report
     from collision_monitor.session import Session
     from collision_monitor.session.history.read_history import read_history
 
-    rules = None if args.rules is None else Rules.given(args.rules)
+    check_profiles([args.replay or ""])
+    with usage():
+        rules = None if args.rules is None else Rules.given(args.rules)
     session = Session(args.session)
     output = args.output or Path(f"{args.session.resolve().stem}.html")
     if output.exists() and output.samefile(args.session):

@@ -8,7 +8,8 @@ from pathlib import Path
 from collision_monitor.cli.parameter_file import check_parameter_file
 from collision_monitor.cli.quantities import positive, size
 from collision_monitor.cli.ros_arguments import parameters
-from collision_monitor.errors import InputError, SessionError
+from collision_monitor.cli.usage import UsageError, usage
+from collision_monitor.errors import SessionError
 from collision_monitor.ros.executables import monitor
 
 DESCRIPTION = """\
@@ -29,7 +30,7 @@ ROS gets all arguments after --ros-args.
 
 exit codes:
   0  stopped by Ctrl-C or SIGTERM
-  1  --params or --record cannot be used
+  1  --record cannot be used
   2  wrong usage, or the node refuses a parameter
 """
 
@@ -77,19 +78,20 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run_command(args: argparse.Namespace) -> int:
-    """Run the node until SIGINT or SIGTERM. Raises InputError, SessionError (the recording exists already)."""
+    """Run the node until SIGINT or SIGTERM. Raises UsageError, SessionError (the recording exists already)."""
     if args.record is not None and args.record.exists():
         raise SessionError(f"--record: expected the name of a new file, {args.record} is there already")
     several = args.split_size is not None or args.split_duration is not None or args.on_event
     if several and (args.record is None or args.record.suffix == ".mcap"):
-        raise SessionError(
+        raise UsageError(
             f"--split-size, --split-duration, --on-event: expected --record with the name of a folder, "
             f"got {args.record or 'none'}; a name without .mcap makes one"
         )
     if (args.before or args.after) and not args.on_event:
-        raise InputError("--before and --after: expected with --on-event, got without")
+        raise UsageError("--before and --after: expected with --on-event, got without")
     if args.params is not None:
-        check_parameter_file(args.params)
+        with usage():
+            check_parameter_file(args.params)
     found = [] if args.params is None else ["--params-file", str(args.params)]
     found += parameters(
         profile=args.profile,

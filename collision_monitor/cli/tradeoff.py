@@ -7,7 +7,7 @@ import csv
 import json
 import math
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.output_file import writing
 from collision_monitor.cli.progress import progress_anywhere, progress_bar
 from collision_monitor.cli.quantities import not_negative, positive, whole
+from collision_monitor.cli.usage import UsageError, check_profiles, usage
 from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
@@ -48,7 +49,8 @@ declare it.
 
 exit codes:
   0  done
-  1  the session, a scene or a profile cannot be used, or a file cannot be written
+  1  the session cannot be used, or a file cannot be written
+  2  wrong usage, or a scene refuses an option
 """
 
 
@@ -103,30 +105,33 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def tradeoff_command(args: argparse.Namespace) -> int:
-    """Run the command and return the exit code. Raises InputError, ProfileError, SessionError."""
+    """Run the command and return the exit code. Raises UsageError, InputError, SessionError."""
     from collision_monitor.accuracy.front import summaries
-    from collision_monitor.accuracy.inputs import recorded, simulated
+    from collision_monitor.accuracy.inputs import recorded
     from collision_monitor.accuracy.tradeoff import tradeoff
+    from collision_monitor.objects.models import parse_model
     from collision_monitor.settings.profile import Profile
 
     if args.session is not None and args.scene:
-        raise InputError("tradeoff: expected a session or scenes, got both")
+        raise UsageError("tradeoff: expected a session or scenes, got both")
     if args.model and args.profile:
-        raise InputError("tradeoff: expected profiles or models, got both: --profile and --model")
+        raise UsageError("tradeoff: expected profiles or models, got both: --profile and --model")
     if args.front and (args.model or args.profile or args.csv or args.impact_methods):
-        raise InputError("tradeoff, --front: goes without --model, --profile, --csv and --impact-methods")
+        raise UsageError("tradeoff, --front: goes without --model, --profile, --csv and --impact-methods")
     if args.impact_methods and (args.model or args.profile or args.csv or args.png):
-        raise InputError("tradeoff, --impact-methods: goes without --model, --profile, --csv and --png")
+        raise UsageError("tradeoff, --impact-methods: goes without --model, --profile, --csv and --png")
     if args.session is not None and args.noise:
-        raise InputError(
+        raise UsageError(
             f"tradeoff, --noise: a session is measured as it was recorded, leave it out (got {args.noise:g})"
         )
+    check_profiles(args.profile or ())
+    with usage():
+        for name in args.model or ():
+            parse_model(name)
     profiles = [Profile.named(name) for name in args.profile or Profile.names()]
     if not args.profile:
         profiles.sort(key=lambda profile: -profile.position_tolerance)
-    inputs = [recorded(args.session)] if args.session else simulated(
-        args.scene, objects=args.objects, seed=args.seed, path=args.path, noise=args.noise, duration=args.seconds
-    )  # fmt: skip
+    inputs = [recorded(args.session)] if args.session else _scenes(args)
     if args.front:
         return _measure_fronts(args, inputs)
     if args.impact_methods:
@@ -147,6 +152,16 @@ def tradeoff_command(args: argparse.Namespace) -> int:
     except OSError as error:
         raise InputError(f"expected a file that can be written, got {error.filename}: {error.strerror}") from None
     return ExitCode.DONE
+
+
+def _scenes(args: argparse.Namespace) -> Iterator[Workload]:
+    """Yield the scenes. Raises UsageError if one does not exist or refuses an option."""
+    from collision_monitor.accuracy.inputs import simulated
+
+    with usage():
+        yield from simulated(
+            args.scene, objects=args.objects, seed=args.seed, path=args.path, noise=args.noise, duration=args.seconds
+        )
 
 
 def _measure_fronts(args: argparse.Namespace, inputs: Iterable[Workload]) -> int:

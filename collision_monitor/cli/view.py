@@ -11,7 +11,8 @@ from typing import Any
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.progress import session_bar
 from collision_monitor.cli.quantities import whole
-from collision_monitor.errors import InputError, MessageError
+from collision_monitor.cli.usage import UsageError, check_profiles
+from collision_monitor.errors import MessageError
 from collision_monitor.pipeline.topics import NODE
 from collision_monitor.ros.process import StopRequest, ros_context, stay_on_this_machine
 from collision_monitor.view.server import LOOPBACK, PORT, start_server, stop_server
@@ -36,6 +37,7 @@ examples:
 exit codes:
   0  stopped by Ctrl-C or SIGTERM
   1  the session cannot be read, the port is in use, or viser is not installed
+  2  wrong usage
 """
 
 
@@ -70,11 +72,12 @@ def add_parser(subparsers: Any) -> None:
 
 
 def view_command(args: argparse.Namespace) -> int:
-    """Serve the page until a signal. Raises InputError, SessionError, ProfileError, UnsupportedError."""
+    """Serve the page until a signal. Raises UsageError, InputError, SessionError, UnsupportedError."""
     if args.replay is not None and args.session is None:
-        raise InputError("--replay: expected a session, got none")
+        raise UsageError("--replay: expected a session, got none")
     if args.port > 65535:
-        raise InputError(f"--port: expected a port from 0 to 65535, got {args.port}")
+        raise UsageError(f"--port: expected a port from 0 to 65535, got {args.port}")
+    check_profiles([args.replay or ""])
     stop = StopRequest().install()
     if args.session is None:
         _view_live(args, stop)

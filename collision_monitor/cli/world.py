@@ -7,7 +7,7 @@ from pathlib import Path
 
 from collision_monitor.cli.quantities import not_negative, positive, whole
 from collision_monitor.cli.ros_arguments import parameters
-from collision_monitor.errors import InputError
+from collision_monitor.cli.usage import UsageError, usage
 from collision_monitor.pipeline.topics import NODE
 from collision_monitor.ros.executables import world
 from collision_monitor.world.response_choice import METHODS
@@ -25,7 +25,6 @@ examples:
 
 exit codes:
   0  the scene ended, or was stopped by Ctrl-C or SIGTERM
-  1  the scene does not exist
   2  wrong usage, or the scene refuses an option
 """
 
@@ -73,7 +72,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def play(args: argparse.Namespace) -> int:
-    """Publish the scene until its end, SIGINT or SIGTERM, and return the exit code. Raises InputError."""
+    """Publish the scene until its end, SIGINT or SIGTERM, and return the exit code. Raises UsageError."""
     from collision_monitor.world import describe, scene_names
 
     if args.list:
@@ -82,8 +81,9 @@ def play(args: argparse.Namespace) -> int:
             print(f"{name:{width}}  {describe(name)}")
         return 0
     if args.scene is None:
-        raise InputError(f"world: expected the name of a scene, one of {', '.join(scene_names())}")
-    describe(args.scene)
+        raise UsageError(f"world: expected the name of a scene, one of {', '.join(scene_names())}")
+    with usage():
+        describe(args.scene)
     found = parameters(
         scene=args.scene,
         objects=args.objects,

@@ -19,7 +19,8 @@ class BoundedCache(Generic[P, R]):
     """Remembers the results of a pure function until they hold more than `limit` bytes; the least used leave first.
 
     size: bytes of a result and of its arguments, which stay in memory as the key. The newest result always stays, so
-    the memory is at most the limit or one result. Arguments are positional and hashable. Safe for threads.
+    the memory is at most the limit or one result. Arguments are hashable; those by name
+    make another entry. Safe for threads.
     """
 
     def __init__(self, function: Callable[P, R], size: Callable[..., int], limit: int) -> None:
@@ -37,16 +38,17 @@ class BoundedCache(Generic[P, R]):
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
         """Return the remembered result, or compute it. Raises what the function raises, and remembers no failure."""
+        key: Any = (args, *kwargs.items()) if kwargs else args
         try:
-            self._results.move_to_end(args)
-            return self._results[args][0]
+            self._results.move_to_end(key)
+            return self._results[key][0]
         except KeyError:  # not there, or another thread has just removed it
             pass
         result = self._function(*args, **kwargs)
-        size = self._size(result, *args) + ENTRY_BYTES
+        size = self._size(result, *args, **kwargs) + ENTRY_BYTES
         with self._lock:
-            if args not in self._results:
-                self._results[args] = result, size
+            if key not in self._results:
+                self._results[key] = result, size
                 self.held += size
             while self.held > self.limit and len(self._results) > 1:
                 self.held -= self._results.popitem(last=False)[1][1]

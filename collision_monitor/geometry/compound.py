@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
 from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Shape
@@ -16,6 +18,8 @@ def shape_pairs(value: Any, what: str) -> tuple[tuple[Shape, Pose], ...]:
         return ((value, Pose()),)
     if not isinstance(value, Iterable):
         raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), got {value!r}")
+    if isinstance(value, np.ndarray):  # one of no dimensions is Iterable, and raises
+        value = value.tolist() if value.ndim else [value.item()]
     pairs = tuple(tuple(item) if isinstance(item, Iterable) else item for item in value)
     for pair in pairs:
         is_pair = isinstance(pair, tuple) and len(pair) == 2

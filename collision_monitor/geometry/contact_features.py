@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.coordinates import Array, Indices, coordinates, triangles
+from collision_monitor.geometry.coordinates import Indices, coordinates, triangles
+from collision_monitor.geometry.point_triangle import closest_point_on_triangle
 from collision_monitor.geometry.points import closest_point_on_segment, distance
 from collision_monitor.tolerances import FEATURE_TIE
 
@@ -89,38 +90,48 @@ def classify_contact(
 
 
 def feature_at(
-    point: ArrayLike, normal: ArrayLike, vertices: ArrayLike, faces: ArrayLike, tolerance: float = FEATURE_TIE
+    point: ArrayLike,
+    normal: ArrayLike,
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    tolerance: float = FEATURE_TIE,
+    off: float = 0.0,
 ) -> Feature:
     """Largest feature of a mesh that touches as a whole at a surface point (3,), for a contact normal (3,).
 
     A face at the point touches as a whole if it is perpendicular to the normal and faces along it, an edge if it is
     perpendicular to the normal. Otherwise the result is the vertex at the point, else the edge or the face that
-    contains the point. The lowest index wins. `tolerance`: part of the mesh's size. Raises InputError if the point is
-    off the surface.
+    contains the point. The lowest index wins. `tolerance`: part of the mesh's size. `off`: error of the point (m); one
+    that is off the surface by no more stands for the nearest point of the surface. Raises InputError if it is further.
     """
     vertices, faces = triangles(vertices, faces)
-    point, normal = coordinates(point, "point", 3), coordinates(normal, "normal", 3)
+    at, normal = coordinates(point, "point", 3), coordinates(normal, "normal", 3)
     reach = tolerance * float(np.ptp(vertices, axis=0).max())
     normal = normal / np.linalg.norm(normal)
-    height = (vertices - point) @ normal
     corner = vertices[faces]
-    near = np.flatnonzero(_distance_to_triangles(point, *np.moveaxis(corner, 1, 0)) <= reach)
-    if not len(near):
-        raise InputError(f"contact: expected a point on the mesh's surface, got {point.tolist()}")
+    foot, away = closest_point_on_triangle(at, *np.moveaxis(corner, 1, 0))
+    nearest = int(away.argmin())
+    if away[nearest] > max(reach, off):
+        raise InputError(f"contact: expected a point on the mesh's surface, got {at.tolist()}")
+    if away[nearest] > reach:
+        at = foot[nearest]
+        away = closest_point_on_triangle(at, *np.moveaxis(corner, 1, 0))[1]
+    near = np.flatnonzero(away <= reach)
+    height = (vertices - at) @ normal
     touching = np.abs(height) <= reach
     upward = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) @ normal > 0.0
     whole = near[touching[faces[near]].all(axis=1) & upward[near]]
     if len(whole):
         return _face(faces, int(whole[0]))
     edges = np.unique(np.sort(faces[near][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
-    on_edge = distance(point, closest_point_on_segment(point, *np.moveaxis(vertices[edges], 1, 0))[0]) <= reach
+    on_edge = distance(at, closest_point_on_segment(at, *np.moveaxis(vertices[edges], 1, 0))[0]) <= reach
     across = edges[on_edge & touching[edges].all(axis=1)]
     if len(across):
         return Feature(FeatureType.EDGE, (int(across[0, 0]), int(across[0, 1])), -1)
     corners = np.unique(faces[near])
-    at = corners[distance(point, vertices[corners]) <= reach]
-    if len(at):
-        return Feature(FeatureType.VERTEX, (int(at[0]),), -1)
+    at_corner = corners[distance(at, vertices[corners]) <= reach]
+    if len(at_corner):
+        return Feature(FeatureType.VERTEX, (int(at_corner[0]),), -1)
     if on_edge.any():
         edge = edges[np.flatnonzero(on_edge)[0]]
         return Feature(FeatureType.EDGE, (int(edge[0]), int(edge[1])), -1)
@@ -130,15 +141,3 @@ def feature_at(
 def _face(faces: Indices, index: int) -> Feature:
     i, j, k = (int(vertex) for vertex in faces[index])
     return Feature(FeatureType.FACE, (i, j, k), index)
-
-
-def _distance_to_triangles(point: Array, a: Array, b: Array, c: Array) -> Array:
-    """Distances (m,) of a point (3,) to triangles (m, 3): to the plane if the foot is inside, else to the sides."""
-    sides = ((a, b), (b, c), (c, a))
-    to_sides = np.min([distance(point, closest_point_on_segment(point, p, q)[0]) for p, q in sides], axis=0)
-    normal = np.cross(b - a, c - a)
-    length = np.linalg.norm(normal, axis=1)
-    above = np.all([(np.cross(q - p, point - p) * normal).sum(axis=1) >= 0.0 for p, q in sides], axis=0)
-    inside = above & (length > 0.0)
-    height = np.abs(((point - a) * normal).sum(axis=1)) / np.where(length > 0.0, length, 1.0)
-    return np.where(inside, height, to_sides)

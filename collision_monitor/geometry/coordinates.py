@@ -18,7 +18,7 @@ def coordinates(value: ArrayLike, what: str, *widths: int) -> Array:
     widths = widths or (2, 3)
     try:
         array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{what}: expected numbers, got {value!r:.100}") from None
     if array.ndim == 0 or array.shape[-1] not in widths or array.size == 0:
         shapes = " or ".join(f"(..., {width})" for width in widths)
@@ -32,7 +32,7 @@ def numbers(value: ArrayLike, what: str, least: float = -np.inf) -> Array:
     """Finite numbers (...) >= `least`. Raises InputError."""
     try:
         array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{what}: expected numbers, got {value!r:.100}") from None
     if not np.isfinite(array).all() or (array < least).any():
         bound = f" >= {least:g}" if least > -np.inf else ""
@@ -56,7 +56,7 @@ def triangles(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> tupl
     points = point_set(vertices, f"{what} vertices", 3, least=3)
     try:
         indices = np.asarray(faces)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ShapeError(f"{what} faces: expected integers of shape (m, 3), got {type(faces).__name__}") from None
     if indices.ndim != 2 or indices.shape[1] != 3 or len(indices) == 0 or not np.issubdtype(indices.dtype, np.integer):
         got = f"{indices.dtype} {indices.shape}"

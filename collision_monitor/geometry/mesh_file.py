@@ -43,7 +43,10 @@ def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
         ...
     collision_monitor.errors.ShapeError: part.stl: expected a mesh file, got no file there
     """
-    file = Path(path)
+    try:
+        file = Path(path)
+    except TypeError:
+        raise ShapeError(f"load_mesh: expected the path of a file, got {path!r:.100}") from None
     try:
         factor = float(scale)
     except (TypeError, ValueError):

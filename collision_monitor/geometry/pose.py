@@ -22,7 +22,7 @@ def vector(value: ArrayLike, name: str, length: int = 3) -> Array:
     """Check a vector of `length` finite numbers; return it as float64, read-only. Raises PoseError."""
     try:
         result = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise PoseError(f"{name}: expected {length} numbers, got {value!r}") from None
     if result.shape != (length,):
         raise PoseError(f"{name}: expected {length} numbers, got an array of shape {result.shape}"
@@ -117,7 +117,7 @@ class Pose:
         """
         try:
             X = np.array(matrix, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise PoseError(f"matrix: expected numbers (4, 4) or (3, 3), got {matrix!r}") from None
         if X.shape not in ((4, 4), (3, 3)):
             raise PoseError(f"matrix: expected shape (4, 4) or (3, 3), got {X.shape}")

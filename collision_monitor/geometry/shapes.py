@@ -27,7 +27,7 @@ def _positive(value: float, what: str, *, or_zero: bool = False) -> float:
     expected = f"{'0 or ' if or_zero else ''}a positive number of metres up to {LARGEST_INPUT:g}"
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ShapeError(f"{what}: expected {expected}, got {value!r}") from None
     if not (0.0 < number <= LARGEST_INPUT or (or_zero and number == 0.0)):
         raise ShapeError(f"{what}: expected {expected}, got {number!r}")
@@ -37,7 +37,7 @@ def _positive(value: float, what: str, *, or_zero: bool = False) -> float:
 def _points(value: ArrayLike, what: str, width: int, least: int) -> Array:
     try:
         points = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ShapeError(f"{what}: expected an array of shape (n, {width}), got {type(value).__name__}") from None
     if points.ndim != 2 or points.shape[1] != width or len(points) < least:
         raise ShapeError(f"{what}: expected at least {least} points, shape (n, {width}), got shape {points.shape}")
@@ -90,7 +90,7 @@ class Box(Shape):
     def __post_init__(self) -> None:
         try:
             size = tuple(float(s) for s in self.size)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ShapeError(f"Box size: expected 3 full extents in m, as Box((1, 1, 1)), got {self.size!r}") from None
         if len(size) != 3 or not all(0.0 <= s <= LARGEST_INPUT for s in size) or max(size) == 0.0:
             raise ShapeError(f"Box size: expected 3 extents from 0 to {LARGEST_INPUT:g}, not all zero, got {size}")
@@ -207,7 +207,7 @@ class Mesh(Shape):
         vertices = _points(self.vertices, "Mesh vertices", 3, 3)
         try:
             faces = np.array(self.faces)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             got = type(self.faces).__name__
             raise ShapeError(f"Mesh faces: expected an array of shape (m, 3), got {got}") from None
         if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0 or not np.issubdtype(faces.dtype, np.integer):
@@ -284,7 +284,7 @@ class HalfSpace(Shape):
         try:
             normal = np.array(self.normal, dtype=np.float64)
             offset = float(self.offset)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             got = f"{self.normal!r}, {self.offset!r}"
             raise ShapeError(f"HalfSpace: expected a normal (3) and an offset, got {got}") from None
         with np.errstate(over="ignore"):  # an infinite length is refused below

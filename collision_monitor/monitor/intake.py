@@ -119,7 +119,7 @@ class Intake(Stage):
             return states, np.empty((0, 12))
         try:
             covariances = np.asarray(covariance, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InputError("covariance: expected an array of numbers") from None
         if covariances.shape != (len(states), 12):
             raise InputError(f"covariance: expected shape ({len(states)}, 12), got {covariances.shape}")
@@ -214,7 +214,7 @@ def _states(ids: NDArray[Any], poses: Any, twists: Any) -> States:
     try:
         pose = np.asarray(poses, dtype=np.float64)
         twist = np.zeros((len(ids), 6)) if twists is None else np.asarray(twists, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError("poses and twists: expected arrays of numbers") from None
     n = len(ids)
     if pose.shape != (n, 7) or twist.shape != (n, 6):

@@ -38,6 +38,9 @@ from collision_monitor.settings.profile import Profile
 FACTS = "monitor"
 """Key of the monitor's entry in Snapshot.facts."""
 
+MOST_NANOSECONDS = 2**63
+"""A stamp is below it, and from its negative on; the stamps of messages and sessions are of 64 bits."""
+
 NAMED = 3
 """Objects that the text of a refused message names."""
 
@@ -99,7 +102,7 @@ class Monitor:
 
     @profile.setter
     def profile(self, profile: str | Profile) -> None:
-        new = self._profile.switched(profile) if isinstance(profile, str) else profile
+        new = profile if isinstance(profile, Profile) else self._profile.switched(profile)
         changed = self._profile.differences(new).keys()
         self._profile, self._settings = new, KernelSettings.of(new)
         if Profile.changes_predictions(changed):
@@ -172,6 +175,8 @@ class Monitor:
         prepared: what represents the object, if it is known already.
         Raises InputError, ShapeError; UnsupportedError for an unsupported shape or model.
         """
+        if not isinstance(description, ObjectDescription):
+            raise InputError(f"describe: expected an ObjectDescription, got {description!r:.99}; or use add(id, shape)")
         model = self.model_of(description)
         if model is not description.model:
             prepared = prepared or monitored_model(description.shapes, model)
@@ -300,13 +305,13 @@ class Monitor:
         Unusable rows and stamps that jump are refused: the result lists them (`refused`), they raise nothing, and the
         first of each kind is a RefusalWarning. Raises InputError for arrays of another shape.
         """
-        if not isinstance(stamp_ns, int | np.integer) or isinstance(stamp_ns, bool):
-            got = f"got {stamp_ns!r}; of seconds t write round(1e9 * t)"
-            raise InputError(f"stamp_ns: expected an integer number of nanoseconds, {got}")
+        stamp_ns = _nanoseconds(stamp_ns, "stamp_ns")
+        if now_ns is not None:
+            now_ns = _nanoseconds(now_ns, "now_ns")
         states, covariances = self._intake.states(ids, poses, twists, covariance)
         self._intake.of_step = {}
         with self.clock:
-            result = self._take_step(int(stamp_ns), states, covariances, now_ns)
+            result = self._take_step(stamp_ns, states, covariances, now_ns)
         for each in result.refused:
             if each.reason in self._unwarned:
                 self._unwarned.discard(each.reason)
@@ -464,6 +469,16 @@ class Monitor:
                 raise
             raise InputError(f"snapshot: expected the state of a monitor of this version, got: {error!r}") from None
         return monitor
+
+
+def _nanoseconds(value: Any, name: str) -> int:
+    """Return a time as int. Raises InputError."""
+    if not isinstance(value, int | np.integer) or isinstance(value, bool):
+        got = f"got {value!r:.100}; of seconds t write round(1e9 * t)"
+        raise InputError(f"{name}: expected an integer number of nanoseconds, {got}")
+    if not -MOST_NANOSECONDS <= value < MOST_NANOSECONDS:
+        raise InputError(f"{name}: expected nanoseconds that 64 bits can hold, got {value}")
+    return int(value)
 
 
 def _of_objects(states: NDArray[np.void]) -> str:

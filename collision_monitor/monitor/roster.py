@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import weakref
+from collections.abc import Hashable
 from itertools import chain
 from typing import Any, Final
 
@@ -128,7 +129,7 @@ class Roster(Stage):
 
     def __contains__(self, object_id: int) -> bool:
         """Whether the object is described."""
-        return object_id in self._slots
+        return isinstance(object_id, Hashable) and object_id in self._slots
 
     def __len__(self) -> int:
         """Number of described objects."""
@@ -141,7 +142,7 @@ class Roster(Stage):
 
     def slot(self, object_id: int) -> int:
         """Slot of an object. Raises InputError for an unknown id."""
-        if object_id not in self._slots:
+        if object_id not in self:
             raise InputError(f"expected the id of an object that was described, got {object_id!r}")
         return self._slots[object_id]
 

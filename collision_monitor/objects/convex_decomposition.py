@@ -71,7 +71,7 @@ REMEMBERED_DECOMPOSITIONS: Final = 32 << 20
 """Bytes of meshes and their parts that are remembered. Less: a mesh that is described again is decomposed again."""
 
 
-def _memory(found: Decomposition, mesh: Mesh, *_: float) -> int:
+def _memory(found: Decomposition, mesh: Mesh, concavity: float = CONCAVITY) -> int:
     return array_bytes(mesh) + sum(map(array_bytes, found.parts))
 
 
@@ -88,8 +88,10 @@ def convex_decomposition(mesh: Mesh, concavity: float = CONCAVITY) -> Decomposit
     >>> len(convex_decomposition(cube).parts)  # with CoACD installed
     1
     """
-    if not 0.01 <= concavity <= 1.0:
-        raise InputError(f"concavity: expected a number from 0.01 to 1, got {concavity}")
+    if not isinstance(mesh, Mesh):
+        raise ShapeError(f"convex decomposition: expected a Mesh, got {mesh!r:.100}")
+    if not isinstance(concavity, int | float) or not 0.01 <= concavity <= 1.0:
+        raise InputError(f"concavity: expected a number from 0.01 to 1, got {concavity!r:.100}")
     try:
         coacd: Any = import_module("coacd")
     except ImportError:

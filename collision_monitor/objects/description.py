@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import operator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -25,20 +27,30 @@ Longer names are refused, because cutting them could make two of them equal."""
 
 
 def _uint32(value: Any, what: str) -> int:
-    if isinstance(value, bool) or not hasattr(value, "__index__") or not 0 <= value.__index__() <= _UINT32_MAX:
+    try:
+        number = -1 if isinstance(value, bool) else operator.index(value)
+    except TypeError:
+        number = -1
+    if not 0 <= number <= _UINT32_MAX:
         name = "; a text goes into name=" if isinstance(value, str) else ""
-        raise InputError(f"{what}: expected an integer from 0 to {_UINT32_MAX}, got {value!r}{name}")
-    return int(value)
+        raise InputError(f"{what}: expected an integer from 0 to {_UINT32_MAX}, got {value!r:.100}{name}")
+    return number
 
 
 def _not_negative(value: Any, what: str, unit: str) -> float:
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{what}: expected a number of {unit}, got {value!r}") from None
     if not 0.0 <= number <= LARGEST_INPUT:
         raise InputError(f"{what}: expected a finite number of {unit} from 0 to {LARGEST_INPUT:g}, got {number!r}")
     return number
+
+
+def _ids(value: Any, what: str) -> Iterable[Any]:
+    if not isinstance(value, Iterable) or isinstance(value, str | bytes):
+        raise InputError(f"{what}: expected a list of ids, got {value!r:.100}")
+    return value
 
 
 def _name(value: Any, what: str) -> str:
@@ -109,7 +121,7 @@ class ObjectDescription:
             "mask": _uint32(self.mask, f"{what}, mask") or ALL_GROUPS,
             "padding": _not_negative(self.padding, f"{what}, padding", "metres"),
             "model": model,
-            "allowed": tuple(_uint32(other, f"{what}, allowed") for other in self.allowed),
+            "allowed": tuple(_uint32(other, f"{what}, allowed") for other in _ids(self.allowed, f"{what}, allowed")),
         }
         for field, unit in (("max_linear_acceleration", "m/s^2"), ("max_angular_acceleration", "rad/s^2")):
             value = getattr(self, field)

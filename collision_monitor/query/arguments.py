@@ -46,10 +46,17 @@ def checked_pose(pose: Any, name: str) -> Pose:
         return pose
     if isinstance(pose, Shape):
         hint = "each shape is followed by its pose: shape_a, pose_a, shape_b, pose_b"
-    elif np.shape(pose) in ((4, 4), (3, 3)):
+    elif (shape := _shape_of(pose)) in ((4, 4), (3, 3)):
         hint = "write Pose.from_matrix(matrix)"
-    elif np.shape(pose) == (7,):
+    elif shape == (7,):
         hint = "write Pose((x, y, z), (qx, qy, qz, qw))"
     else:
         hint = "write Pose((x, y, z))"
     raise PoseError(f"{name}: expected a Pose, got {type(pose).__name__}; {hint}")
+
+
+def _shape_of(value: Any) -> tuple[int, ...]:
+    try:
+        return np.shape(value)
+    except ValueError:  # rows of different lengths
+        return ()

@@ -19,20 +19,20 @@ if TYPE_CHECKING:
 def contact_text(contact: Contact) -> str:
     """Text such as `Contact(0.0123 m ± 1e-12, box face 3 – capsule surface)`."""
     shape_a, pose_a, shape_b, pose_b = contact.arguments
-    tie = tie_of(shape_a, shape_b)
-    a = _feature(shape_a, pose_a, contact.point_a, contact.normal, tie)
-    b = _feature(shape_b, pose_b, contact.point_b, -contact.normal, tie)
+    tie, off = tie_of(shape_a, shape_b), contact.error_bound
+    a = _feature(shape_a, pose_a, contact.point_a, contact.normal, tie, off)
+    b = _feature(shape_b, pose_b, contact.point_b, -contact.normal, tie, off)
     return f"Contact({contact.signed_distance:.4g} m ± {contact.error_bound:.1g}, {a} – {b})"
 
 
-def _feature(shape: Compound, pose: Pose, point: Array, normal: Array, tie: float) -> str:
+def _feature(shape: Compound, pose: Pose, point: Array, normal: Array, tie: float, off: float) -> str:
     if not isinstance(shape, Shape):
         return "compound"
     kind = type(shape).__name__.lower()
     if not isinstance(shape, Box | ConvexHull | Mesh | Points):
         return f"{kind} surface"
     try:
-        found = feature_of(shape, pose, point, normal, tie)
+        found = feature_of(shape, pose, point, normal, tie, off)
     except InputError:  # the witness point is off the surface, by the error bound
         return f"{kind} surface"
     number = found.face if found.type is FeatureType.FACE else "-".join(map(str, found.vertices))

@@ -106,7 +106,7 @@ def edge_edge_impact(
 def _impacts(x: ArrayLike, face: bool, separation: float, tolerance: float | None, budget: int) -> FeatureImpact:
     try:
         points = np.ascontiguousarray(x, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"x: expected numbers of shape (..., 8, 3), got {type(x).__name__}") from None
     if points.ndim < 2 or points.shape[-2:] != (8, 3):
         raise InputError(f"x: expected four points at the start and at the end, (..., 8, 3), got shape {points.shape}")

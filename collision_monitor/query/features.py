@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.errors import UnsupportedError
+from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.contact_features import Feature, FeatureContact, FeatureType, feature_at
 from collision_monitor.geometry.pose import Pose
@@ -30,6 +30,7 @@ from collision_monitor.geometry.shapes import (
     Polygon,
     Shape,
 )
+from collision_monitor.query.arguments import checked_pose
 from collision_monitor.query.contact import Contact
 from collision_monitor.tolerances import FEATURE_TIE
 
@@ -56,10 +57,14 @@ def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Sh
     >>> cm.contact_features(cm.contact(box, pose, box, above), box, pose, box, above).a.type.name
     'FACE'
     """
+    checked_pose(pose_a, "pose_a")
+    checked_pose(pose_b, "pose_b")
+    if not isinstance(contact, Contact):
+        raise InputError(f"contact: expected the result of `contact` of the two shapes, got {contact!r:.100}")
     tie = tie_of(shape_a, shape_b)
     return FeatureContact(
-        feature_of(shape_a, pose_a, contact.point_a, contact.normal, tie),
-        feature_of(shape_b, pose_b, contact.point_b, -contact.normal, tie),
+        feature_of(shape_a, pose_a, contact.point_a, contact.normal, tie, contact.error_bound),
+        feature_of(shape_b, pose_b, contact.point_b, -contact.normal, tie, contact.error_bound),
     )
 
 
@@ -69,22 +74,23 @@ def tie_of(shape_a: object, shape_b: object) -> float:
     return ROUND_TIE if curved else FEATURE_TIE
 
 
-def feature_of(shape: Shape, pose: Pose, point: Array, normal: Array, tie: float = FEATURE_TIE) -> Feature:
+def feature_of(shape: Shape, pose: Pose, point: Array, normal: Array, tie: float, off: float) -> Feature:
     """Feature of a shape at a point (3,) in m with an outward normal (3,), both in the world frame.
 
     Numbered as in `contact_features`, with the same errors. tie: largest difference of equal heights, relative.
+    off: error of the point (m).
     """
     at, towards = (point - pose.position) @ pose.rotation, normal @ pose.rotation
     match shape:
         case Mesh():
-            return feature_at(at, towards, shape.vertices, shape.faces, tie)
+            return feature_at(at, towards, shape.vertices, shape.faces, tie, off)
         case ConvexHull():
             hull = convex_hull(shape.points)
-            found = feature_at(at, towards, hull.vertices, hull.faces, tie)
+            found = feature_at(at, towards, hull.vertices, hull.faces, tie, off)
             same = (shape.points == hull.vertices[list(found.vertices), None]).all(axis=-1)
             return found._replace(vertices=tuple(same.argmax(axis=1).tolist()))
         case Box():
-            found = feature_at(at, towards, _SIDES * shape.size, _TRIANGLES, tie)
+            found = feature_at(at, towards, _SIDES * shape.size, _TRIANGLES, tie, off)
             if found.type is FeatureType.FACE:
                 return Feature(FeatureType.FACE, tuple(_QUADS[found.face // 2].tolist()), found.face // 2)
             return found

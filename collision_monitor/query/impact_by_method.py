@@ -41,7 +41,7 @@ def impact_by_method(
     step: float,
 ) -> Impact:
     """See `time_of_impact`. Raises InputError, UnsupportedError."""
-    if method not in NUMBERS:
+    if not isinstance(method, str) or method not in NUMBERS:
         raise InputError(f"method: expected one of conservative_advancement, {', '.join(NUMBERS)}, got {method!r}")
     if query.horizon / step > MOST_STEPS:
         least = query.horizon / MOST_STEPS

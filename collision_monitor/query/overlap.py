@@ -43,7 +43,7 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
         elif (found := convex_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
             return found[0] <= 0.0
         return contact(shape_a, pose_a, shape_b, pose_b).overlaps
-    if test not in TESTS:
+    if not isinstance(test, str) or test not in TESTS:
         raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")
     if test == "edges" or (test == "sat" and any(_is_polygon(shape) for shape in (shape_a, shape_b))):
         plane = [_polygons(shape, pose, test, name) for shape, pose, name in _named(shape_a, pose_a, shape_b, pose_b)]

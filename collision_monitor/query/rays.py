@@ -53,7 +53,10 @@ def cast_ray(
     """
     checked_pose(pose, "pose")
     p, d = coordinates(origin, "origin", 3), coordinates(direction, "direction", 3)
-    limit = np.asarray(length, dtype=np.float64)
+    try:
+        limit = np.asarray(length, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        limit = np.array(np.nan)
     if not (limit >= 0.0).all():
         raise InputError(f"length: expected metres of at least 0, got {length!r:.100}")
     size = np.linalg.norm(d, axis=-1, keepdims=True)

@@ -92,13 +92,17 @@ def write_report(
         )
         for name in broad
     }
+    try:
+        if pictures is not None:
+            Path(pictures).mkdir(exist_ok=True)
+    except OSError as error:
+        raise SessionError(f"{pictures}: expected to be able to write there, got: {error.strerror}") from None
     files = {Path(path): page(history, facts, drawn).encode("utf-8", errors="replace")}
     if pictures is not None:
         files |= {Path(pictures) / f"{name}.png": as_png(figure) for name, figure in broad.items()}
     check_outputs(list(files), overwrite)
     try:
         for file, content in files.items():
-            file.parent.mkdir(parents=True, exist_ok=True)
             file.write_bytes(content)
     except OSError as error:
         raise SessionError(f"{error.filename}: expected to be able to write there, got: {error.strerror}") from None
@@ -106,8 +110,10 @@ def write_report(
 
 
 def check_outputs(files: list[Path], overwrite: bool) -> None:
-    """Raise SessionError if a file is a folder, or exists and may not be overwritten."""
+    """Raise SessionError if a file is a folder or in none, or exists and may not be overwritten."""
     for file in files:
+        if not file.parent.is_dir():
+            raise SessionError(f"{file}: expected to be able to write there, got no folder {file.parent}")
         if file.is_dir():
             raise SessionError(f"{file}: expected a file to write to, got a folder")
         if file.exists() and not overwrite:

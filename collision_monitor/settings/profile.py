@@ -319,6 +319,8 @@ class Profile:
 
         These are the defaults, or for sessions that are older than a setting what the program did then.
         """
+        if not isinstance(values, Mapping):
+            raise ProfileError(f"profile: expected settings by name, got {values!r:.100}")
         known = {f.name for f in dataclasses.fields(cls)}
         for name in values:
             if name not in known:

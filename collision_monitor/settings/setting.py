@@ -21,6 +21,7 @@ EVERYWHERE: Final = LARGEST_INPUT
 """m: a region with this value as a bound is unbounded on that side."""
 
 _KINDS: dict[type, str] = {bool: "true or false", int: "a whole number", float: "a number", tuple: "three numbers"}
+_UNITS = {"s": "seconds", "ms": "milliseconds", "m": "metres", "rad": "radians"}
 
 
 def number(
@@ -80,7 +81,7 @@ class Setting:
     def checked(self, value: Any) -> Value:
         """Return the value in the setting's type. Raises ProfileError, which names what was expected."""
         if self.choices:
-            if value not in self.choices:
+            if not isinstance(value, str) or value not in self.choices:
                 raise ProfileError(f"{self.name}: expected one of {', '.join(self.choices)}, got {value!r}")
             return str(value)
         if self.type is tuple:
@@ -90,14 +91,14 @@ class Setting:
         whole = isinstance(value, int) and not isinstance(value, bool)
         fits = {bool: isinstance(value, bool), int: whole, float: whole or isinstance(value, float)}[self.type]
         if not fits:
-            raise ProfileError(f"{self.name}: expected {_KINDS[self.type]}{self._in_unit}, got {value!r}")
+            raise ProfileError(f"{self.name}: expected {_KINDS[self.type]}{self._of_unit}, got {value!r}")
         self._check_range(value)
         return self.type(value)  # type: ignore[no-any-return]
 
     def _checked_vector(self, value: Any) -> Vector:
         given = list(value) if isinstance(value, Sequence) and not isinstance(value, str) else []
         if len(given) != 3 or not all(isinstance(x, int | float) and not isinstance(x, bool) for x in given):
-            raise ProfileError(f"{self.name}: expected {_KINDS[tuple]}{self._in_unit}, got {value!r}")
+            raise ProfileError(f"{self.name}: expected {_KINDS[tuple]}{self._of_unit}, got {value!r}")
         for x in given:
             self._check_range(x)
         return (float(given[0]), float(given[1]), float(given[2]))
@@ -105,7 +106,11 @@ class Setting:
     def _check_range(self, value: float) -> None:
         if not self.minimum <= value <= self.maximum:
             wanted = f"{self.minimum:g} to {self.maximum:g}{self._in_unit}"
-            raise ProfileError(f"{self.name}: expected {wanted}, got {value:g}")
+            raise ProfileError(f"{self.name}: expected {wanted}, got {value!r:.100}")
+
+    @property
+    def _of_unit(self) -> str:
+        return "" if self.unit == "1" else f" of {_UNITS.get(self.unit, self.unit)}"
 
     @property
     def _in_unit(self) -> str:

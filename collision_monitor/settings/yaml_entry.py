@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
@@ -77,7 +76,7 @@ class YamlEntry:
     def number(self, unit: str, least: float = 0.0, most: float = 1e9) -> float:
         """Return a number in a range."""
         value = self.value
-        is_number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if not (is_number and least <= value <= most):
             raise self.error(f"a number of {unit} from {least:g} to {most:g}")
         return float(value)

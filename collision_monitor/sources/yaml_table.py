@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection
 from typing import Any
 
@@ -51,7 +50,7 @@ def truth(value: Any, what: str) -> bool:
 
 def number(value: Any, what: str, unit: str, *, least: float = 0.0, most: float = 1e9) -> float:
     """Return a number in a range."""
-    is_number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if not (is_number and least <= value <= most):
         raise InputError(f"{what}: expected a number of {unit} from {least:g} to {most:g}, got {value!r}")
     return float(value)
@@ -61,7 +60,7 @@ def numbers(value: Any, what: str) -> NDArray[np.float64]:
     """Return an array of numbers."""
     try:
         return np.asarray(value, np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{what}: expected numbers, got {value!r}") from None
 
 

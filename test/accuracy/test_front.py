@@ -6,8 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
 from collision_monitor.accuracy.front import Front, error_of, front_settings, measure_front
+from collision_monitor.accuracy.front_picture import draw_fronts
 from collision_monitor.accuracy.inputs import simulated
 from collision_monitor.cli.main import main
 
@@ -47,8 +49,21 @@ def test_the_command_draws_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert {row["profile"] for row in found["rows"]} >= {"fast", "balanced", "exact", "balanced × 10"}
     assert set(found["front"]["crossing"]) == {"time", "distance"} and found["fixed_us"]["crossing"] > 0.0
     assert picture.read_bytes().startswith(b"\x89PNG")
-    assert main([*arguments, "--model", "obb"]) == 1
+    assert main([*arguments, "--model", "obb"]) == 2
     assert "goes without" in capsys.readouterr().err
+
+
+def test_the_legend_lists_the_marks_that_are_drawn(
+    tmp_path: Path, front: Front, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[list[str]] = []
+    monkeypatch.setattr(Figure, "legend", lambda _, handles, **__: shown.append([str(h.get_label()) for h in handles]))
+    some = Front([row for row in front.rows if row.profile != "balanced"], front.fixed_us)
+    for chosen in (None, some.rows[-1].profile):
+        draw_fronts({"clutter": [some]}, tmp_path / "front.png", chosen=chosen)
+    usual = [row.profile for row in some.rows if row.profile in ("fast", "exact")]
+    assert shown[0] == ["front, states ± 0.005", *usual]
+    assert shown[1] == list(dict.fromkeys([*shown[0], some.rows[-1].profile]))
 
 
 def test_a_table_of_profiles_ends_with_what_there_is_to_trade(capsys: pytest.CaptureFixture[str]) -> None:

@@ -30,5 +30,5 @@ def test_the_certified_method_misses_nothing_and_the_others_say_what_they_refuse
 def test_a_table_for_people_and_options_that_do_not_go_together(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(ARGUMENTS) == 0
     assert "bisection" in capsys.readouterr().out
-    assert main([*ARGUMENTS, "--model", "obb"]) == 1
+    assert main([*ARGUMENTS, "--model", "obb"]) == 2
     assert "--impact-methods" in capsys.readouterr().err

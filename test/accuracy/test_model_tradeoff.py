@@ -65,7 +65,7 @@ def test_the_command_names_the_models(capsys: pytest.CaptureFixture[str]) -> Non
     rows = json.loads(capsys.readouterr().out)["rows"]
     assert [row["model"] for row in rows] == ["exact", "sphere"]
     assert all(row["misses"] == row["outside_bound"] == 0 for row in rows)
-    assert main(["tradeoff", "--scene", "clutter", "--model", "rabbit"]) == 1
+    assert main(["tradeoff", "--scene", "clutter", "--model", "rabbit"]) == 2
     assert "expected one of auto, exact, sphere" in capsys.readouterr().err
 
 

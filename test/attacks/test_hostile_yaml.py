@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import resource
 import subprocess
@@ -15,8 +16,11 @@ from processor_time import within
 from collision_monitor.cli.main import main
 from collision_monitor.errors import InputError, SessionError
 from collision_monitor.session import Session
+from collision_monitor.settings.profile import Profile
+from collision_monitor.settings.yaml_entry import YamlEntry
 from collision_monitor.settings.yaml_file import DEEPEST, LARGEST, NODES, read_yaml
 from collision_monitor.sources.bag import Bag
+from collision_monitor.sources.yaml_table import number, pose
 
 SECONDS = 2.0
 """Processor time to refuse a file."""
@@ -53,9 +57,9 @@ HOSTILE: dict[str, tuple[bytes, str]] = {
 
 DOORS = {
     "check --expect": (["check", "SESSION", "--expect", "FILE"], 2),
-    "import --map": (["import", "SESSION", "--map", "FILE", "-o", "OUT"], 1),
-    "import --profile": (["import", "SESSION", "--profile", "FILE", "-o", "OUT"], 1),
-    "run --params": (["run", "--params", "FILE"], 1),
+    "import --map": (["import", "SESSION", "--map", "FILE", "-o", "OUT"], 2),
+    "import --profile": (["import", "SESSION", "--profile", "FILE", "-o", "OUT"], 2),
+    "run --params": (["run", "--params", "FILE"], 2),
 }
 
 
@@ -138,3 +142,15 @@ def test_all_yaml_goes_through_the_one_loader() -> None:
         path.name for path in package.rglob("*.py") if "yaml.load" in (text := path.read_text()) or "safe_load" in text
     ]
     assert loaders == ["yaml_file.py"]
+
+
+@pytest.mark.parametrize("value", [10**400, -(10**400), math.inf, math.nan, True, "1"], ids=lambda x: f"{x!r:.5}")
+def test_numbers_that_no_float_holds_are_refused(value: object) -> None:
+    with pytest.raises(InputError, match="a number of metres"):
+        number(value, "padding", "metres")
+    with pytest.raises(InputError, match="a number of metres"):
+        YamlEntry(value, "rules.yaml", {}, ("distance",)).number("metres")
+    with pytest.raises(InputError, match="expected"):
+        Profile.from_dict({"horizon": value})
+    with pytest.raises(InputError, match="pose: expected"):
+        pose([value, 0.0], "pose")

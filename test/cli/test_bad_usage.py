@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from collision_monitor.cli.main import make_parser
+from collision_monitor.cli.main import main, make_parser
 from collision_monitor.cli.parameter_file import check_parameter_file
 from collision_monitor.errors import InputError
 
@@ -55,6 +55,43 @@ def test_no_traceback(arguments: tuple[str, ...], words: str) -> None:
     assert answer.returncode in (1, 2)
     assert words in answer.stderr
     assert "Traceback" not in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("compare", "none.mcap", "--profile", "nope"), "expected one of balanced, exact, fast"),
+        (("compare", "none.mcap"), "expected two sessions"),
+        (("world", "nope"), "scene: expected one of"),
+        (("view", "--port", "99999999"), "expected a port"),
+        (("view", "none.mcap", "--replay", "nope"), "expected one of balanced, exact, fast"),
+        (("tradeoff", "none.mcap", "--scene", "fleet"), "got both"),
+        (("tradeoff", "--scene", "nope"), "expected one of"),
+        (("report", "none.mcap", "--replay", "nope"), "expected one of balanced, exact, fast"),
+        (("report", "none.mcap", "--rules", "none.yaml"), "none.yaml"),
+        (("check", "none.mcap", "--expect", "none.yaml"), "none.yaml"),
+        (("import", "none", "-o", "out.mcap", "--profile", "nope"), "expected one of balanced, exact, fast"),
+        (("import", "none", "-o", "out.mcap", "--map", "none.yaml"), "none.yaml"),
+        (("replay", "none.mcap", "--threads", "0"), "threads: expected 1 to"),
+        (("bench", "--scene", "nope"), "expected one of"),
+        (("bench", "--broad-phase", "nope"), "expected one of"),
+        (("bench", "--threads", "1000"), "threads: expected 1 to"),
+        (("run", "--params", "none.yaml"), "--params"),
+        (("run", "--on-event"), "expected --record"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_wrong_usage_is_exit_code_2_in_one_line(
+    arguments: tuple[str, ...],
+    words: str,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("collision-monitor: error: ") and error.count("\n") == 1 and words in error
 
 
 def test_the_example_is_for_the_monitor() -> None:

@@ -60,6 +60,12 @@ def test_a_result_larger_than_the_limit_stays_alone_until_the_next() -> None:
     assert (len(cache), cache.held) == (1, ENTRY_BYTES + 2)
 
 
+def test_arguments_by_name_count() -> None:
+    cache: BoundedCache[[int, int], int] = BoundedCache(lambda n, k=1: n * k, lambda result, n, k=1: 8, ROOM)
+    assert [cache(3), cache(3, k=2), cache(3, k=5), cache(n=7), cache(3)] == [3, 6, 15, 7, 3]
+    assert len(cache) == 4
+
+
 def test_an_error_is_raised_and_not_remembered() -> None:
     cache: BoundedCache[[int], float] = BoundedCache(lambda n: 1 / n, lambda result, n: 8, ROOM)
     for _ in range(2):

@@ -143,8 +143,8 @@ def test_a_region_that_changes_takes_objects_in_and_out() -> None:
     ("settings", "words"),
     [
         ({"region_min": (0, 0, 5), "region_max": (1, 1, 4)}, "min <= max, got 5 > 4 along z"),
-        ({"region_min": (0, 0)}, r"region_min: expected three numbers m, got \(0, 0\)"),
-        ({"region_min": "here"}, "region_min: expected three numbers m, got 'here'"),
+        ({"region_min": (0, 0)}, r"region_min: expected three numbers of metres, got \(0, 0\)"),
+        ({"region_min": "here"}, "region_min: expected three numbers of metres, got 'here'"),
         ({"region_max": (0, float("nan"), 0)}, r"region_max: expected -1e\+18 to 1e\+18 m, got nan"),
         ({"ignore_separating": 1}, "ignore_separating: expected true or false, got 1"),
         ({"min_closing_speed": -1}, "min_closing_speed: expected 0 to"),

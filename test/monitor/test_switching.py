@@ -245,7 +245,7 @@ class TestCustomProfiles:
             ("horizn: 1", "expected settings among .*horizon.*, got 'horizn'"),
             ("based_on: hasty", "based_on: expected one of balanced, exact, fast, got 'hasty'"),
             ("threads: 1.5", "threads: expected a whole number, got 1.5"),
-            ("horizon: true", "horizon: expected a number s, got True"),
+            ("horizon: true", "horizon: expected a number of seconds, got True"),
             ("- horizon", "expected settings, as `horizon: 3.0`"),
             ("", "expected settings"),
             ("a: [", "expected YAML"),

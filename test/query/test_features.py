@@ -7,6 +7,7 @@ import pytest
 
 import collision_monitor as cm
 from collision_monitor import Pose
+from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.contact_features import FeaturePair, FeatureType
 
 FLOOR = cm.HalfSpace((0, 0, 1))
@@ -70,3 +71,24 @@ def test_a_curved_surface_is_in_none_of_the_six_pairs():
     for ball in (cm.Sphere(1), cm.Ellipsoid((1, 2, 3))):
         with pytest.raises(cm.UnsupportedError, match="has no vertices, edges and faces; supported are Box"):
             cm.contact_features(cm.contact(ball, X, FLOOR, Pose()), ball, X, FLOOR, Pose())
+
+
+def test_a_contact_off_the_surface_by_its_error_has_features():
+    """Deep contacts of round shapes with meshes; their witness points are off by up to the error bound."""
+    rng = np.random.default_rng(77001)
+    off = 0
+    for _ in range(200):
+        hull = convex_hull(rng.normal(size=(8, 3)) * rng.uniform(0.1, 1.0, 3))
+        mesh = cm.Mesh(hull.vertices, hull.faces)
+        pose, other = cm.Pose(rng.normal(size=3) * 0.3, _turn(rng)), cm.Pose(rng.normal(size=3) * 0.3, _turn(rng))
+        for shape in (cm.Cylinder(*rng.uniform(0.05, 1, 2)), cm.Cone(*rng.uniform(0.05, 1, 2))):
+            found = cm.contact(shape, pose, mesh, other)
+            off += found.error_bound > 1e-6
+            assert cm.contact_features(found, shape, pose, mesh, other).b.type is not FeatureType.SURFACE
+            assert "mesh surface" not in repr(found)
+    assert off > 20
+
+
+def _turn(rng):
+    quaternion = rng.normal(size=4)
+    return quaternion / np.linalg.norm(quaternion)

@@ -101,6 +101,7 @@ def test_only_triangles_near_a_body_on_a_terrain_are_followed_one_by_one(
     ground = terrain(32)
     height = 0.0 if isinstance(other, cm.Mesh) else 0.15
     a, b = Motion(Pose()), Motion(Pose((0.3, 0.2, height)), velocity)
+    monkeypatch.setattr(moving_pair, "MANY_FACES", 10_000)
     whole = cm.time_of_impact(ground, a, other, b)
     counts = []
     follow = moving_pair.in_convex_pieces

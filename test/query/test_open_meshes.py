@@ -7,6 +7,7 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from processor_time import within
 
 import collision_monitor as cm
 from collision_monitor import Motion, Pose
@@ -211,3 +212,22 @@ def test_open_meshes_that_part_or_pass_each_other_are_clear_as_their_surfaces_ar
         surfaces = quick_impact(A, motions[0], B, motions[1], query)
         assert quick_open_impact(A, motions[0], B, motions[1], query) == surfaces == (np.inf, np.inf)
         assert cm.time_of_impact(A, motions[0], B, motions[1]).status == "clear"
+
+
+@pytest.mark.parametrize("velocity", [(0, 0, -1), (0, 0, 1), (1, 0, 0)], ids=["into", "away", "along"])
+def test_the_answer_of_two_sheets_that_touch_is_quick(velocity):
+    """One stands on the other on the line between two rows of its faces."""
+    corner = np.arange(400).reshape(20, 20)
+    quads = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], -1).reshape(-1, 4)
+    rows = np.linspace(-1, 1, 20)
+    points = np.array([(x, y, 0) for x in rows for y in rows])
+    flat = cm.Mesh(points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+    upright = Pose.from_euler(np.pi / 2, 0, 0, (0, 0, 1))
+    assert abs(cm.distance(flat, Pose(), flat, upright)) < 1e-12
+    motions = Motion(Pose()), Motion(upright, velocity)
+    found = cm.time_of_impact(flat, motions[0], flat, motions[1])
+    with within(0.25):
+        again = cm.time_of_impact(flat, motions[0], flat, motions[1])
+    assert (again.status, again.lower, again.upper) == (found.status, found.lower, found.upper)
+    assert found.status == {-1: "hit", 1: "clear"}.get(velocity[2], found.status)
+    assert velocity[2] >= 0 or found.upper < 1e-5

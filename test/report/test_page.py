@@ -151,13 +151,15 @@ def test_bad_input_is_one_line_and_nothing_is_overwritten(
         ([drive, "-o", tmp_path], "got a folder"),
         ([drive, "-o", drive, "--force"], "another file than the session itself"),
         ([drive, "-o", tmp_path / "file" / "r.html"], "able to write"),
+        ([drive, "-o", tmp_path / "nowhere" / "r.html"], "no folder"),
+        ([drive, "-o", tmp_path / "new.html", "--png", tmp_path / "nowhere" / "png"], "able to write"),
         ([drive, "-o", tmp_path / "new.html", "--replay", "hasty"], "expected one of"),
     ):
-        assert main(["report", *map(str, arguments)]) == 1
+        assert main(["report", *map(str, arguments)]) == (2 if "hasty" in arguments else 1)
         error = capsys.readouterr().err
         assert error.count("\n") == 1 and words in error
     assert (tmp_path / "there.html").read_text() == (tmp_path / "png" / "steps.png").read_text() == "mine"
-    assert not (tmp_path / "new.html").exists()
+    assert not (tmp_path / "new.html").exists() and not (tmp_path / "nowhere").exists()
     assert main(["report", str(drive), "-o", str(tmp_path / "there.html"), "--force"]) == 0
     with pytest.raises(SessionError, match="one that exists"):
         write_report(read_history(Session(drive)), tmp_path / "there.html")

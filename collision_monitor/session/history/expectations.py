@@ -7,6 +7,7 @@ happen counts as not known, and fails.
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -163,7 +164,8 @@ def _is_name(value: Any) -> bool:
 
 
 def _number(value: Any, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not value >= 0.0:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not (is_number and (value == math.inf or 0.0 <= value <= sys.float_info.max)):
         raise InputError(f"{what}: expected a number of seconds, at least 0, got {value!r}")
     return float(value)
 

@@ -247,7 +247,7 @@ def test_the_command_names_the_verdict_and_exits_with_it(
     err = capsys.readouterr().err
     assert "expected a session file" in err
     assert "Traceback" not in err
-    assert main(["replay", str(recorded), "--threads", "0"]) == 1
+    assert main(["replay", str(recorded), "--threads", "0"]) == 2
     assert "threads: expected 1 to" in capsys.readouterr().err
 
 

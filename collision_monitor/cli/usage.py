@@ -1,0 +1,33 @@
+"""Wrong usage, exit code 2: what the arguments, or a file of settings that they name, cannot mean.
+
+Sessions that cannot be read and files that cannot be written are errors, exit code 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+
+from collision_monitor.errors import InputError
+
+
+class UsageError(InputError):
+    """The arguments contradict each other, or name a profile, a scene or a setting that does not exist."""
+
+
+@contextmanager
+def usage() -> Iterator[None]:
+    """Raise UsageError in place of the InputError of an argument."""
+    try:
+        yield
+    except InputError as error:
+        raise UsageError(str(error)) from None
+
+
+def check_profiles(names: Iterable[str]) -> None:
+    """Raise UsageError for a profile that does not exist or cannot be used. Empty: the one of a session."""
+    from collision_monitor.settings.profile import Profile
+
+    with usage():
+        for name in filter(None, names):
+            Profile.named(name)
