@@ -157,10 +157,11 @@ def open_box(blocks, box_a, box_b, X, move, work):
     in_b = opens_b(blocks, a, i, child_a, blocks, b, j, child_b)
     if in_b:
         block, size = root_b + int(child_b), size_of(blocks, b, j)
-        box_times(blocks, a, i, blocks, block, X, move, work, BOUNDS)
+        box_times(blocks, root_a, WIDTH * a + i, blocks, root_b, block, X, move, work, BOUNDS)
     else:
         block, size = root_a + int(child_a), size_of(blocks, a, i)
-        box_times(blocks, b, j, blocks, block, inverse(X), seen_from_b(X, move), work, BOUNDS)
+        back = seen_from_b(X, move)
+        box_times(blocks, root_b, WIDTH * b + j, blocks, root_a, block, inverse(X), back, work, BOUNDS)
     soon = inf
     for k in range(WIDTH):
         if blocks[block, CHILD, k] != 0.0:
