@@ -12,7 +12,7 @@ from collision_monitor.meshes.shape_trees import kept_tree, trees_of_pair
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.convex_pairs import convex_contact, convex_impact
 from collision_monitor.query.fillings import filled_box, filled_mesh
-from collision_monitor.query.mesh_impact import mesh_impact
+from collision_monitor.query.mesh_impact import impact_in_hulls, mesh_impact
 from collision_monitor.query.mesh_pairs import boxes_apart
 from collision_monitor.query.moving_pair import MotionQuery
 from collision_monitor.query.open_gap import may_be_inside
@@ -48,6 +48,11 @@ def quick_open_impact(
         return None
     if trees_of_pair(shape_a, shape_b, surface=True) is None:
         return None
+    whole_a, whole_b = _with_filling(shape_a), _with_filling(shape_b)
+    if whole_a and whole_b and not isinstance(whole_a, Mesh) and not isinstance(whole_b, Mesh):
+        found = impact_in_hulls(whole_a, shape_a, motion_a, whole_b, shape_b, motion_b, query)
+        if found is not None:
+            return found
     possible = _possible_impact(shape_a, motion_a, shape_b, motion_b, query)
     if possible is None:
         return None
