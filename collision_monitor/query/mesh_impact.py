@@ -10,6 +10,8 @@ from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor.geometry.pose import Motion
 from collision_monitor.geometry.shapes import Shape
+from collision_monitor.meshes.layout import FACE, WIDTH
+from collision_monitor.meshes.nearest import LEAST, PLACE_A, PLACE_B
 from collision_monitor.meshes.shape_trees import trees_of_pair
 from collision_monitor.narrow_phase.contact_row import DISTANCE
 from collision_monitor.prediction.bodies import Multibody
@@ -39,6 +41,15 @@ def mesh_impact(
     None for a pair without trees or without a mesh, and for shapes that touch at the start, which have to be followed
     (touching.py).
     """
+    found = mesh_impact_of_faces(shape_a, motion_a, shape_b, motion_b, query, (0, 0), begin)
+    return found and found[:2]
+
+
+def mesh_impact_of_faces(
+    shape_a: Shape, motion_a: Motion, shape_b: Shape, motion_b: Motion, query: tuple[float, float, float, int],
+    faces: tuple[int, int], begin: float = 0.0,
+) -> tuple[float, float, bool] | None:
+    """`mesh_impact`, and whether faces certainly meet that are among the first so many of each shape."""
     if trees_of_pair(shape_a, shape_b, surface=True) is None:
         return None
     try:
@@ -47,8 +58,8 @@ def mesh_impact(
         states = packed_motion(motion_a), packed_motion(motion_b)
         if states[0] is None or states[1] is None:
             return None
-    times = _mesh_impact(pair_table(shape_a, shape_b, True), *states, *query, begin, MEMORY.impact)
-    return times if times[0] > 0.0 else None
+    found = _mesh_impact(pair_table(shape_a, shape_b, True), *states, *query, *faces, begin, MEMORY.impact)
+    return found if found[0] > 0.0 else None
 
 
 def impact_in_hulls(
@@ -93,13 +104,25 @@ def _times(event, horizon):
 
 @direct
 @kernel
-def _mesh_impact(table, state_a, state_b, horizon, tolerance, separation, iterations, begin, own):
+def _mesh_impact(
+    table, state_a, state_b, horizon, tolerance, separation, iterations, faces_a, faces_b, begin, own
+):
     """First impact: lower and upper (s), infinite for none; lower is 0 for shapes that touch at the start.
 
-    states (1, 16): packed motions. begin: time at which the search begins (s). own: ImpactMemory.
+    And whether the triangles that meet are among the first faces_a and faces_b. states (1, 16): packed motions. begin:
+    time at which the search begins (s). own: ImpactMemory.
     """
+    answer = own[2].answer
+    answer[LEAST] = -1.0
     search = ImpactQuery(separation, tolerance, iterations)
-    return _times(_search(table, state_a, state_b, Window(begin, horizon), search, own), horizon)
+    event = _search(table, state_a, state_b, Window(begin, horizon), search, own)
+    lower, upper = _times(event, horizon)
+    a, b = int(answer[PLACE_A]), int(answer[PLACE_B])
+    # another search, which may have found other triangles, writes LEAST
+    if not (lower < inf and upper < inf and answer[LEAST] == -1.0 and a >= 0 and b >= 0):
+        return lower, upper, False
+    of_a, of_b = table.blocks[a // WIDTH, FACE, a % WIDTH], table.blocks[b // WIDTH, FACE, b % WIDTH]
+    return lower, upper, of_a < faces_a and of_b < faces_b
 
 
 @inlined
