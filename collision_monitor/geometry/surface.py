@@ -44,35 +44,38 @@ class Surface:
         """Whether a face repeats another, in any order of its vertices."""
 
     @cached_property
-    def _edges(self) -> tuple[Indices, Indices, NDArray[np.bool_]]:
-        """Edges (e, 2), the number of faces at each (e,), and whether as many faces pass it one way as the other."""
-        start, end = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
-        low, high = np.minimum(start, end), np.maximum(start, end)
-        n = len(self.vertices)
-        key = np.sort(2 * (low * n + high) + (start < end))  # sorting numbers is much faster than sorting rows
-        edge, forward = key >> 1, key & 1
-        begin = np.flatnonzero(np.diff(edge, prepend=-1))
-        count = np.diff(begin, append=len(edge))
-        passes = np.add.reduceat(forward, begin) if len(begin) else count
-        edge = edge[begin]
-        return np.column_stack([edge // n, edge % n]), count, 2 * passes == count
+    def _edges(self) -> tuple[Indices, bool]:
+        """Open edges (e, 2), and whether as many faces pass each other edge one way as the other.
 
-    @cached_property
+        The list of all edges is not kept: a third of a mesh's memory without its tree.
+        """
+        n, start, end = len(self.vertices), self.faces, np.roll(self.faces, -1, axis=1)
+        key = np.minimum(start, end) * n
+        key += np.maximum(start, end)
+        key = np.sort(2 * key.ravel() + (start < end).ravel())  # sorting numbers is much faster than sorting rows
+        forward = (key & 1).astype(bool)
+        key >>= 1
+        begin = np.flatnonzero(np.append(True, key[1:] != key[:-1])) if len(key) else key
+        count = np.diff(begin, append=len(key))
+        passes = np.add.reduceat(forward, begin, dtype=np.int64) if len(begin) else count
+        odd = count % 2 == 1
+        edge = key[begin[odd]]
+        return np.column_stack([edge // n, edge % n]), bool((odd | (2 * passes == count)).all())
+
+    @property
     def open_edges(self) -> Indices:
         """Edges (e, 2) that belong to an odd number of faces."""
-        edges, count, _ = self._edges
-        return np.asarray(edges[count % 2 == 1])
+        return self._edges[0]
 
     @property
     def closed(self) -> bool:
         """Whether the surface encloses a volume without a gap."""
         return len(self.faces) > 0 and len(self.open_edges) == 0
 
-    @cached_property
+    @property
     def oriented(self) -> bool:
         """Whether neighbouring faces have the same side outside, at every edge that is not open."""
-        _, count, balanced = self._edges
-        return bool((balanced | (count % 2 == 1)).all())
+        return self._edges[1]
 
     @cached_property
     def part(self) -> Indices:

@@ -15,9 +15,9 @@ from collision_monitor._jit import inlined
 from collision_monitor.meshes.placing import Placing, turn_back
 from collision_monitor.narrow_phase.vector import Vector, opposite
 
-STRETCH: Final = 4.0
-"""Factor by which a step may exceed that with the largest acceleration of any time. Larger: the bound on the
-acceleration within the step is looser. Smaller: the step may stop short."""
+STRETCH: Final = 2.0
+"""Factor by which a step may exceed that with the largest acceleration of any time. Larger: the bounds on the speed and
+the acceleration within the step are looser. Smaller: the step may stop short."""
 
 
 class Approach(NamedTuple):

@@ -157,10 +157,11 @@ def open_box(blocks, box_a, box_b, X, move, work):
     in_b = opens_b(blocks, a, i, child_a, blocks, b, j, child_b)
     if in_b:
         block, size = root_b + int(child_b), size_of(blocks, b, j)
-        box_times(blocks, a, i, blocks, block, X, move, work, BOUNDS)
+        box_times(blocks, root_a, WIDTH * a + i, blocks, root_b, block, X, move, work, BOUNDS)
     else:
         block, size = root_a + int(child_a), size_of(blocks, a, i)
-        box_times(blocks, b, j, blocks, block, inverse(X), seen_from_b(X, move), work, BOUNDS)
+        back = seen_from_b(X, move)
+        box_times(blocks, root_b, WIDTH * b + j, blocks, root_a, block, inverse(X), back, work, BOUNDS)
     soon = inf
     for k in range(WIDTH):
         if blocks[block, CHILD, k] != 0.0:
@@ -179,6 +180,7 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
     if spins(pair.A, pair.B, end - begin):
         most //= FEWER_STEPS
     waiting, steps, later = push_pair(work, 0, begin, place_a, place_b, -1.0), 0, end
+    now = -inf
     while True:
         if waiting == 0 or work[PAIRS] >= later:
             if not later < end:
@@ -193,11 +195,13 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
             return UNRESOLVED, t, 1 + steps // STEPS, 0.0
         a, i, b, j = int(place_a) // WIDTH, int(place_a) % WIDTH, int(place_b) // WIDTH, int(place_b) % WIDTH
         child_a, child_b = blocks[a, CHILD, i], blocks[b, CHILD, j]
-        margin = query.margin + tube.start + tube.growth * (t - begin)
-        p, move = approach_at(table, parts, pair, t, margin, tube.growth, end, scratch)
-        X = relative(scratch.rotation[2], scratch.rotation[3], p)
-        speed = sqrt(dot(move.v, move.v)) + move.growth
-        speed += sqrt(move.bend_a) * reach_in(blocks, root_a) + sqrt(move.bend_b) * reach_in(blocks, root_b)
+        if t != now:  # boxes that overlap are opened at the same time as those around them
+            now = t
+            margin = query.margin + tube.start + tube.growth * (t - begin)
+            p, move = approach_at(table, parts, pair, t, margin, tube.growth, end, scratch)
+            X = relative(scratch.rotation[2], scratch.rotation[3], p)
+            speed = sqrt(dot(move.v, move.v)) + move.growth
+            speed += sqrt(move.bend_a) * reach_in(blocks, root_a) + sqrt(move.bend_b) * reach_in(blocks, root_b)
         if child_a < 0.0 and child_b < 0.0:
             leaf_a, leaf_b = root_a - int(child_a), root_b - int(child_b)
             size = max(size_of(blocks, a, i), size_of(blocks, b, j))

@@ -12,13 +12,16 @@ from collision_monitor.meshes.shape_trees import kept_tree, trees_of_pair
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.convex_pairs import convex_contact, convex_impact
 from collision_monitor.query.fillings import filled_box, filled_mesh
-from collision_monitor.query.mesh_impact import mesh_impact
+from collision_monitor.query.mesh_impact import impact_in_hulls, mesh_impact, mesh_impact_of_faces
 from collision_monitor.query.mesh_pairs import boxes_apart
 from collision_monitor.query.moving_pair import MotionQuery
 from collision_monitor.query.open_gap import may_be_inside
 from collision_monitor.tolerances import GJK_TOUCHING
 
 _HERE: Final = Pose()
+
+ALL: Final = 1 << 53
+"""More faces than a shape has."""
 
 
 def quick_impact(
@@ -48,7 +51,22 @@ def quick_open_impact(
         return None
     if trees_of_pair(shape_a, shape_b, surface=True) is None:
         return None
-    possible = _possible_impact(shape_a, motion_a, shape_b, motion_b, query)
+    whole_a, whole_b = _with_filling(shape_a), _with_filling(shape_b)
+    possible = None
+    if whole_a and whole_b:
+        if not isinstance(whole_a, Mesh) and not isinstance(whole_b, Mesh):
+            found = impact_in_hulls(whole_a, shape_a, motion_a, whole_b, shape_b, motion_b, query)
+            if found is not None:
+                return found
+        elif boxes_apart(whole_a, motion_a.pose, whole_b, motion_b.pose):  # else one may be in the other
+            own = _own_faces(shape_a, whole_a), _own_faces(shape_b, whole_b)
+            filled = mesh_impact_of_faces(whole_a, motion_a, whole_b, motion_b, query, own)
+            if filled is not None:
+                if filled[2]:  # the surfaces meet first
+                    return filled[:2]
+                possible = filled[0], True
+    if possible is None:
+        possible = _possible_impact(shape_a, motion_a, shape_b, motion_b, query)
     if possible is None:
         return None
     first, holds_surfaces = possible
@@ -66,14 +84,6 @@ def _possible_impact(
     And whether the surfaces do not meet earlier either. None for a pair that kernels do not answer, and if it is not
     certain that the boxes are apart, or overlap, now.
     """
-    whole_a, whole_b = _with_filling(shape_a), _with_filling(shape_b)
-    if whole_a and whole_b:
-        # of two meshes, one may be in the other; convex solids that overlap have their impact at 0
-        solid = not isinstance(whole_a, Mesh) and not isinstance(whole_b, Mesh)
-        if solid or boxes_apart(whole_a, motion_a.pose, whole_b, motion_b.pose):
-            times = quick_impact(whole_a, motion_a, whole_b, motion_b, query)
-            if times is not None and (times[0] > 0.0 or not solid):
-                return times[0], True
     boxes = [filled_box(shape) if isinstance(shape, Mesh) else None for shape in (shape_a, shape_b)]
     # the solid is in the hull of its surface, so that a box around the surface replaces it
     parts_a, parts_b = (
@@ -103,6 +113,13 @@ def _with_filling(shape: Shape) -> Shape | None:
     if not isinstance(shape, Mesh) or (box := filled_box(shape)) is None:
         return shape
     return box.hull if box.contains else filled_mesh(shape)
+
+
+def _own_faces(shape: Shape, whole: Shape) -> int:
+    """Number of the first faces of a shape with its filling that are its own; all of a shape without a filling."""
+    if whole is shape:
+        return ALL
+    return len(shape.faces) if isinstance(shape, Mesh) and isinstance(whole, Mesh) else 0
 
 
 def _overlap(a: Shape, motion_a: Motion, b: Shape, motion_b: Motion, query: MotionQuery) -> bool:

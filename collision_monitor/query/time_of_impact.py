@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from collision_monitor.errors import TooCostlyError, UnsupportedError
 from collision_monitor.geometry.pose import Motion
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Sphere
+from collision_monitor.meshes.shape_trees import CERTAIN, kept_tree
 from collision_monitor.prediction.bodies import Multibody
 from collision_monitor.prediction.impact_record import HIT
 from collision_monitor.query.arguments import Compound, finite_number, whole_number
@@ -111,8 +113,8 @@ def time_of_impact(
         duration = finite_number("step", step, positive=True)
         return impact_by_method(shape_a, motion_a, shape_b, motion_b, query, method, duration)
     arguments = shape_a, motion_a, shape_b, motion_b
-    is_certain = all(shape.surface.certain for shape in (shape_a, shape_b) if type(shape) is Mesh)
-    quick = (quick_impact if is_certain else quick_open_impact)(*arguments, query)
+    is_open = _is_open(shape_a) or _is_open(shape_b)
+    quick = (quick_open_impact if is_open else quick_impact)(*arguments, query)
     if quick is not None:
         return impact_of_times(quick, arguments)
     a, b = make_moving_shape(shape_a, motion_a, "A"), make_moving_shape(shape_b, motion_b, "B")
@@ -122,6 +124,11 @@ def time_of_impact(
         return found
     possible = _first_possible_impact(a, b, query) if found.lower > 0.0 else 0.0
     return found if possible >= found.lower else _impact(possible, found.upper, found.method, arguments)
+
+
+def _is_open(shape: Compound) -> bool:
+    """Whether it is a mesh of which it is not certain what is inside."""
+    return type(shape) is Mesh and kept_tree(shape).inside != CERTAIN
 
 
 def _round_off(multibody: Multibody) -> float:
@@ -191,6 +198,14 @@ def _impact(lower: float, upper: float, method: Method, arguments: tuple[Any, An
 
 def check_query(horizon: float, tolerance: float, separation: float, iterations: int) -> MotionQuery:
     """Check the parameters of the query. Raises InputError."""
+    try:
+        return _checked(horizon, tolerance, separation, iterations)
+    except TypeError:  # of what has no hash
+        return _checked.__wrapped__(horizon, tolerance, separation, iterations)
+
+
+@lru_cache(maxsize=16, typed=True)
+def _checked(horizon: Any, tolerance: Any, separation: Any, iterations: Any) -> MotionQuery:
     return MotionQuery(
         horizon=finite_number("horizon", horizon),
         tolerance=finite_number("tolerance", tolerance, positive=True),

@@ -72,6 +72,17 @@ def test_a_face_the_wrong_way_round_is_found():
     assert locate((vertices, faces), [(0.5, 0.5, 0.5), (2, 0.5, 0.5)]).tolist() == [1, -1]
 
 
+def test_a_surface_keeps_no_list_of_its_edges():
+    x, y = np.meshgrid(np.arange(40.0), np.arange(40.0))
+    corners = np.arange(1600).reshape(40, 40)
+    faces = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1]], -1).reshape(-1, 3)
+    surface = Surface(np.stack([x, y, x * y], -1).reshape(-1, 3), faces)
+    assert len(surface.open_edges) and surface.certain and len(surface.part) == len(faces)
+    known = [each for value in vars(surface).values() for each in (value if isinstance(value, tuple) else (value,))]
+    kept = sum(each.nbytes for each in known if isinstance(each, np.ndarray) and each is not surface.vertices)
+    assert kept <= 33 * len(faces) + surface.open_edges.nbytes  # faces, parts, and whether these are open
+
+
 def test_a_terrain_and_a_wall_are_sheets_and_a_box_without_a_side_is_not():
     x, y = np.meshgrid(np.arange(8.0), np.arange(8.0), indexing="ij")
     terrain = np.column_stack([x.ravel(), y.ravel(), np.sin(x.ravel()) + np.cos(2 * y.ravel())])
