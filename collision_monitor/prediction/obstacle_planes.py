@@ -35,6 +35,9 @@ AT_REST: Final = 2
 is in the axes of that shape."""
 
 
+LOUD, QUIET, APART = 0, 1, 2
+"""Segments: some samples of the pilot meet, none does, and none of all samples can."""
+
 NOT_OFF: Final = (0.0, 0.0, 0.0)
 """Error of a position, or rotation vector of an error, of the stated motion."""
 
@@ -60,7 +63,7 @@ class Obstacle(NamedTuple):
     planes: Any  # (MOST_SEGMENTS, MOST_PLANES + 1, PLANE_SIZE)
     placed: Any  # (2, 3, 3): rotation of both shapes where a plane is sought
     count: Any  # (MOST_SEGMENTS,) int64: planes of each segment
-    is_quiet: Any  # (MOST_SEGMENTS,) bool: segments in which no sample of the pilot meets
+    quiet: Any  # (MOST_SEGMENTS,) int8: LOUD, QUIET or APART
     node: Any  # (MOST_SEGMENTS + 1,) NODE
     middle: Any  # (MOST_SEGMENTS,) NODE: in the middle of each segment
 
@@ -71,7 +74,7 @@ def make_obstacle() -> Obstacle:
         np.zeros((MOST_SEGMENTS, MOST_PLANES + 1, PLANE_SIZE)),
         np.zeros((2, 3, 3)),
         np.zeros(MOST_SEGMENTS, np.int64),
-        np.zeros(MOST_SEGMENTS, np.bool_),
+        np.zeros(MOST_SEGMENTS, np.int8),
         np.zeros(MOST_SEGMENTS + 1, NODE),
         np.zeros(MOST_SEGMENTS, NODE),
     )
@@ -120,7 +123,7 @@ def set_nodes(table, parts, pair, window, length, turning, planar, scratch, obst
         if t >= end:
             break
     for k in range(segments):
-        obstacle.count[k], obstacle.is_quiet[k] = 0, False
+        obstacle.count[k], obstacle.quiet[k] = 0, LOUD
     return segments
 
 

@@ -22,7 +22,14 @@ from collision_monitor.prediction.cutting_planes import (
 )
 from collision_monitor.prediction.impact_record import CLEAR
 from collision_monitor.prediction.normal_samples import FURTHEST
-from collision_monitor.prediction.obstacle_planes import MOST_SEGMENTS, set_middles, set_nodes
+from collision_monitor.prediction.obstacle_planes import (
+    APART,
+    LOUD,
+    MOST_SEGMENTS,
+    QUIET,
+    set_middles,
+    set_nodes,
+)
 from collision_monitor.prediction.pair_errors import (
     BENDING,
     TURNED,
@@ -145,7 +152,7 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
     left, skips = samples, not flat and search.verified > 0
     for k in range(segments):
         if skips and stay_apart(table, parts, pair, k, errors, margin, memory.obstacle, work):
-            memory.obstacle.is_quiet[k] = True
+            memory.obstacle.quiet[k] = APART
             continue
         begin_segment(table, pair, k, settings, memory, search.points, 0, samples)
         cut_extremes(table, parts, pair, k, search.extremes, settings, memory, scratch)
@@ -153,12 +160,23 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
         if not cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch):
             return Laid(segments, settings, False)
         before, left = left, end_segment(memory.entry, memory.leave, alone, 0, samples)
-        memory.obstacle.is_quiet[k] = left == before and not settings.careful
+        memory.obstacle.quiet[k] = QUIET if left == before and not settings.careful else LOUD
         if left == 0:
             break
         if k + 1 < segments:
             carry_planes(table, pair, k, settings, memory)
     return Laid(segments, settings, left == 0 or (memory.obstacle.node[segments].time >= end and not is_rough))
+
+
+@inlined
+def _is_left_out(quiet, k, segments):
+    """Whether segment k is left out for all samples: none can meet there, or it is quiet between quiet ones.
+
+    Of all samples, a few may meet in a segment in which none of the pilot does, if it is next to one in which some do.
+    """
+    if quiet[k] != QUIET:
+        return quiet[k] == APART
+    return (k == 0 or quiet[k - 1] != LOUD) and (k + 1 >= segments or quiet[k + 1] != LOUD)
 
 
 @device
@@ -176,7 +194,7 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
     each = max(VERIFIED_IN_PILOT, verified // max(segments - 3, 1)) if verified > 0 or settings.careful else 0
     each *= 1 + settings.careful
     for k in range(segments):
-        if memory.obstacle.is_quiet[k]:
+        if _is_left_out(memory.obstacle.quiet, k, segments):
             continue
         begin_segment(table, pair, k, settings, memory, points, 0, samples)
         if not cut_planes(table, parts, pair, k, samples, each, settings, memory, work.scratch):
