@@ -83,6 +83,42 @@ def test_a_cart_that_reaches_a_long_wall_at_the_horizon(turned: float, x: float)
     assert reported == pytest.approx(true, abs=0.02)
 
 
+def long_pair(
+    position: tuple[float, ...],
+    quaternion: tuple[float, ...],
+    twist: tuple[float, ...],
+    stddevs: tuple[float, float],
+    at_rest: tuple[float, ...],
+) -> NDArray[np.void]:
+    """States of a body with uncertain position and velocity (m, m/s) that passes a long one at rest in the origin."""
+    rows = np.zeros(2, STATE)
+    rows["id"], rows["position"][0], rows["quaternion"] = (0, 1), position, (quaternion, at_rest)
+    rows["linear"][0], rows["angular"][0] = twist[:3], twist[3:]
+    rows["quaternion"] /= np.linalg.norm(rows["quaternion"], axis=1, keepdims=True)
+    rows["position_stddev"][0], rows["velocity_stddev"][0] = stddevs
+    return rows
+
+
+def test_a_cone_that_slides_along_a_wall() -> None:
+    """Few samples meet in the parts of the time in which none of the pilot does."""
+    rows = long_pair(
+        (-4.2405, 0.4952, -0.4408), (0.0446, -0.0611, 0.8935, -0.4426),
+        (-0.8593, 0.0418, 0.3576, -0.0640, 0.0313, -0.0477), (0.0725, 0.0354), (0.0, 0.0, 0.0, 1.0),
+    )  # fmt: skip
+    reported, true = stated_and_true((cm.Cone(0.4, 0.9), cm.Box((60.0, 0.2, 4.0))), rows, 20_000)
+    assert reported == pytest.approx(true, abs=0.02)
+
+
+def test_a_box_that_turns_past_a_beam() -> None:
+    """Samples that passed few planes of a part of the time counted as impacts."""
+    rows = long_pair(
+        (-1.2348, -0.2378, -6.5455), (-0.6620, 0.1754, 0.4064, -0.6048),
+        (0.8550, -0.6699, 1.8417, -0.6609, -1.1727, -0.5273), (0.0267, 0.0501), (-0.5668, 0.4658, 0.6259, 0.2646),
+    )  # fmt: skip
+    reported, true = stated_and_true((cm.Box((0.9, 0.5, 0.7)), cm.Box((12.0, 0.3, 0.3))), rows, 20_000)
+    assert reported == pytest.approx(true, abs=0.025)
+
+
 @pytest.mark.parametrize("turned", [0.05, 0.1])
 def test_people_that_pass_soon_and_may_lean_towards_each_other(turned: float) -> None:
     """Along the gap at one time they seem to meet later, when another direction keeps them apart."""
