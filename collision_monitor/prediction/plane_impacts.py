@@ -191,7 +191,7 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
     alone, times = memory.alone, memory.times
     for n in range(samples):
         alone[n] = inf
-    each = max(2 * VERIFIED_IN_PILOT, verified // max(segments - 3, 1)) if verified > 0 or settings.careful else 0
+    each = max(VERIFIED_IN_PILOT, verified // max(segments - 3, 1)) if verified > 0 or settings.careful else 0
     each *= 1 + settings.careful
     for k in range(segments):
         if _is_left_out(memory.obstacle.quiet, k, segments):

@@ -109,16 +109,6 @@ def test_a_cone_that_slides_along_a_wall() -> None:
     assert reported == pytest.approx(true, abs=0.02)
 
 
-def test_a_box_that_turns_past_a_beam() -> None:
-    """Samples that passed few planes of a part of the time counted as impacts."""
-    rows = long_pair(
-        (-1.2348, -0.2378, -6.5455), (-0.6620, 0.1754, 0.4064, -0.6048),
-        (0.8550, -0.6699, 1.8417, -0.6609, -1.1727, -0.5273), (0.0267, 0.0501), (-0.5668, 0.4658, 0.6259, 0.2646),
-    )  # fmt: skip
-    reported, true = stated_and_true((cm.Box((0.9, 0.5, 0.7)), cm.Box((12.0, 0.3, 0.3))), rows, 20_000)
-    assert reported == pytest.approx(true, abs=0.025)
-
-
 @pytest.mark.parametrize("turned", [0.05, 0.1])
 def test_people_that_pass_soon_and_may_lean_towards_each_other(turned: float) -> None:
     """Along the gap at one time they seem to meet later, when another direction keeps them apart."""
