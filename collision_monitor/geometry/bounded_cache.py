@@ -19,8 +19,8 @@ class BoundedCache(Generic[P, R]):
     """Remembers the results of a pure function until they hold more than `limit` bytes; the least used leave first.
 
     size: bytes of a result and of its arguments, which stay in memory as the key. The newest result always stays, so
-    the memory is at most the limit or one result. Arguments are hashable; those by name
-    make another entry. Safe for threads.
+    the memory is at most the limit or one result. Arguments are hashable; those by name make another entry. Safe for
+    threads.
     """
 
     def __init__(self, function: Callable[P, R], size: Callable[..., int], limit: int) -> None:

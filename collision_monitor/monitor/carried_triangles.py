@@ -31,12 +31,13 @@ from collision_monitor.prediction.body_contact import (
     STATUS,
     TOUCHING,
     closing_now,
+    move_to_world,
     relative_now,
     widening,
 )
 from collision_monitor.prediction.body_impact import CLOSING
 from collision_monitor.prediction.mesh_pair import enclosure, has_mesh, have_trees, root_of, triangles_contact
-from collision_monitor.prediction.motion import position_now, rotation_now
+from collision_monitor.prediction.motion import rotation_now
 
 PLACE_I: Final = RESULT + 11
 PLACE_J: Final = RESULT + 12
@@ -142,10 +143,7 @@ def _write(multibody, i, j, there, placed, known, query, out, result):
     result[BOUND] += max(half, parting + most - half) + widening(there, query.stale_acceleration)
     result[STATUS] = TOUCHING
     result[SHAPE_I], result[SHAPE_J] = bodies.first_shape[i], bodies.first_shape[j]
-    for c in range(3):
-        at = position_now(bodies, i, there.age_i, c)
-        result[POINT_A + c] += at
-        result[POINT_B + c] += at
+    move_to_world(bodies, i, there, result)
     return half
 
 

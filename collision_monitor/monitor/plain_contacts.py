@@ -12,7 +12,7 @@ from typing import Any
 from collision_monitor._jit import inlined
 from collision_monitor.geometry.shape_table import BOX, SPHERE
 from collision_monitor.narrow_phase.box_box import axis_direction, sat, touching_features
-from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
+from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A
 from collision_monitor.narrow_phase.core import half_extents
 from collision_monitor.narrow_phase.dispatch import mirror
 from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
@@ -24,11 +24,12 @@ from collision_monitor.prediction.body_contact import (
     STATUS,
     TOUCHING,
     closing_now,
+    move_to_world,
     relative_now,
     widening,
 )
 from collision_monitor.prediction.body_impact import CLOSING
-from collision_monitor.prediction.motion import position_now, rotation_now
+from collision_monitor.prediction.motion import rotation_now
 from collision_monitor.tolerances import FACE_PREFERENCE, SAT_ROUND_OFF
 
 
@@ -93,8 +94,5 @@ def plain_contact(
         mirror(result, relative.p)
     result[CLOSING] = closing_now(bodies, i, j, relative, result)
     result[BOUND] += widening(relative, query.stale_acceleration)
-    for c in range(3):
-        at = position_now(bodies, i, relative.age_i, c)
-        result[POINT_A + c] += at
-        result[POINT_B + c] += at
+    move_to_world(bodies, i, relative, result)
     return True

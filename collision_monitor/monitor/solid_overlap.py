@@ -33,12 +33,12 @@ from collision_monitor.prediction.body_contact import (
     STATUS,
     TOUCHING,
     closing_now,
+    move_to_world,
     relative_now,
     widening,
 )
 from collision_monitor.prediction.body_impact import CLOSING
 from collision_monitor.prediction.mesh_pair import has_mesh, have_trees, is_mesh, root_of
-from collision_monitor.prediction.motion import position_now
 
 
 @inlined
@@ -96,8 +96,5 @@ def overlap_of_solid(
     result[BOUND] += widening(there, query.stale_acceleration)
     result[STATUS] = TOUCHING
     result[SHAPE_I], result[SHAPE_J] = bodies.first_shape[i], bodies.first_shape[j]
-    for c in range(3):
-        at = position_now(bodies, i, there.age_i, c)
-        result[POINT_A + c] += at
-        result[POINT_B + c] += at
+    move_to_world(bodies, i, there, result)
     return 0.0

@@ -80,6 +80,15 @@ def closing_now(bodies, i, j, now, row):
     return closing_speed(now.v, wa, wb, now.p, row)
 
 
+@inlined
+def move_to_world(bodies, i, now, row):
+    """Move the witness points of a contact row about body i to the world's origin."""
+    for c in range(3):
+        at = position_now(bodies, i, now.age_i, c)
+        row[POINT_A + c] += at
+        row[POINT_B + c] += at
+
+
 @outlined
 def body_contact(multibody, i, j, time, query, scratch, result):
     """Write the deepest contact of bodies i and j at `time` (s), from their last states, into a result row.
@@ -131,10 +140,7 @@ def body_contact(multibody, i, j, time, query, scratch, result):
         result[BOUND] -= best
         certain = excess <= query.margin
     result[STATUS] = TOUCHING if certain else UNSETTLED
-    for c in range(3):
-        at = position_now(bodies, i, now.age_i, c)
-        result[POINT_A + c] += at
-        result[POINT_B + c] += at
+    move_to_world(bodies, i, now, result)
     return True, tests
 
 

@@ -33,7 +33,7 @@ def _feature(shape: Compound, pose: Pose, point: Array, normal: Array, tie: floa
         return f"{kind} surface"
     try:
         found = feature_of(shape, pose, point, normal, tie, off)
-    except InputError:  # the witness point is off the surface, by the error bound
+    except InputError:  # the witness point is off the surface by more than the error bound
         return f"{kind} surface"
     number = found.face if found.type is FeatureType.FACE else "-".join(map(str, found.vertices))
     return f"{kind} {found.type.name.lower()} {number}"

@@ -127,7 +127,7 @@ def time_of_impact(
 
 
 def _is_open(shape: Compound) -> bool:
-    """Whether it is a mesh of which it is not certain what is inside."""
+    """Whether it is a mesh with an uncertain inside."""
     return type(shape) is Mesh and kept_tree(shape).inside != CERTAIN
 
 

@@ -64,6 +64,22 @@ SHAPES: dict[str, tuple[Any, Any]] = {
 }
 
 
+def moving_pair(
+    names: tuple[str, str], poses: NDArray[np.float64], twists: NDArray[np.float64]
+) -> tuple[Any, Any, ShapePair, Any, Any]:
+    """Table and parts of two shapes with these poses (2, 7) and twists (2, 6), the pair, and memory for its samples."""
+    monitor = Monitor()
+    for k, name in enumerate(names):
+        monitor.add(k, SHAPES[name][0])
+    monitor.step(0, [0, 1], poses, twists)
+    table, parts, bodies = monitor.roster.multibody
+    work, memory = make_workspace(), make_plane_memory(SAMPLES)
+    for k in range(2):
+        carry_on(bodies, k, 0.0, work.quaternion, work.motion[k])
+    pair = ShapePair(work.motion[0], work.motion[1], bodies.first_shape[0], bodies.first_shape[1])
+    return table, parts, pair, work, memory
+
+
 def turn(v: Vector) -> Vector:
     """Rotation matrix of a rotation vector (Rodrigues)."""
     angle = float(np.linalg.norm(v))
@@ -82,20 +98,13 @@ def test_gaps_are_those_of_the_turned_shapes(order: int, mode: int, axis: int | 
     rng = np.random.default_rng(10 * order + mode)
     spread = {NOT_TURNED: 0.0, FIRST_ORDER: 0.003, SERIES: 0.3}[order]
     for name_a, name_b in zip(SHAPES, [*list(SHAPES)[1:], "box"], strict=True):
-        monitor = Monitor()
-        monitor.add(0, SHAPES[name_a][0])
-        monitor.add(1, SHAPES[name_b][0])
         q = rng.normal(size=(2, 4))
         q /= np.linalg.norm(q, axis=1, keepdims=True)
         p = rng.normal(size=(2, 3))
         p[1, 0] += 3.0
-        monitor.step(0, [0, 1], np.column_stack([p, q]), rng.normal(size=(2, 6)))
-        table, parts, bodies = monitor.roster.multibody
-        work, memory, points = make_workspace(), make_plane_memory(SAMPLES), sample_columns(SAMPLES).points
-        for k in range(2):
-            carry_on(bodies, k, 0.0, work.quaternion, work.motion[k])
-        pair = ShapePair(work.motion[0], work.motion[1], bodies.first_shape[0], bodies.first_shape[1])
-        obstacle, rows = memory.obstacle, memory.rows
+        poses, twists = np.column_stack([p, q]), rng.normal(size=(2, 6))
+        table, parts, pair, work, memory = moving_pair((name_a, name_b), poses, twists)
+        obstacle, rows, points = memory.obstacle, memory.rows, sample_columns(SAMPLES).points
         turning = ((spread, 0.5 * spread), (0.7 * spread, 0.0))
         assert set_nodes(table, parts, pair, Window(0.0, 0.4), 0.4, turning, False, work.scratch, obstacle) == 1
         memory.off[:] = rng.normal(0, 0.1, memory.off.shape)
@@ -141,21 +150,13 @@ def test_parabolas_give_the_times_behind_a_plane_of_bodies_that_turn(mode: int) 
     off: dict[bool, list[float]] = {False: [], True: []}
     end, orders, still = 0.3, (NOT_TURNED, NOT_TURNED), ((0.0, 0.0), (0.0, 0.0))
     for name in ("capsule", "cylinder", "ellipsoid", "cone") * 20:
-        monitor = Monitor()
-        monitor.add(0, SHAPES[name][0])
-        monitor.add(1, SHAPES["ellipsoid"][0])
         q, p, n = rng.normal(size=(2, 4)), np.zeros((2, 3)), rng.normal(size=3)
         n /= np.linalg.norm(n)
         q /= np.linalg.norm(q, axis=1, keepdims=True)
         twist = np.column_stack([rng.normal(size=(2, 3)), rng.normal(0, 1.5, (2, 3))])
         p[1] = 0.9 * n - 0.5 * end * (twist[1, :3] - twist[0, :3])
-        monitor.step(0, [0, 1], np.column_stack([p, q]), twist)
-        table, parts, bodies = monitor.roster.multibody
-        work, memory, points = make_workspace(), make_plane_memory(SAMPLES), sample_columns(SAMPLES).points
-        for k in range(2):
-            carry_on(bodies, k, 0.0, work.quaternion, work.motion[k])
-        pair = ShapePair(work.motion[0], work.motion[1], bodies.first_shape[0], bodies.first_shape[1])
-        obstacle, rows = memory.obstacle, memory.rows
+        table, parts, pair, work, memory = moving_pair((name, "ellipsoid"), np.column_stack([p, q]), twist)
+        obstacle, rows, points = memory.obstacle, memory.rows, sample_columns(SAMPLES).points
         memory.off[:] = rng.normal(0, 0.1, memory.off.shape)
         errors, window = memory.off[:6, :SAMPLES], Window(0.0, end)
         parts_of_time = set_nodes(table, parts, pair, window, end / 40, still, False, work.scratch, obstacle)
