@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple
 from collision_monitor._jit import inlined
 from collision_monitor.narrow_phase.gjk import Accuracy
 from collision_monitor.prediction.flat_sides import has_side
+from collision_monitor.prediction.live_samples import drop_missed, place_of
 from collision_monitor.prediction.obstacle_planes import (
     AT_REST,
     MOST_PLANES,
@@ -20,7 +21,7 @@ from collision_monitor.prediction.obstacle_planes import (
     separation_at,
     set_plane,
 )
-from collision_monitor.prediction.sample_gaps import NOT_TURNED, enter_planes, gaps_at_end, set_bends, set_samples
+from collision_monitor.prediction.sample_gaps import NOT_TURNED, enter_planes, gaps_at_begin, set_bends
 
 TRIED: Final = 32
 """Number of samples that decide how the normal of a plane turns: a block of the samples, which are spread out. The
@@ -106,6 +107,15 @@ def _sole_mode(table, pair, n, settings, obstacle):
 
 
 @inlined
+def _copy(entry, leave, to_entry, to_leave, first, last):
+    """Copy the intervals of samples first:last."""
+    entry, leave, to_entry, to_leave = entry[first:last], leave[first:last], to_entry[first:last], to_leave[first:last]
+    for n in range(entry.size):
+        to_entry[n] = entry[n]
+        to_leave[n] = leave[n]
+
+
+@inlined
 def _cut(table, pair, n, samples, direction, k, settings, memory):
     """Add the plane along the direction that separates sample n. Its normal may turn with a body.
 
@@ -119,26 +129,25 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
     planes, margin, before = obstacle.planes[k, count : count + 1], plane_margin(settings), leave[n] - entry[n]
     middle, least = obstacle.middle[k], LEAST_BEND * settings.tolerance
     turning, tried = settings.turning, _sole_mode(table, pair, direction, settings, obstacle)
+    trial_entry, trial_leave = memory.trial[0], memory.trial[1]
     if tried != NO_MODE:
         set_plane(direction, tried, obstacle, planes[0])
         set_bends(table, pair, planes[0], nodes, middle, least)
-        enter_planes(table, pair, planes, margin, turning, nodes, middle, n, n + 1, rows, entry, leave)
-        if leave[n] - entry[n] < before:
-            enter_planes(table, pair, planes, margin, turning, nodes, middle, 0, samples, rows, entry, leave)
+        _copy(entry, leave, trial_entry, trial_leave, 0, samples)
+        enter_planes(table, pair, planes, margin, turning, nodes, middle, 0, samples, rows, trial_entry, trial_leave)
+        if trial_leave[n] - trial_entry[n] < before:
+            _copy(trial_entry, trial_leave, entry, leave, 0, samples)
             obstacle.count[k] += 1
             return True
     first = 0 if settings.careful else n // TRIED * TRIED
     last = min(first + TRIED, samples)
     best, latest, span = -1, -inf, nodes[1].time - nodes[0].time
-    trial_entry, trial_leave = memory.trial[0], memory.trial[1]
     for mode in (AT_REST, 0, 1):
         if mode == tried or (mode != AT_REST and not settings.follows[mode]):
             continue
         set_plane(direction, mode, obstacle, planes[0])
         set_bends(table, pair, planes[0], nodes, middle, least)
-        for m in range(first, last):
-            trial_entry[m] = entry[m]
-            trial_leave[m] = leave[m]
+        _copy(entry, leave, trial_entry, trial_leave, first, last)
         enter_planes(table, pair, planes, margin, turning, nodes, middle, first, last, rows, trial_entry, trial_leave)
         if n >= last:
             trial_entry[n], trial_leave[n] = entry[n], leave[n]
@@ -161,11 +170,11 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
 
 @inlined
 def _separation_of(table, parts, pair, n, t, k, turning, accuracy, memory, scratch):
-    """Separation (m) of sample n at time t in segment k; accuracy: see `separation`."""
+    """Separation (m) of live sample n at time t in segment k; accuracy: see `separation`."""
     obstacle, off, first, last = memory.obstacle, memory.off, memory.rows.node[0], memory.rows.node[1]
-    begin, end = obstacle.node[k].time, obstacle.node[k + 1].time
+    begin, end, m = obstacle.node[k].time, obstacle.node[k + 1].time, memory.live[n]
     share = (t - begin) / (end - begin)
-    error = (off[0, n] + t * off[3, n], off[1, n] + t * off[4, n], off[2, n] + t * off[5, n])
+    error = (off[0, m] + t * off[3, m], off[1, m] + t * off[4, m], off[2, m] + t * off[5, m])
     turned_a = _between(first, last, 3, n, share) if turning[0] != NOT_TURNED else NOT_OFF
     turned_b = _between(first, last, 6, n, share) if turning[1] != NOT_TURNED else NOT_OFF
     return separation_at(table, parts, pair, t, error, (turned_a, turned_b), accuracy, obstacle, scratch)
@@ -195,37 +204,43 @@ def _check(table, parts, pair, n, at, samples, k, tolerance, settings, memory, s
 
 
 @inlined
-def cut_extremes(table, parts, pair, k, extremes, settings, memory, scratch):
+def cut_extremes(table, parts, pair, k, extremes, samples, settings, memory, scratch):
     """Add planes to segment k of memory.obstacle where some samples of the pilot, the farthest ones, need them.
 
     The errors with which convex bodies meet are about a convex set, so that the samples between them meet if they do.
+    samples: number of live ones.
     """
     obstacle, entry, leave = memory.obstacle, memory.entry, memory.leave
-    for n in extremes:
-        while entry[n] <= leave[n] and obstacle.count[k] < MOST_PLANES:
+    for extreme in extremes:
+        n = place_of(extreme, memory.live, samples)
+        while n >= 0 and entry[n] <= leave[n] and obstacle.count[k] < MOST_PLANES:
             at, tolerance = entry[n], settings.tolerance
-            if not _check(table, parts, pair, n, at, settings.pilot, k, tolerance, settings, memory, scratch)[0]:
+            if not _check(table, parts, pair, n, at, samples, k, tolerance, settings, memory, scratch)[0]:
                 break
 
 
 @inlined
 def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch):
-    """Add planes to segment k of memory.obstacle for a pair of shapes (ShapePair), where the first `samples` need them.
+    """Add planes to segment k of memory.obstacle for a pair of shapes (ShapePair), where the live samples need them.
 
     Every second sample is the one that passes the planes most briefly in a BLOCK of samples, in turn, because it may
     miss the shapes. The search ends when `wanted` samples needed no plane, half of them after the last plane.
     `begin_segment` comes before it. Returns whether there are planes enough: once the segment is full of them, further
     ones are used but not kept, and at most one in MOST_APART of the wanted samples may need one, beside the brief ones.
+    Also returns the number of samples that are live then.
     """
     obstacle, entry, leave, checked = memory.obstacle, memory.entry, memory.leave, memory.checked
     for n in range(samples):
         checked[n] = 0.0
-    size = samples if settings.careful else min(BLOCK, samples)
-    blocks = -(-samples // size)
     block, cursor, verified, idle = k, 0, 0, 0
     tolerance, coarsest = settings.tolerance, COARSER * settings.tolerance
     is_brief, apart = False, 0
-    while verified < wanted and idle < 2 * blocks:
+    while verified < wanted:
+        samples, cursor = drop_missed(samples, cursor, settings.turning, memory)
+        size = max(samples if settings.careful else min(BLOCK, samples), 1)
+        blocks = -(-samples // size)
+        if idle >= 2 * blocks:
+            break
         is_brief, is_full = not is_brief, obstacle.count[k] >= MOST_PLANES
         tolerance = coarsest if is_full else tolerance
         if is_brief:
@@ -245,68 +260,75 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
             obstacle.count[k] -= 1
             apart += 0 if is_brief else 1
             if apart > wanted // MOST_APART:
-                return False
+                return False, samples
         if is_cut and not is_full:
             checked[n] = 0.0
             verified //= 2
         else:
             verified += 1
             tolerance = min(max(tolerance, gap), coarsest)
-    return True
+    return True, samples
 
 
 @inlined
 def carry_planes(table, pair, k, settings, memory):
-    """Start segment k + 1 with those planes of segment k that keep most apart a sample of the pilot at its end."""
+    """Start segment k with those planes of the one before that keep most apart a sample of the pilot between the two.
+
+    rows.node[0] has all samples of the pilot at the begin of segment k.
+    """
     obstacle, rows, pilot, turning = memory.obstacle, memory.rows, settings.pilot, settings.turning
-    margin, end = plane_margin(settings), obstacle.node[k + 1]
+    margin, begin = plane_margin(settings), obstacle.node[k]
     widest, winner = memory.trial[0, 0:pilot], memory.checked[0:pilot]
     for n in range(pilot):
         widest[n], winner[n] = -inf, -1.0
-    for m in range(obstacle.count[k]):
-        gaps_at_end(table, pair, obstacle.planes[k, m], margin, turning, end, pilot, rows)
-        gap = rows.gap[1, 0:pilot]
+    for m in range(obstacle.count[k - 1]):
+        gaps_at_begin(table, pair, obstacle.planes[k - 1, m], margin, turning, begin, pilot, rows)
+        gap = rows.gap[0, 0:pilot]
         for n in range(gap.size):
             before, widest_before = winner[n] + 0.0, widest[n] + 0.0  # see enter_planes
             winner[n] = m if gap[n] > widest_before else before
             widest[n] = gap[n] if gap[n] > widest_before else widest_before
     for n in range(pilot):
         winner[n] = winner[n] if memory.alone[n] == inf else -1.0
-    for m in range(obstacle.count[k]):
+    for m in range(obstacle.count[k - 1]):
         kept = False
         for n in range(pilot):
             kept |= winner[n] == m
         if kept:
             for c in range(PLANE_SIZE):
-                obstacle.planes[k + 1, obstacle.count[k + 1], c] = obstacle.planes[k, m, c]
-            obstacle.count[k + 1] += 1
+                obstacle.planes[k, obstacle.count[k], c] = obstacle.planes[k - 1, m, c]
+            obstacle.count[k] += 1
 
 
 @inlined
-def begin_segment(table, pair, k, settings, memory, points, first, last):
-    """Set the intervals of the samples first:last to those behind the planes of segment k.
+def begin_segment(table, pair, k, samples, settings, memory):
+    """Set the intervals of the samples in memory.rows to those behind the planes of segment k. Returns the live ones.
 
     memory.alone (S,): times of the samples that met in an earlier segment, whose intervals are empty, else infinite.
     """
     obstacle, rows, entry, leave, times = memory.obstacle, memory.rows, memory.entry, memory.leave, memory.alone
-    set_samples(obstacle, k, memory.off, points, settings.turning, first, last, rows)
     begin, end = obstacle.node[k].time, obstacle.node[k + 1].time
-    for n in range(first, last):
+    for n in range(samples):
         entry[n] = begin if times[n] == inf else inf
         leave[n] = end
+        memory.live[n] = n
+    live, _ = drop_missed(samples, 0, settings.turning, memory)
     planes, nodes, margin = obstacle.planes[k, 0 : obstacle.count[k]], obstacle.node[k : k + 2], plane_margin(settings)
     middle = obstacle.middle[k]
     for m in range(obstacle.count[k]):
         set_bends(table, pair, planes[m], nodes, middle, LEAST_BEND * settings.tolerance)
-    enter_planes(table, pair, planes, margin, settings.turning, nodes, middle, first, last, rows, entry, leave)
+    enter_planes(table, pair, planes, margin, settings.turning, nodes, middle, 0, live, rows, entry, leave)
+    return live
 
 
 @inlined
-def end_segment(entry, leave, times, first, last):
-    """Set the times (S,) of the samples first:last that met in a segment; return the number of those that never met."""
-    left = 0
-    for n in range(first, last):
+def end_segment(live, samples, memory):
+    """Set memory.alone of the live samples that met in a segment; return the number of all that never met."""
+    entry, leave, times = memory.entry, memory.leave, memory.alone
+    for n in range(live):
         if entry[n] <= leave[n]:
-            times[n] = entry[n]
+            times[memory.live[n]] = entry[n]
+    left = 0
+    for n in range(samples):
         left += 1 if times[n] == inf else 0
     return left

@@ -40,6 +40,7 @@ from collision_monitor.prediction.pair_errors import (
 )
 from collision_monitor.prediction.quiet_segments import stay_apart
 from collision_monitor.prediction.sample_count import latest
+from collision_monitor.prediction.sample_gaps import set_samples
 from collision_monitor.prediction.screening import meeting
 from collision_monitor.prediction.straight_samples import draw_evenly, set_errors
 from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE
@@ -154,17 +155,19 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
         if skips and stay_apart(table, parts, pair, k, errors, margin, memory.obstacle, work):
             memory.obstacle.quiet[k] = APART
             continue
-        begin_segment(table, pair, k, settings, memory, search.points, 0, samples)
-        cut_extremes(table, parts, pair, k, search.extremes, settings, memory, scratch)
+        set_samples(memory.obstacle, k, memory.off, search.points, turning, 0, samples, memory.rows)
+        if k > 0 and memory.obstacle.quiet[k - 1] != APART:
+            carry_planes(table, pair, k, settings, memory)
+        live = begin_segment(table, pair, k, samples, settings, memory)
+        cut_extremes(table, parts, pair, k, search.extremes, live, settings, memory, scratch)
         wanted = (1 + careful) * search.verified
-        if not cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch):
+        has_enough, live = cut_planes(table, parts, pair, k, live, wanted, settings, memory, scratch)
+        if not has_enough:
             return Laid(segments, settings, False)
-        before, left = left, end_segment(memory.entry, memory.leave, alone, 0, samples)
+        before, left = left, end_segment(live, samples, memory)
         memory.obstacle.quiet[k] = QUIET if left == before and not settings.careful else LOUD
         if left == 0:
             break
-        if k + 1 < segments:
-            carry_planes(table, pair, k, settings, memory)
     return Laid(segments, settings, left == 0 or (memory.obstacle.node[segments].time >= end and not is_rough))
 
 
@@ -196,10 +199,12 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
     for k in range(segments):
         if _is_left_out(memory.obstacle.quiet, k, segments):
             continue
-        begin_segment(table, pair, k, settings, memory, points, 0, samples)
-        if not cut_planes(table, parts, pair, k, samples, each, settings, memory, work.scratch):
+        set_samples(memory.obstacle, k, memory.off, points, settings.turning, 0, samples, memory.rows)
+        live = begin_segment(table, pair, k, samples, settings, memory)
+        has_enough, live = cut_planes(table, parts, pair, k, live, each, settings, memory, work.scratch)
+        if not has_enough:
             return False
-        if end_segment(memory.entry, memory.leave, alone, 0, samples) == 0:
+        if end_segment(live, samples, memory) == 0:
             break
     _lower(times, alone, samples)
     return True

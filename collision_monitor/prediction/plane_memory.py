@@ -33,6 +33,8 @@ class PlaneMemory(NamedTuple):
     entry: Any  # (S,)
     leave: Any  # (S,)
     checked: Any  # (S,): 0 or infinite
+    live: Any  # (S,) int64: see live_samples.py
+    kept: Any  # (S,) int64: scratch
     trial: Any  # (2, S)
     bins: Any  # (BINS,)
     chosen: ChosenSamples
@@ -53,6 +55,8 @@ def make_plane_memory(samples: int) -> PlaneMemory:
         entry=numbers(),
         leave=numbers(),
         checked=numbers(),
+        live=np.zeros(samples, np.int64),
+        kept=np.zeros(samples, np.int64),
         trial=np.zeros((2, samples)),
         bins=np.zeros(BINS),
         chosen=ChosenSamples(np.zeros((DIMENSIONS, samples + APART)), numbers(), np.zeros((2, samples))),

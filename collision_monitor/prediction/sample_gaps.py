@@ -250,9 +250,9 @@ def _gaps_at(table, pair, plane, node, margin, turning, first, last, state, rows
 
 
 @device
-def gaps_at_end(table, pair, plane, margin, turning, node, count, rows):
-    """Write the gaps of the first `count` samples along a plane at the end of a segment (NODE) into rows.gap[1]."""
-    _gaps_at(table, pair, plane, node, margin, turning, 0, count, rows.node[1], rows, rows.gap[1, 0:count])
+def gaps_at_begin(table, pair, plane, margin, turning, node, count, rows):
+    """Write the gaps of the first `count` samples along a plane at the begin of a segment (NODE) into rows.gap[0]."""
+    _gaps_at(table, pair, plane, node, margin, turning, 0, count, rows.node[0], rows, rows.gap[0, 0:count])
 
 
 @inlined
