@@ -90,6 +90,7 @@ class StateFlag(IntFlag):
     TWIST_UNKNOWN = 1
     ACCELERATION_VALID = 2
     DISCONTINUITY = 4
+    YAW_ONLY = 8
 
 
 class Phase(IntEnum):

@@ -164,7 +164,7 @@ class Intake(Stage):
         accepted, is_uncertain = take_states(roster.bodies, slots, numbers, flags, time, rates, verdicts)
         if is_uncertain or uncertain.active:
             taken = np.where(verdicts == ACCEPTED, slots, np.int32(-1))
-            uncertain.take(taken, numbers, covariances, roster.planar)
+            uncertain.take(taken, numbers, flags, covariances, roster.planar)
         if accepted == len(states):
             return
         for verdict, (reason, text) in _VERDICTS.items():

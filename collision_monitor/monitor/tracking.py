@@ -22,7 +22,7 @@ from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.prediction.motion import age_of, position_now, quaternion_to_matrix, swept_box, turn_quaternion
-from collision_monitor.prediction.spread import surface_spread
+from collision_monitor.prediction.spread import surface_spread, swing_radius
 from collision_monitor.prediction.turning import BLOCK, COLUMNS, make_columns, turned_away
 
 FIRST_SLACK: Final = 0.5
@@ -270,7 +270,7 @@ def _cover_spread(bodies, uncertainty, i, now, most, stale_acceleration):
     m.spread_0 = m.spread_1 = 0.0
     if sigmas > 0.0 and not bodies.static[i]:
         age = 2.0 * (now - bodies.time[i])
-        off, growth = surface_spread(spread, i, bodies.spin_radius[i], age, m.cover - now, stale_acceleration)
+        off, growth = surface_spread(spread, i, swing_radius(bodies, spread, i), age, m.cover - now, stale_acceleration)
         m.spread_0, m.spread_1 = min(WIDER * sigmas * off, most[0]), min(WIDER * sigmas * growth, most[1])
 
 

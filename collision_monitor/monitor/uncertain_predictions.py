@@ -151,9 +151,11 @@ class UncertainPredictions(Stage):
             array[i] = 0.0
         self.active = bool(self.spread.stddev.any() or self.spread.acceleration.any())
 
-    def take(self, slots: Pairs, numbers: Any, covariance: NDArray[np.float64], planar: bool) -> None:
+    def take(
+        self, slots: Pairs, numbers: Any, flags: NDArray[np.uint32], covariance: NDArray[np.float64], planar: bool
+    ) -> None:
         """Store the uncertainties of accepted states; for the arguments see `take_spread`."""
-        take_spread(self.spread, slots, numbers, covariance, planar)
+        take_spread(self.spread, slots, numbers, flags, covariance, planar)
         self.active = True
 
     def sigmas(self, profile: Profile) -> float:

@@ -22,6 +22,7 @@ class Bodies(NamedTuple):
     mask: Any  # (N,) uint32
     first_shape: Any  # (N,) int32: slot in the shape table; further shapes follow by Parts.next
     spin_radius: Any  # (N,) float64: distance of the farthest point that rotation moves (m); 0: none
+    revolved: Any  # (N,) bool: all shapes are solids of revolution about the body's z axis
     model: Any  # (N,) uint8: records.Model that represents the object
     excess: Any  # (N,) float64: largest distance by which the model exceeds the object (m)
     concave: Any  # (N,) bool: a concave object has a convex model, which may overlap where the object is not
@@ -68,6 +69,7 @@ def make_bodies(capacity: int) -> Bodies:
         mask=np.zeros(n, np.uint32),
         first_shape=np.full(n, -1, np.int32),
         spin_radius=np.zeros(n),
+        revolved=np.zeros(n, np.bool_),
         model=np.zeros(n, np.uint8),
         excess=np.zeros(n),
         concave=np.zeros(n, np.bool_),

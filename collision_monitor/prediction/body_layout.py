@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from collision_monitor.geometry.shape_table import CIRCLE, SPHERE
+from collision_monitor.geometry.shape_table import CAPSULE, CIRCLE, CONE, CYLINDER, SPHERE, ShapeTable
 from collision_monitor.prediction.bodies import Multibody
+
+_REVOLVED = [SPHERE, CIRCLE, CAPSULE, CYLINDER, CONE]
+"""Kinds that are solids of revolution about the z axis of their shape."""
 
 
 def lay_out_body(multibody: Multibody, i: int, slots: Sequence[int], shape_of: Sequence[int]) -> None:
@@ -25,3 +29,12 @@ def lay_out_body(multibody: Multibody, i: int, slots: Sequence[int], shape_of: S
     bodies.motion["radius"][i] = radius
     is_round = len(slots) == 1 and table.kind[slots[0]] in (SPHERE, CIRCLE) and not position.any()
     bodies.spin_radius[i] = 0.0 if is_round else radius  # rotation moves every body but a single ball about its origin
+    bodies.revolved[i] = bool(_are_revolved(table, chain).all())
+
+
+def _are_revolved(table: ShapeTable, slots: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Whether shapes are solids of revolution about the z axis of their body, up to its direction."""
+    on_axis = (table.local_position[slots, :2] == 0.0).all(axis=1)
+    along = np.abs(table.local_rotation[slots, 2, 2]) == 1.0
+    is_ball = np.isin(table.kind[slots], [SPHERE, CIRCLE])
+    return np.asarray(np.isin(table.kind[slots], _REVOLVED) & on_axis & (along | is_ball))

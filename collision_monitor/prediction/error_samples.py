@@ -171,10 +171,11 @@ def orientation_spread(spread, i, radius, age, t):
 
 
 @device
-def set_turn(m, t, off, planar, out):
+def set_turn(m, t, off, yaw_only, out):
     """Write the matrix (3, 3) that maps a unit error to the rotation vector (rad) of motion m's error at time t.
 
-    off: error of orientation at time 0 (rad) and of the angular velocity (rad/s). The first turns with the body:
+    off: error of orientation at time 0 (rad) and of the angular velocity (rad/s), about all axes or, if yaw_only, about
+    the z axis. The first turns with the body:
     exp(w t). The second adds up in turning axes: the integral of exp(w s) for s from 0 to t.
     """
     if off[0] + off[1] == 0.0:
@@ -194,7 +195,7 @@ def set_turn(m, t, off, planar, out):
     out[0, 0], out[0, 1], out[0, 2] = same + along * x * x, along * x * y - across * z, along * x * z + across * y
     out[1, 0], out[1, 1], out[1, 2] = along * x * y + across * z, same + along * y * y, along * y * z - across * x
     out[2, 0], out[2, 1], out[2, 2] = along * x * z - across * y, along * y * z + across * x, same + along * z * z
-    if planar:
+    if yaw_only:
         for c in range(3):
             out[c, 0] = out[c, 1] = 0.0
 

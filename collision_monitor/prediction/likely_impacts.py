@@ -28,7 +28,7 @@ from collision_monitor.prediction.round_impacts import NOT_ROUND, enter_round_bo
 from collision_monitor.prediction.sample_gaps import TURNED_FARTHEST
 from collision_monitor.prediction.screening import design_point
 from collision_monitor.prediction.sphere_interval import sphere_interval
-from collision_monitor.prediction.spread import is_uncertain, surface_spread
+from collision_monitor.prediction.spread import is_uncertain, surface_spread, swing_radius, turns_by_yaw
 from collision_monitor.prediction.sure_contact import surely_meet
 from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE, body_has_mesh, first_contact, likely_contact
 
@@ -68,7 +68,7 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         has_mesh = body_has_mesh(table, parts, bodies.first_shape[i])
         has_mesh |= body_has_mesh(table, parts, bodies.first_shape[j])
         ages = (carry_on(bodies, i, now, work.quaternion, A), carry_on(bodies, j, now, work.quaternion, B))
-        r_i, r_j = bodies.spin_radius[i], bodies.spin_radius[j]
+        r_i, r_j = swing_radius(bodies, spread, i), swing_radius(bodies, spread, j)
         now_i, growth_i = surface_spread(spread, i, r_i, ages[0], horizon, stale_acceleration)
         now_j, growth_j = surface_spread(spread, j, r_j, ages[1], horizon, stale_acceleration)
         tube = Tube(now_i + now_j, growth_i + growth_j)
@@ -116,7 +116,8 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         sure = sampling.stated and surely_meet(table, parts, pair, work.joint, swing, t, query.margin, work.scratch)
         take_root(work.joint)
         _clear_upper(work.joint)
-        errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, (far_i, far_j))
+        yaw_only = (turns_by_yaw(spread, i, sampling.planar), turns_by_yaw(spread, j, sampling.planar))
+        errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, (far_i, far_j), yaw_only)
         form = round_form(table, parts, pair, errors, query.margin, work)
         if form != NOT_ROUND:
             samples = enter_round_bodies(table, parts, pair, form, errors, sure, sampling, lattice, memory, work)

@@ -13,7 +13,7 @@ from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.geometry.shape_table import BOX
 from collision_monitor.prediction.body_contact import relative_now
 from collision_monitor.prediction.sphere_interval import sphere_interval
-from collision_monitor.prediction.spread import is_uncertain, surface_spread
+from collision_monitor.prediction.spread import is_uncertain, surface_spread, swing_radius
 
 
 class Nearness(NamedTuple):
@@ -49,8 +49,8 @@ def _could_meet(multibody, spread, i, j, now, nearness):
     if not reach < inf:
         return True
     p, v, age_i, age_j = relative_now(bodies, i, j, now)
-    start_i, growth_i = surface_spread(spread, i, bodies.spin_radius[i], age_i, horizon, stale_acceleration)
-    start_j, growth_j = surface_spread(spread, j, bodies.spin_radius[j], age_j, horizon, stale_acceleration)
+    start_i, growth_i = surface_spread(spread, i, swing_radius(bodies, spread, i), age_i, horizon, stale_acceleration)
+    start_j, growth_j = surface_spread(spread, j, swing_radius(bodies, spread, j), age_j, horizon, stale_acceleration)
     bent = 0.0
     for c in range(3):
         bent += abs(bodies.acceleration[j, c] - bodies.acceleration[i, c])

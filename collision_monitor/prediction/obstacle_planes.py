@@ -42,7 +42,8 @@ NOT_OFF: Final = (0.0, 0.0, 0.0)
 """Error of a position, or rotation vector of an error, of the stated motion."""
 
 NO_TURNS: Final = ((0.0, 0.0), (0.0, 0.0))
-"""Turning of two bodies without errors of orientation, see `set_nodes`."""
+ABOUT_ALL: Final = (False, False)
+"""Turning of two bodies without errors of orientation, and about all axes, see `set_nodes`."""
 
 
 NODE = np.dtype(
@@ -81,7 +82,7 @@ def make_obstacle() -> Obstacle:
 
 
 @inlined
-def _place(table, parts, pair, t, turning, planar, scratch, node):
+def _place(table, parts, pair, t, turning, yaw_only, scratch, node):
     """Set a node to time t, see `set_nodes`."""
     A, B, a, b = pair
     R_i, R_j = scratch.rotation[0], scratch.rotation[1]
@@ -94,31 +95,31 @@ def _place(table, parts, pair, t, turning, planar, scratch, node):
     for c in range(3):
         node.position[c] = p[c]
         node.offset[0, c], node.offset[1, c] = oa[c], ob[c]
-    set_turn(A, t, turning[0], planar, node.turn[0])
-    set_turn(B, t, turning[1], planar, node.turn[1])
+    set_turn(A, t, turning[0], yaw_only[0], node.turn[0])
+    set_turn(B, t, turning[1], yaw_only[1], node.turn[1])
 
 
 @inlined
-def set_middles(table, parts, pair, segments, turning, planar, scratch, obstacle):
-    """Place the shapes of the pair (ShapePair) in the middle of each segment. turning, planar: see `set_nodes`."""
+def set_middles(table, parts, pair, segments, turning, yaw_only, scratch, obstacle):
+    """Place the shapes of the pair (ShapePair) in the middle of each segment. turning, yaw_only: see `set_nodes`."""
     for k in range(segments):
         middle = 0.5 * (obstacle.node[k].time + obstacle.node[k + 1].time)
-        _place(table, parts, pair, middle, turning, planar, scratch, obstacle.middle[k])
+        _place(table, parts, pair, middle, turning, yaw_only, scratch, obstacle.middle[k])
 
 
 @device
-def set_nodes(table, parts, pair, window, length, turning, planar, scratch, obstacle):
+def set_nodes(table, parts, pair, window, length, turning, yaw_only, scratch, obstacle):
     """Divide the window into segments of this length (s) without planes; return their number, at most MOST_SEGMENTS.
 
     The last one is shorter, or the segments end before the window. Places the shapes of the pair (ShapePair) at their
-    ends. turning: for both bodies, error of orientation now and its rate (rad, rad/s), one standard deviation, only
-    about the z axis if planar.
+    ends. turning: for both bodies, error of orientation now and its rate (rad, rad/s), one standard deviation.
+    yaw_only: for both, whether it is about the z axis alone.
     """
     begin, end = window
     segments = 0
     for k in range(MOST_SEGMENTS + 1):
         t = min(begin + k * length, end)
-        _place(table, parts, pair, t, turning, planar, scratch, obstacle.node[k])
+        _place(table, parts, pair, t, turning, yaw_only, scratch, obstacle.node[k])
         segments = k
         if t >= end:
             break

@@ -26,6 +26,7 @@ class PairErrors(NamedTuple):
     sigma: float  # m: standard deviation of the gap
     time: float  # s: of the likeliest contact
     radius: Any  # (m, m): of the bodies; 0: rotation moves nothing
+    yaw_only: Any  # (bool, bool): whether errors of their orientations are about the z axis alone
 
 
 @inlined

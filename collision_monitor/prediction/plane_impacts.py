@@ -142,14 +142,14 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
     length = max(length, min((end - begin) / MOST_SEGMENTS, LONGEST * length))
     length = (end - begin) / (1.0 + np.floor((end - begin) / length))
     window = Window(begin, end)
-    segments = set_nodes(table, parts, pair, window, length, errors.turning, sampling.planar, scratch, memory.obstacle)
+    segments = set_nodes(table, parts, pair, window, length, errors.turning, errors.yaw_only, scratch, memory.obstacle)
     turned = max(turned_at(errors, 0), turned_at(errors, 1))
     large = TURNED * turned > SMALL or sigma > 2.0 * SMALL * min(table.radius[a], table.radius[b])
     spins = spin_rate(A) + spin_rate(B) > SPINS * (errors.turning[0][1] + errors.turning[1][1])
     is_rough = segments > MOST_PARTS and large and spins
     if segments > MOST_PARTS and (careful or (is_rough and not sampling.stated)):
         return Laid(segments, settings, False)
-    set_middles(table, parts, pair, segments, errors.turning, sampling.planar, scratch, memory.obstacle)
+    set_middles(table, parts, pair, segments, errors.turning, errors.yaw_only, scratch, memory.obstacle)
     left, skips = samples, not flat and search.verified > 0
     for k in range(segments):
         if skips and stay_apart(table, parts, pair, k, errors, margin, memory.obstacle, work):

@@ -74,6 +74,9 @@ def round_form(table, parts, pair, errors, margin, work):
         return NOT_ROUND
     R = work.scratch.rotation
     oa, ob = place_shape(table, parts, a, A.rotation, R[0]), place_shape(table, parts, b, B.rotation, R[1])
+    by_yaw = (errors.yaw_only[0] and turned_at(errors, 0) > 0.0) or (errors.yaw_only[1] and turned_at(errors, 1) > 0.0)
+    if by_yaw:
+        return NOT_ROUND
     if not turns and is_parallel(table, a, PairPose(R[0], R[1], (0.0, 0.0, 0.0))):
         return ROUND
     one, other = _axis(R, 0), _axis(R, 1)

@@ -19,7 +19,7 @@ from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tub
 from collision_monitor.prediction.impact_record import CLEAR, HIT
 from collision_monitor.prediction.motion import half_acceleration, relative_position
 from collision_monitor.prediction.normal_samples import FURTHEST
-from collision_monitor.prediction.obstacle_planes import NO_TURNS, NOT_OFF, separation_at, set_nodes
+from collision_monitor.prediction.obstacle_planes import ABOUT_ALL, NO_TURNS, NOT_OFF, separation_at, set_nodes
 from collision_monitor.prediction.sample_gaps import stated_gap
 from collision_monitor.prediction.sphere_interval import sphere_interval
 
@@ -122,7 +122,7 @@ def _towards(A, B, t):
 def _set_window(table, parts, pair, window, bend, work, obstacle):
     """Place the shapes of a pair at both ends of a window. Return how far a gap may bend between them (m)."""
     length = window.end - window.begin
-    set_nodes(table, parts, pair, window, length, NO_TURNS, False, work.scratch, obstacle)
+    set_nodes(table, parts, pair, window, length, NO_TURNS, ABOUT_ALL, work.scratch, obstacle)
     return 0.125 * bend * length * length
 
 

@@ -13,7 +13,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, kernel
+from collision_monitor._jit import device, inlined, kernel
+from collision_monitor.records import StateFlag
 
 FIFTH_ROOT: Final = 0.4472135954999579
 """Standard deviation along one axis of a uniform distribution in a ball of radius 1."""
@@ -22,6 +23,11 @@ _STDDEV: Final = 16
 """Index of the first standard deviation among the numbers of a records.STATE."""
 
 _DIAGONAL: Final = np.array([0, 3, 5])
+
+_YAW_ONLY: Final = int(StateFlag.YAW_ONLY)
+
+UPRIGHT: Final = 1e-6
+"""Largest tilt (rad) of an axis, or rate of it (rad/s), with which it counts as vertical."""
 
 
 SEMI_DEFINITE: Final = 1e-9
@@ -34,12 +40,13 @@ class Spread(NamedTuple):
     stddev: Any  # (N, 4): position (m), orientation (rad), velocity (m/s), angular velocity (rad/s), along one axis
     covariance: Any  # (N, 12): of position (m^2) and velocity (m^2/s^2), upper triangles
     acceleration: Any  # (N, 2): declared bounds (m/s^2, rad/s^2); 0: none
+    yaw_only: Any  # (N,) bool: errors of orientation and angular velocity are about the z axis of the world alone
 
 
 def make_spread(capacity: int) -> Spread:
     """Make `capacity` slots without uncertainty."""
     n = capacity
-    return Spread(np.zeros((n, 4)), np.zeros((n, 12)), np.zeros((n, 2)))
+    return Spread(np.zeros((n, 4)), np.zeros((n, 12)), np.zeros((n, 2)), np.zeros(n, np.bool_))
 
 
 def worst_stddevs(covariance: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -61,11 +68,11 @@ def worst_stddevs(covariance: NDArray[np.float64]) -> tuple[NDArray[np.float64],
 
 
 @kernel
-def take_spread(spread, slots, numbers, covariance, planar):
+def take_spread(spread, slots, numbers, flags, covariance, planar):
     """Store the uncertainties of states.
 
-    slots (M,) int32, -1: skip the state; numbers (M, 21): the rows of records.STATE; covariance (M, 12), or (0, 12):
-    where one is all 0, the standard deviations replace it. planar: set the uncertainty along z to 0.
+    slots (M,) int32, -1: skip the state; numbers (M, 21): the rows of records.STATE; flags (M,); covariance (M, 12), or
+    (0, 12): where one is all 0, the standard deviations replace it. planar: set the uncertainty along z to 0.
     """
     for k in range(slots.size):
         i = slots[k]
@@ -74,6 +81,7 @@ def take_spread(spread, slots, numbers, covariance, planar):
         for c in range(4):
             value = numbers[k, _STDDEV + c]
             spread.stddev[i, c] = value if value > 0.0 else 0.0
+        spread.yaw_only[i] = planar or (flags[k] & _YAW_ONLY) != 0
         for c in range(12):
             spread.covariance[i, c] = covariance[k, c] if covariance.shape[0] > 0 else 0.0
         for part in range(2):
@@ -96,6 +104,25 @@ def is_uncertain(spread, i):
     return declared or a[i, 0] > 0.0 or a[i, 1] > 0.0
 
 
+@inlined
+def turns_by_yaw(spread, i, planar):
+    """Whether errors of orientation turn body i about the z axis alone.
+
+    planar: the whole scene is. In space, an unknown angular acceleration has any axis.
+    """
+    return planar or (spread.yaw_only[i] and spread.acceleration[i, 1] == 0.0)
+
+
+@device
+def swing_radius(bodies, spread, i):
+    """Distance (m) of the farthest point that errors of orientation move; 0: none, as of an upright cylinder by yaw."""
+    if not (bodies.revolved[i] and turns_by_yaw(spread, i, False)):
+        return bodies.spin_radius[i]
+    x, y, wx, wy = bodies.quaternion[i, 0], bodies.quaternion[i, 1], bodies.angular[i, 0], bodies.angular[i, 1]
+    is_upright = 2.0 * (abs(x) + abs(y)) <= UPRIGHT and abs(wx) + abs(wy) <= UPRIGHT
+    return 0.0 if is_upright else bodies.spin_radius[i]
+
+
 @device
 def unknown_acceleration(spread, i, silent, which, stale_acceleration):
     """Standard deviation along one axis of body i's unknown acceleration: m/s^2 (which 0) or rad/s^2 (which 1).
@@ -109,11 +136,11 @@ def unknown_acceleration(spread, i, silent, which, stale_acceleration):
 
 
 @device
-def surface_spread(spread, i, spin_radius, age, ahead, stale_acceleration):
+def surface_spread(spread, i, radius, age, ahead, stale_acceleration):
     """Bound the standard deviation along one axis of every point of body i: now (m), and growth until `ahead` (m/s).
 
-    age, ahead: s since the last state, s from now. The parts are added instead of their squares, so that the bound is
-    linear in time and never too low.
+    radius: swing_radius; age, ahead: s since the last state, s from now. The parts are added instead of their squares,
+    so that the bound is linear in time and never too low.
     """
     s_p, s_o = spread.stddev[i, 0], spread.stddev[i, 1]
     s_v, s_w = spread.stddev[i, 2], spread.stddev[i, 3]
@@ -123,6 +150,6 @@ def surface_spread(spread, i, spin_radius, age, ahead, stale_acceleration):
     now = s_p + s_v * age + 0.5 * silent * age * age
     growth = s_v + silent * age + 0.5 * ahead_a * ahead
     if s_o + s_w + turning > 0.0:  # else 0 * inf for a half-space, which does not turn
-        now += spin_radius * (s_o + s_w * age + 0.5 * turning * age * age)
-        growth += spin_radius * (s_w + turning * (age + 0.5 * ahead))
+        now += radius * (s_o + s_w * age + 0.5 * turning * age * age)
+        growth += radius * (s_w + turning * (age + 0.5 * ahead))
     return now, growth

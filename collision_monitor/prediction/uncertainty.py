@@ -51,7 +51,7 @@ from collision_monitor.prediction.known_axes import parted_until, remember
 from collision_monitor.prediction.motion import carry_on, half_acceleration, relative_position
 from collision_monitor.prediction.normal_samples import DIMENSIONS, PILOT
 from collision_monitor.prediction.sphere_interval import sphere_interval
-from collision_monitor.prediction.spread import is_uncertain, surface_spread
+from collision_monitor.prediction.spread import is_uncertain, surface_spread, swing_radius, turns_by_yaw
 from collision_monitor.prediction.tree_impact import spins
 
 GAP_NODES: Final = 9
@@ -228,19 +228,20 @@ def _coset(nth, stride):
 
 
 @device
-def _set_sides(multibody, i, j, t, turns, times, stride, sampling, work, sides):
+def _set_sides(multibody, i, j, t, turns, yaw_only, times, stride, sampling, work, sides):
     """Find out from the times (S,) of every stride-th sample what foretells those of the others; see `foretell`.
 
-    The motions are the stated ones, t the time (s) that matters most, and turns the errors of orientation.
+    The motions are the stated ones, t the time (s) that matters most, turns the errors of orientation, and yaw_only
+    whether they are about the z axis alone.
     """
-    points, planar = sampling.points, sampling.planar
+    points = sampling.points
     A, B, L, F, block = work.motion[0], work.motion[1], work.joint, work.frame, work.block
     ends = sides.ends
     for r in range(3):
         for c in range(3):
             sides.turns[0, r, c] = sides.turns[1, r, c] = 0.0
-    set_turn(A, t, turns[0], planar, sides.turns[0])
-    set_turn(B, t, turns[1], planar, sides.turns[1])
+    set_turn(A, t, turns[0], yaw_only[0], sides.turns[0])
+    set_turn(B, t, turns[1], yaw_only[1], sides.turns[1])
     middle = find_ends(points, times, stride, ends)
     x, y, z = B.x, B.y, B.z
     for side in range(2):
@@ -296,7 +297,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
             continue
         age_i = carry_on(bodies, i, now, work.quaternion, A)
         age_j = carry_on(bodies, j, now, work.quaternion, B)
-        r_i, r_j = bodies.spin_radius[i], bodies.spin_radius[j]
+        r_i, r_j = swing_radius(bodies, spread, i), swing_radius(bodies, spread, j)
         now_i, growth_i = surface_spread(spread, i, r_i, age_i, horizon, stale_acceleration)
         now_j, growth_j = surface_spread(spread, j, r_j, age_j, horizon, stale_acceleration)
         tube = Tube(now_i + now_j, growth_i + growth_j)
@@ -324,12 +325,13 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
             for c in range(3):
                 work.rotation[0, r, c] = A.rotation[r, c]
                 work.rotation[1, r, c] = B.rotation[r, c]
-        level = 0.0 if sampling.planar else 1.0
+        yaw_only = (turns_by_yaw(spread, i, sampling.planar), turns_by_yaw(spread, j, sampling.planar))
+        level_i, level_j = 0.0 if yaw_only[0] else 1.0, 0.0 if yaw_only[1] else 1.0
         coarse = max(query.tolerance, SAMPLE_TOLERANCE * work.joint[0, 0])
         roughly = ImpactQuery(query.margin, coarse, iterations)
         begin = safe if safe < inf else 0.0
         # a search for the overlap of half a tolerance; the surface of a mesh has no gap below 0
-        exact = has_mesh or (r_i == 0.0 and r_j == 0.0)
+        exact = has_mesh or (bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0)
         bias = 0.0 if exact else -0.75 * coarse
         p, v = (B.x, B.y, B.z), (B.vx, B.vy, B.vz)
         w_i, w_j = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
@@ -357,7 +359,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                 shift(work, np.zeros(DIMENSIONS), t, p, v)
                 turn(A, work.rotation[0], w_i, turn_i, (0.0, 0.0, 0.0))
                 turn(B, work.rotation[1], w_j, turn_j, (0.0, 0.0, 0.0))
-                _set_sides(multibody, i, j, t, (turn_i, turn_j), times, stride // 2, sampling, work, sides)
+                _set_sides(multibody, i, j, t, (turn_i, turn_j), yaw_only, times, stride // 2, sampling, work, sides)
                 weigh_followed(points, weights, stride // 2, sides)
             for n in range(first, weights.size, stride):
                 rank = n // stride
@@ -375,9 +377,9 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                 followed += 1
                 shift(work, z, t, p, v)
                 if turn_i[0] + turn_i[1] > 0.0:
-                    turn(A, work.rotation[0], w_i, turn_i, (level * z[6], level * z[7], z[8]))
+                    turn(A, work.rotation[0], w_i, turn_i, (level_i * z[6], level_i * z[7], z[8]))
                 if turn_j[0] + turn_j[1] > 0.0:
-                    turn(B, work.rotation[1], w_j, turn_j, (level * z[9], level * z[10], z[11]))
+                    turn(B, work.rotation[1], w_j, turn_j, (level_j * z[9], level_j * z[10], z[11]))
                 parted = 0.0
                 if straight:
                     parted = parted_until(work.axes, A, B, horizon, query.margin + bias + 0.5 * coarse)

@@ -17,7 +17,7 @@ from collision_monitor.geometry.pose import Pose, rotation_matrix
 from collision_monitor.geometry.shapes import Box, Cylinder
 from collision_monitor.records import StateFlag
 from collision_monitor.sources.autoware_bytes import POLYGON, TrackArrays
-from collision_monitor.sources.covariances import usable_blocks
+from collision_monitor.sources.covariances import usable_blocks, yaw_alone
 from collision_monitor.sources.frames import IDENTITY, frame_name
 from collision_monitor.sources.mapping import Mapping
 from collision_monitor.sources.object_entry import ObjectEntry
@@ -142,12 +142,13 @@ class AutowareSource:
     ) -> NDArray[np.float64] | None:
         pose = usable_blocks(content.pose_covariance[rows])
         twist = usable_blocks(content.twist_covariance[rows])
-        wrong = int((~(pose[2] & twist[2])).sum())
+        wrong = int((~(pose.valid & twist.valid)).sum())
         if wrong:
             text = "covariance: expected symmetric matrices without negative eigenvalues; it was ignored"
             scene.refuse(self._entry.name, text, wrong)
-        states["orientation_stddev"], states["angular_velocity_stddev"] = pose[1], twist[1]
-        joined: NDArray[np.float64] = np.nan_to_num(np.concatenate([pose[0], twist[0]], axis=1))
+        states["orientation_stddev"], states["angular_velocity_stddev"] = pose.stddev, twist.stddev
+        states["flags"][yaw_alone(pose, twist, states["quaternion"])] |= np.uint32(StateFlag.YAW_ONLY)
+        joined: NDArray[np.float64] = np.nan_to_num(np.concatenate([pose.linear, twist.linear], axis=1))
         if not joined.any():
             return None
         joined[:, 6:] = turned_triangles(rotation_matrix(states["quaternion"]), joined)[:, 6:]

@@ -160,11 +160,13 @@ class DetectionSource:
     def _put_uncertainty(self, states: Any, found: list[Any], scene: Scene) -> None:
         none = np.zeros(36)
         given = np.array([it.results[0].pose.covariance if it.results else none for it in found], np.float64)
-        linear, angular, valid = usable_blocks(given)
-        worst = worst_stddev(linear)
+        blocks = usable_blocks(given)
+        worst = worst_stddev(blocks.linear)
         states["position_stddev"] = np.where(np.isnan(worst), states["position_stddev"], worst)
-        states["orientation_stddev"] = angular
-        if wrong := int((~valid).sum()):
+        states["orientation_stddev"] = blocks.stddev
+        turns = blocks.yaw_only & (blocks.stddev > 0.0)
+        states["flags"][turns] |= np.uint32(StateFlag.YAW_ONLY)
+        if wrong := int((~blocks.valid).sum()):
             text = "covariance: expected symmetric matrices without negative eigenvalues; it was ignored"
             scene.refuse(self._entry.name, text, wrong)
 

@@ -9,7 +9,7 @@ import numpy as np
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.pose import rotation_matrix
 from collision_monitor.records import StateFlag
-from collision_monitor.sources.covariances import usable_blocks
+from collision_monitor.sources.covariances import Blocks, usable_blocks, yaw_alone
 from collision_monitor.sources.frames import IDENTITY, frame_name
 from collision_monitor.sources.mapping import Mapping
 from collision_monitor.sources.object_entry import ObjectEntry
@@ -46,20 +46,24 @@ class PoseSource:
         put_pose(states, pose)
         states["position_stddev"] = entry.position_stddev
         covariance = np.full((1, 12), np.nan)
+        of_pose = of_twist = usable_blocks(np.zeros((1, 36)))
         if entry.covariance and pose is not content.pose:
-            covariance[:, :6], states["orientation_stddev"] = self._blocks(content.pose, "pose", scene)
+            of_pose = self._blocks(content.pose, "pose", scene)
+            covariance[:, :6], states["orientation_stddev"] = of_pose.linear, of_pose.stddev
         if twist is None:
             states["flags"] = StateFlag.TWIST_UNKNOWN
         else:
             states["linear"] = twist.twist.linear.x, twist.twist.linear.y, twist.twist.linear.z
             states["angular"] = twist.twist.angular.x, twist.twist.angular.y, twist.twist.angular.z
             if entry.covariance:
-                covariance[:, 6:], states["angular_velocity_stddev"] = self._blocks(twist, "twist", scene)
+                of_twist = self._blocks(twist, "twist", scene)
+                covariance[:, 6:], states["angular_velocity_stddev"] = of_twist.linear, of_twist.stddev
                 known = ~np.isnan(covariance)
                 covariance = np.where(known.any(1, keepdims=True), np.where(known, covariance, 0.0), np.nan)
                 body = turned_triangles(rotation_matrix(states["quaternion"]), covariance)
                 covariance[:, 6:] = body[:, 6:]
             turn_twists(states)
+        states["flags"][yaw_alone(of_pose, of_twist, states["quaternion"])] |= np.uint32(StateFlag.YAW_ONLY)
         given: Any = covariance
         if twist is None:  # the velocity is estimated, and with it its uncertainty
             worst = worst_stddev(covariance[:, :6])
@@ -74,14 +78,14 @@ class PoseSource:
     def settle(self, now_ns: int, scene: Scene) -> None:
         """See Source."""
 
-    def _blocks(self, part: Any, what: str, scene: Scene) -> tuple[Any, Any]:
-        triangles, stddev, valid = usable_blocks(np.asarray(part.covariance, np.float64).reshape(1, 36))
-        if not valid[0]:
+    def _blocks(self, part: Any, what: str, scene: Scene) -> Blocks:
+        found = usable_blocks(np.asarray(part.covariance, np.float64).reshape(1, 36))
+        if not found.valid[0]:
             scene.refuse(
                 self._entry.name,
                 f"covariance of the {what}: expected a symmetric matrix without negative eigenvalues; it was ignored",
             )
-        return triangles, stddev
+        return found
 
 
 def put_pose(states: Any, pose: Any) -> None:

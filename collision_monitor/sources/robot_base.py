@@ -215,10 +215,10 @@ def _stddev(odometry: Any, name: str, scene: Scene) -> Floats:
     """Return standard deviations (4,) along the worst axes from the covariances of a message; 0 where it has none."""
     found = []
     for part in (odometry.pose, odometry.twist):
-        triangles, angular, valid = usable_blocks(np.asarray(part.covariance, np.float64).reshape(1, 36))
-        if not valid[0]:
+        blocks = usable_blocks(np.asarray(part.covariance, np.float64).reshape(1, 36))
+        if not blocks.valid[0]:
             scene.refuse(name, "base: expected symmetric covariances without negative eigenvalues; one was ignored")
-        found.append((np.nan_to_num(worst_stddev(triangles))[0], angular[0]))
+        found.append((np.nan_to_num(worst_stddev(blocks.linear))[0], blocks.stddev[0]))
     (position, orientation), (velocity, turning) = found
     return np.array([position, orientation, velocity, turning])
 

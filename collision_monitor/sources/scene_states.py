@@ -13,6 +13,9 @@ from collision_monitor.records import StateFlag
 from collision_monitor.sources.frames import FrameMotion
 
 Floats = NDArray[np.float64]
+
+STEEPEST = 1e-3
+"""rad: an axis with a smaller tilt counts as vertical."""
 States = Any  # an array of records.STATE; NumPy's stubs know no assignment to its fields
 
 
@@ -47,6 +50,8 @@ def carry(states: States, frame: FrameMotion, covariance: Floats | None) -> Floa
     states["acceleration"] = _turned(R_WF, states["acceleration"])
     if frame.moving:
         states["flags"] &= ~np.uint32(StateFlag.ACCELERATION_VALID)
+    if np.hypot(R_WF[2, 0], R_WF[2, 1]) > STEEPEST:  # its z axis is not the world's
+        states["flags"] &= ~np.uint32(StateFlag.YAW_ONLY)
     if not frame.twist_known:
         states["flags"] |= np.uint32(StateFlag.TWIST_UNKNOWN)
     return None if covariance is None else turned_triangles(R_WF, covariance)

@@ -14,7 +14,7 @@ from collision_monitor.prediction.body_impact import ShapePair, Window
 from collision_monitor.prediction.error_samples import make_workspace
 from collision_monitor.prediction.motion import carry_on
 from collision_monitor.prediction.normal_samples import sample_columns
-from collision_monitor.prediction.obstacle_planes import MODE, set_middles, set_nodes
+from collision_monitor.prediction.obstacle_planes import ABOUT_ALL, MODE, set_middles, set_nodes
 from collision_monitor.prediction.plane_memory import make_plane_memory
 from collision_monitor.prediction.sample_gaps import (
     FIRST_ORDER,
@@ -106,7 +106,7 @@ def test_gaps_are_those_of_the_turned_shapes(order: int, mode: int, axis: int | 
         table, parts, pair, work, memory = moving_pair((name_a, name_b), poses, twists)
         obstacle, rows, points = memory.obstacle, memory.rows, sample_columns(SAMPLES).points
         turning = ((spread, 0.5 * spread), (0.7 * spread, 0.0))
-        assert set_nodes(table, parts, pair, Window(0.0, 0.4), 0.4, turning, False, work.scratch, obstacle) == 1
+        assert set_nodes(table, parts, pair, Window(0.0, 0.4), 0.4, turning, ABOUT_ALL, work.scratch, obstacle) == 1
         memory.off[:] = rng.normal(0, 0.1, memory.off.shape)
         orders = (order, order)
         set_samples(obstacle, 0, memory.off, points, orders, 0, SAMPLES, rows)
@@ -159,7 +159,7 @@ def test_parabolas_give_the_times_behind_a_plane_of_bodies_that_turn(mode: int) 
         obstacle, rows, points = memory.obstacle, memory.rows, sample_columns(SAMPLES).points
         memory.off[:] = rng.normal(0, 0.1, memory.off.shape)
         errors, window = memory.off[:6, :SAMPLES], Window(0.0, end)
-        parts_of_time = set_nodes(table, parts, pair, window, end / 40, still, False, work.scratch, obstacle)
+        parts_of_time = set_nodes(table, parts, pair, window, end / 40, still, ABOUT_ALL, work.scratch, obstacle)
         nodes = obstacle.node[: parts_of_time + 1].copy()
         plane, times = obstacle.planes[0, 0], nodes["time"]
         plane[:3], plane[MODE] = (nodes["rotation"][20, mode].T @ n) if mode < 2 else n, mode
@@ -169,8 +169,8 @@ def test_parabolas_give_the_times_behind_a_plane_of_bodies_that_turn(mode: int) 
             u = R[mode] @ plane[:3] if mode < 2 else n
             reach = SHAPES[name][1](R[0].T @ u) + ellipsoid(-R[1].T @ u)
             gap[:] = u @ (node["position"][:, None] + errors[:3] + node["time"] * errors[3:]) - reach
-        set_nodes(table, parts, pair, window, end, still, False, work.scratch, obstacle)
-        set_middles(table, parts, pair, 1, still, False, work.scratch, obstacle)
+        set_nodes(table, parts, pair, window, end, still, ABOUT_ALL, work.scratch, obstacle)
+        set_middles(table, parts, pair, 1, still, ABOUT_ALL, work.scratch, obstacle)
         set_samples(obstacle, 0, memory.off, points, orders, 0, SAMPLES, rows)
         ends, middle, planes = obstacle.node[:2], obstacle.middle[0], obstacle.planes[0, :1]
         for bends in (False, True):

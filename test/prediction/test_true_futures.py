@@ -8,21 +8,27 @@ from numpy.typing import NDArray
 
 import collision_monitor as cm
 from collision_monitor.geometry.pose import from_rotation_vector, multiply
-from collision_monitor.records import STATE
+from collision_monitor.records import STATE, StateFlag
 
 HORIZON = 2.0
 NAMES = ("position", "orientation", "velocity", "angular_velocity")
 
 
 def predicted_and_true(
-    shapes: tuple[cm.Shape, cm.Shape], rows: NDArray[np.void], futures: int, samples: int = 1024
+    shapes: tuple[cm.Shape, cm.Shape],
+    rows: NDArray[np.void],
+    futures: int,
+    samples: int = 1024,
+    profile: str = "balanced",
 ) -> tuple[np.void, NDArray[np.float64]]:
     """Prediction of two objects with the states `rows`, and times (s) of impact of their futures; infinite: none."""
-    monitor = cm.Monitor(cm.Profile.named("balanced").replace(horizon=HORIZON, uncertainty_samples=samples))
+    monitor = cm.Monitor(cm.Profile.named(profile).replace(horizon=HORIZON, uncertainty_samples=samples))
     motions, rng = [], np.random.default_rng(0)
     for k, row in enumerate(rows):
         monitor.add(k, shapes[k])
         off = [row[f"{name}_stddev"] * rng.normal(size=(futures, 3)) for name in NAMES]
+        if row["flags"] & StateFlag.YAW_ONLY:
+            off[1][:, :2] = off[3][:, :2] = 0.0
         turned = multiply(from_rotation_vector(off[1]), np.tile(row["quaternion"], (futures, 1)))
         poses = np.column_stack([row["position"] + off[0], turned])
         motions.append((poses, np.column_stack([row["linear"] + off[2], row["angular"] + off[3]])))
@@ -174,3 +180,28 @@ def test_impacts_of_bodies_that_turn_are_hardly_earlier_or_later_than_stated(nam
     reported, times = predicted_and_true(shapes, rows, 20_000)
     assert np.mean(times > reported["latest"]) < 0.055
     assert np.mean(times < reported["earliest"]) < 0.055
+
+
+CORNERS = np.random.default_rng(3).normal(0, 0.5, (12, 3))
+SOLIDS = (cm.Box((1.6, 0.4, 0.9)), cm.Cylinder(0.3, 1.7), cm.ConvexHull(CORNERS))
+
+
+@pytest.mark.parametrize("profile", ["balanced", "exact"])
+@pytest.mark.parametrize("seed", [*range(8), *range(9, 13)])  # with seed 8 they pass each other
+def test_errors_of_yaw_alone(seed: int, profile: str) -> None:
+    """Two bodies that turn and lean, and whose yaw and rate of yaw are uncertain, or all axes of the second one."""
+    rng = np.random.default_rng(seed)
+    shapes = SOLIDS[seed % 3], SOLIDS[seed // 3 % 3]
+    rows = np.zeros(2, STATE)
+    rows["id"] = 0, 1
+    rows["quaternion"] = rng.normal(size=(2, 4)) if seed % 2 else (0.0, 0.0, 0.6, 0.8)
+    rows["quaternion"] /= np.linalg.norm(rows["quaternion"], axis=1, keepdims=True)
+    way = rng.normal(size=3) * (1.0, 1.0, 0.3)
+    rows["position"][1] = 2.2 * way / np.linalg.norm(way)
+    rows["linear"][1] = -rows["position"][1] / rng.uniform(0.8, 1.6) + rng.normal(0, 0.25, 3)
+    rows["angular"] = rng.normal(0, 0.4, (2, 3)) if seed % 2 else (0.0, 0.0, 0.5)
+    for name, most in zip(NAMES, (0.05, 0.2, 0.05, 0.1), strict=True):
+        rows[f"{name}_stddev"] = rng.uniform(0.2, 1.0, 2) * most
+    rows["flags"] = StateFlag.YAW_ONLY, StateFlag.YAW_ONLY if seed % 4 else 0
+    reported, times = predicted_and_true(shapes, rows, 20_000, profile=profile)
+    assert reported["probability"] == pytest.approx(np.mean(times < np.inf), abs=0.03)

@@ -85,7 +85,7 @@ def test_covariances_of_odometry_are_turned_to_the_axes_of_the_map(seed: int) ->
     ],
 )
 def test_covariances_that_are_none(matrix: Any, valid: bool) -> None:
-    triangles, stddev, is_valid = usable_blocks(matrix.reshape(1, 36))
+    triangles, stddev, _, is_valid = usable_blocks(matrix.reshape(1, 36))
     assert is_valid[0] == valid
     assert stddev[0] == 0.0
     assert not np.nan_to_num(triangles).any()
@@ -102,10 +102,39 @@ def test_covariances_that_are_none(matrix: Any, valid: bool) -> None:
 
 def test_an_axis_that_is_not_measured_leaves_the_others() -> None:
     planar = np.diag([0.04, 0.09, 1e6, 1e6, 1e6, 0.01])
-    triangles, stddev, valid = usable_blocks(planar.reshape(1, 36))
+    triangles, stddev, yaw_only, valid = usable_blocks(planar.reshape(1, 36))
     assert valid[0]
+    assert yaw_only[0]
     assert triangles[0].tolist() == [0.04, 0, 0, 0.09, 0, 0]
     assert stddev[0] == pytest.approx(0.1)
+
+
+TILTED = Rotation.from_euler("x", 0.1).as_quat()
+YAW = np.diag([0.01, 0.01, 0.0, 0.0, 0.0, 0.04])
+
+
+@pytest.mark.parametrize(
+    ("pose", "twist", "frame", "body", "is_flagged"),
+    [
+        (YAW, YAW, (0, 0, 0, 1), (0, 0, 0.6, 0.8), True),
+        (YAW + np.diag([0, 0, 1e6, 1e6, 1e6, 0]), None, (0, 0, 0.6, 0.8), (0, 0, 0, 1), True),  # not measured
+        (YAW + np.diag([0, 0, 0, 1e-6, 1e-6, 0]), YAW, (0, 0, 0, 1), (0, 0, 0, 1), True),  # 1 mrad
+        (YAW + np.diag([0, 0, 0, 1e-4, 0, 0]), YAW, (0, 0, 0, 1), (0, 0, 0, 1), False),
+        (YAW, 0.1 * np.eye(6), (0, 0, 0, 1), (0, 0, 0, 1), False),
+        (YAW, None, TILTED, (0, 0, 0, 1), False),  # the axis of the map is another one
+        (YAW, YAW, (0, 0, 0, 1), TILTED, False),  # twists are along the axes of the body
+        (YAW, None, (0, 0, 0, 1), TILTED, True),
+        (None, None, (0, 0, 0, 1), (0, 0, 0, 1), False),
+    ],
+)
+def test_errors_of_yaw_alone_are_flagged(pose: Any, twist: Any, frame: Any, body: Any, is_flagged: bool) -> None:
+    fed = Fed({"cart": {"topic": "/odom", "shape": SPHERE}})
+    fed.give("/tf_static", START, transforms(START, ("map", "odom", (1, 2, 3), frame)))
+    message = odometry("odom", START, (0, 0, 0), body, (1, 0, 0), (0, 0, 1))
+    fed.give("/odom", START, with_covariance(message, pose, twist))
+    assert bool(fed.rows[0]["flags"] & StateFlag.YAW_ONLY) == is_flagged
+    if pose is not None:
+        assert fed.rows[0]["orientation_stddev"] == pytest.approx(0.2)
 
 
 # -- steps
