@@ -20,8 +20,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 MANY: Final = 3
 """Number of members of a named tuple from which on it is known again by its identity."""
 
-_known: dict[type, tuple[tuple[Any, ...], int]] = {}
-"""The last such tuple of each class, and its kind. It is kept, because a new one could take its place in memory."""
+_known: dict[type, tuple[Any, ...]] = {}
+"""The last two such tuples of each class, each with its kind: an open mesh is sought with and without its filling by
+turns. They are kept, because a new one could take their place in memory."""
 
 _numbers: dict[Any, int] = {}
 """Short names of the kinds of such tuples."""
@@ -52,13 +53,16 @@ def kinds(values: Iterable[Any]) -> tuple[Any, ...]:
 def _of_tuple(value: tuple[Any, ...]) -> Any:
     own = type(value)
     known = _known.get(own)
-    if known is not None and known[0] is value:
-        return known[1]
+    if known is not None:
+        if known[0] is value:
+            return known[1]
+        if known[2] is value:
+            return known[3]
     found = own, kinds(value)
     if own is tuple or len(value) < MANY:
         return found
     number = _numbers.setdefault(found, next(_names))
-    _known[own] = value, number
+    _known[own] = value, number, *(known[:2] if known else (None, 0))
     return number
 
 

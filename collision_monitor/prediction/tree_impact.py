@@ -44,6 +44,10 @@ MOST_SWEPT: Final = 1e6
 FEWER_STEPS: Final = 256
 """Divisor of the STEPS for such bodies, which need more than any limit too."""
 
+SAME: Final = 0.1
+"""A box is opened at the time of the one before unless it moves by more than this part of its size until its own time:
+the motion of both bodies at a time costs as much as half of the boxes that it is compared with."""
+
 ENTRY: Final = 4
 """Numbers of a waiting pair of boxes: time, both places, and the pair of triangles that limited its last step."""
 
@@ -180,7 +184,7 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
     if spins(pair.A, pair.B, end - begin):
         most //= FEWER_STEPS
     waiting, steps, later = push_pair(work, 0, begin, place_a, place_b, -1.0), 0, end
-    now = -inf
+    now, speed = -inf, inf
     while True:
         if waiting == 0 or work[PAIRS] >= later:
             if not later < end:
@@ -195,16 +199,18 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
             return UNRESOLVED, t, 1 + steps // STEPS, 0.0
         a, i, b, j = int(place_a) // WIDTH, int(place_a) % WIDTH, int(place_b) // WIDTH, int(place_b) % WIDTH
         child_a, child_b = blocks[a, CHILD, i], blocks[b, CHILD, j]
-        if t != now:  # boxes that overlap are opened at the same time as those around them
+        is_leaf = child_a < 0.0 and child_b < 0.0
+        size = size_of(blocks, a, i)
+        size = max(size, size_of(blocks, b, j)) if is_leaf else size
+        if t != now and (is_leaf or t < now or not (t - now) * speed < SAME * size):
             now = t
             margin = query.margin + tube.start + tube.growth * (t - begin)
             p, move = approach_at(table, parts, pair, t, margin, tube.growth, end, scratch)
             X = relative(scratch.rotation[2], scratch.rotation[3], p)
             speed = sqrt(dot(move.v, move.v)) + move.growth
             speed += sqrt(move.bend_a) * reach_in(blocks, root_a) + sqrt(move.bend_b) * reach_in(blocks, root_b)
-        if child_a < 0.0 and child_b < 0.0:
+        if is_leaf:
             leaf_a, leaf_b = root_a - int(child_a), root_b - int(child_b)
-            size = max(size_of(blocks, a, i), size_of(blocks, b, j))
             d, triangles = leaf_time(
                 blocks, int(place_a), leaf_a, blocks, int(place_b), leaf_b, X, move, query.tolerance,
                 KEEP * size / speed, triangles, work,
@@ -219,12 +225,12 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
                 waiting = push_pair(work, waiting, t + d, place_a, place_b, float(triangles))
             continue
         in_b, block, size, soon = open_box(blocks, (root_a, a, i, child_a), (root_b, b, j, child_b), X, move, work)
-        if soon * speed > KEEP * size and t + soon > t:  # else the time has no finer resolution
-            if t + soon < end:
-                waiting = push_pair(work, waiting, t + soon, place_a, place_b, -1.0)
+        if soon * speed > KEEP * size and now + soon > t:  # else the time has no finer resolution
+            if now + soon < end:
+                waiting = push_pair(work, waiting, now + soon, place_a, place_b, -1.0)
             continue
         for k in range(WIDTH):
-            time = t + work[BOUNDS + k]
+            time = max(t, now + work[BOUNDS + k])
             if blocks[block, CHILD, k] != 0.0 and time < later:
                 child = float(WIDTH * block + k)
                 if waiting < HEAP:
