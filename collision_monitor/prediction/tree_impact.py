@@ -45,8 +45,8 @@ FEWER_STEPS: Final = 256
 """Divisor of the STEPS for such bodies, which need more than any limit too."""
 
 SAME: Final = 0.1
-"""A box is opened at the time of the one before unless it moves by more than this part of its size until its own time:
-the motion of both bodies at a time costs as much as half of the boxes that it is compared with."""
+"""A pair is examined at the time of the one before unless its boxes move by more than this part of their size until its
+own time: the motion of both bodies at a time costs as much as half of the boxes that it is compared with."""
 
 ENTRY: Final = 4
 """Numbers of a waiting pair of boxes: time, both places, and the pair of triangles that limited its last step."""
@@ -202,7 +202,7 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
         is_leaf = child_a < 0.0 and child_b < 0.0
         size = size_of(blocks, a, i)
         size = max(size, size_of(blocks, b, j)) if is_leaf else size
-        if t != now and (is_leaf or t < now or not (t - now) * speed < SAME * size):
+        if t != now and (t < now or not (t - now) * speed < SAME * size):
             now = t
             margin = query.margin + tube.start + tube.growth * (t - begin)
             p, move = approach_at(table, parts, pair, t, margin, tube.growth, end, scratch)
@@ -215,14 +215,17 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
                 blocks, int(place_a), leaf_a, blocks, int(place_b), leaf_b, X, move, query.tolerance,
                 KEEP * size / speed, triangles, work,
             )  # fmt: skip
+            if now < t and not now + d > t:  # looked at too early: again at its own time
+                waiting, now = push_pair(work, waiting, t, place_a, place_b, float(triangles)), -inf
+                continue
             if d == 0.0:
                 answer[PLACE_A] = WIDTH * leaf_a + triangles // WIDTH
                 answer[PLACE_B] = WIDTH * leaf_b + triangles % WIDTH
                 return HIT, t, 1 + steps // STEPS, 0.0
-            if t + d <= t:  # the time has no finer resolution
+            if now + d <= t:  # the time has no finer resolution
                 return UNRESOLVED, t, 1 + steps // STEPS, 0.0
-            if t + d < end:
-                waiting = push_pair(work, waiting, t + d, place_a, place_b, float(triangles))
+            if now + d < end:
+                waiting = push_pair(work, waiting, now + d, place_a, place_b, float(triangles))
             continue
         in_b, block, size, soon = open_box(blocks, (root_a, a, i, child_a), (root_b, b, j, child_b), X, move, work)
         if soon * speed > KEEP * size and now + soon > t:  # else the time has no finer resolution
