@@ -42,8 +42,10 @@ NOT_OFF: Final = (0.0, 0.0, 0.0)
 """Error of a position, or rotation vector of an error, of the stated motion."""
 
 NO_TURNS: Final = ((0.0, 0.0), (0.0, 0.0))
+"""Turning of two bodies without errors of orientation, see `set_nodes`."""
+
 ABOUT_ALL: Final = (False, False)
-"""Turning of two bodies without errors of orientation, and about all axes, see `set_nodes`."""
+"""Errors of orientation of neither body are about the z axis alone, see `set_nodes`."""
 
 
 NODE = np.dtype(
