@@ -225,9 +225,9 @@ def contact_of_row(
     """
     distance, bound, row = quick
     made = _new(Contact)
-    known = {"signed_distance": distance, "error_bound": bound, "_row": row, "_arguments": arguments}
-    if bound is None:
-        del known["error_bound"]
+    known = {"signed_distance": distance, "_row": row, "_arguments": arguments}
+    if bound is not None:
+        known["error_bound"] = bound
     _set(made, "__dict__", known)
     return made
 

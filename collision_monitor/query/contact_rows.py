@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from collision_monitor._jit import kernel, outlined
+from collision_monitor._jit.settled import settled
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.dispatch import pair_contact
 from collision_monitor.narrow_phase.pair_pose import PairPose
@@ -26,6 +27,7 @@ def write_contact(a, at_a, x_a, i, b, at_b, x_b, j, memory, row):
         row[POINT_B + c] = row[POINT_A + c] + row[DISTANCE] * row[NORMAL + c]
 
 
+@settled
 @kernel
 def contact_row(a, x_a, b, x_b, memory, row):
     """Write the contact of two packed shapes to a row (CONTACT_SIZE,), with the points in the world frame.

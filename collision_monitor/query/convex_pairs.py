@@ -51,9 +51,9 @@ def convex_contact(shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any) -> tupl
         if a is None or b is None or x_a is None or x_b is None:
             return None
     row = np.empty(CONTACT_SIZE)
-    distance, bound = contact_row(a, x_a, b, x_b, MEMORY.memory, row)
+    distance, bound = contact_row.entry(a, x_a, b, x_b, MEMORY.memory, row)
     if bound < 0.0:
-        distance, bound = contact_row(a, x_a, b, x_b, MEMORY.enlarge(a, b), row)
+        distance, bound = contact_row.entry(a, x_a, b, x_b, MEMORY.enlarge(a, b), row)
     return distance, bound, row
 
 

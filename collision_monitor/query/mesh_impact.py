@@ -7,12 +7,12 @@ from math import inf
 import numpy as np
 
 from collision_monitor._jit import inlined, kernel
-from collision_monitor._jit.direct import direct
+from collision_monitor._jit.settled import settled
 from collision_monitor.geometry.pose import Motion
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.meshes.layout import FACE, WIDTH
 from collision_monitor.meshes.nearest import LEAST, PLACE_A, PLACE_B
-from collision_monitor.meshes.shape_trees import trees_of_pair
+from collision_monitor.meshes.shape_trees import NEVER, have_kernels, kept_tree
 from collision_monitor.narrow_phase.contact_row import DISTANCE
 from collision_monitor.prediction.bodies import Multibody
 from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window, body_impact, shape_impact
@@ -50,7 +50,7 @@ def mesh_impact_of_faces(
     faces: tuple[int, int], begin: float = 0.0,
 ) -> tuple[float, float, bool] | None:
     """`mesh_impact`, and whether faces certainly meet that are among the first so many of each shape."""
-    if trees_of_pair(shape_a, shape_b, surface=True) is None:
+    if not have_kernels(kept_tree(shape_a), kept_tree(shape_b), NEVER):
         return None
     try:
         states = motion_a.packed_motion, motion_b.packed_motion  # type: ignore[attr-defined]
@@ -58,7 +58,7 @@ def mesh_impact_of_faces(
         states = packed_motion(motion_a), packed_motion(motion_b)
         if states[0] is None or states[1] is None:
             return None
-    found = _mesh_impact(pair_table(shape_a, shape_b, True), *states, *query, *faces, begin, MEMORY.impact)
+    found = _mesh_impact.entry(pair_table(shape_a, shape_b, True), *states, *query, *faces, begin, MEMORY.impact)
     return found if found[0] > 0.0 else None
 
 
@@ -80,7 +80,7 @@ def impact_in_hulls(
             return None
     table = pair_table(shape_a, shape_b, True)
     memory = MEMORY.enlarge(*hulls)
-    first, lower, upper = _impact_in_hulls(*hulls, table, *states, *query, MEMORY.impact, memory)
+    first, lower, upper = _impact_in_hulls.entry(*hulls, table, *states, *query, MEMORY.impact, memory)
     return (min(first, lower), upper) if lower > 0.0 else None
 
 
@@ -102,7 +102,7 @@ def _times(event, horizon):
     return event.lower, event.upper if event.status == HIT and event.upper <= horizon else inf
 
 
-@direct
+@settled
 @kernel
 def _mesh_impact(
     table, state_a, state_b, horizon, tolerance, separation, iterations, faces_a, faces_b, begin, own
@@ -139,7 +139,7 @@ def _first_time(table, parts, bodies, window, search, scratch):
     return inf if status == CLEAR else t
 
 
-@direct
+@settled
 @kernel
 def _impact_in_hulls(
     hull_a, hull_b, table, state_a, state_b, horizon, tolerance, separation, iterations, own, memory

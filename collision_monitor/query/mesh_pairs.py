@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import inlined, kernel
+from collision_monitor._jit.settled import settled
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Shape
 from collision_monitor.meshes.boxes import box_separations
@@ -51,35 +52,31 @@ class _Memory(threading.local):
 _OWN: Final = _Memory()
 
 
-def _packed(
-    shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any
-) -> tuple[KeptTree, Array, KeptTree, Array] | None:
-    """Trees and packed poses of two shapes, of an open mesh its surface; None for others."""
+def _packed(shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any) -> tuple[KeptTree, Array, KeptTree, Array] | None:
+    """Trees and packed poses of two shapes; None for other arguments."""
     try:
-        a, x_a, b, x_b = shape_a.kept_tree, pose_a.packed_pose, shape_b.kept_tree, pose_b.packed_pose
-    except AttributeError:
+        return shape_a.kept_tree, pose_a.packed_pose, shape_b.kept_tree, pose_b.packed_pose
+    except AttributeError:  # not made yet
         if not (isinstance(shape_a, Shape) and isinstance(shape_b, Shape)):
             return None
-        a, b = kept_tree(shape_a), kept_tree(shape_b)
         x_a, x_b = packed_pose(pose_a), packed_pose(pose_b)
         if x_a is None or x_b is None:
             return None
-    return (a, x_a, b, x_b) if have_kernels(a, b, NEVER) else None
+        return kept_tree(shape_a), x_a, kept_tree(shape_b), x_b
 
 
 def mesh_overlap(shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any) -> bool | None:
     """Whether two shapes overlap or touch; of an open mesh its surface. None for a pair without trees or a mesh."""
-    try:
-        far = (shape_a.kept_tree.reach + shape_b.kept_tree.reach) * _ROUNDED_UP
-        if dist(pose_a.point, pose_b.point) > far:
-            return False
-    except AttributeError:  # of shapes without a tree yet
-        pass
     found = _packed(shape_a, pose_a, shape_b, pose_b)
     if found is None:
         return None
     a, x_a, b, x_b = found
-    return trees_overlap(a.tree, x_a, b.tree, x_b, _OWN.work)
+    if dist(pose_a.point, pose_b.point) > (a.reach + b.reach) * _ROUNDED_UP:
+        return False
+    if not have_kernels(a, b, NEVER):
+        return None
+    meet: bool = trees_overlap.entry(a.tree, x_a, b.tree, x_b, _OWN.work)
+    return meet
 
 
 def boxes_apart(shape_a: Shape, pose_a: Pose, shape_b: Shape, pose_b: Pose) -> bool:
@@ -88,7 +85,7 @@ def boxes_apart(shape_a: Shape, pose_a: Pose, shape_b: Shape, pose_b: Pose) -> b
     x_a, x_b = packed_pose(pose_a), packed_pose(pose_b)
     if a is None or b is None or x_a is None or x_b is None:
         return False
-    return bool(roots_apart(a, x_a, b, x_b, _OWN.work))
+    return bool(roots_apart.entry(a, x_a, b, x_b, _OWN.work))
 
 
 def mesh_contact(
@@ -100,11 +97,11 @@ def mesh_contact(
     takes, and for those that may overlap.
     """
     found = _packed(shape_a, pose_a, shape_b, pose_b)
-    if found is None:
+    if found is None or not have_kernels(found[0], found[2], NEVER):
         return None
     a, x_a, b, x_b = found
     row = np.empty(CONTACT_SIZE)
-    distance, bound = trees_contact(a.tree, x_a, b.tree, x_b, _OWN.work, row)
+    distance, bound = trees_contact.entry(a.tree, x_a, b.tree, x_b, _OWN.work, row)
     if bound < 0.0:
         return None
     return distance, bound if a.inside == b.inside == CERTAIN else None, row
@@ -118,6 +115,7 @@ def _place(pose_a: Any, pose_b: Any, R: Any) -> tuple[float, float, float]:
     return pose_b[0, 0] - pose_a[0, 0], pose_b[0, 1] - pose_a[0, 1], pose_b[0, 2] - pose_a[0, 2]
 
 
+@settled
 @kernel
 def roots_apart(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: Any) -> bool:
     """Whether the boxes of two whole trees, placed as in `trees_overlap`, are apart."""
@@ -127,6 +125,7 @@ def roots_apart(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: Any)
     return memory[BOUNDS] > 0.0
 
 
+@settled
 @kernel
 def trees_overlap(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: Any) -> bool:
     """Whether two trees have a point in common, on a surface or in a solid, or may have one if it takes too long.
@@ -141,6 +140,7 @@ def trees_overlap(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: An
     return is_either_in(tree_a, 0, tree_b, 0, X, 0.0, memory) != OUTSIDE
 
 
+@settled
 @kernel
 def trees_contact(
     tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: Any, row: Any
