@@ -15,6 +15,13 @@ from collision_monitor.meshes.boxes import Block
 from collision_monitor.meshes.layout import CHILD, WIDTH
 
 
+def is_all_above_zero(numbers: Lanes) -> Any:
+    """Whether all eight numbers are above 0, while a kernel is compiled."""
+    builder, zero = numbers.builder, Lanes.constant(numbers.builder, 0.0)
+    bits = builder.bitcast(builder.fcmp_ordered(">", numbers.value, zero.value), ir.IntType(WIDTH))
+    return builder.icmp_unsigned("==", bits, ir.Constant(bits.type, -1))
+
+
 @intrinsic
 def _below(typing_context, limit, numbers, at, blocks, block):
     signature = types.int64(types.float64, numbers, types.int64, blocks, types.int64)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import inf
+from collections.abc import Callable
+from functools import reduce
 from typing import Any, Final
 
 from llvmlite import ir
@@ -76,13 +77,13 @@ def raise_bounds(
             _raise_bounds((0.0, gap - work[far + k]), work, far + WIDTH, row, row)
 
 
-def _largest_lane(lanes: Lanes) -> Any:
-    """The largest of eight numbers, as a number."""
-    number, best = ir.IntType(32), lanes
+def _foremost(rows: list[Lanes], better: Callable[[Lanes, Lanes], Lanes]) -> Any:
+    """The largest or the least of some rows of eight numbers, as a number."""
+    number, best = ir.IntType(32), reduce(better, rows)
     for width in (4, 2, 1):
         order = ir.Constant(ir.VectorType(number, WIDTH), [(k + width) % WIDTH for k in range(WIDTH)])
-        best = best.largest(Lanes(lanes.builder, lanes.builder.shuffle_vector(best.value, best.value, order)))
-    return lanes.builder.extract_element(best.value, number(0))
+        best = better(best, Lanes(best.builder, best.builder.shuffle_vector(best.value, best.value, order)))
+    return best.builder.extract_element(best.value, number(0))
 
 
 @intrinsic
@@ -92,7 +93,7 @@ def _farthest(typing_context, n, blocks, block):
     def codegen(context, builder, signature, arguments):
         n = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
         reach = _reach(n, Block(context, builder, signature.args[1], arguments[1], arguments[2]))
-        return _largest_lane(reach)
+        return _foremost([reach], Lanes.largest)
 
     return signature, codegen
 
@@ -103,17 +104,39 @@ def farthest_along(n: Vector, blocks: Any, leaf: int) -> float:
     return _farthest(n, blocks, leaf)
 
 
+@intrinsic
+def _least(typing_context, work, at):
+    signature = types.float64(work, types.int64)
+
+    def codegen(context, builder, signature, arguments):
+        rows = _rows(context, builder, signature.args[0], arguments)
+        return _foremost(rows, Lanes.least)
+
+    return signature, codegen
+
+
+@intrinsic
+def _first_equal(typing_context, work, at, number):
+    """The first number of all pairs that equals another one, or the last."""
+    signature = types.int64(work, types.int64, types.float64)
+
+    def codegen(context, builder, signature, arguments):
+        number, bits = Lanes.constant(builder, arguments[2]), ir.Constant(ir.IntType(64), 1 << (PAIRS_OF_LEAVES - 1))
+        for k, row in enumerate(_rows(context, builder, signature.args[0], arguments)):
+            equal = builder.bitcast(builder.fcmp_ordered("==", row.value, number.value), ir.IntType(WIDTH))
+            bits = builder.or_(bits, builder.shl(builder.zext(equal, bits.type), bits.type(WIDTH * k)))
+        return builder.cttz(bits, ir.Constant(ir.IntType(1), 1))
+
+    return signature, codegen
+
+
+def _rows(context: Any, builder: Any, array_type: Any, arguments: Any) -> list[Lanes]:
+    """The numbers of all pairs of triangles of two leaves, from an array (the first argument) and a place there."""
+    return [load(context, builder, array_type, *arguments[:2], row) for row in range(0, PAIRS_OF_LEAVES, WIDTH)]
+
+
 @inlined
 def least_of_pairs(work: Any, at: int) -> tuple[float, int]:
     """Least of the numbers of all pairs of triangles of two leaves, and the pair: 8 k + m."""
-    best, first = inf, 0
-    for row in range(0, PAIRS_OF_LEAVES, WIDTH):
-        least = work[at + row]
-        for k in range(1, WIDTH):
-            least = min(least, work[at + row + k])
-        if least < best:
-            best, first = least, row
-    pair = first
-    while work[at + pair] != best and pair < first + WIDTH - 1:
-        pair += 1
-    return best, pair
+    best = _least(work, at)
+    return best, _first_equal(work, at, best)

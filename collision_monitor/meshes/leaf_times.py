@@ -15,8 +15,9 @@ from numba.extending import intrinsic
 
 from collision_monitor._jit import device
 from collision_monitor._jit.lanes import Lanes, load, store
-from collision_monitor.meshes.approach import Approach
-from collision_monitor.meshes.box_times import curvature_until, norm, times_open
+from collision_monitor.meshes.approach import Approach, time_until
+from collision_monitor.meshes.below import is_all_above_zero
+from collision_monitor.meshes.box_times import curvature_until, times_open
 from collision_monitor.meshes.boxes import Block, inner
 from collision_monitor.meshes.layout import CORNERS, RADIUS, WIDTH
 from collision_monitor.meshes.leaf_bounds import least_of_pairs
@@ -30,12 +31,14 @@ SHARE: Final = 0.7
 steps."""
 
 FACTS: Final = 4
-"""Rows of `_extents`: largest n . x with the radius, k . x, u . x, and |x| over the points x of a triangle."""
+"""Rows of a leaf's triangles: largest n . x with the radius, k . x, u . x (`_extents`), and |x| (`_reaches`) over the
+points x of a triangle."""
 
 # in the scratch memory of a query, instead of the boxes that wait
 _TIMES: Final = 0
 _OWN: Final = _TIMES + WIDTH * WIDTH
 _OTHER: Final = _OWN + FACTS * WIDTH
+_REACH: Final = 3 * WIDTH
 
 
 @intrinsic
@@ -46,9 +49,8 @@ def _extents(typing_context, directions, blocks, block, out, at):
         numbers = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
         members = Block(context, builder, signature.args[1], arguments[1], arguments[2])
         corners = [members.vector(CORNERS + 3 * i) for i in range(3)]
-        rows = [[inner(numbers[3 * k : 3 * k + 3], corner) for corner in corners] for k in range(3)]
-        rows.append([norm(corner) for corner in corners])
-        for k, (x, y, z) in enumerate(rows):
+        for k in range(3):
+            x, y, z = (inner(numbers[3 * k : 3 * k + 3], corner) for corner in corners)
             largest = x.largest(y).largest(z)
             row = largest + members.row(RADIUS) if k == 0 else largest
             store(context, builder, row, signature.args[3], arguments[3], arguments[4], WIDTH * k)
@@ -58,19 +60,38 @@ def _extents(typing_context, directions, blocks, block, out, at):
 
 
 @intrinsic
-def _raise_times(typing_context, numbers, work, other, times):
-    signature = types.void(numbers, work, types.int64, types.int64)
+def _reaches(typing_context, blocks, block, out, at):
+    signature = types.void(blocks, types.int64, out, types.int64)
+
+    def codegen(context, builder, signature, arguments):
+        members = Block(context, builder, signature.args[0], arguments[0], arguments[1])
+        x, y, z = (inner(corner, corner) for corner in (members.vector(CORNERS + 3 * i) for i in range(3)))
+        far = x.largest(y).largest(z).root()
+        store(context, builder, far, signature.args[2], arguments[2], arguments[3], _REACH)
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@intrinsic
+def _raise_times(typing_context, numbers, enough, work, other, times):
+    """Raise the times of eight pairs to those until which they stay apart, or to `enough` if all of them are later."""
+    signature = types.void(numbers, types.float64, work, types.int64, types.int64)
 
     def codegen(context, builder, signature, arguments):
         fields = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
         gap, speed, bent, largest, change, bend, jerk, until = fields
-        far, forth, curving, reach = (
-            load(context, builder, signature.args[1], arguments[1], arguments[2], WIDTH * k) for k in range(FACTS)
-        )
+        enough, array = Lanes.constant(builder, arguments[1]), (signature.args[2], arguments[2])
+        far, forth, curving, reach = (load(context, builder, *array, arguments[3], WIDTH * k) for k in range(FACTS))
         curvature = curvature_until(until, largest + bend * reach, bent + curving, change + jerk * reach)
-        time = times_open(gap - far, speed + forth, curvature)
-        known = load(context, builder, signature.args[1], arguments[1], arguments[3])
-        store(context, builder, known.largest(time), signature.args[1], arguments[1], arguments[3])
+        gap, speed, known = gap - far, speed + forth, load(context, builder, *array, arguments[4])
+        rest = gap - enough * (speed + enough * curvature * Lanes.constant(builder, 0.5))
+        # with a curvature of at least 0, a gap that is open now and at the end of a time is open within it; NaN is not
+        with builder.if_else(is_all_above_zero(gap.least(rest)), likely=True) as (open_, closing):
+            with open_:
+                store(context, builder, known.largest(enough), *array, arguments[4])
+            with closing:  # with a root and a quotient
+                store(context, builder, known.largest(times_open(gap, speed, curvature)), *array, arguments[4])
         return context.get_dummy_value()
 
     return signature, codegen
@@ -78,9 +99,13 @@ def _raise_times(typing_context, numbers, work, other, times):
 
 @device
 def _raise_along(
-    n: Vector, blocks_a: Any, leaf_a: int, blocks_b: Any, leaf_b: int, X: Placing, move: Approach, aim: float, work: Any
+    n: Vector, blocks_a: Any, leaf_a: int, blocks_b: Any, leaf_b: int, X: Placing, move: Approach, aim: float,
+    enough: float, pair: int, work: Any,
 ) -> None:
-    """Raise the times of all pairs to those until which they stay `aim` (m) apart along a direction n."""
+    """Raise the times of all pairs to those until which they stay `aim` (m) apart along a direction n.
+
+    Times later than `enough` (s), or than that of a pair that is not -1, are as good as that.
+    """
     k, m = cross(n, move.w_a), cross(n, move.w_b)
     u = cross(k, move.w_a)
     _extents((n[0], n[1], n[2], k[0], k[1], k[2], u[0], u[1], u[2]), blocks_a, leaf_a, work, _OWN)
@@ -88,8 +113,17 @@ def _raise_along(
     d, f, u = turn_back(X, opposite(n)), turn_back(X, opposite(m)), turn_back(X, cross(move.w_b, m))
     _extents((d[0], d[1], d[2], f[0], f[1], f[2], u[0], u[1], u[2]), blocks_b, leaf_b, work, _OTHER)
     speed, bent = move.growth - dot(n, move.v), -dot(n, move.a)
+    if pair >= 0:
+        i, j = _OWN + pair // WIDTH, _OTHER + pair % WIDTH
+        reach, other = work[i + _REACH], work[j + _REACH]
+        curving = bent + work[i + 2 * WIDTH] + work[j + 2 * WIDTH]
+        change = move.jerk + move.jerk_a * reach + move.jerk_b * other
+        largest = move.bend + move.bend_a * reach + move.bend_b * other
+        curvature = min(largest, max(curving + move.until * change / 3.0, 0.0))
+        time = time_until(gap - work[i] - work[j], speed + work[i + WIDTH] + work[j + WIDTH], curvature)
+        enough = min(enough, time)
     for i in range(WIDTH):
-        reach = work[_OWN + 3 * WIDTH + i]
+        reach = work[_OWN + _REACH + i]
         numbers = (
             gap - work[_OWN + i],
             speed + work[_OWN + WIDTH + i],
@@ -100,7 +134,7 @@ def _raise_along(
             move.jerk_b,
             move.until,
         )
-        _raise_times(numbers, work, _OTHER, _TIMES + WIDTH * i)
+        _raise_times(numbers, enough, work, _OTHER, _TIMES + WIDTH * i)
 
 
 @device
@@ -116,6 +150,8 @@ def leaf_time(
     """
     for k in range(WIDTH * WIDTH):
         work[_TIMES + k] = 0.0
+    _reaches(blocks_a, leaf_a, work, _OWN)
+    _reaches(blocks_b, leaf_b, work, _OTHER)
     seen, best, first, is_bounded = 0, inf, pair, False
     while True:  # terminates: each pair is looked at once
         if pair >= 0 and not (seen >> pair) & 1:
@@ -129,13 +165,13 @@ def leaf_time(
                 return 0.0, pair
             w = minus(found.on_b, found.on_a)
             n = w[0] / length, w[1] / length, w[2] / length
-            _raise_along(n, blocks_a, leaf_a, blocks_b, leaf_b, X, move, 0.5 * tolerance, work)
+            _raise_along(n, blocks_a, leaf_a, blocks_b, leaf_b, X, move, 0.5 * tolerance, best, pair, work)
             if work[_TIMES + pair] < best:
                 best, first = work[_TIMES + pair], pair
         elif not is_bounded:
             is_bounded = True
             n = toward(blocks_a, place_a // WIDTH, place_a % WIDTH, blocks_b, place_b // WIDTH, place_b % WIDTH, X)
-            _raise_along(n, blocks_a, leaf_a, blocks_b, leaf_b, X, move, 0.5 * tolerance, work)
+            _raise_along(n, blocks_a, leaf_a, blocks_b, leaf_b, X, move, 0.5 * tolerance, best, -1, work)
         soon, pair = least_of_pairs(work, _TIMES)
         if soon >= SHARE * best or soon > enough or soon >= move.until or (seen >> pair) & 1:
             return soon, first
