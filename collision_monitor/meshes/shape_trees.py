@@ -45,14 +45,14 @@ def shape_tree(shape: Shape) -> Array | None:
     return kept_tree(shape).tree
 
 
-def kept_tree(shape: Shape) -> KeptTree:
-    """Tree of a shape with what is known of it, made at the first call."""
+def kept_tree(shape: Shape, split: int = 0) -> KeptTree:
+    """Tree of a shape with what is known of it, made at the first call; split: of a mesh's faces, see `tree_of`."""
     known: KeptTree | None = shape.__dict__.get("kept_tree")
     if known is None:
         inside = UNCERTAIN if isinstance(shape, Points) else CERTAIN
         if isinstance(shape, Mesh) and not shape.surface.certain:
             inside = NEVER if len(shape.surface.hole) else UNCERTAIN
-        tree, radius = made_tree(shape), shape.radius if isinstance(shape, Points) else 0.0
+        tree, radius = made_tree(shape, split), shape.radius if isinstance(shape, Points) else 0.0
         known = KeptTree(tree, is_concave_mesh(shape), inside, inf if tree is None else reach_of(tree) + radius)
         shape.__dict__["kept_tree"] = known
     return known
@@ -89,15 +89,16 @@ def _plate(box: Box) -> Array:
     return np.array([k[[q[0], q[i], q[i + 1]]] for q in quads for i in (1, 2)])
 
 
-def made_tree(shape: Shape) -> Array | None:
-    """As `shape_tree`, but made anew."""
+def made_tree(shape: Shape, split: int = 0) -> Array | None:
+    """As `shape_tree`, but made anew; split: of a mesh's faces, see `tree_of`."""
     match shape:
         case Mesh():
             surface = shape.surface
             faces = surface.faces if len(surface.faces) else shape.faces[:1]
             first = np.unique(surface.part, return_index=True)[1] if len(surface.faces) else [0]
             closed = surface.closed and surface.certain
-            return tree_of(shape.vertices[shape.faces], closed=closed, parts=shape.vertices[faces[first, 0]])
+            parts = shape.vertices[faces[first, 0]]
+            return tree_of(shape.vertices[shape.faces], closed=closed, parts=parts, split=split)
         case Points():
             return cloud_tree(shape.points)
         case Sphere():

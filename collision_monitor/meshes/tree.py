@@ -51,23 +51,24 @@ PARALLEL: Final = 50_000
 
 
 def tree_of(
-    corners: Array, radius: float | Array = 0.0, closed: bool = False, parts: Array | None = None
+    corners: Array, radius: float | Array = 0.0, closed: bool = False, parts: Array | None = None, split: int = 0
 ) -> Array:
     """Build the tree (n, ROWS, WIDTH) over triangles (m, 3, 3) in m, m >= 1, in any order and place.
 
     radius: by which the triangles are enlarged (m), one number or (m,). A cloud of points is triangles with equal
     corners. closed: the triangles bound a solid. parts (k, 3): a point of each connected part; None: there is one part.
+    split: the first so many triangles, and the others, have a box of their own each below the root.
     """
     corners = np.ascontiguousarray(corners, dtype=np.float64)
     n = len(corners)
     radii = np.broadcast_to(np.asarray(radius, dtype=np.float64), n).copy()
     inner = corners[:1, 0] if parts is None else parts
-    behind = BOXES + _blocks_of(n)
+    behind = BOXES + (BOXES + _blocks_of(split) + _blocks_of(n - split) if split else _blocks_of(n))
     tree = np.empty((behind + -(-min(len(inner), MOST_PARTS) // WIDTH), ROWS, WIDTH))
     tree[:BOXES] = tree[behind:] = 0.0
     middle = np.empty((n, 3))
     far = _measure(corners, radii, middle)
-    _grow_all((corners, radii, middle, np.arange(n), tree))
+    _grow_all((corners, radii, middle, np.arange(n), tree), split)
     for k, point in enumerate(inner[:MOST_PARTS]):
         tree[behind + k // WIDTH, :3, k % WIDTH] = point
     tree[0, CLOSED, 1], tree[0, REACH, 1] = closed, np.nextafter(far * (1.0 + CONTAINED), np.inf)
@@ -79,11 +80,18 @@ def tree_of(
     return tree
 
 
-def _grow_all(arrays: tuple[Array, Array, Array, NDArray[np.int64], Array]) -> None:
+def _grow_all(arrays: tuple[Array, Array, Array, NDArray[np.int64], Array], split: int) -> None:
     """Write all blocks. The parts of a large tree grow on threads; each writes its own blocks, known in advance."""
     stack = np.zeros((STACK, PART), np.int64)
-    n = len(arrays[0])
+    n, order = len(arrays[0]), arrays[3]
     stack[0] = 0, n, 0, 0, BOXES
+    if split:
+        _grow(*arrays, stack, 1, 1)  # the root, and parts in another order
+        order[:] = range(n)
+        first = 2 * BOXES
+        stack[:2] = (0, split, BOXES, 0, first), (split, n, BOXES, 1, first + _blocks_of(split))
+        _grow(*arrays, stack, 2, n)
+        return
     if n < PARALLEL:
         _grow(*arrays, stack, 1, n)
         return

@@ -17,6 +17,7 @@ from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape, array_bytes
+from collision_monitor.meshes.shape_trees import kept_tree
 from collision_monitor.tolerances import ROUNDED_UP
 
 LEAST_THICKNESS: Final = 1e-6
@@ -57,12 +58,17 @@ MOST_FILLED: Final = 20_000
 
 @bounded_cache(REMEMBERED_FILLINGS, lambda found, mesh: array_bytes(mesh) + (array_bytes(found) if found else 0))
 def filled_mesh(mesh: Mesh) -> Mesh | None:
-    """The surface of an open mesh and the box around its hole as one; None for more than MOST_FILLED faces."""
-    if len(mesh.faces) > MOST_FILLED:
+    """The surface of an open mesh and the box around its hole as one; None for more than MOST_FILLED faces.
+
+    Its tree has a branch for each: the large faces of the box would enlarge the boxes of small ones beside them.
+    """
+    if len(mesh.faces) > MOST_FILLED or (filled := filled_box(mesh)) is None:
         return None
-    box = convex_hull(_filled_box(mesh).hull.points)
+    box = convex_hull(filled.hull.points)
     faces = np.concatenate([mesh.faces, box.faces + len(mesh.vertices)])
-    return Mesh(np.concatenate([mesh.vertices, box.vertices]), faces)
+    whole = Mesh(np.concatenate([mesh.vertices, box.vertices]), faces)
+    kept_tree(whole, split=len(mesh.faces))
+    return whole
 
 
 class FilledBox(NamedTuple):
@@ -73,11 +79,15 @@ class FilledBox(NamedTuple):
 
 
 def filled_box(mesh: Mesh) -> FilledBox | None:
-    """Box around the hole of a mesh; None for a closed one."""
-    return _filled_box(mesh) if len(mesh.surface.hole) else None
+    """Box around the hole of a mesh, kept with the mesh as its tree is; None for a closed one."""
+    known: FilledBox | None
+    try:
+        known = mesh.__dict__["filled_box"]
+    except KeyError:
+        known = mesh.__dict__["filled_box"] = _filled_box(mesh) if len(mesh.surface.hole) else None
+    return known
 
 
-@bounded_cache(REMEMBERED_FILLINGS, lambda found, mesh: FILLING_BYTES + array_bytes(mesh))
 def _filled_box(mesh: Mesh) -> FilledBox:
     ((box, pose),) = _filling(mesh)
     own = np.abs((mesh.vertices - pose.position) @ pose.rotation)

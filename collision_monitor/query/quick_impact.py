@@ -8,7 +8,7 @@ from typing import Final
 
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import Mesh, Shape
-from collision_monitor.meshes.shape_trees import kept_tree, trees_of_pair
+from collision_monitor.meshes.shape_trees import NEVER, have_kernels, kept_tree
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.convex_pairs import convex_contact, convex_impact
 from collision_monitor.query.fillings import filled_box, filled_mesh
@@ -49,7 +49,7 @@ def quick_open_impact(
         return None
     if not (isinstance(motion_a, Motion) and isinstance(motion_b, Motion)):
         return None
-    if trees_of_pair(shape_a, shape_b, surface=True) is None:
+    if not have_kernels(kept_tree(shape_a), kept_tree(shape_b), NEVER):
         return None
     whole_a, whole_b = _with_filling(shape_a), _with_filling(shape_b)
     possible = None
