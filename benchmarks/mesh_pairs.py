@@ -3,10 +3,10 @@
     python benchmarks/mesh_pairs.py              all surfaces, about 3 minutes
     python benchmarks/mesh_pairs.py --quick      a few poses of each
 
-Each query is asked of us and of FCL in turn, and of Coal (installed by `make bench-peers`) in a second process with the
-same poses. The figures are means in µs over all poses, each the best of three. The ratios are to the faster of the two:
-below 1 we are faster. All answers are compared. Ours are `cm.contact`, `cm.overlap` and `cm.time_of_impact`, with all
-that Python adds.
+Each query is asked of us and of FCL in turn, and just before, of Coal (installed by `make bench-peers`) in a second
+process with the same poses. The figures are means in µs over all poses, each the best of three. The ratios are to the
+faster of the two: below 1 we are faster. All answers are compared. Ours are `cm.contact`, `cm.overlap` and
+`cm.time_of_impact`, with all that Python adds.
 """
 
 from __future__ import annotations
@@ -105,32 +105,40 @@ def timed(function: Callable[[], Any]) -> tuple[Any, float]:
 
 
 def coal_answers(file: Path) -> dict[str, Any]:
-    """Times (s) and answers of Coal for the poses of all surfaces in the file; runs in the peers' environment."""
+    """Times (s) and answers of Coal for the poses of a surface in a file; runs in the peers' environment."""
     import coal
 
-    data, found = np.load(file), {}
-    for name in data["names"]:
-        vertices, faces = data[f"{name}.vertices"], data[f"{name}.faces"]
-        begin = time.perf_counter()
-        model = coal.BVHModelOBBRSS()
-        model.beginModel(len(faces), len(vertices))
-        model.addVertices(vertices)
-        model.addTriangles(faces.astype(np.int64))
-        model.endModel()
-        rows: dict[str, Any] = {"build": time.perf_counter() - begin, "distance": [], "overlap": []}
-        for a, b in data[f"{name}.poses"]:
-            X, Y = (coal.Transform3s(*matrices(pose)) for pose in (a, b))
+    data = np.load(file)
+    vertices, faces = data["vertices"], data["faces"]
+    begin = time.perf_counter()
+    model = coal.BVHModelOBBRSS()
+    model.beginModel(len(faces), len(vertices))
+    model.addVertices(vertices)
+    model.addTriangles(faces.astype(np.int64))
+    model.endModel()
+    rows: dict[str, Any] = {"build": time.perf_counter() - begin, "distance": [], "overlap": []}
+    for a, b in data["poses"]:
+        X, Y = (coal.Transform3s(*matrices(pose)) for pose in (a, b))
 
-            def collide(X: Any = X, Y: Any = Y, model: Any = model) -> bool:
-                return bool(coal.collide(model, X, model, Y, coal.CollisionRequest(), coal.CollisionResult()))
+        def collide(X: Any = X, Y: Any = Y) -> bool:
+            return bool(coal.collide(model, X, model, Y, coal.CollisionRequest(), coal.CollisionResult()))
 
-            def distance(X: Any = X, Y: Any = Y, model: Any = model) -> float:
-                return float(coal.distance(model, X, model, Y, coal.DistanceRequest(), coal.DistanceResult()))
+        def distance(X: Any = X, Y: Any = Y) -> float:
+            return float(coal.distance(model, X, model, Y, coal.DistanceRequest(), coal.DistanceResult()))
 
-            rows["overlap"].append(timed(collide))
-            rows["distance"].append((0.0, np.nan) if rows["overlap"][-1][0] else timed(distance))
-        found[str(name)] = rows
-    return found
+        rows["overlap"].append(timed(collide))
+        rows["distance"].append((0.0, np.nan) if rows["overlap"][-1][0] else timed(distance))
+    return rows
+
+
+def asked_of_coal(peers: Path, surface: Surface, rows: Array) -> dict[str, Any]:
+    """`coal_answers` of a second process."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "mesh.npz"
+        np.savez(file, vertices=surface.vertices, faces=surface.faces, poses=rows)
+        command = [str(peers), __file__, "--coal", str(file)]
+        answers: dict[str, Any] = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    return answers
 
 
 def measure(surface: Surface, rows: Array) -> dict[str, Any]:
@@ -184,24 +192,15 @@ def main() -> int:
         return 0
     every = surfaces()
     asked = {name: poses(surface, 3 if args.quick else 12, k) for k, (name, surface) in enumerate(every.items())}
-    coal: dict[str, Any] = {}
-    if args.peers.exists():
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "meshes.npz"
-            arrays: dict[str, Any] = {"names": np.array(list(every))}
-            for name, surface in every.items():
-                arrays |= {f"{name}.vertices": surface.vertices, f"{name}.faces": surface.faces}
-                arrays[f"{name}.poses"] = asked[name]
-            np.savez(file, **arrays)
-            command = [str(args.peers), __file__, "--coal", str(file)]
-            coal = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
-    else:
+    has_coal = args.peers.exists()
+    if not has_coal:
         print(f"no Coal: there is no Python at {args.peers} (make bench-peers); FCL alone", file=sys.stderr)
     header = "surface, triangles | distance: ours  FCL  Coal ratio | overlap: ours  FCL  Coal ratio | "
     print(header + "impact /distance | build ms: ours  FCL ratio | bytes/triangle | differ")
     table = []
     for name, surface in every.items():
-        row = summary(measure(surface, asked[name]), coal.get(name), len(surface.faces))
+        coal = asked_of_coal(args.peers, surface, asked[name]) if has_coal else None
+        row = summary(measure(surface, asked[name]), coal, len(surface.faces))
         table.append({"surface": name, **row})
         print("{:18s} | {:7.1f} {:7.1f} {:7.1f} {:5.2f} | {:7.1f} {:7.1f} {:7.1f} {:5.2f} | {:7.0f} {:6.1f} | "
               "{:8.2f} {:8.2f} {:5.2f} | {:5.0f} | {}".format(name, *row.values()))  # fmt: skip

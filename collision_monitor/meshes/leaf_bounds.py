@@ -132,7 +132,8 @@ def _first_equal(typing_context, work, at, number):
 
 def _rows(context: Any, builder: Any, array_type: Any, arguments: Any) -> list[Lanes]:
     """The numbers of all pairs of triangles of two leaves, from an array (the first argument) and a place there."""
-    return [load(context, builder, array_type, *arguments[:2], row) for row in range(0, PAIRS_OF_LEAVES, WIDTH)]
+    array, at = arguments[:2]
+    return [load(context, builder, array_type, array, at, row) for row in range(0, PAIRS_OF_LEAVES, WIDTH)]
 
 
 @inlined
