@@ -20,6 +20,9 @@ REMEMBERED_PIECES: Final = 16 << 20
 """Bytes of pieces that are remembered: those of meshes of 11,000 faces in all. More: memory that hostile meshes can
 fill. Less: describing an object cuts its mesh several times."""
 
+FEW_FACES: Final = 16
+"""Faces that are compared with all vertices first: of most concave meshes, one of them has vertices on both sides."""
+
 PIECE_BYTES: Final = 1300
 """Memory of a piece with its pose and the pose's rotation (measured with tracemalloc: 1,114 bytes for a triangle)."""
 
@@ -78,7 +81,10 @@ def is_convex_mesh(mesh: Mesh) -> bool:
     flat = HULL_DROP * 16 * size
     # all faces must point outward, or all inward, and the mesh must not be a sheet folded onto itself
     outward = inward = True
-    for some in np.array_split(np.arange(len(normal)), len(normal) * len(used) // HEIGHTS_AT_ONCE + 1):
+    first, last = 0, FEW_FACES
+    while first < len(normal):
+        some, first = slice(first, last), last
+        last += max(HEIGHTS_AT_ONCE // len(used), FEW_FACES)
         height = used @ normal[some].T - offset[some]
         low, high = height.min(axis=0), height.max(axis=0)
         outward = outward and bool((high <= flat).all() and (low < -flat).all())
