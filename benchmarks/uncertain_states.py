@@ -5,6 +5,7 @@ For each scene with noisy states: ms a step of the profile `fast` (without proba
 
     python benchmarks/uncertain_states.py                    about two minutes
     python benchmarks/uncertain_states.py --scene fleet hall
+    python benchmarks/uncertain_states.py --scene fleet "clutter of 100" --noise 0.05      larger errors
 """
 
 from __future__ import annotations
@@ -25,13 +26,13 @@ from collision_monitor.records import STATE
 from collision_monitor.world import make_scene
 
 States = NDArray[np.void]
-NOISE = 0.005
+Scene = tuple[Sequence[ObjectDescription], Iterator[States]]
 PLANES, SAMPLES = uncertain_predictions.FINEST_WITH_PLANES, float("inf")
 
 
-def simulated(name: str, objects: int | None) -> tuple[Sequence[ObjectDescription], Iterator[States]]:
-    """Descriptions and states of a scene at 20 Hz, with the noise of a localiser in all quantities."""
-    scene = make_scene(name, objects=objects, noise=NOISE)
+def simulated(name: str, objects: int | None, noise: float) -> Scene:
+    """Descriptions and states of a scene at 20 Hz, with the same noise in all quantities (m, rad, m/s and rad/s)."""
+    scene = make_scene(name, objects=objects, noise=noise)
 
     def states() -> Iterator[States]:
         while True:
@@ -41,7 +42,7 @@ def simulated(name: str, objects: int | None) -> tuple[Sequence[ObjectDescriptio
     return scene.descriptions, states()
 
 
-def hall(people: int) -> tuple[Sequence[ObjectDescription], Iterator[States]]:
+def hall(people: int) -> Scene:
     """People that cross a hall at random, 0.125 for each square metre, uncertain by 0.05 m and 0.15 m/s."""
     random = np.random.default_rng(0)
     side = float(np.sqrt(8.0 * people))
@@ -59,20 +60,24 @@ def hall(people: int) -> tuple[Sequence[ObjectDescription], Iterator[States]]:
     return [ObjectDescription(k, cm.Cylinder(0.25, 1.75)) for k in range(people)], states()
 
 
-SCENES: dict[str, Callable[[], tuple[Sequence[ObjectDescription], Iterator[States]]]] = {
-    "fleet": lambda: simulated("fleet", None),
-    "fleet of 1000": lambda: simulated("fleet", 1000),
-    "hall": lambda: hall(200),
-    "hall of 1000": lambda: hall(1000),
-    "swarm of 1000": lambda: simulated("swarm", 1000),
-    "particles of 1000": lambda: simulated("particles", 1000),
-    "clutter of 300": lambda: simulated("clutter", 300),
+SCENES: dict[str, Callable[[float], Scene]] = {
+    "fleet": lambda noise: simulated("fleet", None, noise),
+    "fleet of 1000": lambda noise: simulated("fleet", 1000, noise),
+    "hall": lambda noise: hall(200),
+    "hall of 1000": lambda noise: hall(1000),
+    "swarm of 100": lambda noise: simulated("swarm", 100, noise),
+    "swarm of 1000": lambda noise: simulated("swarm", 1000, noise),
+    "particles of 1000": lambda noise: simulated("particles", 1000, noise),
+    "clutter of 100": lambda noise: simulated("clutter", 100, noise),
+    "clutter of 300": lambda noise: simulated("clutter", 300, noise),
+    "clutter of 1000": lambda noise: simulated("clutter", 1000, noise),
+    "arm": lambda noise: simulated("arm", None, noise),
 }
 
 
-def measure(name: str, steps: int) -> str:
+def measure(name: str, steps: int, noise: float) -> str:
     """One row of the table."""
-    descriptions, states = SCENES[name]()
+    descriptions, states = SCENES[name](noise)
     ways = {"fast": ("fast", PLANES), "planes": ("balanced", PLANES), "samples": ("balanced", SAMPLES)}
     monitors = {way: cm.Monitor(profile) for way, (profile, _) in ways.items()}
     for monitor in monitors.values():
@@ -109,6 +114,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scene", nargs="+", choices=SCENES, default=list(SCENES), metavar="NAME")
     parser.add_argument("--steps", type=int, default=12)
+    parser.add_argument("--noise", type=float, default=0.005, help="of states, not in halls (m, rad, m/s, rad/s)")
     args = parser.parse_args()
     print(
         "| scene | objects | fast (ms) | balanced (ms) | p99 (ms) | every sample (ms) | times as fast "
@@ -116,7 +122,7 @@ def main() -> int:
     )
     print("|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|")
     for name in args.scene:
-        print(measure(name, args.steps), flush=True)
+        print(measure(name, args.steps, args.noise), flush=True)
     return 0
 
 

@@ -39,7 +39,7 @@ examples:
   collision-monitor tradeoff --path ../shared/data/citr                   with recorded tracks too
   collision-monitor tradeoff --scene clutter --impact-methods             bisection, swept SAT, …
   collision-monitor tradeoff --scene arm --model obb --model convex_hull  models against the meshes
-  collision-monitor tradeoff run.mcap --front --png front.png              the Pareto front of 17 settings
+  collision-monitor tradeoff run.mcap --front --png front.png              the Pareto front of up to 18 settings
 
 An alarm is a pair that is reported at a step, as a contact or as a prediction. It is false if the
 pair does not touch within the horizon (`compare` and `tune` count the same). `beyond`: alarms that the
