@@ -77,15 +77,34 @@ def sphere_grown(points: ArrayLike) -> BoundingSphere:
 
 
 def minimal_sphere(points: ArrayLike) -> BoundingSphere:
-    """Smallest sphere, to about 1e-12 of its radius. Expected O(n). (Welzl, Smallest enclosing disks, 1991)"""
+    """Smallest sphere, to about 1e-12 of its radius. About ten passes over the points.
+
+    (Welzl, Smallest enclosing disks, 1991; Gärtner, Fast and robust smallest enclosing balls, 1999: the farthest point
+    first)
+    """
     points = point_set(points, "points")
     outer = np.unique(_outer(points), axis=0)
     base = outer.mean(axis=0)
     size = float(np.abs(outer - base).max()) or 1.0
     # a random order makes the expected time linear; a fixed seed makes the result reproducible
     shuffled = np.random.default_rng(0).permutation((outer - base) / size)
-    found = _smallest(shuffled, np.zeros((0, points.shape[1])), iter(range(MOST_GROWTH)))
+    found = _smallest_of_few(shuffled, iter(range(MOST_GROWTH)))
     return sphere_grown(points) if found is None else _around(points, base + size * found[0])
+
+
+def _smallest_of_few(points: Array, tries: Iterator[int]) -> tuple[Array, float] | None:
+    """As `_smallest` without points on the surface: that of a few points, to which the farthest one is added in turn."""
+    few, none = points[:1], points[:0]
+    while True:  # terminates: each turn takes one of the tries
+        found = _smallest(few, none, tries)
+        if found is None or next(tries, None) is None:
+            return None
+        center, radius = found
+        distance = np.linalg.norm(points - center, axis=1)
+        k = int(distance.argmax())
+        if not distance[k] > radius * (1 + GROWTH_THRESHOLD):
+            return found
+        few = np.vstack([points[k], few])
 
 
 def _smallest(points: Array, touching: Array, tries: Iterator[int]) -> tuple[Array, float] | None:
