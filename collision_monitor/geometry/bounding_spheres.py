@@ -93,7 +93,7 @@ def minimal_sphere(points: ArrayLike) -> BoundingSphere:
 
 
 def _smallest_of_few(points: Array, tries: Iterator[int]) -> tuple[Array, float] | None:
-    """As `_smallest` without points on the surface: that of a few points, to which the farthest one is added in turn."""
+    """As `_smallest`, for no points on the surface: around a few points, to which the farthest one is added in turn."""
     few, none = points[:1], points[:0]
     while True:  # terminates: each turn takes one of the tries
         found = _smallest(few, none, tries)
