@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
@@ -13,6 +12,7 @@ from typing import Final
 from collision_monitor._version import VERSION
 from collision_monitor.cli.error_line import print_error
 from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.output_streams import accept_any_text, discard_output
 from collision_monitor.cli.usage import UsageError
 from collision_monitor.errors import CollisionMonitorError
 
@@ -77,6 +77,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line (default: sys.argv) and return the exit code."""
+    accept_any_text()
     try:
         args = make_parser().parse_args(arguments)
         command: Callable[[argparse.Namespace], int] = args.command
@@ -91,10 +92,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return ExitCode.ERROR
     except KeyboardInterrupt:
         return ExitCode.INTERRUPTED
-    except BrokenPipeError:
-        # The reader (head, less) closed the pipe. Redirect stdout, or Python reports the error again at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # the reader (head, less) closed the pipe
+        discard_output()
         return ExitCode.BROKEN_PIPE
+    except OSError as error:  # a full disk behind stdout, for example
+        discard_output()
+        where = f"{error.filename}: " if error.filename else ""
+        print_error(f"{where}{error.strerror or error}")
+        return ExitCode.ERROR
 
 
 def replay_main() -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -108,3 +109,26 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
         process.stdout.close()
         assert process.stderr.read() == ""
     assert process.wait(60) == 141
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_a_terminal_of_another_encoding_gets_question_marks(encoding: str) -> None:
+    environment = {**os.environ, "PYTHONIOENCODING": encoding}
+    answer = subprocess.run([PROGRAM, "tradeoff", "--help"], capture_output=True, env=environment, timeout=60)
+    assert (answer.returncode, answer.stderr) == (0, b"")
+    assert b"tradeoff" in answer.stdout
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no /dev/full")
+def test_a_full_disk_behind_stdout_is_one_line() -> None:
+    with open("/dev/full", "w") as full:
+        answer = subprocess.run([PROGRAM, "world", "--list"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+    assert answer.returncode == 1
+    assert answer.stderr == "collision-monitor: error: No space left on device\n"
+
+
+def test_a_closed_stdout_is_no_error() -> None:
+    answer = subprocess.run(
+        ["sh", "-c", '"$0" world --list >&-', PROGRAM], stderr=subprocess.PIPE, text=True, timeout=60
+    )
+    assert (answer.returncode, answer.stderr) == (0, "")
