@@ -11,7 +11,7 @@ from typing import Any
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.progress import session_bar
 from collision_monitor.cli.quantities import whole
-from collision_monitor.cli.usage import UsageError, check_profiles
+from collision_monitor.cli.usage import UsageError, check_profiles, usage
 from collision_monitor.errors import MessageError
 from collision_monitor.pipeline.topics import NODE
 from collision_monitor.ros.process import StopRequest, ros_context, stay_on_this_machine
@@ -141,7 +141,8 @@ def _view_live(args: argparse.Namespace, stop: StopRequest) -> None:
     with ros_context(["collision-monitor", *(["--ros-args", *args.ros_args] if args.ros_args else [])]):
         from collision_monitor.ros.scene_listener import SceneListener
 
-        listener = SceneListener(monitor, take)
+        with usage():
+            listener = SceneListener(monitor, take)
         _announce(server, args, f"/{monitor}")
         while not stop.received:
             now = time.monotonic()

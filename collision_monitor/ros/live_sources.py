@@ -17,6 +17,7 @@ from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.pipeline.topics import SOURCES
 from collision_monitor.ros.endpoints import message_class
 from collision_monitor.ros.line_report import Level, LineReport
+from collision_monitor.ros.names import is_topic_name
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage
 from collision_monitor.sources.tf_objects import TRANSFORMS
@@ -36,6 +37,7 @@ class LiveSources:
     """Subscribes to the topics of a sources file. take: called with each input for the monitor.
 
     warn: called with the name of a line, a text and how often it happened.
+    Raises InputError for a topic whose name ROS does not accept.
     """
 
     def __init__(
@@ -47,6 +49,10 @@ class LiveSources:
         self._feed = Feed(mapping, self._decoder)
         # Transforms first: if several messages wait, the executor takes them in the order of the subscriptions.
         wanted = dict.fromkeys(_TF, (TRANSFORMS,)) | self._feed.wanted
+        for topic in (*wanted, *filter(None, [mapping.step_topic])):
+            if not is_topic_name(topic):
+                text = f"expected a topic's name of letters, digits, underscores and slashes, got {topic!r}"
+                raise InputError(mapping.located(f"{self._line(topic)}, topic: {text}"))
         self._wanted = {node.resolve_topic_name(topic): (topic, types) for topic, types in wanted.items()}
         self._found: dict[str, str] = {}  # topic of the file -> type
         self._problems: dict[str, str] = {}  # the same, or the name of a line -> why it cannot be used

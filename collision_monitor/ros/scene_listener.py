@@ -11,6 +11,7 @@ from rclpy.executors import SingleThreadedExecutor
 
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.ros.endpoints import subscription
+from collision_monitor.ros.names import check_node_name
 
 TOPICS: Final = (
     *(Topic.MONITORED_SHAPES, Topic.MONITORED_STATES, Topic.CONTACTS, Topic.PREDICTIONS, Topic.RAISED_ALERTS),
@@ -22,12 +23,13 @@ class SceneListener:
     """Passes each message to `take` with its type, such as `ContactArray`.
 
     monitor: the full name of the node without the first slash. arrived: monotonic time (s) of the last answers; None
-    before the first.
+    before the first. Raises InputError for a name that no node can have.
     """
 
     def __init__(self, monitor: str, take: Callable[[str, bytes], None]) -> None:
         self.arrived: float | None = None
         self._take = take
+        check_node_name(monitor)
         self._node = rclpy.create_node("view")
         for topic in TOPICS:
             subscription(self._node, topic, self._taking(topic), topic.of(monitor))

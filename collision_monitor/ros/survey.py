@@ -12,6 +12,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from collision_monitor.errors import CollisionMonitorError
+from collision_monitor.pipeline.topics import Topic
 from collision_monitor.ros.endpoints import message_class
 from collision_monitor.ros.line_report import LineReport
 from collision_monitor.ros.live_sources import LiveSources, quality_of_all
@@ -59,18 +60,30 @@ class TopicFacts:
 
 
 def survey(seconds: float) -> list[TopicFacts]:
-    """Listen to every topic of a type that the sources understand, and return what was there, by topic."""
+    """Listen to every topic of a type that the sources understand, and return what was there, by topic.
+
+    The markers of monitors are left out: they show what is monitored already.
+    """
     found: dict[str, TopicFacts] = {}
     decoder = Decoder({})
     end = time.monotonic() + seconds
     with _Listener("collision_monitor_survey") as listener:
         while time.monotonic() < end:
             listener.listen(LOOK_PERIOD)
-            for topic, kinds in listener.node.get_topic_names_and_types():
+            topics = dict(listener.node.get_topic_names_and_types())
+            for topic, kinds in topics.items():
+                if _is_of_a_monitor(topic, topics):
+                    continue
                 kind = next((each for each in kinds if each in BY_TYPE or is_of_robot(topic, each)), None)
                 if kind is not None and topic not in found:
                     _subscribe(listener.node, topic, kind, found, decoder)
     return [found[topic] for topic in sorted(found)]
+
+
+def _is_of_a_monitor(topic: str, topics: dict[str, list[str]]) -> bool:
+    """Whether a monitor publishes the topic, of all topics with their types, as its markers."""
+    node = topic.removeprefix("/").removesuffix(f"/{Topic.MARKERS.path}")
+    return topic == Topic.MARKERS.of(node) and Topic.STATUS.type_name in topics.get(Topic.STATUS.of(node), [])
 
 
 def _subscribe(node: Node, topic: str, kind: str, found: dict[str, TopicFacts], decoder: Decoder) -> None:

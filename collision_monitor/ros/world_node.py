@@ -8,15 +8,14 @@ from __future__ import annotations
 import math
 import time
 
-from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from collision_monitor import codec
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.pipeline.topics import NODE, Topic
 from collision_monitor.ros.endpoints import publisher, subscription
+from collision_monitor.ros.names import check_node_name
 from collision_monitor.ros.parameters import ParameterReader
 from collision_monitor.ros.process import WAKE_UP, StopRequest
 from collision_monitor.world import make_scene, scene_names
@@ -45,12 +44,7 @@ class WorldNode(Node):
             self.destroy_node()
             raise
         shapes, states = Topic.SHAPES.of(self._monitor), Topic.STATES.of(self._monitor)
-        try:
-            validate_full_topic_name(shapes)
-        except InvalidTopicNameException:
-            raise InputError(
-                f"monitor: expected a node's name of letters, digits and underscores, got {self._monitor!r}"
-            ) from None
+        check_node_name(self._monitor)
         self._shapes_out = publisher(self, Topic.SHAPES, shapes)
         self._states_out = publisher(self, Topic.STATES, states)
 
