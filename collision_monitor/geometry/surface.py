@@ -38,10 +38,12 @@ class Surface:
         first = first_equal(vertices)
         self.welded = int((first != np.arange(len(first))).sum())
         """Number of vertices that equal an earlier one."""
-        solid = _without_collapsed(first[faces])
-        self.faces: Indices = _distinct(solid)
-        self.repeats = len(self.faces) < len(solid)
-        """Whether a face repeats another, in any order of its vertices."""
+        welded = first[faces]
+        solid = _are_solid(welded)
+        kept = _are_distinct(welded[solid])
+        self.faces: Indices = welded[solid][kept]
+        self.repeated: Indices = np.flatnonzero(solid)[~kept]
+        """Indices of the given faces that repeat another, in any order of its vertices. They count once."""
 
     @cached_property
     def _edges(self) -> tuple[Indices, bool]:
@@ -99,7 +101,7 @@ class Surface:
     def sheet(self) -> bool:
         """Whether the open parts look mostly one way, as a terrain or a wall does; a sheet has no inside.
 
-        So is an open surface in one plane, whichever way its faces look.
+        So is an open surface in one plane, whichever way its faces look. Closed parts beside it have one.
         """
         if self.closed or not len(self.faces):
             return not self.closed
@@ -124,8 +126,13 @@ class Surface:
 
     @property
     def certain(self) -> bool:
-        """Whether the winding number of the faces as given tells what is inside: no hole, no repeats, and oriented."""
-        return self.sheet or (self.closed and self.oriented and not self.repeats)
+        """Whether the winding number of the faces tells what is inside: no hole, and oriented.
+
+        Of a sheet nothing is inside, unless there are closed parts beside it, whose faces alone have to be counted.
+        """
+        if self.sheet:
+            return bool(self.in_open_part.all())
+        return self.closed and self.oriented
 
     @cached_property
     def volume(self) -> float:
@@ -138,6 +145,7 @@ class Surface:
             way = "outward" if self.volume >= 0.0 else "inward"
             return f"closed, oriented {way}" if self.oriented else "closed, not oriented"
         kind = "a sheet without an inside" if self.sheet else "its inside is uncertain"
+        kind += "" if self.certain or not self.sheet else " beside closed parts"
         return f"open at {len(self.open_edges)} edges, {kind}"
 
 
@@ -170,17 +178,17 @@ def _with_equal_key(keys: NDArray[np.uint64]) -> Indices:
     return np.flatnonzero(np.isin(keys, repeated)) if len(repeated) else np.zeros(0, np.int64)
 
 
-def _without_collapsed(faces: Indices) -> Indices:
-    """Faces without those that have two equal vertices."""
+def _are_solid(faces: Indices) -> NDArray[np.bool_]:
+    """Whether the vertices of each face (k, 3) are three."""
     a, b, c = faces.T
-    return faces[(a != b) & (b != c) & (c != a)]
+    return np.asarray((a != b) & (b != c) & (c != a))
 
 
-def _distinct(faces: Indices) -> Indices:
-    """Faces without repetitions in any order of the vertices; the first is kept."""
+def _are_distinct(faces: Indices) -> NDArray[np.bool_]:
+    """Whether each face (k, 3) repeats none before it, in any order of the vertices."""
     ordered = np.sort(faces, axis=1)
     some = _with_equal_key(_mixed(ordered.astype(np.uint64)))
     order = some[np.lexsort(ordered[some].T)]
     repeats = np.zeros(len(faces), bool)
     repeats[order[1:]] = (ordered[order[1:]] == ordered[order[:-1]]).all(axis=1)
-    return faces[~repeats]
+    return ~repeats

@@ -204,6 +204,8 @@ def _winding(blocks: Any, root: int, x: Vector, d: Vector, work: Any) -> int:
             slack = 64.0 * EPSILON * scale
             if (u < -slack or v < -slack or w < -slack) and (u > slack or v > slack or w > slack):
                 continue
+            if a == b and b == c:  # a face that repeats another, see `made_tree`
+                continue
             volume = dot(cross(a, b), c)  # its sign, against that of the turns, says on which side of x the triangle is
             if abs(u) <= slack or abs(v) <= slack or abs(w) <= slack or abs(volume) <= slack * scale**0.5:
                 return UNDECIDED

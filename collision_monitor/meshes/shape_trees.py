@@ -98,7 +98,9 @@ def made_tree(shape: Shape, split: int = 0) -> Array | None:
             first = np.unique(surface.part, return_index=True)[1] if len(surface.faces) else [0]
             closed = surface.closed and surface.certain
             parts = shape.vertices[faces[first, 0]]
-            return tree_of(shape.vertices[shape.faces], closed=closed, parts=parts, split=split)
+            corners = shape.vertices[shape.faces]
+            corners[surface.repeated] = corners[surface.repeated, :1]  # to a point, which no ray crosses
+            return tree_of(corners, closed=closed, parts=parts, split=split)
         case Points():
             return cloud_tree(shape.points)
         case Sphere():

@@ -34,6 +34,7 @@ from collision_monitor.geometry.shapes import (
     Sphere,
     Triangle,
 )
+from collision_monitor.objects.closed_parts import separated
 from collision_monitor.objects.convex_decomposition import convex_decomposition
 from collision_monitor.objects.excess import PosedShapes, corners, excess_of
 from collision_monitor.records import Model
@@ -122,27 +123,39 @@ def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | i
     chosen = parse_model(model)
     if chosen not in (Model.AUTO, Model.EXACT):
         return containing_model(shapes, chosen)
-    uncertain = [isinstance(shape, Mesh) and not shape.surface.certain for shape, _ in shapes]
+    pairs, index = _separated(shapes)
+    uncertain = [isinstance(shape, Mesh) and not shape.surface.certain for shape, _ in pairs]
     if not any(uncertain):
         return exact_model(shapes)
     parts = [
         containing_model([pair], Model.CONVEX_HULL) if open_ else exact_model([pair])
-        for pair, open_ in zip(shapes, uncertain, strict=True)
+        for pair, open_ in zip(pairs, uncertain, strict=True)
     ]
     return Modelled(
         pieces=[piece for part in parts for piece in part.pieces],
-        shapes=[k for k, part in enumerate(parts) for _ in part.pieces],
+        shapes=[k for k, part in zip(index, parts, strict=True) for _ in part.pieces],
         model=Model.CONVEX_HULL,
         excess=max(part.excess for part in parts),
         convex=False,
     )
 
 
+def _separated(shapes: Sequence[tuple[Shape, Pose]]) -> tuple[PosedShapes, list[int]]:
+    """The shapes, with the closed parts and the sheets of each mesh apart; and the index of each in `shapes`."""
+    pairs, index = [], []
+    for k, (shape, pose) in enumerate(shapes):
+        for part in separated(shape) if isinstance(shape, Mesh) else (shape,):
+            pairs.append((part, pose))
+            index.append(k)
+    return pairs, index
+
+
 def exact_model(shapes: Sequence[tuple[Shape, Pose]]) -> Modelled:
     """Convex pieces, concave meshes and clouds that are exactly the object."""
     pieces: PosedShapes = []
     index = []
-    for k, (shape, pose) in enumerate(shapes):
+    pairs, of_shape = _separated(shapes)
+    for k, (shape, pose) in zip(of_shape, pairs, strict=True):
         if is_concave_mesh(shape) or isinstance(shape, Points):
             pieces.append((shape, pose))
             index.append(k)
