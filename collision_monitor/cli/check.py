@@ -15,7 +15,6 @@ from collision_monitor.cli.progress import progress_bar
 from collision_monitor.cli.usage import check_profiles, usage
 
 if TYPE_CHECKING:
-    from collision_monitor.alerts.rules import Rules
     from collision_monitor.session.history.check import Checked
 
 EXAMPLE = """\
@@ -89,6 +88,7 @@ def add_parser(subparsers: Any) -> None:
 
 def check_command(args: argparse.Namespace) -> int:
     """Run the command and return the exit code. Raises UsageError, InputError, UnsupportedError."""
+    from collision_monitor.alerts.rules import Rules
     from collision_monitor.session.history.check import check_sessions, junit_xml
     from collision_monitor.session.history.expectations import read_expectations
     from collision_monitor.session.many import find_sessions
