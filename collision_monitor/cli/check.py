@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.engines import add_engine, engine_of
 from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.output_file import writing
+from collision_monitor.cli.output_file import add_force, check_outputs, writing
 from collision_monitor.cli.progress import progress_bar
 from collision_monitor.cli.usage import check_profiles, usage
 
 if TYPE_CHECKING:
-    from collision_monitor.alerts.rules import Rules
     from collision_monitor.session.history.check import Checked
 
 EXAMPLE = """\
@@ -42,7 +41,7 @@ EPILOG = f"""\
 examples:
   collision-monitor check run.mcap --expect expectations.yaml
   collision-monitor check runs --expect expectations.yaml --replay fast   answers of the profile fast
-  collision-monitor check "runs/*.mcap" --expect expectations.yaml --junit results.xml
+  collision-monitor check "runs/*.mcap" --expect expectations.yaml --junit results.xml --force
 
 expectations.yaml, with every kind of expectation:
 
@@ -52,7 +51,7 @@ missing, an expectation that something did not happen fails with "not known".
 
 exit codes:
   0  all expectations hold
-  1  a session cannot be read
+  1  a session cannot be read, or the file of --junit cannot be written
   2  wrong usage, or the expectations file is not valid
   3  an expectation does not hold
 """
@@ -83,12 +82,14 @@ def add_parser(subparsers: Any) -> None:
     )
     add_engine(parser)
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
+    add_force(parser, "the file of --junit")
     parser.add_argument("--json", action="store_true", help="print the results as one JSON object")
     parser.set_defaults(command=check_command)
 
 
 def check_command(args: argparse.Namespace) -> int:
-    """Run the command and return the exit code. Raises UsageError, InputError, UnsupportedError."""
+    """Run the command and return the exit code. Raises UsageError, InputError, SessionError, UnsupportedError."""
+    from collision_monitor.alerts.rules import Rules
     from collision_monitor.session.history.check import check_sessions, junit_xml
     from collision_monitor.session.history.expectations import read_expectations
     from collision_monitor.session.many import find_sessions
@@ -98,9 +99,9 @@ def check_command(args: argparse.Namespace) -> int:
         expectations = read_expectations(args.expect)
         rules = None if args.rules is None else Rules.given(args.rules)
     paths = find_sessions(args.sessions)
-    if args.junit is not None:
-        with writing(args.junit):  # report an error before the long work, not after it
-            args.junit.open("a").close()
+    check_outputs(
+        {"--junit": args.junit}, force=args.force, inputs=[*paths, args.expect, args.rules, args.replay]
+    )
     results = []
     with progress_bar("check", len(paths)) as done:
         for each in check_sessions(paths, expectations, with_profile=args.replay, rules=rules, engine=engine_of(args)):

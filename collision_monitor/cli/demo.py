@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING
 
 from collision_monitor.cli.child import PATIENCE, Child, ProcessError
 from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.output_file import add_force, check_outputs, writing
 from collision_monitor.cli.quantities import positive, whole
+from collision_monitor.cli.usage import usage
 from collision_monitor.errors import InputError
 from collision_monitor.ros.domain import free_domain
 from collision_monitor.ros.process import StopRequest, ros_context, stay_on_this_machine
@@ -45,7 +47,8 @@ examples:
 
 exit codes:
   0    the replay gives the same bytes
-  1    a process failed, or the session file already exists
+  1    a process failed, the session already exists, or a file cannot be written
+  2    wrong usage, or the scene refuses an option
   3    the replay gives different answers
   4    the replay cannot be compared
   130  interrupted
@@ -74,7 +77,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--duration", type=positive, default=10.0, metavar="S", help="duration of the scene (s, default: 10)"
     )
     parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="seed of the random numbers (default: 1)")
-    parser.add_argument("--path", metavar="FILE", help="recorded tracks for the scene `trajectory`")
+    parser.add_argument("--path", type=Path, metavar="FILE", help="recorded tracks for the scene `trajectory`")
     parser.add_argument(
         "--noise", type=positive, metavar="S", help="standard deviation of the states (m, rad, m/s, rad/s)"
     )
@@ -82,16 +85,26 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--output", type=Path, metavar="PATH", help="new session file (default: sessions/SCENE-DATE.mcap)"
     )
     parser.add_argument("--capture", type=Path, metavar="FILE", help="save the last table as SVG")
+    add_force(parser, "the file of --capture; a session is never overwritten")
     parser.set_defaults(command=demo_command)
 
 
 def demo_command(args: argparse.Namespace) -> int:
-    """Run the demo and return the exit code: 0 if the replay gave the same bytes. Raises ProcessError, InputError."""
-    stop = StopRequest(within=2.5 * PATIENCE, code=ExitCode.INTERRUPTED).install()  # both processes end before
-    from collision_monitor.world import describe
+    """Run the demo and return the exit code: 0 if the replay gave the same bytes.
 
-    describe(args.scene)
-    session = _new_file(args.output, args.scene)
+    Raises UsageError, InputError, SessionError before anything is started or written; ProcessError.
+    """
+    stop = StopRequest(within=2.5 * PATIENCE, code=ExitCode.INTERRUPTED).install()  # both processes end before
+    from collision_monitor.world import make_scene
+    from collision_monitor.world.trajectory import track_files
+
+    with usage():
+        make_scene(args.scene, objects=args.objects, seed=args.seed, path=args.path, noise=args.noise or 0.0)
+    if args.output is not None and args.output.exists():
+        raise InputError(f"--output: expected the name of a new file, {args.output} is there already")
+    outputs = {"--output": args.output, "--capture": args.capture}
+    check_outputs(outputs, force=args.force, inputs=track_files(args.path))
+    session = args.output or _usual_file(args.scene)
     stay_on_this_machine()
     os.environ.setdefault("ROS_DOMAIN_ID", str(free_domain()))
 
@@ -106,7 +119,7 @@ def _watch(args: argparse.Namespace, session: Path, stop: StopRequest) -> bool:
     """Run both processes until the session file is complete. Return False if interrupted before the scene began."""
     scene = ["world", args.scene, "--duration", str(args.duration), "--seed", str(args.seed)]
     if args.path:
-        scene += ["--path", args.path]
+        scene += ["--path", str(args.path)]
     if args.noise is not None:
         scene += ["--noise", str(args.noise)]
     if args.objects is not None:
@@ -195,22 +208,18 @@ def _capture(picture: Picture, path: Path) -> None:
     with open(os.devnull, "w") as nowhere:
         console = Console(record=True, width=100, file=nowhere)
         console.print(picture.table())
-    console.save_svg(str(path), title="collision-monitor demo")
+    with writing(path):
+        console.save_svg(str(path), title="collision-monitor demo")
 
 
-def _new_file(chosen: Path | None, scene: str) -> Path:
-    """Return the path of a new file and create the usual folder. Raises InputError if that is not possible."""
-    if chosen is None:
-        chosen = Path("sessions") / f"{scene}-{datetime.now():%Y%m%d-%H%M%S}.mcap"
-    elif not chosen.parent.is_dir():
-        raise InputError(f"--output: expected to be able to write {chosen}, got no folder {chosen.parent}")
-    if chosen.exists():
-        raise InputError(f"--output: expected the name of a new file, {chosen} is there already")
+def _usual_file(scene: str) -> Path:
+    """Return the path of a new file in the usual folder, and create the folder. Raises InputError."""
+    folder = Path("sessions")
     try:
-        chosen.parent.mkdir(exist_ok=True)
+        folder.mkdir(exist_ok=True)
     except OSError as error:
-        raise InputError(f"--output: expected to be able to write {chosen.parent}, got: {error.strerror}") from None
-    return chosen
+        raise InputError(f"{folder}: expected a folder that can be written, got: {error.strerror}") from None
+    return folder / f"{scene}-{datetime.now():%Y%m%d-%H%M%S}.mcap"
 
 
 def _replay(session: Path) -> int:
@@ -219,9 +228,10 @@ def _replay(session: Path) -> int:
     from collision_monitor.session.replaying.replay import replay
     from collision_monitor.session.replaying.replay_report import Verdict
 
-    report = replay(Session(session))
-    size = session.stat().st_size / 1e6
-    print(f"session  {session} ({report.messages} messages, {size:.1f} MB)")
+    recorded = Session(session)
+    report = replay(recorded)
+    size = f"{recorded.size / 1e6:.1f} MB" if recorded.size >= 1e6 else f"{recorded.size / 1e3:.0f} kB"
+    print(f"session  {session} ({report.messages} messages, {size})")
     if report.verdict is Verdict.IDENTICAL:
         print(
             f"replay   bit-identical: {report.steps} steps in {report.replay_duration:.1f} s without ROS "

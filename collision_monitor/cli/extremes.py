@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.output_file import writing
+from collision_monitor.cli.output_file import add_force, check_outputs, check_picture, writing
 from collision_monitor.cli.progress import progress_bar
 from collision_monitor.cli.quantities import whole
 
@@ -31,6 +31,7 @@ examples:
 exit codes:
   0  every number is finite and every exact answer is within its bound
   1  the picture cannot be written
+  2  wrong usage
   3  a number is not finite, or an exact answer is outside its bound
 """
 
@@ -50,14 +51,19 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="seed of the random numbers (default: 1)")
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
-    parser.add_argument("--png", type=Path, metavar="FILE", help="draw the errors, one panel per scale")
+    parser.add_argument(
+        "--png", type=Path, metavar="FILE", help="draw the errors, one panel per scale (.png, .svg or .pdf)"
+    )
+    add_force(parser, "the picture")
     parser.set_defaults(command=extremes_command)
 
 
 def extremes_command(args: argparse.Namespace) -> int:
-    """Run the command and return the exit code. Raises InputError."""
+    """Run the command and return the exit code. Raises UsageError, InputError, SessionError."""
     from collision_monitor.accuracy import extremes
 
+    check_picture("--png", args.png)
+    check_outputs({"--png": args.png}, force=args.force)
     with progress_bar("extremes", extremes.steps()) as done:
         rows = extremes.run(args.samples, args.seed, done)
     if args.json:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.output_file import add_force
 from collision_monitor.cli.usage import check_profiles, usage
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ examples:
 
 exit codes:
   0  everything was imported
-  1  the bag cannot be imported
+  1  the bag cannot be imported, or OUT cannot be written
   2  wrong usage, or the mapping, the profile or the rules are not valid
   3  something was skipped or refused, or an object has no state
 """
@@ -70,7 +71,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--node", metavar="NAME", help="without --map: monitor whose inputs are imported, if there are several"
     )
-    parser.add_argument("--force", action="store_true", help="overwrite OUT")
+    add_force(parser, "OUT")
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
     parser.set_defaults(command=import_command)
 
@@ -78,12 +79,15 @@ def add_parser(subparsers: Any) -> None:
 def import_command(args: argparse.Namespace) -> int:
     """Run the command and return the exit code. Raises UsageError, SessionError, InputError."""
     from collision_monitor.alerts.rules import Rules
+    from collision_monitor.session.output_file import check_recording
     from collision_monitor.sources import import_bag, load_mapping
 
     check_profiles([args.profile])
     with usage():
         mapping = None if args.map is None else load_mapping(args.map)
         rules = Rules.given(args.rules)
+    read = [Path(each) for each in (args.bag, args.map, args.rules, args.profile) if each]
+    check_recording(args.output, overwrite=args.force, inputs=read)
     with _progress() as progress:
         result = import_bag(
             args.bag,

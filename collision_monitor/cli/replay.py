@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.engines import add_engine, engine_of
 from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.output_file import add_force, check_outputs
 from collision_monitor.cli.progress import progress_bar
 from collision_monitor.cli.quantities import not_negative, positive
 from collision_monitor.cli.usage import UsageError, usage
@@ -31,7 +32,7 @@ examples:
 
 exit codes:
   0  the answers are identical
-  1  a session cannot be read
+  1  a session cannot be read, or OUT cannot be written
   2  wrong usage
   3  the answers differ
   4  the answers cannot be compared: they differ and were recorded by another version or machine, or
@@ -71,7 +72,7 @@ def add_parser(subparsers: Any) -> None:
         metavar="OUT",
         help="if answers differ, write a short session that shows the first difference",
     )
-    parser.add_argument("--force", action="store_true", help="overwrite OUT")
+    add_force(parser, "OUT")
     add_engine(parser)
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
     parser.set_defaults(command=replay_command)
@@ -92,6 +93,7 @@ def replay_command(args: argparse.Namespace) -> int:
         if args.cut is not None:
             raise UsageError(f"--cut: expected one session, got {len(paths)}")
         return _replay_many(paths, args)
+    check_outputs({"--cut": args.cut}, force=args.force, inputs=paths)
     session = Session(paths[0])
     with _progress_bar(session) as progress:
         report = replay(session, **_options(args), progress=progress)

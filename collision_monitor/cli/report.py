@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.output_file import add_force
 from collision_monitor.cli.progress import session_bar
 from collision_monitor.cli.usage import check_profiles, usage
-from collision_monitor.errors import SessionError
 
 DESCRIPTION = """\
 Write one HTML page about a session: the verdict, a timeline, predicted against actual times of
@@ -50,14 +50,14 @@ def add_parser(subparsers: Any) -> None:
         help="report the answers of a replay, with the recorded profile or with PROFILE",
     )  # fmt: skip
     parser.add_argument("--rules", metavar="FILE", help="report the alerts of a replay, by these rules (YAML)")
-    parser.add_argument("--force", action="store_true", help="overwrite existing files")
+    add_force(parser)
     parser.set_defaults(command=report_command)
 
 
 def report_command(args: argparse.Namespace) -> int:
     """Run the command and return the exit code. Raises UsageError, SessionError."""
     from collision_monitor.alerts.rules import Rules
-    from collision_monitor.report import check_outputs, write_report
+    from collision_monitor.report import check_report, write_report
     from collision_monitor.session import Session
     from collision_monitor.session.history.read_history import read_history
 
@@ -66,9 +66,8 @@ def report_command(args: argparse.Namespace) -> int:
         rules = None if args.rules is None else Rules.given(args.rules)
     session = Session(args.session)
     output = args.output or Path(f"{args.session.resolve().stem}.html")
-    if output.exists() and output.samefile(args.session):
-        raise SessionError(f"{output}: expected another file than the session itself")
-    check_outputs([output], args.force)  # before the long work
+    read = [Path(each) for each in (args.session, args.replay, args.rules) if each]
+    check_report(output, args.png, overwrite=args.force, inputs=read)
     with session_bar("report", session) as show:
         history = read_history(session, args.replay, show, rules)
     for file in write_report(history, output, pictures=args.png, overwrite=args.force):

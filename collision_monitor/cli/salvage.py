@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.output_file import add_force
 
 EPILOG = """\
 Messages in a chunk with a correct checksum are copied. Complete messages in a chunk with a wrong
@@ -39,7 +40,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("session", type=Path, metavar="SESSION", help="damaged .mcap file")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help="new .mcap file")
     parser.add_argument("--unverified", action="store_true", help="also keep messages of chunks with a wrong checksum")
-    parser.add_argument("--force", action="store_true", help="overwrite OUT")
+    add_force(parser, "OUT")
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
     parser.set_defaults(command=salvage_command)
 

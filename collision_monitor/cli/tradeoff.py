@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 from collision_monitor.accuracy.default_scenes import DEFAULT_SCENES
 from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.output_file import writing
+from collision_monitor.cli.output_file import add_force, check_outputs, check_picture, writing
 from collision_monitor.cli.progress import progress_anywhere, progress_bar
 from collision_monitor.cli.quantities import not_negative, positive, whole
 from collision_monitor.cli.usage import UsageError, check_profiles, usage
-from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
     from collision_monitor.accuracy.inputs import Workload
@@ -100,7 +99,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="also write the rows to this file")
-    parser.add_argument("--png", type=Path, metavar="FILE", help="draw time against error, one panel per scene")
+    parser.add_argument(
+        "--png", type=Path, metavar="FILE", help="draw time against error, one panel per scene (.png, .svg or .pdf)"
+    )
+    add_force(parser)
     parser.set_defaults(command=tradeoff_command)
 
 
@@ -111,6 +113,7 @@ def tradeoff_command(args: argparse.Namespace) -> int:
     from collision_monitor.accuracy.tradeoff import tradeoff
     from collision_monitor.objects.models import parse_model
     from collision_monitor.settings.profile import Profile
+    from collision_monitor.world.trajectory import track_files
 
     if args.session is not None and args.scene:
         raise UsageError("tradeoff: expected a session or scenes, got both")
@@ -128,6 +131,9 @@ def tradeoff_command(args: argparse.Namespace) -> int:
     with usage():
         for name in args.model or ():
             parse_model(name)
+    check_picture("--png", args.png)
+    read = [args.session, *track_files(args.path), *(args.profile or ())]
+    check_outputs({"--csv": args.csv, "--png": args.png}, force=args.force, inputs=read)
     profiles = [Profile.named(name) for name in args.profile or Profile.names()]
     if not args.profile:
         profiles.sort(key=lambda profile: -profile.position_tolerance)
@@ -142,15 +148,14 @@ def tradeoff_command(args: argparse.Namespace) -> int:
     else:
         _print_table(rows)
         print("\n".join(summaries(rows)))
-    try:
-        if args.csv:
+    if args.csv:
+        with writing(args.csv):
             _write_csv(rows, args.csv)
-        if args.png:
-            from collision_monitor.accuracy.pictures import draw_tradeoff
+    if args.png:
+        from collision_monitor.accuracy.pictures import draw_tradeoff
 
+        with writing(args.png):
             draw_tradeoff(rows, args.png)
-    except OSError as error:
-        raise InputError(f"expected a file that can be written, got {error.filename}: {error.strerror}") from None
     return ExitCode.DONE
 
 

@@ -11,10 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.output_file import writing
+from collision_monitor.cli.output_file import add_force, check_outputs, check_picture, writing
 from collision_monitor.cli.progress import progress_anywhere
 from collision_monitor.cli.quantities import positive, whole
-from collision_monitor.errors import InputError
 
 if TYPE_CHECKING:
     from collision_monitor.accuracy.halving import Trial
@@ -36,6 +35,7 @@ examples:
 exit codes:
   0  a profile was found and written
   1  the session cannot be read, the demands contradict it, or a file cannot be written
+  2  wrong usage
   3  no profile meets the demands
 """
 
@@ -70,22 +70,24 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="parameter file (default: SESSION.yaml in the current folder)"
     )
-    parser.add_argument("--force", action="store_true", help="overwrite the parameter file")
-    parser.add_argument("--png", type=Path, metavar="FILE", help="draw time against error of each profile")
+    parser.add_argument(
+        "--png", type=Path, metavar="FILE", help="draw time against error of each profile (.png, .svg or .pdf)"
+    )
+    add_force(parser)
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
     parser.set_defaults(command=tune_command)
 
 
 def tune_command(args: argparse.Namespace) -> int:
-    """Run the command and return the exit code. Raises InputError, SessionError."""
+    """Run the command and return the exit code. Raises UsageError, InputError, SessionError."""
     from collision_monitor.accuracy.demands import Demands
     from collision_monitor.accuracy.inputs import recorded
     from collision_monitor.accuracy.tune import estimate, parameter_file, space_of, tune
     from collision_monitor.session import Session
 
     output = args.output or Path(f"{args.session.stem}.yaml")
-    if output.exists() and not args.force:
-        raise InputError(f"{output}: expected a new file, got one that exists; choose another name or --force")
+    check_picture("--png", args.png)
+    check_outputs({"--output": output, "--png": args.png}, force=args.force, inputs=[args.session])
     demands = Demands(
         args.max_distance_error, args.max_ttc_error, args.budget_ms, args.max_probability_error, args.min_horizon
     )

@@ -1,5 +1,5 @@
 """Report of a session as one HTML page: verdict, timeline, predicted against actual, distances, tracks."""
 
-from collision_monitor.report.page import check_outputs, write_report
+from collision_monitor.report.page import check_report, write_report
 
-__all__ = ["check_outputs", "write_report"]
+__all__ = ["check_report", "write_report"]

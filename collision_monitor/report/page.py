@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from html import escape
 from pathlib import Path
 from typing import Any, Final
@@ -17,6 +17,7 @@ from collision_monitor.report.facts import ReportFacts, gather
 from collision_monitor.report.figures import figures
 from collision_monitor.report.rendering import BROAD, NARROW, as_png, as_svg
 from collision_monitor.session.history.history import CollisionEvent, History
+from collision_monitor.session.output_file import check_output
 
 ROWS: Final = 200
 """Largest number of collisions in the table."""
@@ -82,7 +83,7 @@ def write_report(
 
     Raises SessionError if a file exists and `overwrite` is false, or if a file cannot be written.
     """
-    check_outputs([Path(path)], overwrite)
+    check_report(Path(path), None if pictures is None else Path(pictures), overwrite=overwrite)
     facts = gather(history)
     broad, narrow = figures(history, facts, BROAD), figures(history, facts, NARROW)
     drawn = {
@@ -100,7 +101,6 @@ def write_report(
     files = {Path(path): page(history, facts, drawn).encode("utf-8", errors="replace")}
     if pictures is not None:
         files |= {Path(pictures) / f"{name}.png": as_png(figure) for name, figure in broad.items()}
-    check_outputs(list(files), overwrite)
     try:
         for file, content in files.items():
             file.write_bytes(content)
@@ -109,15 +109,21 @@ def write_report(
     return list(files)
 
 
-def check_outputs(files: list[Path], overwrite: bool) -> None:
-    """Raise SessionError if a file is a folder or in none, or exists and may not be overwritten."""
-    for file in files:
-        if not file.parent.is_dir():
-            raise SessionError(f"{file}: expected to be able to write there, got no folder {file.parent}")
-        if file.is_dir():
-            raise SessionError(f"{file}: expected a file to write to, got a folder")
-        if file.exists() and not overwrite:
-            raise SessionError(f"{file}: expected a new file, got one that exists; choose another name or --force")
+def check_report(
+    path: Path, pictures: Path | None = None, *, overwrite: bool = False, inputs: Iterable[Path] = ()
+) -> None:
+    """Check before the work that the report may be written; inputs: as in `check_output`. Raises SessionError."""
+    read = list(inputs)
+    check_output(path, overwrite=overwrite, inputs=read)
+    if pictures is None:
+        return
+    if pictures.is_dir():
+        for name in PICTURES:
+            check_output(pictures / f"{name}.png", overwrite=overwrite, inputs=read)
+    elif pictures.exists():
+        raise SessionError(f"{pictures}: expected a folder for the pictures, got a file")
+    else:
+        check_output(pictures, overwrite=overwrite, inputs=read)
 
 
 def page(history: History, facts: ReportFacts, pictures: dict[str, str]) -> str:

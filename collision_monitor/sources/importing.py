@@ -14,6 +14,7 @@ from collision_monitor.codec import decode_states
 from collision_monitor.errors import CollisionMonitorError, InputError, MessageError, Refusal, SessionError
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.topics import NODE, RECORDED, STATUS_PERIOD, Topic
+from collision_monitor.session.output_file import check_recording
 from collision_monitor.session.recording.recorder import Recorder
 from collision_monitor.session.recording.recording_state import Recording
 from collision_monitor.settings.profile import Profile
@@ -68,8 +69,7 @@ def import_bag(
     the alerts. Raises SessionError or InputError; then there is no target.
     """
     result = Imported()
-    if target.exists() and source.exists() and target.samefile(source):
-        raise SessionError(f"{target}: expected another file than the bag that is imported")
+    check_recording(target, overwrite=overwrite, inputs=[source])
     with Bag(source) as bag:
         if mapping is None:
             frame_id, inputs = _recorded_inputs(bag, node)

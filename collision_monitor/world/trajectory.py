@@ -10,6 +10,7 @@ brakes or accelerates. Predictions inherit this error, as they would from any li
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +106,13 @@ class Trajectory(Scene):
 def clip_paths(path: Path) -> list[Path]:
     """Paths of the clips at `path`, one for each clip. Raises InputError if there are none."""
     return [path] if path.is_file() else [_prefix(clip[0]) for clip in _find_clips(path)]
+
+
+def track_files(path: Path | None) -> list[Path]:
+    """Files of all clips at `path`; none if there are no tracks."""
+    with suppress(InputError):
+        return [file for clip in _find_clips(path) for file in clip]
+    return []
 
 
 def _prefix(file: Path) -> Path:

@@ -63,6 +63,10 @@ def test_no_traceback(arguments: tuple[str, ...], words: str) -> None:
         (("compare", "none.mcap", "--profile", "nope"), "expected one of balanced, exact, fast"),
         (("compare", "none.mcap"), "expected two sessions"),
         (("world", "nope"), "scene: expected one of"),
+        (("demo", "--scene", "nope"), "scene: expected one of"),
+        (("demo", "--noise", "5"), "noise: expected more than 0"),
+        (("demo", "--objects", "2", "--scene", "arm"), "'arm'"),
+        (("demo", "--scene", "trajectory", "--output", "new.mcap"), "give a clip's prefix"),
         (("view", "--port", "99999999"), "expected a port"),
         (("view", "none.mcap", "--replay", "nope"), "expected one of balanced, exact, fast"),
         (("tradeoff", "none.mcap", "--scene", "fleet"), "got both"),
@@ -92,6 +96,7 @@ def test_wrong_usage_is_exit_code_2_in_one_line(
     assert main(arguments) == 2
     error = capsys.readouterr().err
     assert error.startswith("collision-monitor: error: ") and error.count("\n") == 1 and words in error
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_example_is_for_the_monitor() -> None:

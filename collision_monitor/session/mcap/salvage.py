@@ -35,6 +35,7 @@ from collision_monitor.session.mcap.damaged import Damage, RecoveredRecord, Sect
 from collision_monitor.session.mcap.definitions_in_force import DefinitionsInForce
 from collision_monitor.session.mcap.layout import LIBRARY, MESSAGE, SALVAGE, SEQUENCE_HALF
 from collision_monitor.session.mcap.sentences import add_sentence
+from collision_monitor.session.output_file import check_output
 
 _DECODERS: Final[dict[int, Any]] = {
     Opcode.HEADER: Header,
@@ -80,11 +81,9 @@ def salvage(source: str | Path, target: str | Path, *, unverified: bool = False,
             else "nothing there"
         )
         raise SessionError(f"{source}: expected an MCAP file, got {found}")
-    if target.exists():
-        if source.samefile(target):
-            raise SessionError(f"{target}: expected another file than the one that is salvaged")
-        if not overwrite:
-            raise SessionError(f"{target}: expected a new file, got one that exists; choose another name or --force")
+    if target.exists() and not (target.is_file() or target.is_dir()):  # it would be replaced by a file
+        raise SessionError(f"{target}: expected a file that can be written, got a device")
+    check_output(target, overwrite=overwrite, inputs=[source])
     try:
         with source.open("rb") as file:
             if source.stat().st_size == 0:
@@ -98,9 +97,10 @@ def salvage(source: str | Path, target: str | Path, *, unverified: bool = False,
 def _write(data: mmap.mmap, source: Path, target: Path, unverified: bool) -> Salvaged:
     """Write into a file beside the target, and put it in the target's place when it is finished."""
     contents = _Contents(data)
-    unfinished = target.with_name(f"{target.name}.part")
+    unfinished = target.with_name(f"{target.name}.{os.getpid()}.part")
+    stream = unfinished.open("xb")  # a file of that name, even the damaged one, stays as it is
     try:
-        with unfinished.open("wb") as stream:
+        with stream:
             copy = _Copy(contents, Writer(stream), unverified)
             result = copy.run(data)
             if not result.messages:

@@ -11,6 +11,7 @@ from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.session.mcap.layout import REPEATED
 from collision_monitor.session.mcap.rosbag2 import RECORDED_TYPES, full_name
+from collision_monitor.session.output_file import check_output
 from collision_monitor.session.reader import Recorded, RecordedSnapshot, Session
 from collision_monitor.session.recording.queue_entry import QueueEntry
 from collision_monitor.session.recording.session_file import SessionFile
@@ -28,10 +29,7 @@ def cut(
     """
     if session.foreign:
         raise SessionError(f"{session.path}: expected a session with its settings in it, got another program's")
-    if target.exists() and target.samefile(session.path):
-        raise SessionError(f"{target}: expected another path than that of the session itself")
-    if target.exists() and not overwrite:
-        raise SessionError(f"{target}: expected a new file, got one that exists; choose another name or remove it")
+    check_output(target, overwrite=overwrite, inputs=[session.path])
     found = list(_until(session, sequence))
     snapshots = [k for k, each in enumerate(found) if isinstance(each, RecordedSnapshot)]
     for start in (*snapshots[-1:], 0):

@@ -203,6 +203,8 @@ def test_the_command_and_its_exit_codes(yard: Path, tmp_path: Path, capsys: pyte
     code, out, _ = run("expect: [{contact: [cart, person_1]}, {replay: identical}]", str(yard))
     assert code == 0
     assert "1 sessions: 1 hold, 0 fail" in out
+    rules = Path(__file__).parents[3] / "config" / "rules.yaml"
+    assert run("expect: [{contact: [cart, person_1]}]", str(yard), "--rules", str(rules))[0] == 0
     report = tmp_path / "junit.xml"
     code, out, _ = run("expect: [{no_contact: any}]", str(yard), "--replay", "fast", "--json", "--junit", str(report))
     assert code == 3

@@ -288,3 +288,12 @@ def test_the_command(tmp_path: Path) -> None:
         assert not (tmp_path / "none.mcap").exists()
     assert run(whole, "-o", whole, "--force").returncode == 1
     assert len(messages(whole)) == 12
+
+
+def test_the_rest_of_an_interrupted_salvage_can_be_salvaged(whole: Path, tmp_path: Path) -> None:
+    """The unfinished copy beside the target must not have the name of the damaged file."""
+    rest = tmp_path / "out.mcap.part"
+    rest.write_bytes(whole.read_bytes())
+    assert salvage(rest, tmp_path / "out.mcap").messages == 12
+    assert rest.read_bytes() == whole.read_bytes()
+    assert sorted(tmp_path.glob("out*")) == [tmp_path / "out.mcap", rest]
