@@ -10,6 +10,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from collision_monitor.errors import TooCostlyError, UnsupportedError
+from collision_monitor.geometry.convex_pieces import is_concave_mesh
 from collision_monitor.geometry.pose import Motion
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Sphere
 from collision_monitor.meshes.shape_trees import CERTAIN, kept_tree
@@ -150,6 +151,15 @@ def _first_possible_impact(a: MovingShape, b: MovingShape, query: MotionQuery) -
     return float(events[0]["lower"]) if len(events) else math.inf
 
 
+def _may_overlap(a: MovingShape, b: MovingShape, start: Contact, separation: float, round_off: float) -> bool:
+    """Whether concave solids whose surfaces touch may be in each other: where faces lie in one plane, no depth shows."""
+    if separation != 0.0 or start.signed_distance > round_off:
+        return False
+    meshes = [shape for body in (a, b) for shape, _ in body.shapes if is_concave_mesh(shape)]
+    is_known = all(isinstance(shape, Mesh) and shape.surface.certain and shape.surface.closed for shape in meshes)
+    return bool(meshes) and is_known and start.signed_distance - start.error_bound < -round_off
+
+
 def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain: bool = False) -> Impact:
     """First impact of the shapes, of an open mesh its surface; `uncertain`: a possible overlap at the start counts."""
     start = contact(a.shapes, a.motion.pose, b.shapes, b.motion.pose)
@@ -158,6 +168,8 @@ def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain:
     least = start.signed_distance - (start.error_bound if uncertain else 0.0)
     if least < query.separation - round_off:
         return Impact("hit", 0.0, 0.0, start)
+    if _may_overlap(a, b, start, query.separation, round_off):
+        return _impact(0.0, math.inf, Method.CONSERVATIVE_ADVANCEMENT, (a.shapes, a.motion, b.shapes, b.motion))
     events = first_impacts(multibody, np.array([[0, 1]], np.int32), 0.0, query)
     if not len(events):
         return _CLEAR
