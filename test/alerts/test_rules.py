@@ -108,7 +108,8 @@ def test_a_file_that_is_refused(text: str, said: str) -> None:
 
 
 def test_any_is_every_pair() -> None:
-    short, long = (Rules.parse(rule(f"{{between: {each}, caution: {{distance: 1}}}}")) for each in ("any", "[any, any]"))
+    texts = (rule(f"{{between: {each}, caution: {{distance: 1}}}}") for each in ("any", "[any, any]"))
+    short, long = map(Rules.parse, texts)
     assert short.rules == long.rules and short.rules[0].between == ("any", "any")
 
 

@@ -13,8 +13,8 @@ from collision_monitor.settings.yaml_file import parse_yaml
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("1e-4", 1e-4), ("-1e+18", -1e18), ("1E5", 1e5), ("+2e3", 2e3), ("1.5e3", 1.5e3), (".5e1", 5.0), ("1.e2", 100.0),
-        ("1.0e-4", 1e-4), ("0x1e5", 0x1E5), ("10", 10), ("010", 8),
+        ("1e-4", 1e-4), ("-1e+18", -1e18), ("1E5", 1e5), ("+2e3", 2e3), ("1.5e3", 1.5e3), (".5e1", 5.0),
+        ("1.e2", 100.0), ("1.0e-4", 1e-4), ("0x1e5", 0x1E5), ("10", 10), ("010", 8),
     ],
 )  # fmt: skip
 def test_numbers(text: str, value: float) -> None:
