@@ -13,7 +13,7 @@ from collision_monitor.codec import decode_descriptions, decode_states
 from collision_monitor.errors import InputError, MessageError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session import Session
-from collision_monitor.world import make_scene
+from collision_monitor.world import check_path, make_scene
 from collision_monitor.world.trajectory import clip_paths
 
 
@@ -59,8 +59,10 @@ def simulated(
 
     duration: s, of each scene (None: DEFAULT_DURATION, or the whole clip). Raises InputError, see `make_scene`.
     """
+    if scenes and TRACK_SCENE not in scenes:
+        check_path(scenes[0], path)
     for name, scene_noise in _scenes(scenes, path, noise):
-        for clip in clip_paths(path) if name == TRACK_SCENE and path else [path]:
+        for clip in clip_paths(path) if name == TRACK_SCENE and path else [None]:
             scene = make_scene(name, objects=objects, seed=seed, path=clip, noise=scene_noise)
             seconds = DEFAULT_DURATION if scene.duration is None else scene.duration + 1.0 / scene.rate
             count = max(round((duration or seconds) * scene.rate), 1)

@@ -93,6 +93,7 @@ def check_command(args: argparse.Namespace) -> int:
     from collision_monitor.session.history.expectations import read_expectations
     from collision_monitor.session.many import find_sessions
 
+    engine = engine_of(args)
     check_profiles([args.replay or ""])
     with usage():
         expectations = read_expectations(args.expect)
@@ -103,7 +104,7 @@ def check_command(args: argparse.Namespace) -> int:
             args.junit.open("a").close()
     results = []
     with progress_bar("check", len(paths)) as done:
-        for each in check_sessions(paths, expectations, with_profile=args.replay, rules=rules, engine=engine_of(args)):
+        for each in check_sessions(paths, expectations, with_profile=args.replay, rules=rules, engine=engine):
             results.append(each)
             done(1)
             if not args.json:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from collision_monitor.cli.child import PATIENCE, Child, ProcessError
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.quantities import positive, whole
+from collision_monitor.cli.usage import usage
 from collision_monitor.errors import InputError
 from collision_monitor.ros.domain import free_domain
 from collision_monitor.ros.process import StopRequest, ros_context, stay_on_this_machine
@@ -46,6 +47,7 @@ examples:
 exit codes:
   0    the replay gives the same bytes
   1    a process failed, or the session file already exists
+  2    wrong usage
   3    the replay gives different answers
   4    the replay cannot be compared
   130  interrupted
@@ -88,9 +90,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def demo_command(args: argparse.Namespace) -> int:
     """Run the demo and return the exit code: 0 if the replay gave the same bytes. Raises ProcessError, InputError."""
     stop = StopRequest(within=2.5 * PATIENCE, code=ExitCode.INTERRUPTED).install()  # both processes end before
-    from collision_monitor.world import describe
+    from collision_monitor.world import check_path, describe
 
-    describe(args.scene)
+    with usage():
+        describe(args.scene)
+        check_path(args.scene, args.path)
     session = _new_file(args.output, args.scene)
     stay_on_this_machine()
     os.environ.setdefault("ROS_DOMAIN_ID", str(free_domain()))

@@ -5,6 +5,7 @@ Sessions that cannot be read and files that cannot be written are errors, exit c
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
@@ -22,6 +23,14 @@ def usage() -> Iterator[None]:
         yield
     except InputError as error:
         raise UsageError(str(error)) from None
+
+
+def check_unused(args: Namespace, options: Iterable[str], why: str) -> None:
+    """Raise UsageError for an option that was given and would be ignored. why: for the user; names as in `args`."""
+    for name in options:
+        value = getattr(args, name)
+        if value is not None:
+            raise UsageError(f"--{name.replace('_', '-')}: {why}; leave it out (got {value})")
 
 
 def check_profiles(names: Iterable[str]) -> None:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from collision_monitor.cli.main import main, make_parser
 from collision_monitor.cli.parameter_file import check_parameter_file
 from collision_monitor.errors import InputError
+from collision_monitor.session import many
 
 PROGRAM = Path(sys.executable).with_name("collision-monitor")
+GOLDEN = Path(__file__).parents[1] / "golden" / "balanced.mcap"
 EXAMPLE = Path(__file__).parents[2] / "config" / "monitor.yaml"
 
 
@@ -78,6 +82,18 @@ def test_no_traceback(arguments: tuple[str, ...], words: str) -> None:
         (("bench", "--threads", "1000"), "threads: expected 1 to"),
         (("run", "--params", "none.yaml"), "--params"),
         (("run", "--on-event"), "expected --record"),
+        (("tradeoff", "none.mcap", "--objects", "10"), "--objects: a session is measured as it was recorded; leave it"),
+        (("tradeoff", "none.mcap", "--seconds", "1"), "--seconds: a session is measured as it was recorded"),
+        (("tradeoff", "none.mcap", "--seed", "1"), "--seed: a session is measured as it was recorded"),
+        (("tradeoff", "none.mcap", "--path", "x"), "--path: a session is measured as it was recorded"),
+        (("tradeoff", "none.mcap", "--noise", "0"), "--noise: a session is measured as it was recorded"),
+        (("tradeoff", "--scene", "fleet", "--path", "x"), "path: expected the scene 'trajectory', which plays"),
+        (("world", "fleet", "--path", "x"), "path: expected the scene 'trajectory', which plays"),
+        (("demo", "--path", "x"), "path: expected the scene 'trajectory', which plays"),
+        (("demo", "--scene", "nope"), "scene: expected one of"),
+        (("replay", "none.mcap", "--address", "x:1"), "--address: expected --engine ray"),
+        (("check", "none.mcap", "--expect", "none.yaml", "--address", "x:1"), "--address: expected --engine ray"),
+        (("replay", "none.mcap", "--engine", "ray", "--cut", "x"), "--cut: expected a replay in this process"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
@@ -92,6 +108,16 @@ def test_wrong_usage_is_exit_code_2_in_one_line(
     assert main(arguments) == 2
     error = capsys.readouterr().err
     assert error.startswith("collision-monitor: error: ") and error.count("\n") == 1 and words in error
+
+
+def test_ray_is_used_for_one_session_too(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def on_ray(function: Any, paths: list[Path], failed: Any, engine: many.Engine) -> Iterator[Any]:
+        assert (engine.name, engine.address) == ("ray", "here:1")
+        yield from (failed(path, "was on Ray") for path in paths)
+
+    monkeypatch.setattr(many, "_on_ray", on_ray)
+    assert main(["replay", str(GOLDEN), "--engine", "ray", "--address", "here:1"]) == 1
+    assert "was on Ray" in capsys.readouterr().out
 
 
 def test_the_example_is_for_the_monitor() -> None:
