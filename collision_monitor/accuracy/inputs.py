@@ -18,12 +18,16 @@ from collision_monitor.world.trajectory import clip_paths
 
 
 class Workload(NamedTuple):
-    """A scene or session: its name, objects, steps, and the noise of its states (see `world.measured`)."""
+    """A scene or session: its name, objects, steps, and the noise of its states (see `world.measured`).
+
+    damage: one sentence for each part of a session that is missing or broken.
+    """
 
     name: str
     descriptions: list[ObjectDescription]
     steps: list[Step]
     noise: float = 0.0
+    damage: tuple[str, ...] = ()
 
 
 def recorded(path: Path) -> Workload:
@@ -33,7 +37,8 @@ def recorded(path: Path) -> Workload:
     """
     described: dict[int, ObjectDescription] = {}
     steps = []
-    for message in Session(path).messages():
+    session = Session(path)
+    for message in session.messages():
         with suppress(MessageError):
             if message.type == "ObjectDescriptionArray":
                 changes = decode_descriptions(message.data).objects
@@ -43,7 +48,7 @@ def recorded(path: Path) -> Workload:
                 steps.append((states.stamp_ns, states.states.copy()))
     if not described or not steps:
         raise InputError(f"{path}: expected object shapes and states, found {len(described)} and {len(steps)} of them")
-    return Workload(path.stem, list(described.values()), steps)
+    return Workload(path.stem, list(described.values()), steps, damage=tuple(session.damage))
 
 
 def simulated(

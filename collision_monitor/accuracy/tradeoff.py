@@ -30,7 +30,8 @@ def tradeoff(
     """
     named = profiles or sorted(map(Profile.named, Profile.names()), key=lambda each: -each.position_tolerance)
     rows = []
-    for name, descriptions, steps, noise in inputs:
+    for work in inputs:
+        name, descriptions, steps = work.name, work.descriptions, work.steps
         if models or (name == MESH_SCENE and not profiles):
             chosen = models or MODELS
             with progress_bar(name, len(chosen) * len(steps) + min(COMPARED_STEPS, len(steps))) as progress:
@@ -38,7 +39,7 @@ def tradeoff(
         else:
             with progress_bar(name, 2 * len(steps) * len(named)) as progress:
                 found = profile_tradeoff(name, descriptions, steps, named, progress)
-            fixed = fixed_part(Workload(name, descriptions, steps))
+            fixed = fixed_part(work)
             found = [replace(row, fixed_us=fixed) for row in found]
-        rows += [replace(row, noise=noise) for row in found]
+        rows += [replace(row, noise=work.noise) for row in found]
     return rows

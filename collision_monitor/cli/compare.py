@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.missing import missing_lines
 from collision_monitor.cli.progress import session_bar
 from collision_monitor.cli.quantities import positive, whole
 from collision_monitor.cli.usage import UsageError, check_profiles
@@ -138,8 +139,7 @@ def _as_text(found: Changes, limit: int) -> str:
     lines.append(_row("step time, median", *(_milliseconds(side.step_median) for side in sides)))
     lines.append(_row("step time, 99 %", *(_milliseconds(side.step_p99) for side in sides)))
     for letter, side in zip("AB", sides, strict=True):
-        lines += [f"missing in {letter}: {problem}" for problem in side.problems[:3]]
-        lines += [f"missing in {letter}: and {len(side.problems) - 3} more"] if len(side.problems) > 3 else []
+        lines += missing_lines(side.problems, f" in {letter}")
     if found.changes:
         lines += ["", *(_change(each) for each in found.changes[:limit])]
         if len(found.changes) > limit:

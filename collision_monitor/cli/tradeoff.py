@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from collision_monitor.accuracy.default_scenes import DEFAULT_SCENES
 from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.missing import print_missing
 from collision_monitor.cli.output_file import writing
 from collision_monitor.cli.progress import progress_anywhere, progress_bar
 from collision_monitor.cli.quantities import not_negative, positive, whole
@@ -130,7 +131,9 @@ def tradeoff_command(args: argparse.Namespace) -> int:
         for name in args.model or ():
             parse_model(name)
     profiles = [Profile.named(name) for name in args.profile] if args.profile else None
-    inputs = [recorded(args.session)] if args.session else _scenes(args)
+    inputs: Iterable[Workload] = _scenes(args) if args.session is None else [recorded(args.session)]
+    for work in inputs if args.session is not None else ():
+        print_missing(work.damage)
     if args.front:
         return _measure_fronts(args, inputs)
     if args.impact_methods:
