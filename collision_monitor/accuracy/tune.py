@@ -20,7 +20,7 @@ from collision_monitor.accuracy.playback import play
 from collision_monitor.accuracy.profile_tradeoff import exact_answers
 from collision_monitor.accuracy.tiles import Recording, tiles_of, workers
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.pipeline.topics import PARAMETER_SECTION
+from collision_monitor.settings.parameter_file import PARAMETER_SECTION
 from collision_monitor.settings.profile import Profile
 
 TIMING_NOISE: Final = 1.05
