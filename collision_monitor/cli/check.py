@@ -12,10 +12,9 @@ from collision_monitor.cli.engines import add_engine, engine_of
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.output_file import writing
 from collision_monitor.cli.progress import progress_bar
-from collision_monitor.cli.usage import check_profiles, usage
+from collision_monitor.cli.usage import check_profiles, given_rules, usage
 
 if TYPE_CHECKING:
-    from collision_monitor.alerts.rules import Rules
     from collision_monitor.session.history.check import Checked
 
 EXAMPLE = """\
@@ -97,7 +96,7 @@ def check_command(args: argparse.Namespace) -> int:
     check_profiles([args.replay or ""])
     with usage():
         expectations = read_expectations(args.expect)
-        rules = None if args.rules is None else Rules.given(args.rules)
+    rules = None if args.rules is None else given_rules(args.rules)
     paths = find_sessions(args.sessions)
     if args.junit is not None:
         with writing(args.junit):  # report an error before the long work, not after it

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.missing import missing_lines
 from collision_monitor.cli.progress import session_bar
-from collision_monitor.cli.quantities import positive, whole
+from collision_monitor.cli.quantities import not_negative, whole
 from collision_monitor.cli.usage import UsageError, check_profiles
 
 if TYPE_CHECKING:
@@ -65,8 +65,9 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--replay", action="store_true", help="compare answers of a replay, not the recorded ones")
     parser.add_argument(
-        "--tolerance", type=positive, default=0.0, metavar="S", help="largest difference of equal times (s, default: 0)"
-    )
+        "--tolerance", type=not_negative, default=0.0, metavar="S",
+        help="largest difference of equal times (s, default: 0)",
+    )  # fmt: skip
     parser.add_argument(
         "--limit", type=whole(1), default=20, metavar="N", help="largest number of differences to list (default: 20)"
     )

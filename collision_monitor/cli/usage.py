@@ -8,8 +8,12 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from collision_monitor.errors import InputError
+
+if TYPE_CHECKING:
+    from collision_monitor.alerts.rules import Rules
 
 
 class UsageError(InputError):
@@ -31,6 +35,17 @@ def check_unused(args: Namespace, options: Iterable[str], why: str) -> None:
         value = getattr(args, name)
         if value is not None:
             raise UsageError(f"--{name.replace('_', '-')}: {why}; leave it out (got {value})")
+
+
+def given_rules(file: str) -> Rules:
+    """Return the rules of alerts in a file. Raises UsageError if it cannot be used or has none."""
+    from collision_monitor.alerts.rules import Rules
+
+    with usage():
+        rules = Rules.given(file)
+    if not rules.rules:
+        raise UsageError(f"--rules: expected at least one rule in {file}, got none; leave the option out")
+    return rules
 
 
 def check_profiles(names: Iterable[str]) -> None:
