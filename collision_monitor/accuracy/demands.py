@@ -12,6 +12,15 @@ from collision_monitor.settings.profile import Profile
 
 _UNITS: Final = {"distance_error": "m", "ttc_error": "s", "budget_ms": "ms", "probability_error": "1", "horizon": "s"}
 
+_OPTIONS: Final = {
+    "distance_error": "--max-distance-error",
+    "ttc_error": "--max-ttc-error",
+    "budget_ms": "--budget-ms",
+    "probability_error": "--max-probability-error",
+    "horizon": "--min-horizon",
+}
+"""The options of `tune`, which errors name."""
+
 MOST_SAMPLES: Final = 4096
 """Largest value of uncertainty_samples."""
 
@@ -34,11 +43,12 @@ class Demands:
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if value is not None and not value > 0.0:
-                raise InputError(f"{name}: expected a number above 0, got {value!r}")
+                raise InputError(f"{_OPTIONS[name]}: expected a number above 0, got {value!r}")
         most, least = self.probability_error, 0.5 / MOST_SAMPLES**0.5
         if most is not None and not least <= most <= 0.5:
             raise InputError(
-                f"probability_error: expected {least:.4g}, with {MOST_SAMPLES} samples, to 0.5, got {most:g}"
+                f"{_OPTIONS['probability_error']}: expected {least:.4g}, with {MOST_SAMPLES} samples, to 0.5, "
+                f"got {most:g}"
             )
 
     def check(self, recorded: Profile, *, uncertain: bool) -> None:
@@ -46,18 +56,18 @@ class Demands:
         horizon = recorded.horizon if self.horizon is None else self.horizon
         if horizon > recorded.horizon:
             raise InputError(
-                f"horizon: expected at most that of the recording, {recorded.horizon:g} s, got {horizon:g} s; "
-                "a longer one is not searched, because it only costs more"
+                f"{_OPTIONS['horizon']}: expected at most that of the recording, {recorded.horizon:g} s, got "
+                f"{horizon:g} s; a longer one is not searched, because it only costs more"
             )
         if self.ttc_error is not None and self.ttc_error >= horizon > 0.0:
             raise InputError(
-                f"ttc_error, horizon: expected an error below the horizon of {horizon:g} s, got {self.ttc_error:g} s, "
-                "which every prediction meets; leave it out"
+                f"{_OPTIONS['ttc_error']}: expected an error below the horizon of {horizon:g} s, got "
+                f"{self.ttc_error:g} s, which every prediction meets; leave it out"
             )
         if self.probability_error is not None and not uncertain:
             raise InputError(
-                "probability_error: expected states that declare an uncertainty, got none; leave it out, or record "
-                "states with standard deviations"
+                f"{_OPTIONS['probability_error']}: expected states that declare an uncertainty, got none; leave it "
+                "out, or record states with standard deviations"
             )
 
     def failures(self, row: Measurement, *, median: bool = False) -> list[str]:
@@ -74,6 +84,16 @@ class Demands:
             if value > most:  # NaN (no answers) meets the demand
                 found.append(f"{name} {value:.3g} {unit}, {value / most:.3g} times the {most:g} {unit} allowed")
         return found
+
+    def untested(self, row: Measurement) -> list[str]:
+        """Return a sentence for each demand of which a row says nothing, because nothing of its kind was compared."""
+        lacking = {
+            "distance error": ("distance_error", "contact"),
+            "TTC error": ("ttc_error", "certain prediction"),
+            "step time": ("budget_ms", "step to be timed"),
+        }
+        found = [lacking[name] for name, value, _, _ in self._measured(row, median=True) if value != value]
+        return [f"{_OPTIONS[name]}: the session has no {what}, so that it could not be tested" for name, what in found]
 
     def excess(self, row: Measurement) -> float:
         """Return the largest factor by which a row exceeds a demand; infinite with a miss or a wrong bound."""

@@ -13,17 +13,21 @@ from collision_monitor.codec import decode_descriptions, decode_states
 from collision_monitor.errors import InputError, MessageError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session import Session
-from collision_monitor.world import make_scene
+from collision_monitor.world import check_path, make_scene
 from collision_monitor.world.trajectory import clip_paths
 
 
 class Workload(NamedTuple):
-    """A scene or session: its name, objects, steps, and the noise of its states (see `world.measured`)."""
+    """A scene or session: its name, objects, steps, and the noise of its states (see `world.measured`).
+
+    damage: one sentence for each part of a session that is missing or broken.
+    """
 
     name: str
     descriptions: list[ObjectDescription]
     steps: list[Step]
     noise: float = 0.0
+    damage: tuple[str, ...] = ()
 
 
 def recorded(path: Path) -> Workload:
@@ -33,7 +37,8 @@ def recorded(path: Path) -> Workload:
     """
     described: dict[int, ObjectDescription] = {}
     steps = []
-    for message in Session(path).messages():
+    session = Session(path)
+    for message in session.messages():
         with suppress(MessageError):
             if message.type == "ObjectDescriptionArray":
                 changes = decode_descriptions(message.data).objects
@@ -43,7 +48,7 @@ def recorded(path: Path) -> Workload:
                 steps.append((states.stamp_ns, states.states.copy()))
     if not described or not steps:
         raise InputError(f"{path}: expected object shapes and states, found {len(described)} and {len(steps)} of them")
-    return Workload(path.stem, list(described.values()), steps)
+    return Workload(path.stem, list(described.values()), steps, damage=tuple(session.damage))
 
 
 def simulated(
@@ -59,8 +64,10 @@ def simulated(
 
     duration: s, of each scene (None: DEFAULT_DURATION, or the whole clip). Raises InputError, see `make_scene`.
     """
+    if scenes and TRACK_SCENE not in scenes:
+        check_path(scenes[0], path)
     for name, scene_noise in _scenes(scenes, path, noise):
-        for clip in clip_paths(path) if name == TRACK_SCENE and path else [path]:
+        for clip in clip_paths(path) if name == TRACK_SCENE and path else [None]:
             scene = make_scene(name, objects=objects, seed=seed, path=clip, noise=scene_noise)
             seconds = DEFAULT_DURATION if scene.duration is None else scene.duration + 1.0 / scene.rate
             count = max(round((duration or seconds) * scene.rate), 1)

@@ -19,22 +19,27 @@ ProgressBar = Callable[[str, int], AbstractContextManager[Callable[[int], None]]
 
 
 def tradeoff(
-    inputs: Iterable[Workload], profiles: Sequence[Profile], models: Sequence[str] | None, progress_bar: ProgressBar
+    inputs: Iterable[Workload],
+    profiles: Sequence[Profile] | None,
+    models: Sequence[str] | None,
+    progress_bar: ProgressBar,
 ) -> list[Measurement]:
-    """Return the rows of each input: of models if models are named or the scene is MESH_SCENE, otherwise of profiles.
+    """Return the rows of each input: of the models or the profiles that are named. Raises InputError.
 
-    Raises InputError.
+    Without either: of all profiles, the fastest first, and for MESH_SCENE of MODELS.
     """
+    named = profiles or sorted(map(Profile.named, Profile.names()), key=lambda each: -each.position_tolerance)
     rows = []
-    for name, descriptions, steps, noise in inputs:
-        if models or name == MESH_SCENE:
+    for work in inputs:
+        name, descriptions, steps = work.name, work.descriptions, work.steps
+        if models or (name == MESH_SCENE and not profiles):
             chosen = models or MODELS
             with progress_bar(name, len(chosen) * len(steps) + min(COMPARED_STEPS, len(steps))) as progress:
                 found = model_tradeoff(name, descriptions, steps, chosen, progress)
         else:
-            with progress_bar(name, 2 * len(steps) * len(profiles)) as progress:
-                found = profile_tradeoff(name, descriptions, steps, profiles, progress)
-            fixed = fixed_part(Workload(name, descriptions, steps))
+            with progress_bar(name, 2 * len(steps) * len(named)) as progress:
+                found = profile_tradeoff(name, descriptions, steps, named, progress)
+            fixed = fixed_part(work)
             found = [replace(row, fixed_us=fixed) for row in found]
-        rows += [replace(row, noise=noise) for row in found]
+        rows += [replace(row, noise=work.noise) for row in found]
     return rows

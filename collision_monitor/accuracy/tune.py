@@ -20,7 +20,7 @@ from collision_monitor.accuracy.playback import play
 from collision_monitor.accuracy.profile_tradeoff import exact_answers
 from collision_monitor.accuracy.tiles import Recording, tiles_of, workers
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.pipeline.topics import PARAMETER_SECTION
+from collision_monitor.settings.parameter_file import PARAMETER_SECTION
 from collision_monitor.settings.profile import Profile
 
 TIMING_NOISE: Final = 1.05
@@ -35,11 +35,15 @@ ProgressBar = Callable[[str, int], AbstractContextManager[Callable[[int], None]]
 
 @dataclass(frozen=True)
 class Tuned:
-    """chosen: None if no profile meets the demands. trials: all, cheapest first. reasons: three lines for a person."""
+    """chosen: None if no profile meets the demands. trials: all, cheapest first. reasons: three lines for a person.
+
+    untested: a sentence for each demand that the chosen profile meets only because the recording lacks such answers.
+    """
 
     chosen: Profile | None
     trials: list[Trial]
     reasons: list[str]
+    untested: list[str]
 
 
 def space_of(work: Workload, recorded: Profile, demands: Demands) -> Space:
@@ -65,7 +69,8 @@ def tune(work: Workload, space: Space, progress_bar: ProgressBar, jobs: int | No
         search.run()
     trials = search.trials()
     chosen = _choice(trials)
-    return Tuned(chosen.profile if chosen else None, trials, explain(chosen, trials, space.demands))
+    untested = space.demands.untested(chosen.measurement) if chosen else []
+    return Tuned(chosen.profile if chosen else None, trials, explain(chosen, trials, space.demands), untested)
 
 
 def _runs(space: Space, tiles: int, jobs: int) -> int:

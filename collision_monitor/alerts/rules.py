@@ -160,6 +160,14 @@ def _read_pair(entry: YamlEntry, classes: Mapping[str, ObjectClass]) -> tuple[st
     return a.text(), b.text()
 
 
+def _read_between(entry: YamlEntry, classes: Mapping[str, ObjectClass]) -> tuple[str, str]:
+    if entry.value == ANY:
+        return ANY, ANY
+    if isinstance(entry.value, str):
+        raise entry.error(f"two classes, or `{ANY}`")
+    return _read_pair(entry, classes)
+
+
 def _read_rule(name: str, entry: YamlEntry, classes: Mapping[str, ObjectClass], zones: Mapping[str, Zone]) -> Rule:
     content = entry.table(_RULE)
     if "between" not in content:
@@ -176,7 +184,7 @@ def _read_rule(name: str, entry: YamlEntry, classes: Mapping[str, ObjectClass], 
         raise content["outside"].error("other zones than those of `inside`", repr(each))
     return Rule(
         name,
-        _read_pair(content["between"], classes),
+        _read_between(content["between"], classes),
         levels,
         raise_after=_delay(content, "raise_after"),
         clear_after=_delay(content, "clear_after"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,9 @@ from collision_monitor.cli.quantities import positive, whole
 from collision_monitor.cli.usage import UsageError, usage
 
 HARD_SPHERES = ("hard-spheres", "hard_spheres")
+
+MOST_BODIES = 10_000_000
+"""Their poses in 12 frames take 7 GB."""
 
 DESCRIPTION = """\
 Measure how long it takes to find all contacts of N moving bodies.
@@ -52,14 +56,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--scene", default="boxes", metavar="NAME", help="boxes (default), spheres, mixed, hulls or hard-spheres"
     )
-    parser.add_argument("--n", type=whole(1), default=10_000, metavar="N", help="number of bodies (default: 10000)")
+    parser.add_argument(
+        "--n", type=whole(1, MOST_BODIES), default=10_000, metavar="N", help="number of bodies (default: 10000)"
+    )
     parser.add_argument("--seed", type=whole(0), default=1, metavar="S", help="seed of the random scene (default: 1)")
     parser.add_argument("--scene-file", type=Path, metavar="FILE", help="measure a saved scene (.npz) instead")
     parser.add_argument(
         "--frames",
-        type=whole(1),
+        type=whole(WARM_UP_FRAMES + 1),
         metavar="F",
-        help=f"number of frames; the first {WARM_UP_FRAMES} are not counted (default: 12)",
+        help=f"number of frames; the first {WARM_UP_FRAMES} of them are not counted (default: 12)",
     )
     parser.add_argument(
         "--threads", type=whole(1), metavar="T", help="number of threads (default: 2, or 1 on a single core)"
@@ -84,10 +90,17 @@ def bench_command(args: argparse.Namespace) -> int:
     from collision_monitor.accuracy.detection_time import time_detection
     from collision_monitor.detection.detector import default_threads
     from collision_monitor.detection.partitioned import BROAD_PHASES, MOST_FOR_BRUTE_FORCE
-    from collision_monitor.world.moving_bodies import FRAMES, load_moving_bodies, make_moving_bodies
+    from collision_monitor.world.moving_bodies import (
+        BENCHMARK_SCENES,
+        FRAMES,
+        load_moving_bodies,
+        make_moving_bodies,
+    )
 
     if args.scene_file is None and args.scene in HARD_SPHERES:
         return _bench_hard_spheres(args)
+    _check_choice("scene", args.scene, (*BENCHMARK_SCENES, HARD_SPHERES[0]))
+    _check_choice("--broad-phase", args.broad_phase or "all", (*BROAD_PHASES, "all"))
     if args.packing is not None:
         raise UsageError("--packing: expected the scene hard-spheres, other scenes have a fixed density")
     if args.scene_file is None:
@@ -109,6 +122,11 @@ def bench_command(args: argparse.Namespace) -> int:
             result = time_detection(scene, threads if name == "grid" else 1, args.frames, name)
         _print({**result, "broad_phase": name}, args.json)
     return ExitCode.DONE
+
+
+def _check_choice(option: str, value: str, choices: Sequence[str]) -> None:
+    if value not in choices:
+        raise UsageError(f"{option}: expected one of {', '.join(choices)}, got {value!r}")
 
 
 def _bench_hard_spheres(args: argparse.Namespace) -> int:

@@ -12,7 +12,7 @@ from collision_monitor.cli.engines import add_engine, engine_of
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.output_file import add_force, check_outputs, writing
 from collision_monitor.cli.progress import progress_bar
-from collision_monitor.cli.usage import check_profiles, usage
+from collision_monitor.cli.usage import check_profiles, given_rules, usage
 
 if TYPE_CHECKING:
     from collision_monitor.session.history.check import Checked
@@ -89,22 +89,22 @@ def add_parser(subparsers: Any) -> None:
 
 def check_command(args: argparse.Namespace) -> int:
     """Run the command and return the exit code. Raises UsageError, InputError, SessionError, UnsupportedError."""
-    from collision_monitor.alerts.rules import Rules
     from collision_monitor.session.history.check import check_sessions, junit_xml
     from collision_monitor.session.history.expectations import read_expectations
     from collision_monitor.session.many import find_sessions
 
+    engine = engine_of(args)
     check_profiles([args.replay or ""])
     with usage():
         expectations = read_expectations(args.expect)
-        rules = None if args.rules is None else Rules.given(args.rules)
+    rules = None if args.rules is None else given_rules(args.rules)
     paths = find_sessions(args.sessions)
     check_outputs(
         {"--junit": args.junit}, force=args.force, inputs=[*paths, args.expect, args.rules, args.replay]
     )
     results = []
     with progress_bar("check", len(paths)) as done:
-        for each in check_sessions(paths, expectations, with_profile=args.replay, rules=rules, engine=engine_of(args)):
+        for each in check_sessions(paths, expectations, with_profile=args.replay, rules=rules, engine=engine):
             results.append(each)
             done(1)
             if not args.json:

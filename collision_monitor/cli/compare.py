@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.missing import missing_lines
 from collision_monitor.cli.progress import session_bar
-from collision_monitor.cli.quantities import positive, whole
+from collision_monitor.cli.quantities import not_negative, whole
 from collision_monitor.cli.usage import UsageError, check_profiles
 
 if TYPE_CHECKING:
@@ -64,8 +65,9 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--replay", action="store_true", help="compare answers of a replay, not the recorded ones")
     parser.add_argument(
-        "--tolerance", type=positive, default=0.0, metavar="S", help="largest difference of equal times (s, default: 0)"
-    )
+        "--tolerance", type=not_negative, default=0.0, metavar="S",
+        help="largest difference of equal times (s, default: 0)",
+    )  # fmt: skip
     parser.add_argument(
         "--limit", type=whole(1), default=20, metavar="N", help="largest number of differences to list (default: 20)"
     )
@@ -138,8 +140,7 @@ def _as_text(found: Changes, limit: int) -> str:
     lines.append(_row("step time, median", *(_milliseconds(side.step_median) for side in sides)))
     lines.append(_row("step time, 99 %", *(_milliseconds(side.step_p99) for side in sides)))
     for letter, side in zip("AB", sides, strict=True):
-        lines += [f"missing in {letter}: {problem}" for problem in side.problems[:3]]
-        lines += [f"missing in {letter}: and {len(side.problems) - 3} more"] if len(side.problems) > 3 else []
+        lines += missing_lines(side.problems, f" in {letter}")
     if found.changes:
         lines += ["", *(_change(each) for each in found.changes[:limit])]
         if len(found.changes) > limit:

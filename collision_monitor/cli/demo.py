@@ -95,10 +95,11 @@ def demo_command(args: argparse.Namespace) -> int:
     Raises UsageError, InputError, SessionError before anything is started or written; ProcessError.
     """
     stop = StopRequest(within=2.5 * PATIENCE, code=ExitCode.INTERRUPTED).install()  # both processes end before
-    from collision_monitor.world import make_scene
+    from collision_monitor.world import check_path, make_scene
     from collision_monitor.world.trajectory import track_files
 
     with usage():
+        check_path(args.scene, args.path)
         make_scene(args.scene, objects=args.objects, seed=args.seed, path=args.path, noise=args.noise or 0.0)
     if args.output is not None and args.output.exists():
         raise InputError(f"--output: expected the name of a new file, {args.output} is there already")

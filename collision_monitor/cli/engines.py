@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from collision_monitor.cli.quantities import whole
+from collision_monitor.cli.usage import UsageError
 
 if TYPE_CHECKING:
     from collision_monitor.session.many import Engine
+
+
+RAY: Final = "ray"
 
 
 def add_engine(parser: argparse.ArgumentParser) -> None:
@@ -17,7 +21,7 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
         "--jobs", type=whole(1), metavar="N", help="number of sessions at a time (default: one per core)"
     )
     parser.add_argument(
-        "--engine", choices=("processes", "ray"), default="processes",
+        "--engine", choices=("processes", RAY), default="processes",
         help="run in processes on this machine (default), or on Ray (needs `pip install collision_monitor[ray]`)",
     )  # fmt: skip
     parser.add_argument(
@@ -27,7 +31,9 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
 
 
 def engine_of(args: argparse.Namespace) -> Engine:
-    """Return the engine that the options select."""
+    """Return the engine that the options select. Raises UsageError for an address without Ray."""
     from collision_monitor.session.many import Engine
 
+    if args.address is not None and args.engine != RAY:
+        raise UsageError(f"--address: expected --engine {RAY}, whose cluster it names, got --engine {args.engine}")
     return Engine(args.engine, args.jobs, args.address)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.output_file import add_force
-from collision_monitor.cli.usage import check_profiles, usage
+from collision_monitor.cli.usage import check_profiles, given_rules, usage
 
 if TYPE_CHECKING:
     from collision_monitor.sources import Imported
@@ -67,7 +67,7 @@ def add_parser(subparsers: Any) -> None:
         metavar="NAME",
         help="profile of the monitor: fast, balanced (default) or exact",
     )
-    parser.add_argument("--rules", metavar="FILE", default="", help="rules of the alerts (YAML), see docs/alerts.md")
+    parser.add_argument("--rules", metavar="FILE", help="rules of the alerts (YAML), see docs/alerts.md")
     parser.add_argument(
         "--node", metavar="NAME", help="without --map: monitor whose inputs are imported, if there are several"
     )
@@ -78,14 +78,13 @@ def add_parser(subparsers: Any) -> None:
 
 def import_command(args: argparse.Namespace) -> int:
     """Run the command and return the exit code. Raises UsageError, SessionError, InputError."""
-    from collision_monitor.alerts.rules import Rules
     from collision_monitor.session.output_file import check_recording
     from collision_monitor.sources import import_bag, load_mapping
 
     check_profiles([args.profile])
     with usage():
         mapping = None if args.map is None else load_mapping(args.map)
-        rules = Rules.given(args.rules)
+    rules = None if args.rules is None else given_rules(args.rules)
     read = [Path(each) for each in (args.bag, args.map, args.rules, args.profile) if each]
     check_recording(args.output, overwrite=args.force, inputs=read)
     with _progress() as progress:

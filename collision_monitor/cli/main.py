@@ -79,7 +79,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line (default: sys.argv) and return the exit code."""
     accept_any_text()
     try:
-        args = make_parser().parse_args(arguments)
+        given = sys.argv[1:] if arguments is None else arguments
+        _check_empty(given)
+        args = make_parser().parse_args(given)
         command: Callable[[argparse.Namespace], int] = args.command
         code = command(args)
         sys.stdout.flush()
@@ -88,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print_error(error)
         return ExitCode.USAGE if isinstance(error, UsageError) else ExitCode.ERROR
     except MemoryError as error:
-        print_error(f"there is not enough memory for that: {error}")
+        print_error(": ".join(filter(None, ("there is not enough memory for that", str(error)))))
         return ExitCode.ERROR
     except KeyboardInterrupt:
         return ExitCode.INTERRUPTED
@@ -100,6 +102,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         where = f"{error.filename}: " if error.filename else ""
         print_error(f"{where}{error.strerror or error}")
         return ExitCode.ERROR
+
+
+def _check_empty(arguments: Sequence[str]) -> None:
+    """Raise UsageError for an empty argument: as a path it would be the current folder, as a name the default."""
+    before = "collision-monitor"
+    for each in arguments:
+        if each == "--ros-args":
+            return
+        name, _, value = each.partition("=")
+        if not each or (name.startswith("--") and name != each and not value):
+            raise UsageError(f"expected a value after `{each or before}`, got an empty text; is a variable not set?")
+        before = each
 
 
 def replay_main() -> int:

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from collision_monitor.cli.engines import add_engine, engine_of
+from collision_monitor.cli.engines import RAY, add_engine, engine_of
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.output_file import add_force, check_outputs
 from collision_monitor.cli.progress import progress_bar
@@ -21,6 +21,7 @@ from collision_monitor.cli.usage import UsageError, usage
 
 if TYPE_CHECKING:
     from collision_monitor.session import Session
+    from collision_monitor.session.many import Engine
     from collision_monitor.session.replaying.replay_report import ReplayReport
 
 EPILOG = """\
@@ -37,7 +38,7 @@ exit codes:
   3  the answers differ
   4  the answers cannot be compared: they differ and were recorded by another version or machine, or
      messages are missing
-With several sessions, the exit code is the smallest that is not 0.
+With several sessions, or on Ray, each has a line, and the exit code is the smallest that is not 0.
 """
 
 
@@ -88,11 +89,14 @@ def replay_command(args: argparse.Namespace) -> int:
     if args.threads is not None:
         with usage():
             Profile(threads=args.threads)
+    engine = engine_of(args)
+    if args.cut is not None and engine.name == RAY:
+        raise UsageError(f"--cut: expected a replay in this process, got --engine {RAY}; leave one of the two out")
     paths = find_sessions(args.sessions)
-    if len(paths) > 1:
+    if len(paths) > 1 or engine.name == RAY:
         if args.cut is not None:
             raise UsageError(f"--cut: expected one session, got {len(paths)}")
-        return _replay_many(paths, args)
+        return _replay_many(paths, args, engine)
     check_outputs({"--cut": args.cut}, force=args.force, inputs=paths)
     session = Session(paths[0])
     with _progress_bar(session) as progress:
@@ -129,13 +133,13 @@ def _unread(_path: Path, why: str) -> _Replayed:
     return _Replayed(None, why)
 
 
-def _replay_many(paths: list[Path], args: argparse.Namespace) -> int:
+def _replay_many(paths: list[Path], args: argparse.Namespace, engine: Engine) -> int:
     from collision_monitor.session.many import for_each
 
     found: list[_Replayed] = []
     with progress_bar("replay", len(paths)) as done:
         run = partial(_replay_one, options=_options(args))
-        for path, each in zip(paths, for_each(run, paths, _unread, engine_of(args)), strict=True):
+        for path, each in zip(paths, for_each(run, paths, _unread, engine), strict=True):
             found.append(each)
             done(1)
             if not args.json:

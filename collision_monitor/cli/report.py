@@ -9,7 +9,7 @@ from typing import Any
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.output_file import add_force
 from collision_monitor.cli.progress import session_bar
-from collision_monitor.cli.usage import check_profiles, usage
+from collision_monitor.cli.usage import check_profiles, given_rules
 
 DESCRIPTION = """\
 Write one HTML page about a session: the verdict, a timeline, predicted against actual times of
@@ -56,14 +56,12 @@ def add_parser(subparsers: Any) -> None:
 
 def report_command(args: argparse.Namespace) -> int:
     """Run the command and return the exit code. Raises UsageError, SessionError."""
-    from collision_monitor.alerts.rules import Rules
     from collision_monitor.report import check_report, write_report
     from collision_monitor.session import Session
     from collision_monitor.session.history.read_history import read_history
 
     check_profiles([args.replay or ""])
-    with usage():
-        rules = None if args.rules is None else Rules.given(args.rules)
+    rules = None if args.rules is None else given_rules(args.rules)
     session = Session(args.session)
     output = args.output or Path(f"{args.session.resolve().stem}.html")
     read = [Path(each) for each in (args.session, args.replay, args.rules) if each]

@@ -8,7 +8,7 @@ from pathlib import Path
 from collision_monitor.cli.parameter_file import check_parameter_file
 from collision_monitor.cli.quantities import positive, size
 from collision_monitor.cli.ros_arguments import parameters
-from collision_monitor.cli.usage import UsageError, usage
+from collision_monitor.cli.usage import UsageError, given_rules, usage
 from collision_monitor.errors import SessionError
 from collision_monitor.ros.executables import monitor
 
@@ -92,6 +92,8 @@ def run_command(args: argparse.Namespace) -> int:
     if args.params is not None:
         with usage():
             check_parameter_file(args.params)
+    if args.rules is not None:
+        given_rules(str(args.rules))
     found = [] if args.params is None else ["--params-file", str(args.params)]
     found += parameters(
         profile=args.profile,

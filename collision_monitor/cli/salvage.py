@@ -23,6 +23,7 @@ examples:
 exit codes:
   0  nothing is missing
   1  nothing could be recovered
+  2  wrong usage
   3  something is missing
 """
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.exit_codes import ExitCode
 from collision_monitor.cli.quantities import positive
+from collision_monitor.cli.usage import usage
 
 if TYPE_CHECKING:
     from collision_monitor.ros.survey import TopicFacts
@@ -30,7 +32,7 @@ docs/sources.md explains every type and key.
 
 exit codes:
   0  done; with --check: every line got messages and nothing was refused
-  1  the file cannot be used
+  2  wrong usage, or the file cannot be used
   3  with --check: a line has a problem
 """
 
@@ -58,10 +60,14 @@ def sources_command(args: argparse.Namespace) -> int:
     stay_on_this_machine()
     with ros_context(["collision-monitor"]):
         from collision_monitor.ros.survey import survey
+        from collision_monitor.sources.template import NOTHING
 
         found = survey(args.seconds)
     _print_list(found)
-    print(_template(found), end="")
+    text = _template(found)
+    print(text, end="")
+    if NOTHING in text:
+        print("the file names no object yet, and `run --sources` needs one: fill in `objects`", file=sys.stderr)
     return ExitCode.DONE
 
 
@@ -69,7 +75,8 @@ def _check(path: Path, seconds: float) -> int:
     from collision_monitor.ros.process import ros_context, stay_on_this_machine
     from collision_monitor.sources.mapping import load_mapping
 
-    mapping = load_mapping(path)
+    with usage():
+        mapping = load_mapping(path)
     stay_on_this_machine()
     with ros_context(["collision-monitor"]):
         from collision_monitor.ros.survey import check

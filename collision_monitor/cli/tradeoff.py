@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 from collision_monitor.accuracy.default_scenes import DEFAULT_SCENES
 from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.missing import print_missing
 from collision_monitor.cli.output_file import add_force, check_outputs, check_picture, writing
 from collision_monitor.cli.progress import progress_anywhere, progress_bar
 from collision_monitor.cli.quantities import not_negative, positive, whole
-from collision_monitor.cli.usage import UsageError, check_profiles, usage
+from collision_monitor.cli.usage import UsageError, check_profiles, check_unused, usage
 
 if TYPE_CHECKING:
     from collision_monitor.accuracy.inputs import Workload
@@ -83,8 +84,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         metavar="S",
         help="duration of each scene (s, default: 5, or all of the recorded tracks)",
     )
-    parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="seed of the random numbers (default: 1)")
-    parser.add_argument("--profile", action="append", metavar="NAME", help="profile; may be repeated (default: all)")
+    parser.add_argument("--seed", type=whole(0), metavar="K", help="seed of the random numbers (default: 1)")
+    parser.add_argument(
+        "--profile", action="append", metavar="NAME",
+        help="profile; may be repeated (default: all, and models of the shapes for the scene arm)",
+    )  # fmt: skip
     parser.add_argument(
         "--model", action="append", metavar="NAME",
         help="measure models of the shapes against the exact shapes, in place of profiles; may be repeated",
@@ -123,10 +127,8 @@ def tradeoff_command(args: argparse.Namespace) -> int:
         raise UsageError("tradeoff, --front: goes without --model, --profile, --csv and --impact-methods")
     if args.impact_methods and (args.model or args.profile or args.csv or args.png):
         raise UsageError("tradeoff, --impact-methods: goes without --model, --profile, --csv and --png")
-    if args.session is not None and args.noise:
-        raise UsageError(
-            f"tradeoff, --noise: a session is measured as it was recorded, leave it out (got {args.noise:g})"
-        )
+    if args.session is not None:
+        check_unused(args, ("path", "noise", "objects", "seconds", "seed"), "a session is measured as it was recorded")
     check_profiles(args.profile or ())
     with usage():
         for name in args.model or ():
@@ -134,10 +136,10 @@ def tradeoff_command(args: argparse.Namespace) -> int:
     check_picture("--png", args.png)
     read = [args.session, *track_files(args.path), *(args.profile or ())]
     check_outputs({"--csv": args.csv, "--png": args.png}, force=args.force, inputs=read)
-    profiles = [Profile.named(name) for name in args.profile or Profile.names()]
-    if not args.profile:
-        profiles.sort(key=lambda profile: -profile.position_tolerance)
-    inputs = [recorded(args.session)] if args.session else _scenes(args)
+    profiles = [Profile.named(name) for name in args.profile] if args.profile else None
+    inputs: Iterable[Workload] = _scenes(args) if args.session is None else [recorded(args.session)]
+    for work in inputs if args.session is not None else ():
+        print_missing(work.damage)
     if args.front:
         return _measure_fronts(args, inputs)
     if args.impact_methods:
@@ -164,8 +166,9 @@ def _scenes(args: argparse.Namespace) -> Iterator[Workload]:
     from collision_monitor.accuracy.inputs import simulated
 
     with usage():
+        seed = 1 if args.seed is None else args.seed
         yield from simulated(
-            args.scene, objects=args.objects, seed=args.seed, path=args.path, noise=args.noise, duration=args.seconds
+            args.scene, objects=args.objects, seed=seed, path=args.path, noise=args.noise, duration=args.seconds
         )
 
 

@@ -8,14 +8,18 @@ import os
 import sys
 from dataclasses import asdict
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.exit_codes import ExitCode
+from collision_monitor.cli.missing import print_missing
 from collision_monitor.cli.output_file import add_force, check_outputs, check_picture, writing
 from collision_monitor.cli.progress import progress_anywhere
 from collision_monitor.cli.quantities import positive, whole
+from collision_monitor.cli.usage import usage
 
 if TYPE_CHECKING:
+    from collision_monitor.accuracy.demands import Demands
     from collision_monitor.accuracy.halving import Trial
     from collision_monitor.settings.profile import Profile
 
@@ -34,9 +38,10 @@ examples:
 
 exit codes:
   0  a profile was found and written
-  1  the session cannot be read, the demands contradict it, or a file cannot be written
-  2  wrong usage
+  1  the session cannot be read, or a file cannot be written
+  2  wrong usage: demands out of range, or that contradict the session
   3  no profile meets the demands
+  4  a demand could not be tested, because the session has no such answers; no file is written
 """
 
 
@@ -85,17 +90,22 @@ def tune_command(args: argparse.Namespace) -> int:
     from collision_monitor.accuracy.tune import estimate, parameter_file, space_of, tune
     from collision_monitor.session import Session
 
+    with usage():
+        demands = Demands(
+            args.max_distance_error, args.max_ttc_error, args.budget_ms, args.max_probability_error, args.min_horizon
+        )
     output = args.output or Path(f"{args.session.stem}.yaml")
     check_picture("--png", args.png)
     check_outputs({"--output": output, "--png": args.png}, force=args.force, inputs=[args.session])
-    demands = Demands(
-        args.max_distance_error, args.max_ttc_error, args.budget_ms, args.max_probability_error, args.min_horizon
-    )
-    jobs = args.jobs or len(os.sched_getaffinity(0))
+    cores = len(os.sched_getaffinity(0))
+    jobs = args.jobs or cores
     work = recorded(args.session)
-    space = space_of(work, Session(args.session).profile, demands)
-    seconds = estimate(work, space, jobs)
-    print(f"tune: {len(work.steps)} steps, about {seconds:.0f} s on {jobs} cores", file=sys.stderr, flush=True)
+    print_missing(work.damage)
+    with usage():
+        space = space_of(work, Session(args.session).profile, demands)
+    used = min(jobs, cores)
+    seconds = estimate(work, space, used)
+    print(f"tune: {len(work.steps)} steps, about {seconds:.0f} s on {used} cores", file=sys.stderr, flush=True)
     found = tune(work, space, progress_anywhere, jobs)
     chosen = found.chosen
     if args.json:
@@ -103,9 +113,9 @@ def tune_command(args: argparse.Namespace) -> int:
             each.measurement.to_dict() | {"failures": each.failures, "timed_alone": each.timed} for each in found.trials
         ]
         answer = {"chosen": chosen and chosen.name, "demands": asdict(demands), "reasons": found.reasons, "rows": rows}
-        print(json.dumps(answer))
+        print(json.dumps(answer | {"untested": found.untested}))
     else:
-        print("\n".join([*_as_text(found.trials, chosen), "", *found.reasons]))
+        print("\n".join([*_as_text(found.trials, chosen, demands), "", *found.reasons]))
     if args.png:
         from collision_monitor.accuracy.front import Front
         from collision_monitor.accuracy.front_picture import draw_fronts
@@ -115,15 +125,18 @@ def tune_command(args: argparse.Namespace) -> int:
             draw_fronts({work.name: [front]}, args.png, chosen=chosen.name if chosen else None)
     if chosen is None:
         return ExitCode.NOT_AS_EXPECTED
+    if found.untested:
+        print("\n".join([*found.untested, "no file is written"]), file=sys.stderr)
+        return ExitCode.NOT_KNOWN
     notes = [f"Found by `collision-monitor tune` on {args.session.name}", f"demands: {demands}", *found.reasons]
     with writing(output):
         output.write_text(parameter_file(chosen, notes), encoding="utf-8")
     if not args.json:
-        print(f"written {output}; start the node with: collision-monitor run --params {output}")
+        print(f"written {output}; start the node with: collision-monitor run --params {quote(str(output))}")
     return ExitCode.DONE
 
 
-def _as_text(trials: list[Trial], chosen: Profile | None) -> list[str]:
+def _as_text(trials: list[Trial], chosen: Profile | None, demands: Demands) -> list[str]:
     heads = ("ms/step", "p99", "alarms", "false", "distance m", "TTC p99 s", "steps")
     widths = (8, 8, 8, 8, 11, 10, 6)
     wide = max(len(each.profile.name) for each in trials)
@@ -137,5 +150,6 @@ def _as_text(trials: list[Trial], chosen: Profile | None) -> list[str]:
             row.steps,
         )  # fmt: skip
         shown = " ".join(f"{x:>{w}.3g}" if x == x else f"{'–':>{w}}" for x, w in zip(numbers, widths, strict=True))
-        lines.append(f"{mark}{each.profile.name:<{wide}} {shown}  {'; '.join(each.failures) or 'meets all demands'}")
+        good = "meets what could be tested" if demands.untested(row) else "meets all demands"
+        lines.append(f"{mark}{each.profile.name:<{wide}} {shown}  {'; '.join(each.failures) or good}")
     return lines

@@ -73,7 +73,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def play(args: argparse.Namespace) -> int:
     """Publish the scene until its end, SIGINT or SIGTERM, and return the exit code. Raises UsageError."""
-    from collision_monitor.world import describe, scene_names
+    from collision_monitor.world import check_path, describe, scene_names
 
     if args.list:
         width = max(map(len, scene_names()))
@@ -84,6 +84,7 @@ def play(args: argparse.Namespace) -> int:
         raise UsageError(f"world: expected the name of a scene, one of {', '.join(scene_names())}")
     with usage():
         describe(args.scene)
+        check_path(args.scene, args.path)
     found = parameters(
         scene=args.scene,
         objects=args.objects,

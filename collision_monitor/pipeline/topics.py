@@ -5,11 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final, NamedTuple
 
-NODE: Final = "object_monitor"
-"""The node's name unless it is remapped."""
-
-PARAMETER_SECTION: Final = f"/**/{NODE}"
-"""The section of a parameter file for the node, in any namespace."""
+from collision_monitor.settings.parameter_file import NODE as NODE
 
 STATUS_PERIOD: Final = 50_000_000
 """ns between two statuses while steps arrive: 20 Hz is enough for people and supervisors, and 1 kHz too much."""

@@ -152,7 +152,7 @@ def _first_possible_impact(a: MovingShape, b: MovingShape, query: MotionQuery) -
 
 
 def _may_overlap(a: MovingShape, b: MovingShape, start: Contact, separation: float, round_off: float) -> bool:
-    """Whether concave solids whose surfaces touch may be in each other: where faces lie in one plane, no depth shows."""
+    """Whether concave solids whose surfaces touch may overlap: where faces lie in one plane, no depth shows."""
     if separation != 0.0 or start.signed_distance > round_off:
         return False
     meshes = [shape for body in (a, b) for shape, _ in body.shapes if is_concave_mesh(shape)]

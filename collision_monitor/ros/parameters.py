@@ -20,13 +20,13 @@ from collision_monitor.pipeline.settings_event import PROFILE, RULES
 from collision_monitor.ros.diagnostics import DiagnosticsParameters
 from collision_monitor.session import ONE_FILE, Splitting
 from collision_monitor.settings.names import nearest_name
+from collision_monitor.settings.parameter_file import OTHER_PARAMETERS, PARAMETERS_BY_RCLPY
 from collision_monitor.settings.profile import Profile
 from collision_monitor.settings.setting import Setting
 from collision_monitor.sources.mapping import Mapping, load_mapping
 
 T = TypeVar("T", str, int, float, bool, str | int | float)
 
-_BY_RCLPY = ("use_sim_time", "start_type_description_service", "qos_overrides.")
 _TYPES = {bool: "true or false", str: "a text", int: "a whole number", float: "a number"}
 
 
@@ -41,7 +41,7 @@ class ParameterReader:
         self._node = node
         self._given = {name: parameter.value for name, parameter in node.get_parameters_by_prefix("").items()}
         for name in self._given:
-            if name in names or name.startswith(_BY_RCLPY):
+            if name in names or name.startswith(PARAMETERS_BY_RCLPY):
                 continue
             raise InputError(f"parameter {name!r} is unknown: {nearest_name(name, names)}")
 
@@ -75,11 +75,6 @@ class ParameterReader:
 DEFAULT_FRAME = "world"
 EXECUTORS = ("single", "events")
 RECORD_MODES = ("always", "on_event")
-_RECORD = ("record", "record_mode", "record_before", "record_after", "record_split_size", "record_split_duration")
-
-
-_RUNNING = ("executor", "keep_up", "autostart", "diagnostic_updater.period", "diagnostic_updater.use_fqn")
-
 
 @dataclass(frozen=True)
 class MonitorParameters:
@@ -100,8 +95,7 @@ class MonitorParameters:
 def read_monitor_parameters(node: Node) -> MonitorParameters:
     """Read, check and declare the parameters. Raises InputError; ProfileError for a setting out of range."""
     settings = Profile.fields()
-    others = ("frame_id", "sources", RULES, *_RECORD, *_RUNNING)
-    reader = ParameterReader(node, [PROFILE, *(s.name for s in settings), *others])
+    reader = ParameterReader(node, [PROFILE, *(s.name for s in settings), *OTHER_PARAMETERS])
     name = reader.value(PROFILE, "balanced")
     profile = Profile.named(name)
     given = {s.name: plain(reader.given(s.name), s) for s in settings if reader.given(s.name) is not None}

@@ -6,10 +6,19 @@ from pathlib import Path
 from typing import Any, Final
 
 from collision_monitor.errors import InputError, ProfileError
+from collision_monitor.settings.parameter_file import (
+    PARAMETER_SECTION,
+    is_other_parameter,
+    reaches_monitor,
+    sections_of,
+)
 from collision_monitor.settings.yaml_file import read_yaml
 
 BASED_ON: Final = "based_on"
 """Key in the file of a custom profile: the named profile that it starts from."""
+
+_PROFILE: Final = "profile"
+"""The same in a parameter file of the node, which may serve as a profile: the other parameters are left out."""
 
 _TOLERANCES: Final = ("position_tolerance", "orientation_tolerance", "velocity_tolerance", "angular_velocity_tolerance")
 
@@ -77,10 +86,27 @@ def _read(path: Path) -> dict[str, Any]:
         raise ProfileError(f"profile {error}") from None
     if not isinstance(content, dict) or not content:
         raise ProfileError(f"profile {path}: expected settings, as `horizon: 3.0`, got {content!r:.80}")
-    base = content.pop(BASED_ON, "balanced")
+    sections = sections_of(content)
+    key = _PROFILE if sections else BASED_ON
+    if sections:
+        content = _of_parameters(path, sections)
+    base = content.pop(key, "balanced")
     if not isinstance(base, str) or base not in NAMED_PROFILES:
-        raise ProfileError(f"profile {path}, {BASED_ON}: expected one of {_names()}, got {base!r:.80}")
+        raise ProfileError(f"profile {path}, {key}: expected one of {_names()}, got {base!r:.80}")
     return {**NAMED_PROFILES[base], "name": path.stem, **content}
+
+
+def _of_parameters(path: Path, sections: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """Return the settings and the profile in a parameter file of the node. Raises ProfileError."""
+    mine = {name: values for name, values in sections.items() if reaches_monitor(name)}
+    if not mine:
+        raise ProfileError(
+            f"profile {path}: expected settings, or parameters under {PARAMETER_SECTION}, got those of "
+            f"{', '.join(sections):.100}"
+        )
+    return {
+        name: value for values in mine.values() for name, value in values.items() if not is_other_parameter(str(name))
+    }
 
 
 def _names() -> str:

@@ -6,6 +6,7 @@ The metadata of rosbag2 may hold some, because PyYAML writes them for equal list
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -33,6 +34,10 @@ NODES: Final = 100_000
 
 _LONGEST: Final = 100
 """Characters of a number or a date: Python takes quadratic time for longer ones."""
+
+_EXPONENT: Final = re.compile(r"[-+]?(?:[0-9]+\.?|[0-9]*\.[0-9]+)[eE][-+]?[0-9]{1,3}$")
+"""Numbers such as 1e-4, as YAML 1.2 and our own messages write them: YAML 1.1 wants 1.0e-4. No float needs more digits
+of the exponent."""
 
 _SHOWN: Final = 200
 """Characters of the library's reason that an error repeats."""
@@ -178,3 +183,4 @@ def _bounded(construct: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
 
 for _kind in ("int", "float", "timestamp"):
     _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _bounded(getattr(SafeLoader, f"construct_yaml_{_kind}")))
+_Loader.add_implicit_resolver("tag:yaml.org,2002:float", _EXPONENT, list("-+.0123456789"))

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Any
 
 from collision_monitor.errors import SessionError
-from collision_monitor.sources.bag_limits import check_bag, unpack_message
+from collision_monitor.sources.bag_limits import check_bag, salvage_hint, unpack_message
 from collision_monitor.sources.source import RawMessage
 
 
@@ -97,5 +97,5 @@ class Bag:
 
     def _broken(self, error: Exception) -> SessionError:
         reason = str(error) or type(error).__name__
-        hint = "" if self.path.suffix != ".mcap" else "; `collision-monitor salvage` recovers its complete messages"
+        hint = salvage_hint(self.path)
         return SessionError(f"{self.path}: expected a bag of rosbag2, cannot be read: {reason}{hint}")

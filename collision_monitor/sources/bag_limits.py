@@ -61,9 +61,18 @@ def check_bag(path: Path) -> None:
     except OSError as error:
         raise SessionError(f"{path}: expected a bag that can be read, got: {error.strerror or error}") from None
     except Exception as error:  # the libraries raise many kinds of errors for wrong bytes
-        hint = "; `collision-monitor salvage` recovers what is whole in it" if path.suffix == ".mcap" else ""
         reason = str(error) or type(error).__name__
-        raise SessionError(f"{path}: expected a bag of rosbag2, cannot be read: {reason}{hint}") from None
+        raise SessionError(f"{path}: expected a bag of rosbag2, cannot be read: {reason}{salvage_hint(path)}") from None
+
+
+def salvage_hint(path: Path) -> str:
+    """Return what an error adds about a bag that cannot be read, if it begins like an MCAP: others hold nothing."""
+    try:
+        with path.open("rb") as file:
+            begins = file.read(len(MAGIC)) == MAGIC
+    except OSError:
+        begins = False
+    return "; `collision-monitor salvage` recovers its complete messages" if begins else ""
 
 
 def unpack_message(data: bytes, topic: str) -> bytes:

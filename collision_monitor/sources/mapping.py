@@ -93,8 +93,10 @@ def make_mapping(content: Any, path: str = "", lines: dict[str, int] | None = No
         raise InputError(f"stamps: expected {HEADER} or {RECEIVED}, got {stamps!r}")
     sections = {name: top[name] for name in SECTIONS if name in top}
     objects = top.get("objects", {} if sections else None)
-    if not isinstance(objects, dict) or not (objects or sections):
+    if not isinstance(objects, dict):
         raise InputError(f"objects: expected a table of names, got {objects!r}")
+    if not (objects or sections):
+        raise InputError("objects: expected at least one, as `cart: {topic: /cart/odom, ...}`, got an empty table")
     if "rate" in top and "step" in top:
         raise InputError("rate: expected `rate` or `step`, got both")
     return Mapping(

@@ -27,6 +27,9 @@ _ENTRIES: Final = {
 }
 """The keys of an entry besides its topic. Sizes are to be replaced by the real ones."""
 
+NOTHING: Final = "objects: {}             # no topic of a known type is there; `run --sources` needs an object here"
+"""The line of a file without an entry, which a node would refuse."""
+
 _SIZED: Final = (ODOMETRY, POSE, POSE_WITH_COVARIANCE)
 
 
@@ -65,8 +68,8 @@ def sources_file(topics: Iterable[Seen], parents: dict[str, str]) -> str:
     if not robots:  # the world of a planning scene alone
         scenes = [each.topic for each in given if each.type in (PLANNING_SCENE, COLLISION_OBJECT)]
         lines += [f"  {_name(topic, used)}: {{topic: {topic}}}" for topic in scenes]
-    if len(lines) == 3:
-        lines[-1:] = [] if robots else ["objects: {}               # no topic of a known type is there"]
+    if all(line.lstrip().startswith("#") for line in lines[3:]):  # frames of tf, if anything
+        lines[2] = "# objects:" if robots else NOTHING
     lines += robots
     return "\n".join(lines) + "\n"
 

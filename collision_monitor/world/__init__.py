@@ -8,12 +8,12 @@
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.world.scene import Scene
-from collision_monitor.world.scenes import describe, make_scene, scene_names
+from collision_monitor.world.scenes import check_path, describe, make_scene, scene_names
 
 if TYPE_CHECKING:
     from collision_monitor.world.hard_spheres.simulation import HardSpheres as HardSpheres
 
-__all__ = ["HardSpheres", "Scene", "describe", "make_scene", "scene_names"]
+__all__ = ["HardSpheres", "Scene", "check_path", "describe", "make_scene", "scene_names"]
 
 
 def __getattr__(name: str) -> Any:

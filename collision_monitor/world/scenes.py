@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import Final
 
 from collision_monitor.errors import InputError
 from collision_monitor.world.arm import Arm
@@ -17,6 +18,8 @@ from collision_monitor.world.response_choice import AS_USUAL, ResponseChoice
 from collision_monitor.world.scene import Scene
 from collision_monitor.world.swarm import Swarm
 from collision_monitor.world.trajectory import Trajectory
+
+_TRACKS: Final = "trajectory"
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ _SCENES = {
     "slope": _responding("slope", "Slope", "boxes and balls of different friction slide and roll down a slope"),
     "pile": _responding("pile", "Pile", "boxes and balls fall into a bin and come to rest on each other"),
     "pendulums": _responding("pendulums", "Pendulums", "rows of balls on rods, some of them pulled aside"),
-    "trajectory": _RegisteredScene(
+    _TRACKS: _RegisteredScene(
         lambda objects, seed, rate, path: Trajectory(objects, rate, path),
         "plays recorded tracks of people and carts from CSV files (needs a path)",
     ),
@@ -103,6 +106,12 @@ def _registered(name: str) -> _RegisteredScene:
 def describe(name: str) -> str:
     """One-line description of a scene for users. Raises InputError with the list of names."""
     return _registered(name).description
+
+
+def check_path(name: str, path: str | Path | None) -> None:
+    """Raise InputError if a scene would ignore the path of recorded tracks."""
+    if path is not None and name != _TRACKS:
+        raise InputError(f"path: expected the scene {_TRACKS!r}, which plays recorded tracks, got {name!r} with {path}")
 
 
 def make_scene(
@@ -128,6 +137,7 @@ def make_scene(
     registered = _registered(name)
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise InputError(f"seed: expected a whole number from 0, got {seed!r}")
+    check_path(name, path)
     choice = ResponseChoice(restitution, gravity, response)
     if choice == AS_USUAL:
         scene = registered.make(objects, seed, rate, None if path is None else Path(path))

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import csv
 import json
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from collision_monitor.accuracy.inputs import Workload
 from collision_monitor.accuracy.playback import Step
 from collision_monitor.accuracy.profile_tradeoff import profile_tradeoff
 from collision_monitor.accuracy.reference_monitor import ReferenceMonitor
+from collision_monitor.accuracy.tradeoff import tradeoff
 from collision_monitor.cli.main import main
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.shapes import Sphere
@@ -130,6 +133,12 @@ def test_the_command_writes_what_it_prints(tmp_path: Path, capsys: pytest.Captur
 def test_a_session_can_be_measured(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["tradeoff", str(GOLDEN), "--profile", "balanced"]) == 0
     assert "balanced" in capsys.readouterr().out
+
+
+def test_profiles_that_are_named_are_measured_on_the_scene_of_meshes_too() -> None:
+    meshes = Workload("arm", TWO, passing(0.0))
+    rows = tradeoff([meshes], [Profile.named("fast")], None, lambda name, total: nullcontext(lambda done: None))
+    assert [row.profile for row in rows] == ["fast"] and rows[0].model == "exact"
 
 
 @pytest.mark.parametrize(

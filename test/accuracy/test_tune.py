@@ -10,7 +10,9 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+import session_scene
 import yaml
 
 from collision_monitor.accuracy.candidates import Space, models_of, with_threads
@@ -22,11 +24,13 @@ from collision_monitor.accuracy.profile_tradeoff import profile_tradeoff
 from collision_monitor.accuracy.tune import parameter_file, space_of, tune
 from collision_monitor.cli.main import main
 from collision_monitor.cli.parameter_file import check_parameter_file
+from collision_monitor.codec import encode_descriptions, encode_states
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Sphere
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.settings.profile import Profile
+from collision_monitor.world.scene import state_array
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "balanced.mcap"
 PROGRAM = Path(sys.executable).with_name("collision-monitor")
@@ -171,11 +175,11 @@ def test_the_file_makes_the_profile_again(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("demands", "words"),
     [
-        ({"budget_ms": 0.0}, "budget_ms: expected a number above 0, got 0"),
-        ({"probability_error": 0.001}, "probability_error: expected 0.007812, with 4096 samples, to 0.5, got 0.001"),
-        ({"horizon": 3.0}, "horizon: expected at most that of the recording, 2 s, got 3 s"),
-        ({"ttc_error": 2.5}, "ttc_error, horizon: expected an error below the horizon of 2 s, got 2.5 s"),
-        ({"probability_error": 0.1}, "probability_error: expected states that declare an uncertainty, got none"),
+        ({"budget_ms": 0.0}, "--budget-ms: expected a number above 0, got 0"),
+        ({"probability_error": 0.001}, "--max-probability-error: expected 0.007812, with 4096 samples, to 0.5"),
+        ({"horizon": 3.0}, "--min-horizon: expected at most that of the recording, 2 s, got 3 s"),
+        ({"ttc_error": 2.5}, "--max-ttc-error: expected an error below the horizon of 2 s, got 2.5 s"),
+        ({"probability_error": 0.1}, "--max-probability-error: expected states that declare an uncertainty, got none"),
     ],
 )
 def test_contradictory_demands_are_refused(work: Workload, demands: dict[str, float], words: str) -> None:
@@ -209,3 +213,48 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     with pytest.raises(SystemExit) as wrong:
         run("--budget-ms", 0)
     assert wrong.value.code == 2
+
+
+@pytest.fixture
+def far_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Session of one step, in which two spheres rest far from each other."""
+    objects = [ObjectDescription(k, Sphere(0.5)) for k in (1, 2)]
+    states = state_array(np.array([1, 2], np.uint32))
+    states["position"][1, 0] = 50.0
+    messages = [
+        (session_scene.SHAPES, encode_descriptions(session_scene.START, "world", objects, snapshot=True)),
+        (session_scene.STATES, encode_states(session_scene.START, "world", 1, states)),
+    ]
+    monkeypatch.setattr(session_scene, "inputs", lambda steps: messages)
+    session_scene.record(tmp_path / "far.mcap")
+    return tmp_path / "far.mcap"
+
+
+def test_a_demand_that_no_answer_tests_is_not_known_to_be_met(
+    far_apart: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["tune", str(far_apart), "-j", "1000", "--max-ttc-error", "0.001", "--max-distance-error", "0.1"]) == 4
+    out, error = capsys.readouterr()
+    assert "--max-distance-error: the session has no contact, so that it could not be tested" in error
+    assert "--max-ttc-error: the session has no certain prediction, so that" in error
+    assert "meets what could be tested" in out and "meets all demands" not in out
+    assert f" on {len(os.sched_getaffinity(0))} cores" in error
+    assert not (tmp_path / "far.yaml").exists()
+    assert main(["tune", str(far_apart), "-j", "1", "--budget-ms", "1000", "-o", "a file.yaml"]) == 0
+    assert "collision-monitor run --params 'a file.yaml'" in capsys.readouterr().out
+
+
+def test_wrong_demands_are_wrong_usage(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    for arguments in (("--max-ttc-error", "3"), ("--min-horizon", "9"), ("--max-probability-error", "0.6")):
+        assert main(["tune", str(GOLDEN), "-o", str(tmp_path / "new.yaml"), *arguments]) == 2
+        assert f"error: {arguments[0]}: expected" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["tune", "tradeoff"])
+def test_what_a_session_lacks_is_said(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(GOLDEN.read_bytes()[:60_000])
+    options = {"tune": ["--min-horizon", "9"], "tradeoff": ["--profile", "fast"]}[command]  # no long search
+    main([command, str(cut), *options])
+    assert "missing: the recording was cut off" in capsys.readouterr().err

@@ -50,6 +50,7 @@ def test_members_of_a_class() -> None:
     [
         ("{between: [crt, person], caution: {distance: 1}}", "line 5, rules, near, between, 0: the class 'crt' is"),
         ("{between: [cart], caution: {distance: 1}}", "between: expected a list of 2, got ['cart']"),
+        ("{between: cart, caution: {distance: 1}}", "between: expected two classes, or `any`, got 'cart'"),
         ("{B}", "expected at least one of caution, warning, critical with its thresholds, got none"),
         ("{B, caution: {}}", "expected a threshold of at least one of"),
         ("{B, caution: {distanc: 1}}", "the key 'distanc' is unknown: did you mean 'distance'?"),
@@ -104,6 +105,12 @@ def test_a_file_that_is_refused(text: str, said: str) -> None:
     found = refused(text)
     assert found.startswith("r.yaml")
     assert said in found
+
+
+def test_any_is_every_pair() -> None:
+    texts = (rule(f"{{between: {each}, caution: {{distance: 1}}}}") for each in ("any", "[any, any]"))
+    short, long = map(Rules.parse, texts)
+    assert short.rules == long.rules and short.rules[0].between == ("any", "any")
 
 
 def test_more_rules_than_a_step_may_evaluate_are_refused() -> None:

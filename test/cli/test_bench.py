@@ -82,7 +82,7 @@ def test_bad_arguments_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixtur
     partial = tmp_path / "partial.npz"
     np.savez(partial, kind=np.zeros(3, np.uint8))
     for arguments, expected in (
-        (["--scene", "rabbits"], "scene: expected one of boxes, spheres, mixed, hulls, got 'rabbits'"),
+        (["--scene", "rabbits"], "scene: expected one of boxes, spheres, mixed, hulls, hard-spheres"),
         (["--packing", "0.3"], "--packing: expected the scene hard-spheres"),
         (["--scene", "hard-spheres", "--threads", "2"], "--threads: expected no value"),
         (["--scene", "hard-spheres", "--n", "10"], "reflecting walls"),
@@ -110,4 +110,5 @@ def test_broad_phases_are_compared_and_find_the_same_pairs(capsys: pytest.Captur
     assert main(["bench", "--n", "50", "--frames", "3", "--broad-phase", "k-d-tree"]) == 0
     assert ", k-d-tree: " in capsys.readouterr().out
     assert main(["bench", "--n", "50", "--broad-phase", "magic"]) == 2
-    assert "expected one of grid" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert "--broad-phase: expected one of grid" in error and ", all, got 'magic'" in error

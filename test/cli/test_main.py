@@ -122,7 +122,8 @@ def test_a_terminal_of_another_encoding_gets_question_marks(encoding: str) -> No
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no /dev/full")
 def test_a_full_disk_behind_stdout_is_one_line() -> None:
     with open("/dev/full", "w") as full:
-        answer = subprocess.run([PROGRAM, "world", "--list"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+        command = [PROGRAM, "world", "--list"]
+        answer = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
     assert answer.returncode == 1
     assert answer.stderr == "collision-monitor: error: No space left on device\n"
 

@@ -105,8 +105,8 @@ def test_no_file_of_a_recording_that_is_read_is_overwritten(name: str, work: _Wo
         ("check", "--rules rules.yaml", "rules.yaml"),
         ("check", "--replay own.yaml", "own.yaml"),
         ("tradeoff csv", "", "own.yaml"),
-        ("tradeoff csv", "--path clip_ped.csv", "clip_ped.csv"),
-        ("tradeoff csv", "--path clip", "clip_ped.csv"),
+        ("tracks", "--path clip_ped.csv", "clip_ped.csv"),
+        ("tracks", "--path clip", "clip_ped.csv"),
         ("report", "--rules rules.yaml", "rules.yaml"),
         ("report", "--replay own.yaml", "own.yaml"),
         ("import", "--map map.yaml", "map.yaml"),
@@ -121,7 +121,8 @@ def test_no_other_input_is_overwritten(name: str, options: str, file: str, work:
     rows = [f"1,{frame},p,{0.1 * frame},0,3,0" for frame in range(4)]
     (work.folder / "clip_ped.csv").write_text("\n".join(["id,frame,label,x_est,y_est,vx_est,vy_est", *rows]))
     before = contents(work.folder)
-    code, error = work.run(COMMANDS[name], *options.split(), "--force", out=file)
+    command = COMMANDS.get(name, "tradeoff --scene trajectory --csv {out}")
+    code, error = work.run(command, *options.split(), "--force", out=file)
     assert code == 1 and one_line(error) and f"{file}: expected another file than" in error
     assert contents(work.folder) == before
 

@@ -20,7 +20,7 @@ from collision_monitor.sources import import_bag
 from collision_monitor.sources.decoding import Decoder
 from collision_monitor.sources.feed import Feed
 from collision_monitor.sources.mapping import load_mapping, make_mapping
-from collision_monitor.sources.template import Seen, sources_file
+from collision_monitor.sources.template import NOTHING, Seen, sources_file
 
 ROOT = Path(__file__).parents[2]
 ARM = ROOT / "examples/arm/arm.urdf"
@@ -275,6 +275,16 @@ def test_the_file_to_start_from_holds_the_robots_that_are_there() -> None:
     assert alone["objects"] == {"scene": {"topic": "/scene"}} and "robots" not in alone
     bolted = yaml.safe_load(sources_file(topics[:2], {}))
     assert "objects" not in bolted and make_mapping(bolted).frame == "map"
+    bolted = yaml.safe_load(sources_file(topics[:2], {"tool": "map"}))
+    assert "objects" not in bolted and make_mapping(bolted).frame == "map"
+
+
+@pytest.mark.parametrize("parents", [{}, {"cart": "map"}])
+def test_a_file_to_start_from_without_an_object_says_so(parents: dict[str, str]) -> None:
+    text = sources_file([], parents)
+    assert NOTHING in text and ("# cart:" in text) == bool(parents)
+    with pytest.raises(InputError, match="objects: expected at least one"):
+        make_mapping(yaml.safe_load(text))
 
 
 def test_a_robot_without_joint_states_moves_with_its_frame_alone() -> None:
