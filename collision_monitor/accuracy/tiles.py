@@ -7,7 +7,6 @@ answers to the tile are computed once for all of them.
 from __future__ import annotations
 
 import os
-import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
@@ -25,6 +24,7 @@ from collision_monitor.accuracy.tally import Tally
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session.history.alarms import Contacts
+from collision_monitor.session.worker import begin_worker
 from collision_monitor.settings.profile import Profile
 
 TILES: Final = 16
@@ -144,7 +144,7 @@ _taken: dict[str, Any] = {}
 
 
 def _take(recording: Recording, done: Any) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends the processes silently
+    begin_worker()
     _taken.update(recording=recording, done=done)
 
 

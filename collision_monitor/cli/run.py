@@ -11,6 +11,7 @@ from collision_monitor.cli.ros_arguments import parameters
 from collision_monitor.cli.usage import UsageError, given_rules, usage
 from collision_monitor.errors import SessionError
 from collision_monitor.ros.executables import monitor
+from collision_monitor.session.output_file import check_recording
 
 DESCRIPTION = """\
 Run the monitor as the ROS 2 node object_monitor. It subscribes to ~/objects/shapes and
@@ -78,9 +79,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run_command(args: argparse.Namespace) -> int:
-    """Run the node until SIGINT or SIGTERM. Raises UsageError, SessionError (the recording exists already)."""
+    """Run the node until SIGINT or SIGTERM. Raises UsageError, SessionError (no recording can be there)."""
     if args.record is not None and args.record.exists():
         raise SessionError(f"--record: expected the name of a new file, {args.record} is there already")
+    if args.record is not None:
+        check_recording(args.record, overwrite=False)
     several = args.split_size is not None or args.split_duration is not None or args.on_event
     if several and (args.record is None or args.record.suffix == ".mcap"):
         raise UsageError(

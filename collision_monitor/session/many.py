@@ -9,7 +9,6 @@ import glob
 import logging
 import os
 import re
-import signal
 import socket
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -20,6 +19,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from collision_monitor.errors import CollisionMonitorError, InputError, UnsupportedError
+from collision_monitor.session.worker import begin_worker
 
 Result = TypeVar("Result")
 
@@ -138,10 +138,8 @@ def _alone(function: Callable[[Path], Result], path: Path, failed: Callable[[Pat
 
 
 def _pool(jobs: int) -> ProcessPoolExecutor:
-    """Return a pool of spawned processes: a fork of a process with threads may deadlock. Ctrl-C ends them silently."""
-    return ProcessPoolExecutor(
-        jobs, mp_context=get_context("spawn"), initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_DFL)
-    )
+    """Return a pool of spawned processes: a fork of a process with threads may deadlock."""
+    return ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=begin_worker)
 
 
 def _on_ray(

@@ -266,7 +266,7 @@ def _create(
         raise SessionError(
             f"{path}: expected a new file, got one that exists; choose another name or remove it"
         ) from None
-    except FileNotFoundError:
-        raise SessionError(f"{path}: expected an existing folder {path.parent}, got none; create it first") from None
     except OSError as error:
+        if not (folder := path.parent).is_dir():
+            raise SessionError(f"{path}: expected an existing folder {folder}, got none; create it first") from None
         raise SessionError(f"{path}: expected to be able to write there, got: {error.strerror}") from None
