@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.alerts.alerts import Alerts
 from collision_monitor.alerts.rules import Rules
+from collision_monitor.geometry.point_tree import PointTree
 from collision_monitor.geometry.pose import Motion, Pose
 from collision_monitor.geometry.shapes import Box, ConvexHull, Cylinder, Mesh, Points, Shape, Sphere
 from collision_monitor.monitor.monitor import Monitor
@@ -62,6 +63,7 @@ def _step_certain(monitor: Monitor) -> tuple[Array, Array]:
     corners = np.vstack([np.zeros(3), np.eye(3)])
     containing_model([(ConvexHull(corners), Pose())], Model.AABB)
     containing_model([(Mesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]), Pose())], Model.AABB)
+    PointTree(corners, corners).exceeds(corners, corners[:, 0], np.eye(4), corners[:, 0])  # for large meshes
     poses = np.zeros((OBJECTS, 7))
     poses[:, 6] = 1.0
     poses[:, 0] = 0.9 * np.arange(OBJECTS)

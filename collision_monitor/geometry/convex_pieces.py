@@ -9,12 +9,15 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.bounded_cache import bounded_cache
+from collision_monitor.geometry.point_tree import PointTree
 from collision_monitor.geometry.polygons import is_convex
 from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.qhull import HEIGHTS_AT_ONCE
 from collision_monitor.geometry.shapes import ConvexHull, Mesh, Points, Polygon, Shape, Triangle, array_bytes
 from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.tolerances import HULL_DROP
+
+Array = NDArray[np.float64]
 
 REMEMBERED_PIECES: Final = 16 << 20
 """Bytes of pieces that are remembered: those of meshes of 11,000 faces in all. More: memory that hostile meshes can
@@ -82,7 +85,8 @@ def is_convex_mesh(mesh: Mesh) -> bool:
     # all faces must point outward, or all inward, and the mesh must not be a sheet folded onto itself
     outward = inward = True
     first, last = 0, FEW_FACES
-    while first < len(normal):
+    small = len(used) * len(normal) <= HEIGHTS_AT_ONCE
+    while first < (len(normal) if small else FEW_FACES):
         some, first = slice(first, last), last
         last += max(HEIGHTS_AT_ONCE // len(used), FEW_FACES)
         height = used @ normal[some].T - offset[some]
@@ -91,4 +95,19 @@ def is_convex_mesh(mesh: Mesh) -> bool:
         inward = inward and bool((low >= -flat).all() and (high > flat).all())
         if not (outward or inward):
             return False
-    return True
+    if small:
+        return True
+    return _is_below_planes(mesh, normal if outward else -normal, offset if outward else -offset, flat)
+
+
+def _is_below_planes(mesh: Mesh, normal: Array, offset: Array, flat: float) -> bool:
+    """Whether no vertex is higher than `flat` (m) over the plane of any face, and one is deeper below each plane."""
+    faces, which = np.unique(mesh.surface.faces, return_inverse=True)
+    used, which = mesh.vertices[faces], which.ravel()
+    # the normals of the faces at each vertex together are about normal to the surface
+    upward = np.zeros_like(used)
+    for c in range(3):
+        upward[:, c] = np.bincount(which, np.repeat(normal[:, c], 3), len(used))
+    tree, rows = PointTree(used, upward), np.column_stack([used, np.zeros(len(used))])
+    above = tree.exceeds(normal, offset + flat, rows, offset + flat, stop=True)
+    return not above.any() and bool(tree.exceeds(-normal, flat - offset, rows, flat - offset).all())

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from collision_monitor.geometry.inside import locate_in_surface
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.qhull import Hull
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shape_table import ShapeTableBuilder, take
 from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape, Sphere, Triangle
@@ -38,12 +39,32 @@ FARTHEST_FIRST: Final = 256
 """Cells that are first tested for the inside of a mesh, which takes longest. The next test takes 8 times as many."""
 
 
+MANY_FACES: Final = 1000
+"""Faces from which a concave mesh is one set of vertices here, not a list of triangles, which take 60 µs each. Its
+model is then tested by the planes of its faces, which lets a few more cells count. Smaller: nothing is gained."""
+
+
+PLANES_ROUND_OFF: Final = 1e-6
+"""By this part of half a cell's diagonal, the planes of a hull may be inside of its corners. Larger: a few cells more
+count. Smaller: that is not certain, because Qhull merges faces that are nearly coplanar."""
+
+
+def excess_of_large(mesh: Mesh, at: Pose, vertices: Array, model: Shape, pose: Pose, hull: Hull | None) -> float:
+    """`excess_of` a concave mesh at a pose, with its vertices (n, 3) in the object's frame.
+
+    hull: that of the model, if this is a convex hull with many corners; a cell counts if no plane of it keeps it out.
+    """
+    near_model = None if hull is None else lambda points, most: ~hull.beyond(points, most * (1.0 + PLANES_ROUND_OFF))
+    certain = [] if len(mesh.surface.hole) else [(mesh, at)]  # a surface with a hole has no certain inside
+    return _excess_around_concave(certain, _DistanceTo.vertices(vertices), model, pose, near_model)
+
+
 def excess_of(shapes: Sequence[tuple[Shape, Pose]], pieces: PosedShapes, model: Shape, pose: Pose) -> float:
     """Largest distance (m) by which the model exceeds the object, rounded up. pieces: the object's convex pieces."""
     if len(pieces) == 1 and model is pieces[0][0]:
         return 0.0
     if len(pieces) > 1:
-        return _excess_around_concave(shapes, pieces, model, pose)
+        return _excess_around_concave(shapes, _DistanceTo.pieces(pieces), model, pose)
     # the distance to a convex object is greatest at a corner of the model
     if isinstance(model, Sphere):
         return max(float(_distances(pose.position[None], pieces)[0]) + model.radius, 0.0)
@@ -64,20 +85,28 @@ def corners(pieces: PosedShapes) -> Array:
 
 
 def _excess_around_concave(
-    shapes: Sequence[tuple[Shape, Pose]], pieces: PosedShapes, model: Shape, pose: Pose
+    shapes: Sequence[tuple[Shape, Pose]],
+    distance: _DistanceTo,
+    model: Shape,
+    pose: Pose,
+    near_model: Callable[[Array, float], NDArray[np.bool_]] | None = None,
 ) -> float:
-    """Excess at the farthest cell of a grid around the model that is in the model and not inside of the object."""
+    """Excess at the farthest cell of a grid around the model that is in the model and not inside of the object.
+
+    shapes: those that may have an inside. near_model: whether points may be within a distance (m) of the model.
+    """
     low, high = -reach([(model, pose)], -np.eye(3)), reach([(model, pose)], np.eye(3))
     cell = (high - low) / (BLOCK * BLOCKS)
     diagonal = float(np.linalg.norm(cell))
     slack = diagonal / 2
-    distance = _DistanceTo(pieces)
     # a point in a hull takes longer than its nearest vertex, and than a point in a mesh, so it is asked last
     is_asked_last = distance.is_to_vertices and isinstance(model, ConvexHull)
 
     def in_model(points: Array) -> NDArray[np.bool_]:
         if isinstance(model, Box) or not len(points):
             return np.full(len(points), True)
+        if near_model is not None:
+            return near_model(points, slack)
         return _distances(points, [(model, pose)]) <= slack
 
     def counts(points: Array) -> NDArray[np.bool_]:
@@ -136,14 +165,24 @@ def _inside_of_meshes(points: Array, shapes: Sequence[tuple[Shape, Pose]]) -> ND
 class _DistanceTo:
     """Distance (n,) in m of points (n, 3) from the nearest piece, rounded up."""
 
-    def __init__(self, pieces: PosedShapes) -> None:
+    def __init__(self, pieces: PosedShapes, vertices: Array | None) -> None:
         self._pieces = pieces
         self._tree = None
-        if all(isinstance(shape, Triangle) for shape, _ in pieces):
+        if vertices is not None:
             from scipy.spatial import cKDTree
 
             # the distance to the nearest vertex bounds that to the nearest face and is much faster to compute
-            self._tree = cKDTree(corners(pieces))
+            self._tree = cKDTree(vertices)
+
+    @classmethod
+    def pieces(cls, pieces: PosedShapes) -> _DistanceTo:
+        """Distance from pieces; from their vertices if all are triangles."""
+        return cls(pieces, corners(pieces) if all(isinstance(shape, Triangle) for shape, _ in pieces) else None)
+
+    @classmethod
+    def vertices(cls, vertices: Array) -> _DistanceTo:
+        """Distance from the vertices (n, 3) of a mesh."""
+        return cls([], vertices)
 
     @property
     def is_to_vertices(self) -> bool:

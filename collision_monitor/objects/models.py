@@ -19,6 +19,7 @@ from collision_monitor.geometry.coordinates import coordinates
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
 from collision_monitor.geometry.planar import is_planar
 from collision_monitor.geometry.pose import Pose
+from collision_monitor.geometry.qhull import Hull
 from collision_monitor.geometry.reach import reach
 from collision_monitor.geometry.shapes import (
     Box,
@@ -36,7 +37,7 @@ from collision_monitor.geometry.shapes import (
 )
 from collision_monitor.objects.closed_parts import separated
 from collision_monitor.objects.convex_decomposition import convex_decomposition
-from collision_monitor.objects.excess import PosedShapes, corners, excess_of
+from collision_monitor.objects.excess import MANY_FACES, PosedShapes, corners, excess_of, excess_of_large
 from collision_monitor.records import Model
 from collision_monitor.tolerances import ROUNDED_UP
 
@@ -94,6 +95,8 @@ def containing_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | 
     Raises InputError for an unknown name, UnsupportedError if the model does not exist for the object.
     """
     chosen = parse_model(model)
+    if chosen not in (Model.AUTO, Model.EXACT, Model.CONVEX_DECOMPOSITION) and _is_large_concave(shapes):
+        return _around_large(shapes, chosen)
     pieces, index = [], []
     for k, (shape, pose) in enumerate(shapes):
         # the poses of the pieces cache their rotations, so those of a mesh at the origin are used again
@@ -113,6 +116,28 @@ def containing_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | 
         return _decomposed(shapes, convex)
     piece, pose = _enclose(pieces, chosen)
     return Modelled([(piece, pose)], [0], chosen, excess_of(shapes, pieces, piece, pose), convex)
+
+
+def _is_large_concave(shapes: Sequence[tuple[Shape, Pose]]) -> bool:
+    """Whether an object is one concave mesh of so many faces that they are not made pieces of."""
+    shape, _ = shapes[0]
+    return len(shapes) == 1 and isinstance(shape, Mesh) and len(shape.faces) > MANY_FACES and is_concave_mesh(shape)
+
+
+def _around_large(shapes: Sequence[tuple[Shape, Pose]], model: Model, directions: Array | None = None) -> Modelled:
+    """Model of one large concave mesh: what encloses its convex hull encloses it. directions: of the user's k-DOP."""
+    mesh, at = shapes[0]
+    assert isinstance(mesh, Mesh)
+    vertices = mesh.vertices[np.unique(mesh.faces)] @ at.rotation.T + at.position
+    if model is Model.CONVEX_HULL and directions is None:
+        hull = Hull(vertices)
+        solid = ConvexHull(vertices[hull.vertices])
+        known = (np.arange(len(hull.vertices), dtype=np.int32),)
+        excess = excess_of_large(mesh, at, vertices, solid, Pose(), hull)
+        return Modelled([(solid, Pose())], [0], model, excess, False, known)
+    whole: PosedShapes = [(ConvexHull(vertices), Pose())]
+    around = _enclose(whole, model) if directions is None else _kdop(whole, directions, "of these directions")
+    return Modelled([around], [0], model, excess_of_large(mesh, at, vertices, *around, None), False)
 
 
 def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | int) -> Modelled:
@@ -137,6 +162,7 @@ def monitored_model(shapes: Sequence[tuple[Shape, Pose]], model: Model | str | i
         model=Model.CONVEX_HULL,
         excess=max(part.excess for part in parts),
         convex=False,
+        corners=tuple(each for part in parts for each in part.corners or (None,) * len(part.pieces)),
     )
 
 
@@ -254,6 +280,8 @@ def containing_kdop(shapes: Sequence[tuple[Shape, Pose]], directions: ArrayLike)
     for shape, _ in shapes:
         if is_planar(shape) or isinstance(shape, HalfSpace | Points):
             raise UnsupportedError(f"{type(shape).__name__}: a k-DOP is not offered; supported are auto, exact")
+    if _is_large_concave(shapes):
+        return _around_large(shapes, Model.CONVEX_HULL, normals)
     pieces = [(piece, pose @ offset) for shape, pose in shapes for piece, offset in convex_pieces(shape)]
     solid, pose = _kdop(pieces, normals, "of these directions")
     excess = excess_of(shapes, pieces, solid, pose)
