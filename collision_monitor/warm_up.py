@@ -61,9 +61,11 @@ def _step_certain(monitor: Monitor) -> tuple[Array, Array]:
         monitor.add(object_id, Box((1, 1, 1)) if object_id % 2 else Sphere(0.5))
     # the excess of a model has kernels too; without this, the first concave mesh would hold up the answers
     corners = np.vstack([np.zeros(3), np.eye(3)])
+    tetrahedron = Mesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     containing_model([(ConvexHull(corners), Pose())], Model.AABB)
-    containing_model([(Mesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]), Pose())], Model.AABB)
     PointTree(corners, corners).exceeds(corners, corners[:, 0], np.eye(4), corners[:, 0])  # for large meshes
+    containing_model([(tetrahedron, Pose())], Model.AABB)
+    monitor.add(OBJECTS - 1, tetrahedron, replace=True)  # a convex mesh names its features by a kernel of its own
     poses = np.zeros((OBJECTS, 7))
     poses[:, 6] = 1.0
     poses[:, 0] = 0.9 * np.arange(OBJECTS)

@@ -16,7 +16,7 @@ from collision_monitor.geometry.shape_table import CONE, CONVEX_HULL, HALF_SPACE
 from collision_monitor.meshes.approach import Approach, time_until
 from collision_monitor.meshes.boxes import half_of
 from collision_monitor.meshes.contact import reach_in
-from collision_monitor.meshes.feature import triangle_feature
+from collision_monitor.meshes.feature import tie_of, triangle_feature
 from collision_monitor.meshes.layout import CENTER, CHILD, FACE, RADIUS, WIDTH
 from collision_monitor.meshes.nearest import NEAR_A, triangle_at
 from collision_monitor.meshes.placing import Placing, inverse, place_point, relative, turn_back, turned_back
@@ -220,12 +220,15 @@ def solid_contact(
                 best, found, enough = row[DISTANCE], True, row[DISTANCE] - row[BOUND]
                 for i in range(CONTACT_SIZE):
                     out[i] = row[i]
-                n = rotate_back(pose.R_A, (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2]))
                 if _is_point(T):
                     out[FEATURE_TYPE_A], out[FEATURE_TYPE_A + 1] = VERTEX, blocks[block, FACE, k]
                 else:
-                    reach = reach_in(blocks, root)
-                    out[FEATURE_TYPE_A], out[FEATURE_TYPE_A + 1] = triangle_feature(blocks, block, k, n, reach)
+                    n = rotate_back(pose.R_A, (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2]))
+                    x = rotate_back(pose.R_A, (row[POINT_A], row[POINT_A + 1], row[POINT_A + 2]))
+                    reach = tie_of(table, b, b) * reach_in(blocks, root)
+                    out[FEATURE_TYPE_A], out[FEATURE_TYPE_A + 1] = triangle_feature(
+                        T, blocks[block, FACE, k], along(x, -radius, n), n, reach
+                    )
         if examined > MOST_EXAMINED and found:
             for k in range(waiting + 1):  # of the boxes that are left, and of this one
                 out[BOUND] = max(out[BOUND], best - work[2 * k])

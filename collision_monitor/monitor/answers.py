@@ -16,6 +16,7 @@ from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.active_pairs import ActivePairs
 from collision_monitor.monitor.event_list import EventList
+from collision_monitor.monitor.mesh_faces import name_mesh_features
 from collision_monitor.monitor.patches import with_patches
 from collision_monitor.monitor.result import StepResult, StepStatus
 from collision_monitor.monitor.roster import count_bodies
@@ -64,7 +65,11 @@ class Answers(Stage):
         if len(contacts):
             b = step.roster.bodies
             columns = b.model, multibody.parts.index
-            details = step.profile.contact_details
+            details, faces = step.profile.contact_details, step.roster.mesh_faces
+            if details and len(faces):
+                table = faces.table(len(multibody.table.kind))
+                scratch = np.empty((1, 4)), np.empty((2, 3, 3))
+                name_mesh_features(multibody, active.pairs, active.results, step.now, table, scratch)
             n = write_contacts(active.pairs, active.results, *columns, step.now, details, contacts)
             contacts = contacts[:n]
         if step.profile.contact_points > 1:

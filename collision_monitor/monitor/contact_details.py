@@ -18,9 +18,20 @@ from collision_monitor.geometry.shape_table import (
     MESH,
     POINTS,
     POLYGON,
+    SPHERE,
     TREE,
 )
 from collision_monitor.meshes.extent import farthest
+from collision_monitor.meshes.feature import (
+    ROUND_TIE,
+    feature_in_triangle,
+    number_in_hull,
+    off_segment,
+    off_triangle,
+    tie_of,
+    vertex_at,
+)
+from collision_monitor.meshes.triangle_pair import Triangle
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,
     DISTANCE,
@@ -30,58 +41,91 @@ from collision_monitor.narrow_phase.contact_row import (
     FEATURE_TYPE_A,
     FEATURE_TYPE_B,
     NORMAL,
+    POINT_A,
+    POINT_B,
     SURFACE,
     UNKNOWN,
     VERTEX,
 )
-from collision_monitor.narrow_phase.core import rounding
+from collision_monitor.narrow_phase.core import Core, CorePair, core_length, core_of, rounding
+from collision_monitor.narrow_phase.gjk import EXACT, gjk, simplex_point
 from collision_monitor.narrow_phase.support_value import core_support
-from collision_monitor.narrow_phase.vector import Vector, dot, opposite, rotate_back
+from collision_monitor.narrow_phase.vector import (
+    Vector,
+    along,
+    dot,
+    minus,
+    opposite,
+    plus,
+    rotate_back,
+    sum_of_sizes,
+)
+from collision_monitor.narrow_phase.work_memory import P_AB, R_AB
 from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUCHING, relative_now
 from collision_monitor.prediction.mesh_pair import has_mesh
-from collision_monitor.prediction.motion import rotation_now
-from collision_monitor.tolerances import FEATURE_TIE
+from collision_monitor.prediction.motion import age_of, position_now, rotation_now
+from collision_monitor.tolerances import FEATURE_TIE, SAT_ROUND_OFF
 
-ROUND_TIE: Final = 1e-6
-"""Sine of the angle between a normal and an axis below which they count as parallel, because the normals that GJK finds
-on round surfaces are off by up to 1e-7. Larger: a tilted cylinder stands on its face."""
+LIFT: Final = 1e-3
+"""Height above a hull, as a part of its size, from which the nearest point of the hull is searched to find the face at
+a point of it. The nearest point is beside that point by the height times the error of the normal, which may be 1e-3 for
+round surfaces. Larger: points near an edge are put on it. Smaller: the direction to the nearest point is round-off."""
 
 
 @device
-def _of_box(table: Any, s: int, n: Vector) -> tuple[float, float]:
-    """Feature of a box that is farthest along n, numbered as in box_box.py."""
-    tie = FEATURE_TIE * table.radius[s]
-    free, axis, normal_axis = 0, 0, 0
-    bits = 0
+def _of_box(table: Any, s: int, x: Vector, n: Vector, reach: float) -> tuple[float, float]:
+    """Feature of a box, numbered as in box_box.py."""
+    gap = (table.size[s, 0] - abs(x[0]), table.size[s, 1] - abs(x[1]), table.size[s, 2] - abs(x[2]))
+    outermost = max(min(gap[0], min(gap[1], gap[2])), reach)  # the point is at this side, even if it is below it
+    sides, level, beside, last = 0, 0, 0, 0  # as bits: at a side; along it a corner is as high as the other; positive
     for c in range(3):
-        if 2.0 * table.size[s, c] * abs(n[c]) <= tie:
-            free, axis = free + 1, c
+        if gap[c] <= outermost:
+            sides |= 1 << c
         else:
-            normal_axis = c
-        if n[c] > 0.0:
-            bits |= 1 << c
-    if free == 0:
-        return VERTEX, float(bits)
-    if free == 1:
-        return EDGE, 4.0 * axis + (bits >> (axis + 1) % 3 & 1) + 2.0 * (bits >> (axis + 2) % 3 & 1)
-    return FACE, 2.0 * normal_axis + (0.0 if n[normal_axis] > 0.0 else 1.0)
+            last = c
+        if 2.0 * table.size[s, c] * abs(n[c]) <= reach:
+            level |= 1 << c
+        if (n[c] if table.size[s, c] <= reach else x[c]) > 0.0:
+            beside |= 1 << c
+    for c in range(3):
+        upward = (n[c] > 0.0) == (beside >> c & 1 == 1)
+        if sides >> c & 1 and level | 1 << c == 7 and upward:
+            return FACE, 2.0 * c + (0.0 if beside >> c & 1 else 1.0)
+    edge = -1
+    for c in range(3):
+        if level >> c & 1 and sides | 1 << c == 7:
+            edge = c
+    if edge < 0 and sides == 7:
+        return VERTEX, float(beside)
+    if edge < 0 and sides | 1 << last == 7:
+        edge = last
+    if edge >= 0:
+        return EDGE, 4.0 * edge + (beside >> (edge + 1) % 3 & 1) + 2.0 * (beside >> (edge + 2) % 3 & 1)
+    c = 0 if sides & 1 else (1 if sides & 2 else 2)
+    return FACE, 2.0 * c + (0.0 if beside >> c & 1 else 1.0)
 
 
 @device
-def _of_solid_of_revolution(table: Any, s: int, n: Vector) -> tuple[float, float]:
-    """Feature of a cylinder or a cone that is farthest along n, numbered as in geometry/round_features.py."""
+def _of_solid_of_revolution(table: Any, s: int, x: Vector, n: Vector, reach: float) -> tuple[float, float]:
+    """Feature of a cylinder or a cone, numbered as in geometry/round_features.py."""
     r, h = table.size[s, 0], table.size[s, 1]
-    rim = sqrt(n[0] * n[0] + n[1] * n[1])
-    slope = n[2]
-    if table.kind[s] == CONE:
-        slope = (2.0 * h * n[2] - r * rim) / sqrt(4.0 * h * h + r * r)
-        if slope > ROUND_TIE:
+    reach = max(reach, ROUND_TIE * (r + 2.0 * h))
+    rim, away = sqrt(n[0] * n[0] + n[1] * n[1]), sqrt(x[0] * x[0] + x[1] * x[1])
+    if table.kind[s] == CYLINDER:
+        end, slope, side = (1.0 if x[2] < 0.0 else 0.0), n[2], r - away
+        base, down = h - abs(x[2]), (-n[2] if x[2] < 0.0 else n[2])
+    else:
+        if away * away + (x[2] - h) ** 2 <= reach * reach:
             return VERTEX, 0.0
-    if abs(slope) <= ROUND_TIE:
+        slant = sqrt(4.0 * h * h + r * r)
+        end, slope, side = 0.0, (2.0 * h * n[2] - r * rim) / slant, (r * (h - x[2]) - 2.0 * h * away) / slant
+        base, down = x[2] + h, -n[2]
+    if abs(slope) <= ROUND_TIE or base > max(reach, side):  # a line of the side touches as a whole; or below the base
         return SURFACE, 0.0
-    end = 1.0 if table.kind[s] == CYLINDER and n[2] < 0.0 else 0.0
-    return (FACE if rim <= ROUND_TIE else EDGE), end
+    if abs(r - away) <= reach and not (rim <= ROUND_TIE and down > 0.0):
+        return EDGE, end
+    return FACE, end
 
 
 @inlined
@@ -90,10 +134,10 @@ def _along(table: Any, k: int, n: Vector) -> Any:
 
 
 @device
-def _of_vertices(table: Any, s: int, n: Vector) -> tuple[float, float]:
-    """Feature of a hull or a polygon that is farthest along n; edges and faces have the lowest number of a vertex.
+def _of_polygon(table: Any, s: int, n: Vector) -> tuple[float, float]:
+    """Feature of a polygon that is farthest along n, which SAT finds without an error.
 
-    The edge of a polygon between its last and its first point has the number of the last.
+    The edge between its last and its first point has the number of the last.
     """
     first, count = table.vertex_start[s], table.vertex_count[s]
     farthest = -inf
@@ -111,24 +155,87 @@ def _of_vertices(table: Any, s: int, n: Vector) -> tuple[float, float]:
             touching += 1
     if touching == 1:
         return VERTEX, float(lowest)
-    if table.kind[s] == POLYGON:
-        return EDGE, float(highest if highest - lowest > 1 and lowest == 0 else lowest)
-    return (EDGE if touching == 2 else FACE), float(lowest)
+    return EDGE, float(highest if highest - lowest > 1 and lowest == 0 else lowest)
 
 
 @device
-def feature_along(table: Any, s: int, n: Vector) -> tuple[float, float]:
-    """Type (contact_row.py) and index of the feature of the shape in slot s that is farthest along n, in its frame."""
+def _of_hull(table: Any, s: int, x: Vector, n: Vector, reach: float, work: Any) -> tuple[float, float]:
+    """Feature of a hull, numbered as in meshes/feature.py; work: scratch of GJK.
+
+    A hull has no list of faces. The vertices that span the point nearest to one above x are those of its face.
+    """
+    first, count, height = table.vertex_start[s], table.vertex_count[s], dot(x, n)
+    level, lowest, p, q = 0, 0, first, first
+    for k in range(first, first + count):
+        index = table.vertex_index[k]
+        if k > first and index == table.vertex_index[k - 1]:
+            continue  # padding
+        if abs(_along(table, k, n) - height) <= reach:
+            lowest = index if level == 0 else min(lowest, index)
+            p, q = q, k
+            level += 1
+    if level > 2:
+        return FACE, float(lowest)
+    if level == 2 and off_segment(x, vertex_at(table, p), vertex_at(table, q)) <= reach * reach:
+        return EDGE, float(lowest)
+    radius = core_length(table, s)
+    above = along(x, LIFT * radius, n)
+    for i in range(9):
+        work[R_AB + i] = 1.0 if i % 4 == 0 else 0.0
+    work[P_AB], work[P_AB + 1], work[P_AB + 2] = opposite(above)
+    cores = CorePair(Core(SPHERE, (0.0, 0.0, 0.0), 0, 0), core_of(table, s), table.vertices)
+    spanned, _, _ = gjk(cores, work, 2.0 * radius, inf, EXACT)
+    # a simplex of one or two points repeats the last; one of four points is flat, so any three of them are its face
+    last = min(spanned, 3) - 1
+    T = Triangle(
+        plus(simplex_point(work, 0), above),
+        plus(simplex_point(work, min(1, last)), above),
+        plus(simplex_point(work, last), above),
+    )
+    _, foot = off_triangle(x, T)
+    _, kind, c = feature_in_triangle(T, foot, n, reach)
+    if kind == FACE and spanned < 3:
+        kind, c = (EDGE if spanned == 2 else VERTEX), 0.0
+    return kind, number_in_hull(table, s, T, kind, c, reach)
+
+
+@device
+def feature_at(table: Any, s: int, x: Vector, n: Vector, reach: float, work: Any) -> tuple[float, float]:
+    """Type (contact_row.py) and index of the feature of the shape in slot s at a point x of its surface, in its frame.
+
+    It is the face or the edge at the point that touches as a whole, because the outward normal n is at a right angle to
+    it; else the vertex at the point, else the edge or the face that contains it. So a normal that is a little off does
+    not move the feature away from the point. reach (m): heights and distances up to it count as 0.
+    """
     kind = table.kind[s]
     if kind == BOX:
-        return _of_box(table, s, n)
+        return _of_box(table, s, x, n, reach)
     if kind == CYLINDER or kind == CONE:
-        return _of_solid_of_revolution(table, s, n)
-    if kind == CONVEX_HULL or kind == POLYGON:
-        return _of_vertices(table, s, n)
+        return _of_solid_of_revolution(table, s, x, n, reach)
+    if kind == CONVEX_HULL:
+        return _of_hull(table, s, x, n, reach, work)
+    if kind == POLYGON:
+        return _of_polygon(table, s, n)
     if kind == HALF_SPACE:
         return FACE, 0.0
     return SURFACE, 0.0
+
+
+@inlined
+def origin_now(bodies: Any, i: int, now: float) -> Vector:
+    """Position of body i in the world at `now` (s)."""
+    age = age_of(bodies, i, now)
+    return position_now(bodies, i, age, 0), position_now(bodies, i, age, 1), position_now(bodies, i, age, 2)
+
+
+@inlined
+def core_point(table: Any, s: int, R: Any, o: Vector, world: Vector, n: Vector) -> tuple[Vector, float]:
+    """Point of a shape's core below a point of its surface, in its frame, and the round-off of that (m).
+
+    R, o: rotation and position of the shape in the world; n: outward normal there, in its frame.
+    """
+    x = along(rotate_back(R, minus(world, o)), -table.margin[s], n)
+    return x, SAT_ROUND_OFF * (sum_of_sizes(world) + sum_of_sizes(o))
 
 
 @device
@@ -174,11 +281,14 @@ def complete_contact(multibody: Any, i: int, j: int, now: float, scratch: Any, r
         at = FEATURE_TYPE_A if side == 0 else FEATURE_TYPE_B
         exact = bodies.excess[i if side == 0 else j] == 0.0
         if row[at] == UNKNOWN and exact and row[STATUS] == TOUCHING:
-            s = int(row[SHAPE_I] if side == 0 else row[SHAPE_J])
-            place_shape(table, parts, s, R[side], R[2])
-            row[at], row[at + FEATURE_INDEX_A - FEATURE_TYPE_A] = feature_along(
-                table, s, rotate_back(R[2], n if side == 0 else opposite(n))
-            )
+            body, s = (i, int(row[SHAPE_I])) if side == 0 else (j, int(row[SHAPE_J]))
+            o = plus(origin_now(bodies, body, now), place_shape(table, parts, s, R[side], R[2]))
+            p = POINT_A if side == 0 else POINT_B
+            d = rotate_back(R[2], n if side == 0 else opposite(n))
+            x, round_off = core_point(table, s, R[2], o, (row[p], row[p + 1], row[p + 2]), d)
+            size = table.radius[s] if table.kind[s] != HALF_SPACE else 0.0
+            reach = tie_of(table, int(row[SHAPE_I]), int(row[SHAPE_J])) * size + round_off
+            row[at], row[at + FEATURE_INDEX_A - FEATURE_TYPE_A] = feature_at(table, s, x, d, reach, scratch.work)
     if several and row[DISTANCE] <= 0.0:
         if table.kind[int(row[SHAPE_I])] == HALF_SPACE or table.kind[int(row[SHAPE_J])] == HALF_SPACE:
             return  # the only way out is along its normal

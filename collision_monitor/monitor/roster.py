@@ -20,6 +20,7 @@ from collision_monitor.geometry.shape_table import POLYGON, SHARED, TREE, ShapeT
 from collision_monitor.geometry.shapes import HalfSpace, Mesh, Points, array_bytes
 from collision_monitor.meshes.shape_trees import shape_tree
 from collision_monitor.meshes.slot_trees import plant_trees
+from collision_monitor.monitor.mesh_faces import MeshFaces, faces_of
 from collision_monitor.monitor.mesh_snapshot import mesh_arrays, plant_meshes
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.objects.description import ObjectDescription
@@ -47,9 +48,9 @@ COPIES: Final = 4
 the table has up to twice the room that it needs."""
 
 
-TREE_BYTES: Final = 300
+TREE_BYTES: Final = 330
 """Memory of a triangle or a point in its tree: 150 to 220 bytes, and the array of all trees may have half as much room
-again."""
+again. A face of a convex mesh takes 104 bytes, twice that while the faces are packed, and its hull may have a tree."""
 
 
 def memory(d: ObjectDescription) -> int:
@@ -64,12 +65,13 @@ class Roster(Stage):
     """The described objects. A body keeps its slot as long as its object is described.
 
     bodies, parts: the arrays that the kernels read. top: number of slots that have been used so far. planar: the scene
-    lies in the x-y plane. renewed: slots that the next step predicts anew, for example after a new description.
+    lies in the x-y plane. mesh_faces: of the convex meshes, which name their features. renewed: slots that the next
+    step predicts anew, for example after a new description.
     """
 
     SAVED = (
         *("bodies", "parts", "top", "planar", "renewed"),
-        *("_shapes", "_slots", "_names", "_memory", "_free", "_allowed"),
+        *("mesh_faces", "_shapes", "_slots", "_names", "_memory", "_free", "_allowed"),
     )
     CACHES = ("_last_ids", "_last_slots", "_allowed_keys", "_all_memory", "_by_name")
 
@@ -79,6 +81,7 @@ class Roster(Stage):
         self.top = 0
         self.planar = False
         self.renewed: set[int] = set()
+        self.mesh_faces = MeshFaces()
         weakref.finalize(self, forget)  # the kernels keep the arrays of their last call
         self._shapes = ShapeTableBuilder()
         self._slots: dict[int, int] = {}
@@ -226,6 +229,10 @@ class Roster(Stage):
             parts = make_parts(len(self._shapes.table.kind))
             enlarge(self.parts, parts)
             self.parts = parts
+        for k, slot in enumerate(slots):
+            faces = faces_of(d, modelled, k)
+            if faces is not None:
+                self.mesh_faces.add(slot, faces)
         lay_out_body(self.multibody, i, slots, modelled.shapes)
         self.planar = planar
         bodies = self.bodies
@@ -304,6 +311,7 @@ class Roster(Stage):
         slot = int(self.bodies.first_shape[i])
         while slot >= 0:
             self._shapes.remove(slot)
+            self.mesh_faces.drop(slot)
             slot, self.parts.next[slot] = int(self.parts.next[slot]), -1
         self.bodies.first_shape[i] = -1
 
@@ -335,6 +343,7 @@ class Roster(Stage):
                 "shapes.vertices": shapes.vertices.T.copy(),
                 "shapes.size": size,
                 **mesh_arrays(shapes),
+                **self.mesh_faces.arrays(),
             }
         )
         facts |= {
@@ -400,6 +409,7 @@ class Roster(Stage):
         free_blocks = {count: list(starts) for count, starts in facts["free_blocks"]}
         self._shapes = ShapeTableBuilder.restored(table, list(facts["free_shapes"]), free_blocks)
         plant_meshes(self._shapes, snapshot)
+        self.mesh_faces = MeshFaces.restored(snapshot, table.kind)
 
 
 def _empty_bodies(capacity: int) -> Bodies:

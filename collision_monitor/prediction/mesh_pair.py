@@ -5,12 +5,12 @@ from __future__ import annotations
 from math import inf, sqrt
 
 from collision_monitor._jit import device, inlined, outlined
-from collision_monitor.geometry.shape_table import HALF_SPACE, MESH, POINTS, TREE
+from collision_monitor.geometry.shape_table import CONVEX_HULL, HALF_SPACE, MESH, POINTS, TREE
 from collision_monitor.meshes.contact import FARTHER, OPEN, tree_contact
-from collision_monitor.meshes.feature import triangle_feature
+from collision_monitor.meshes.feature import feature_in_triangle, number_in_hull, off_triangle, triangle_feature
 from collision_monitor.meshes.inside import INSIDE, OUTSIDE, is_either_in, locate
 from collision_monitor.meshes.layout import CLOSED, FACE, MOST_PARTS, PARTS, WIDTH
-from collision_monitor.meshes.nearest import PLACE_A, PLACE_B, nearest
+from collision_monitor.meshes.nearest import PLACE_A, PLACE_B, nearest, triangle_at
 from collision_monitor.meshes.placing import inverse, relative
 from collision_monitor.meshes.solid import SolidMemory, solid_contact
 from collision_monitor.meshes.touching import contact_of_places
@@ -27,8 +27,8 @@ from collision_monitor.narrow_phase.contact_row import (
 )
 from collision_monitor.narrow_phase.dispatch import contact_within, mirror
 from collision_monitor.narrow_phase.pair_pose import swapped
-from collision_monitor.narrow_phase.vector import along, dot, opposite, rotate, rotate_back, sum_of_sizes
-from collision_monitor.tolerances import SAT_ROUND_OFF
+from collision_monitor.narrow_phase.vector import along, dot, minus, opposite, rotate, rotate_back, sum_of_sizes
+from collision_monitor.tolerances import FEATURE_TIE, SAT_ROUND_OFF
 
 
 @inlined
@@ -126,8 +126,11 @@ def mesh_within(table, a, b, pose, limit, out, scratch):
         if known != OPEN and not out[DISTANCE] <= limit:
             return False
         n = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
-        _name_feature(table, a, answer[PLACE_A], rotate_back(pose.R_A, n), out, 0)
-        _name_feature(table, b, answer[PLACE_B], rotate_back(pose.R_B, opposite(n)), out, 1)
+        n_a, n_b = rotate_back(pose.R_A, n), rotate_back(pose.R_B, opposite(n))
+        on_a = out[POINT_A], out[POINT_A + 1], out[POINT_A + 2]
+        on_b = minus((out[POINT_B], out[POINT_B + 1], out[POINT_B + 2]), pose.p)
+        _name_feature(table, a, answer[PLACE_A], rotate_back(pose.R_A, on_a), n_a, out, 0)
+        _name_feature(table, b, answer[PLACE_B], rotate_back(pose.R_B, on_b), n_b, out, 1)
     else:
         memory = SolidMemory(scratch.triangle, scratch.work, scratch.tree)
         found = solid_contact(table.blocks, root_of(table, a), table.margin[a], table, b, pose, limit, out, memory)
@@ -149,14 +152,25 @@ def mesh_within(table, a, b, pose, limit, out, scratch):
 
 
 @device
-def _name_feature(table, s, place, n, out, side):
-    """Write the feature of a mesh or a cloud at the place of a triangle or point, farthest along n in its frame."""
+def _name_feature(table, s, place, x, n, out, side):
+    """Write the feature of a mesh, a cloud or a hull at a point x of the triangle at a place, for a normal n.
+
+    The triangle itself tells it, because a normal of two triangles need not be one of the solids at that point.
+    """
     at = FEATURE_TYPE_B if side else FEATURE_TYPE_A
     block, k = int(place) // WIDTH, int(place) % WIDTH
+    reach = FEATURE_TIE * table.radius[s]
     if table.kind[s] == POINTS:
         out[at], out[at + 1] = VERTEX, table.blocks[block, FACE, k]
-    elif table.kind[s] == MESH:
-        out[at], out[at + 1] = triangle_feature(table.blocks, block, k, n, table.radius[s])
+    elif table.kind[s] == MESH or table.kind[s] == CONVEX_HULL:
+        T = triangle_at(table.blocks, block, k)
+        x = along(x, -table.margin[s], n)
+        if table.kind[s] == MESH:
+            out[at], out[at + 1] = triangle_feature(T, table.blocks[block, FACE, k], x, n, reach)
+        else:
+            _, foot = off_triangle(x, T)
+            _, kind, c = feature_in_triangle(T, foot, n, reach)
+            out[at], out[at + 1] = kind, number_in_hull(table, s, T, kind, c, reach)
 
 
 @device

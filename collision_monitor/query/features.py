@@ -40,6 +40,13 @@ Array = NDArray[np.float64]
 _SIDES: Final = np.array([[(k >> axis & 1) - 0.5 for axis in range(3)] for k in range(8)])
 _QUADS: Final = np.array([[1, 3, 7, 5], [0, 4, 6, 2], [2, 6, 7, 3], [0, 1, 5, 4], [4, 5, 7, 6], [0, 2, 3, 1]])
 _TRIANGLES: Final = _QUADS[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+_DIAGONALS: Final = [(int(min(q[0], q[2])), int(max(q[0], q[2]))) for q in _QUADS]
+"""The edge between the two triangles of each face, which is no edge of the box."""
+
+
+def _side(face: int) -> Feature:
+    """Face of a box."""
+    return Feature(FeatureType.FACE, tuple(_QUADS[face].tolist()), face)
 
 
 def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Shape, pose_b: Pose) -> FeatureContact:
@@ -92,7 +99,9 @@ def feature_of(shape: Shape, pose: Pose, point: Array, normal: Array, tie: float
         case Box():
             found = feature_at(at, towards, _SIDES * shape.size, _TRIANGLES, tie, off)
             if found.type is FeatureType.FACE:
-                return Feature(FeatureType.FACE, tuple(_QUADS[found.face // 2].tolist()), found.face // 2)
+                return _side(found.face // 2)
+            if found.type is FeatureType.EDGE and found.vertices in _DIAGONALS:
+                return _side(_DIAGONALS.index(found.vertices))
             return found
         case Cylinder():
             return feature_of_cylinder(at, towards, shape.radius, shape.length)

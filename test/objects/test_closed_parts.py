@@ -29,7 +29,8 @@ def monitored(mesh: cm.Mesh, other: cm.Shape, place: tuple[float, float, float])
 def test_closed_parts_and_sheets_are_meshes_of_their_own() -> None:
     mesh = beside_ground(BOX)
     closed, sheet = separated(mesh)
-    assert closed.surface.closed and len(closed.faces) == len(BOX.faces)
+    assert closed.surface.closed and len(closed.surface.faces) == len(BOX.faces)
+    assert len(closed.faces) == len(mesh.faces)  # the numbers stay
     assert sheet.surface.sheet and len(sheet.faces) == 2 and sheet.surface.certain
     assert "beside closed parts" in repr(mesh)
     assert separated(closed) == (closed,) and separated(sheet) == (sheet,)
@@ -49,6 +50,19 @@ def test_what_is_inside_of_a_closed_part_is_in_contact(solid: trimesh.Trimesh, o
     assert cm.time_of_impact(mesh, still, other, motion, horizon=2.0).lower == 0.0
     (contact,) = monitored(mesh, other, place).contacts
     assert contact["signed_distance"] < 0.0
+
+
+@pytest.mark.parametrize("solid", [BOX, RING], ids=["convex", "concave"])
+@pytest.mark.parametrize("first", [True, False], ids=["ground first", "ground last"])
+def test_a_contact_names_the_face_of_the_whole_mesh(solid: trimesh.Trimesh, first: bool) -> None:
+    order = slice(None, None, -1) if first else slice(None)
+    whole = beside_ground(solid)
+    mesh = cm.Mesh(whole.vertices, whole.faces[order])
+    centre, normal = solid.triangles_center[7], solid.face_normals[7]
+    found = monitored(mesh, cm.Sphere(0.1), tuple(centre + 0.1 * normal)).contacts[0]
+    assert found["feature_type_a"] == cm.FeatureType.FACE
+    corners = mesh.vertices[mesh.faces[found["feature_index_a"]]]
+    assert np.abs((corners - centre) @ normal).max() < 1e-9
 
 
 def test_above_the_ground_nothing_touches_and_below_the_sheet_nothing_is_inside() -> None:

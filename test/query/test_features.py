@@ -9,6 +9,7 @@ import collision_monitor as cm
 from collision_monitor import Pose
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.contact_features import FeaturePair, FeatureType
+from collision_monitor.query.features import feature_of
 
 FLOOR = cm.HalfSpace((0, 0, 1))
 UPRIGHT, LYING = (0, 0, 0, 1), (np.sqrt(0.5), 0, 0, np.sqrt(0.5))  # lying: +z to -y
@@ -71,6 +72,15 @@ def test_a_curved_surface_is_in_none_of_the_six_pairs():
     for ball in (cm.Sphere(1), cm.Ellipsoid((1, 2, 3))):
         with pytest.raises(cm.UnsupportedError, match="has no vertices, edges and faces; supported are Box"):
             cm.contact_features(cm.contact(ball, X, FLOOR, Pose()), ball, X, FLOOR, Pose())
+
+
+def test_a_diagonal_of_the_side_of_a_box_is_no_edge():
+    box, needle = cm.Box((2, 2, 2)), cm.Cone(0.1, 1)
+    for at in ((0.0, 0.0), (0.5, 0.5), (0.5, -0.5)):
+        assert words(box, Pose(), needle, Pose((*at, 1.501), (1, 0, 0, 0))) == "face 4 of A on vertex 0 of B"
+        # a normal that is a right angle to no side, as of triangles that cross
+        found = feature_of(box, Pose(), np.array([*at, 1.0]), np.array([0.6, 0.0, 0.8]), 1e-9, 0.0)
+        assert str(found) == "face 4"
 
 
 def test_a_contact_off_the_surface_by_its_error_has_features():
