@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 import collision_monitor as cm
+from collision_monitor.narrow_phase.contact_row import FACE
 from collision_monitor.objects.closed_parts import separated
 
 BOX = trimesh.creation.box((2.0, 2.0, 2.0))
@@ -59,8 +60,8 @@ def test_a_contact_names_the_face_of_the_whole_mesh(solid: trimesh.Trimesh, firs
     whole = beside_ground(solid)
     mesh = cm.Mesh(whole.vertices, whole.faces[order])
     centre, normal = solid.triangles_center[7], solid.face_normals[7]
-    found = monitored(mesh, cm.Sphere(0.1), tuple(centre + 0.1 * normal)).contacts[0]
-    assert found["feature_type_a"] == cm.FeatureType.FACE
+    found = monitored(mesh, cm.Sphere(0.1), tuple(centre + 0.09 * normal)).contacts[0]
+    assert found["feature_type_a"] == FACE
     corners = mesh.vertices[mesh.faces[found["feature_index_a"]]]
     assert np.abs((corners - centre) @ normal).max() < 1e-9
 
