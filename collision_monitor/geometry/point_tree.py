@@ -29,6 +29,9 @@ and the largest distance of a point from the origin."""
 WAITING: Final = 64
 """Nodes that wait in a search: one for each level."""
 
+SCATTER: Final = 2654435761
+"""Multiple of a place that is scattered over 32 bits (Knuth, The Art of Computer Programming 3, section 6.4)."""
+
 BOUND_ROUND_OFF: Final = 8 * EPSILON
 """Round-off of a bound, as part of the product of the lengths. Larger: more points of a flat face are examined."""
 
@@ -105,10 +108,15 @@ def _write_node(points: Any, directions: Any, order: Any, begin: int, end: int, 
 
 @device
 def _sort_about(points: Any, order: Any, begin: int, end: int, middle: int, axis: int) -> None:
-    """Sort the order so that the part before the middle lies below the rest. (Quickselect: Hoare, 1961)"""
+    """Sort the order so that the part before the middle lies below the rest. (Quickselect: Hoare, 1961)
+
+    The pivots are at scattered places, because there are orders that make fixed places take quadratic time.
+    """
     first, last = begin, end - 1
     while first < last:
-        a, b, c = points[order[first], axis], points[order[(first + last) // 2], axis], points[order[last], axis]
+        scattered, size = (first * SCATTER + last) & 0x7FFFFFFF, last - first + 1
+        a, b = points[order[first + scattered % size], axis], points[order[(first + last) // 2], axis]
+        c = points[order[first + (scattered >> 8) % size], axis]
         pivot = max(min(a, b), min(max(a, b), c))
         i, j = first, last
         while i <= j:
