@@ -267,6 +267,6 @@ def _create(
             f"{path}: expected a new file, got one that exists; choose another name or remove it"
         ) from None
     except OSError as error:
-        if not (folder := path.parent).is_dir():
+        if not (folder := path.parent).exists():
             raise SessionError(f"{path}: expected an existing folder {folder}, got none; create it first") from None
         raise SessionError(f"{path}: expected to be able to write there, got: {error.strerror}") from None
