@@ -86,7 +86,7 @@ class Demands:
         return found
 
     def untested(self, row: Measurement) -> list[str]:
-        """Return a sentence for each demand of which a row says nothing, because nothing of its kind was compared."""
+        """Return a sentence for each demand that a row cannot test, because the session has no answers of its kind."""
         lacking = {
             "distance error": ("distance_error", "contact"),
             "TTC error": ("ttc_error", "certain prediction"),

@@ -137,9 +137,12 @@ def tradeoff_command(args: argparse.Namespace) -> int:
     read = [args.session, *track_files(args.path), *(args.profile or ())]
     check_outputs({"--csv": args.csv, "--png": args.png}, force=args.force, inputs=read)
     profiles = [Profile.named(name) for name in args.profile] if args.profile else None
-    inputs: Iterable[Workload] = _scenes(args) if args.session is None else [recorded(args.session)]
-    for work in inputs if args.session is not None else ():
-        print_missing(work.damage)
+    inputs: Iterable[Workload]
+    if args.session is None:
+        inputs = _scenes(args)
+    else:
+        inputs = [recorded(args.session)]
+        print_missing(inputs[0].damage)
     if args.front:
         return _measure_fronts(args, inputs)
     if args.impact_methods:
