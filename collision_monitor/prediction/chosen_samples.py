@@ -1,8 +1,8 @@
-"""The samples that a pair needs: beside a coarser lattice, those whose outcome its pilot leaves open.
+"""The samples that a pair needs: beside the first ones, those whose outcome the pilot leaves open.
 
 The first coordinate of a sample, the error along the miss, decides most. Sorted by it, the samples of the pilot meet in
 one run and miss outside of it, but for some ranks at the ends of the run where other errors matter too. Other samples
-beyond these ranks end as the pilot does, so that those of the coarser lattice stand for them, with their weight.
+beyond these ranks end as the pilot does, so that the first ones stand for them, with their weight.
 """
 
 from __future__ import annotations
@@ -64,11 +64,11 @@ def _represent(lattice, weights, begin, end):
 
 
 @device
-def choose_samples(times, lattice, sampling, careful, chosen):
+def choose_samples(times, lattice, used, sampling, careful, chosen):
     """Choose samples (ChosenSamples) for bodies with these times (S,) of the pilot; infinite: they do not meet.
 
     Returns their number. 0: the bodies are stated to pass, and hardly meet in the pilot. The first ones are the pilot.
-    careful: choose all unless the whole pilot meets.
+    used: number of the coordinates in use; careful: choose all unless the whole pilot meets.
     """
     pilot = lattice.pilot
     if samples_needed(times, lattice, sampling, careful) == 0:
@@ -81,7 +81,7 @@ def choose_samples(times, lattice, sampling, careful, chosen):
     weights = chosen.weights[0:base]
     for n in range(base):
         weights[n] = lattice.weights[n]
-    for row in range(lattice.points.shape[0]):
+    for row in range(used):
         source, target = lattice.points[row, 0:base], chosen.points[row, 0:base]
         for n in range(base):
             target[n] = source[n]
@@ -92,7 +92,7 @@ def choose_samples(times, lattice, sampling, careful, chosen):
     for zone in range(2):
         begin, end = lattice.place[is_open[2 * zone]], lattice.place[is_open[2 * zone + 1]]
         ranked = lattice.ranked[begin:end]
-        for row in range(lattice.points.shape[0]):
+        for row in range(used):
             source, target = lattice.points[row], chosen.points[row, count : count + ranked.size]
             for n in range(ranked.size):
                 target[n] = source[ranked[n]]

@@ -54,6 +54,7 @@ class CutSettings(NamedTuple):
 
     margin: float  # m
     tolerance: float  # m: gap up to which a sample has entered
+    fineness: Any  # (float, 1/s): factor of the tolerance now, up to 1, and its growth
     pilot: int  # number of samples of the pilot lattice
     follows: Any  # (bool, bool): whether normals may turn with the bodies
     turning: Any  # (int, int): how errors of orientation turn the bodies, see sample_gaps
@@ -64,6 +65,12 @@ class CutSettings(NamedTuple):
 def plane_margin(settings):
     """Gap (m) at which a sample is behind a plane. Between planes the obstacle is farther by up to a tolerance."""
     return settings.margin - 0.5 * settings.tolerance
+
+
+@inlined
+def _part(settings, t):
+    """Factor of the tolerances at time t."""
+    return min(settings.fineness[0] + settings.fineness[1] * t, 1.0)
 
 
 @inlined
@@ -214,7 +221,8 @@ def cut_extremes(table, parts, pair, k, extremes, samples, settings, memory, scr
     for extreme in extremes:
         n = place_of(extreme, memory.live, samples)
         while n >= 0 and entry[n] <= leave[n] and obstacle.count[k] < MOST_PLANES:
-            at, tolerance = entry[n], settings.tolerance
+            at = entry[n]
+            tolerance = settings.tolerance * _part(settings, at)
             if not _check(table, parts, pair, n, at, samples, k, tolerance, settings, memory, scratch)[0]:
                 break
 
@@ -255,7 +263,8 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
             continue
         idle, checked[n] = 0, inf
         at = 0.5 * (entry[n] + leave[n]) if is_brief else entry[n]
-        is_cut, gap = _check(table, parts, pair, n, at, samples, k, tolerance, settings, memory, scratch)
+        part = _part(settings, at)
+        is_cut, gap = _check(table, parts, pair, n, at, samples, k, part * tolerance, settings, memory, scratch)
         if is_cut and is_full:
             obstacle.count[k] -= 1
             apart += 0 if is_brief else 1
@@ -266,7 +275,7 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
             verified //= 2
         else:
             verified += 1
-            tolerance = min(max(tolerance, gap), coarsest)
+            tolerance = min(max(tolerance, gap / part), coarsest)
     return True, samples
 
 

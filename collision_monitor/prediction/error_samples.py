@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,12 @@ from collision_monitor.prediction.known_axes import AXES
 from collision_monitor.prediction.motion import MOTION
 from collision_monitor.prediction.spread import FIFTH_ROOT, unknown_acceleration
 from collision_monitor.prediction.trigonometry import sin_cos
+
+ORIENTATION, LEFT_OVER = 6, 12
+"""First coordinates of a sample that are unit errors of orientation, three for each body: see `orientation_spread`."""
+
+NOT_TURNING: Final = (0.0, 0.0, 0.0, 0.0)
+"""`orientation_spread` of a body that errors do not turn."""
 
 
 class Workspace(NamedTuple):
@@ -79,15 +85,16 @@ def _across(x, y, z):
 
 
 @device
-def add_covariance(spread, i, age, t, stale_acceleration, planar, work):
+def add_covariance(spread, i, age, t, right, stale_acceleration, planar, work):
     """Add body i's part to work.joint (6, 6): covariance of its position t seconds from now and its velocity.
 
-    Both are along the axes of work.frame. age: s since the body's last state. A stale object widens its spread here:
-    its unknown acceleration acts as a velocity error whose displacement at t is right.
+    Both are along the axes of work.frame. age: s since the body's last state. A stale object widens its spread here. An
+    unknown acceleration from now on acts as a velocity error with the right displacement at the time `right` (s from
+    now; 0: it is left out).
     """
     at = age + t
     s = unknown_acceleration(spread, i, age > 0.0, 0, stale_acceleration)
-    ahead = 0.5 * t if unknown_acceleration(spread, i, False, 0, stale_acceleration) > 0.0 else 0.0
+    ahead = 0.5 * right if unknown_acceleration(spread, i, False, 0, stale_acceleration) > 0.0 else 0.0
     velocity = s * (age + ahead)
     position = s * 0.5 * age * age + velocity * t
     C, frame, joint, block = spread.covariance, work.frame, work.joint, work.block
@@ -134,11 +141,17 @@ def take_root(joint):
 
 
 @inlined
-def turn(m, R, w, off, error):
-    """Set rotation and angular velocity of m (MOTION) to R and w (3,), off by error (3,) times `off` (rad, rad/s)."""
+def turn(m, R, w, off, error, left):
+    """Set rotation and angular velocity of m (MOTION) to R and w (3,), off by unit errors, see `orientation_spread`.
+
+    error, left (3,): of the orientation at the time of `off`, and of what is left.
+    """
     x, y, z = error
-    m.wx, m.wy, m.wz = w[0] + off[1] * x, w[1] + off[1] * y, w[2] + off[1] * z
-    dx, dy, dz = off[0] * x, off[0] * y, off[0] * z
+    u, v, q = left
+    m.wx = w[0] + off[1] * x + off[3] * u
+    m.wy = w[1] + off[1] * y + off[3] * v
+    m.wz = w[2] + off[1] * z + off[3] * q
+    dx, dy, dz = off[0] * x + off[2] * u, off[0] * y + off[2] * v, off[0] * z + off[2] * q
     angle = sqrt(dx * dx + dy * dy + dz * dz)
     c = 2.0 * np.sin(0.5 * angle) ** 2
     s = np.sin(angle)
@@ -153,21 +166,33 @@ def turn(m, R, w, off, error):
 
 
 @device
-def orientation_spread(spread, i, radius, age, t):
-    """Orientation error that is one standard deviation t seconds from now: (rad now, mean rad/s from now to t).
+def orientation_spread(spread, i, radius, age, t, right):
+    """Errors of body i's orientation for two unit errors: (rad now, rad/s, rad now, rad/s), the last two independent.
 
-    These are averages: each source of the error (pose, rate, acceleration) contributes in proportion to its share of
-    the variance at t. (0, 0) if rotation moves nothing. age: s since the last state.
+    The first one is that of the orientation t seconds from now, with its likeliest way there; the second is what is
+    left of the errors of orientation and angular velocity, and moves nothing at t (the Cholesky factor of both at t).
+    An unknown angular acceleration acts as an error of the angular velocity that is right at the time `right` (s from
+    now). All are 0 if rotation moves nothing. age: s since the last state.
     """
     if radius == 0.0:
-        return 0.0, 0.0
-    at = age + t
+        return NOT_TURNING
+    mean = 2.0 * age + right
     pose, rate = spread.stddev[i, 1] ** 2, spread.stddev[i, 3] ** 2
     turning = (0.5 * FIFTH_ROOT * spread.acceleration[i, 1]) ** 2
-    whole = sqrt(pose + (rate + turning * at * at) * at * at)
+    now = pose + (rate + turning * age * age) * age * age
+    both = (rate + turning * age * mean) * age
+    rate += turning * mean * mean
+    whole = sqrt(now + (2.0 * both + rate * t) * t)
     if whole == 0.0:
-        return 0.0, 0.0
-    return (pose + (rate + turning * age * at) * age * at) / whole, (rate + turning * at * (at + age)) * at / whole
+        return 0.0, sqrt(rate), 0.0, 0.0
+    left = sqrt(max(now * rate - both * both, 0.0)) / whole
+    return (now + both * t) / whole, (both + rate * t) / whole, -t * left, left
+
+
+@inlined
+def turns(off):
+    """Whether errors turn a body; off: orientation_spread."""
+    return off[0] + off[1] + off[3] > 0.0
 
 
 @device
@@ -178,7 +203,7 @@ def set_turn(m, t, off, yaw_only, out):
     the z axis. The first turns with the body:
     exp(w t). The second adds up in turning axes: the integral of exp(w s) for s from 0 to t.
     """
-    if off[0] + off[1] == 0.0:
+    if off[0] == 0.0 and off[1] == 0.0:
         return
     rate = sqrt(m.wx * m.wx + m.wy * m.wy + m.wz * m.wz)
     angle = rate * t
@@ -202,7 +227,7 @@ def set_turn(m, t, off, yaw_only, out):
 
 @device
 def shift(work, z, t, p, v):
-    """Move body j by sample z (12,) of the errors: its velocity is v + the error, its position p + the error at t."""
+    """Move body j by sample z (DIMENSIONS,): its velocity is v + the error, its position p + the error at t."""
     B, L, F, y = work.motion[1], work.joint, work.frame, work.block
     for r in range(6):
         value = 0.0

@@ -1,4 +1,4 @@
-"""Samples whose outcome is foretold by those of a coarser lattice, so that they need not be followed.
+"""Samples whose outcome is foretold by the first ones, so that they need not be followed.
 
 Bodies that just touch do so at two points. A small error of position or orientation widens their gap there in
 proportion, so that one number, the widening, orders the samples from those that surely meet to those that surely miss.
@@ -23,7 +23,7 @@ SPARE: Final = 0.1
 """Standard deviations of the widening beyond those with both outcomes that count as open too; SPARE_PART of the width
 of the open part comes on top. Larger: more samples are followed. Smaller: the probability is less exact."""
 
-SPARE_PART: Final = 0.1
+SPARE_PART: Final = 0.05
 
 
 SIDES = np.dtype(
@@ -41,20 +41,20 @@ SIDES = np.dtype(
 
 
 @device
-def find_ends(points, times, stride, ends):
-    """Write the first coordinates (2,) between which bodies meet, from the times (S,) of every stride-th sample.
+def find_ends(points, times, first, ends):
+    """Write the first coordinates (2,) between which bodies meet, from the times (S,) of the first samples.
 
     It is infinite on a side on which none misses. points: (S, DIMENSIONS). Returns the middle.
     """
     count = total = squares = 0.0
-    for n in range(0, times.size, stride):
+    for n in range(first):
         if times[n] < inf:
             z = points[n, 0]
             count, total, squares = count + 1.0, total + z, squares + z * z
     mean = total / max(count, 1.0)
     spread = sqrt(3.0 * max(squares / max(count, 1.0) - mean * mean, 0.0))  # half the length of an even distribution
     ends[0], ends[1] = -inf, inf
-    for n in range(0, times.size, stride):
+    for n in range(first):
         if times[n] == inf:
             if points[n, 0] < mean:
                 ends[0] = mean - spread
@@ -96,15 +96,15 @@ def _widened(widening, z):
 
 
 @device
-def set_limits(points, times, stride, middle, sides):
-    """Set the limits of the widenings from the times (S,) of every stride-th sample; middle: see `find_ends`."""
+def set_limits(points, times, first, middle, sides):
+    """Set the limits of the widenings from the times (S,) of the first samples; middle: see `find_ends`."""
     for side in range(2):
         sides.below[side] = sides.above[side] = inf
         if not -inf < sides.ends[side] < inf:
             continue
         w = sides.widening[side]
         least, most = inf, -inf
-        for n in range(0, times.size, stride):
+        for n in range(first):
             if times[n] < inf:
                 most = max(most, _widened(w, points[n]))
             elif (points[n, 0] >= middle) == (side == 1):
@@ -126,20 +126,20 @@ def foretell(sides, z):
 
 
 @device
-def weigh_followed(points, weights, stride, sides):
-    """Begin the sums of the weights with those of every stride-th sample, which are followed."""
+def weigh_followed(points, weights, first, sides):
+    """Begin the sums of the weights with those of the first samples, which are followed."""
     for outcome in range(2):
         sides.followed[outcome] = sides.skipped[outcome] = 0.0
-    for n in range(0, weights.size, stride):
+    for n in range(first):
         outcome = foretell(sides, points[n])
         if outcome != OPEN:
             sides.followed[outcome] += weights[n]
 
 
 @device
-def stand_for_skipped(points, share, stride, sides):
+def stand_for_skipped(points, share, first, sides):
     """Add the weights of the samples that were skipped to the share (S,) of those that stand for them."""
-    for n in range(0, share.size, stride):
+    for n in range(first):
         outcome = foretell(sides, points[n])
         if outcome != OPEN:
             share[n] *= 1.0 + sides.skipped[outcome] / sides.followed[outcome]

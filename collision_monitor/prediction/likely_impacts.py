@@ -22,11 +22,18 @@ from collision_monitor.prediction.impact_distribution import (
 )
 from collision_monitor.prediction.impact_histogram import NOT_FOUND, summarise_by_bins
 from collision_monitor.prediction.motion import carry_on, half_acceleration
-from collision_monitor.prediction.pair_errors import PairErrors, set_gap_covariance, surface_bend, swing_bound
+from collision_monitor.prediction.pair_errors import (
+    PairErrors,
+    acceleration_terms,
+    deviation_at,
+    set_gap_covariance,
+    surface_bend,
+    swing_bound,
+)
 from collision_monitor.prediction.plane_impacts import enter_bodies, enter_surely
 from collision_monitor.prediction.round_impacts import NOT_ROUND, enter_round_bodies, round_form
 from collision_monitor.prediction.sample_gaps import TURNED_FARTHEST
-from collision_monitor.prediction.screening import design_point
+from collision_monitor.prediction.screening import GapGrowth, design_point
 from collision_monitor.prediction.sphere_interval import sphere_interval
 from collision_monitor.prediction.spread import is_uncertain, surface_spread, swing_radius, turns_by_yaw
 from collision_monitor.prediction.sure_contact import surely_meet
@@ -86,8 +93,9 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
             if has_mesh:
                 answer[PROBABILITY] = LEFT
                 continue
-            set_gap_covariance(multibody, spread, i, j, ages, t, sampling, work)
-            bound, t = design_point(multibody, i, j, tube, turning, bend, sampling, t, memory.obstacle, work)
+            set_gap_covariance(multibody, spread, i, j, ages, t, 0.0, sampling, work)
+            growth = GapGrowth(turning, acceleration_terms(multibody, spread, i, j, ages), bend)
+            bound, t = design_point(multibody, i, j, tube, growth, sampling, t, memory.obstacle, work)
             if bound < sampling.min_probability:
                 answer[:] = nan
                 continue
@@ -96,10 +104,11 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
                 continue
         elif not has_mesh:
             t = likely_contact(multibody, i, j, t, horizon, query, work)
-        late = max(t, closest)  # when errors of orientation, which grow, count most
-        turn_i = orientation_spread(spread, i, r_i, ages[0], late)
-        turn_j = orientation_spread(spread, j, r_j, ages[1], late)
-        most = max(turn_i[0] + turn_i[1] * late, turn_j[0] + turn_j[1] * late)
+        late = max(t, closest)
+        late = late if late > 0.0 else horizon
+        turn_i = orientation_spread(spread, i, r_i, ages[0], late, late)
+        turn_j = orientation_spread(spread, j, r_j, ages[1], late, late)
+        most = max(deviation_at(turn_i, late), deviation_at(turn_j, late))
         if has_mesh or most > TURNED_FARTHEST or (flat and most > 0.0):
             answers[k, PROBABILITY] = LEFT
             continue
@@ -109,15 +118,15 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
             frame[0, 1] = B.y - A.y + t * (B.vy - A.vy)
             frame[0, 2] = B.z - A.z + t * (B.vz - A.vz)
         set_frame(work.frame, B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
-        set_gap_covariance(multibody, spread, i, j, ages, t, sampling, work)
+        set_gap_covariance(multibody, spread, i, j, ages, t, t if t > 0.0 else horizon, sampling, work)
         pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
         far_i, far_j = r_i if r_i < inf else 0.0, r_j if r_j < inf else 0.0  # a half-space does not turn
-        swing = (far_i * (turn_i[0] + turn_i[1] * t), far_j * (turn_j[0] + turn_j[1] * t))
+        swing = (far_i * deviation_at(turn_i, t), far_j * deviation_at(turn_j, t))
         sure = sampling.stated and surely_meet(table, parts, pair, work.joint, swing, t, query.margin, work.scratch)
         take_root(work.joint)
         _clear_upper(work.joint)
         yaw_only = (turns_by_yaw(spread, i, sampling.planar), turns_by_yaw(spread, j, sampling.planar))
-        errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, (far_i, far_j), yaw_only)
+        errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, late, (far_i, far_j), yaw_only)
         form = round_form(table, parts, pair, errors, query.margin, work)
         if form != NOT_ROUND:
             samples = enter_round_bodies(table, parts, pair, form, errors, sure, sampling, lattice, memory, work)

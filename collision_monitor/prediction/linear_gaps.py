@@ -60,15 +60,16 @@ def _add(row, body, own, mode, turned, factor, v):
 
 
 @inlined
-def _most(row, turn):
-    """Bound on the magnitude of a row's part from errors of orientation; turn (2, 3, 3): see NODE."""
+def _most(row, node):
+    """Bound on the magnitude of a row's part from errors of orientation at a node (NODE)."""
     most = 0.0
     for body in range(2):
         for c in range(3):
-            total = 0.0
+            total = left = 0.0
             for r in range(3):
-                total += row[OWN + 3 * body + r] * turn[body, r, c]
-            most += abs(total)
+                total += row[OWN + 3 * body + r] * node.turn[body, r, c]
+                left += row[OWN + 3 * body + r] * node.left[body, r, c]
+            most += abs(total) + abs(left)
     return FURTHEST * most
 
 
@@ -81,7 +82,7 @@ def begin_term(row, along, size):
 
 
 @inlined
-def add_reach(table, s, body, R, o, n, plane, turn, terms, count):
+def add_reach(table, s, body, R, o, n, plane, node, terms, count):
     """Subtract the support value of shape s of a body, along n for A and -n for B, from the gap in terms[LINEAR].
 
     R, o: rotation of the shape, and its offset from its body's origin. plane (own, mode, turned): whether errors turn
@@ -109,7 +110,7 @@ def add_reach(table, s, body, R, o, n, plane, turn, terms, count):
         begin_term(row, along, length)
         lever = _cross(n, axis)
         _add(row, body, own, mode, turned, 1.0, lever)
-        if abs(along) > _most(row, turn):
+        if abs(along) > _most(row, node):
             up = length if along > 0.0 else -length
             total[ALONG] -= up * along
             _add(total, body, own, mode, turned, -up, lever)

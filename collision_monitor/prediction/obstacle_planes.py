@@ -16,7 +16,7 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.narrow_phase.dispatch import separation
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.bodies import place_shape
-from collision_monitor.prediction.error_samples import set_turn
+from collision_monitor.prediction.error_samples import NOT_TURNING, set_turn
 from collision_monitor.prediction.motion import relative_position, rotation_at
 from collision_monitor.prediction.trigonometry import sin_cos
 
@@ -41,7 +41,7 @@ LOUD, QUIET, APART = 0, 1, 2
 NOT_OFF: Final = (0.0, 0.0, 0.0)
 """Error of a position, or rotation vector of an error, of the stated motion."""
 
-NO_TURNS: Final = ((0.0, 0.0), (0.0, 0.0))
+NO_TURNS: Final = (NOT_TURNING, NOT_TURNING)
 """Turning of two bodies without errors of orientation, see `set_nodes`."""
 
 ABOUT_ALL: Final = (False, False)
@@ -55,6 +55,7 @@ NODE = np.dtype(
         ("rotation", np.float64, (2, 3, 3)),  # of the shapes
         ("offset", np.float64, (2, 3)),  # of the shapes from their bodies, in world axes (m)
         ("turn", np.float64, (2, 3, 3)),  # rotation vectors of the bodies for unit errors of orientation (rad)
+        ("left", np.float64, (2, 3, 3)),  # the same for what is left of these errors, see orientation_spread
     ]
 )
 """The stated motion at one end of a segment. One record, because a function takes it as one pointer."""
@@ -84,6 +85,18 @@ def make_obstacle() -> Obstacle:
 
 
 @inlined
+def _set_turns(m, t, off, yaw_only, turn, left):
+    """Write the rotation vectors of a body with motion m at time t for unit errors; off: see `orientation_spread`."""
+    set_turn(m, t, (off[0], off[1]), yaw_only, turn)
+    if off[3] > 0.0:
+        set_turn(m, t, (off[2], off[3]), yaw_only, left)
+        return
+    for r in range(3):
+        for c in range(3):
+            left[r, c] = 0.0
+
+
+@inlined
 def _place(table, parts, pair, t, turning, yaw_only, scratch, node):
     """Set a node to time t, see `set_nodes`."""
     A, B, a, b = pair
@@ -97,8 +110,8 @@ def _place(table, parts, pair, t, turning, yaw_only, scratch, node):
     for c in range(3):
         node.position[c] = p[c]
         node.offset[0, c], node.offset[1, c] = oa[c], ob[c]
-    set_turn(A, t, turning[0], yaw_only[0], node.turn[0])
-    set_turn(B, t, turning[1], yaw_only[1], node.turn[1])
+    _set_turns(A, t, turning[0], yaw_only[0], node.turn[0], node.left[0])
+    _set_turns(B, t, turning[1], yaw_only[1], node.turn[1], node.left[1])
 
 
 @inlined
@@ -114,7 +127,7 @@ def set_nodes(table, parts, pair, window, length, turning, yaw_only, scratch, ob
     """Divide the window into segments of this length (s) without planes; return their number, at most MOST_SEGMENTS.
 
     The last one is shorter, or the segments end before the window. Places the shapes of the pair (ShapePair) at their
-    ends. turning: for both bodies, error of orientation now and its rate (rad, rad/s), one standard deviation.
+    ends. turning: for both bodies, see `orientation_spread`.
     yaw_only: for both, whether it is about the z axis alone.
     """
     begin, end = window

@@ -6,7 +6,8 @@ from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import inlined
-from collision_monitor.prediction.error_samples import add_covariance
+from collision_monitor.prediction.error_samples import LEFT_OVER, ORIENTATION, add_covariance, turns
+from collision_monitor.prediction.normal_samples import DIMENSIONS
 from collision_monitor.prediction.sample_gaps import FIRST_ORDER, NOT_TURNED, SERIES
 from collision_monitor.prediction.spread import unknown_acceleration
 
@@ -21,10 +22,11 @@ class PairErrors(NamedTuple):
     """Uncertainty of a pair of bodies."""
 
     tube: Any  # Tube: bound on the standard deviation of their surfaces
-    turning: Any  # ((rad, rad/s), (rad, rad/s)): errors of their orientations
+    turning: Any  # errors of their orientations, see `orientation_spread`
     bend: float  # m/s^2: bound on the acceleration of their surfaces
     sigma: float  # m: standard deviation of the gap
     time: float  # s: of the likeliest contact
+    late: float  # s: when errors of orientation, which grow, count most
     radius: Any  # (m, m): of the bodies; 0: rotation moves nothing
     yaw_only: Any  # (bool, bool): whether errors of their orientations are about the z axis alone
 
@@ -59,8 +61,49 @@ def swing_bound(spread, i, radius, age, horizon):
 
 @inlined
 def turned_at(errors, body):
-    """Standard deviation of the orientation of a body at the time of the likeliest contact (rad)."""
-    return errors.turning[body][0] + errors.turning[body][1] * errors.time
+    """Standard deviation of the orientation of a body at the time when it counts most (rad)."""
+    return deviation_at(errors.turning[body], errors.late)
+
+
+@inlined
+def deviation_at(off, t):
+    """Standard deviation (rad) of an orientation at time t (s); off: orientation_spread."""
+    own, left = off[0] + off[1] * t, off[2] + off[3] * t
+    return sqrt(own * own + left * left) if left != 0.0 else own
+
+
+@inlined
+def gap_deviation(n, root, errors, t):
+    """Standard deviation (m) of the gap along n (3,), in the axes of the root, at time t.
+
+    root (6, 6): lower Cholesky factor of the covariance of position at errors.time and of velocity.
+    """
+    variance, since = 0.0, t - errors.time
+    for c in range(6):
+        factor = 0.0
+        for r in range(3):
+            factor += n[r] * (root[r, c] + since * root[3 + r, c])
+        variance += factor * factor
+    for body in range(2):
+        swing = errors.radius[body] * deviation_at(errors.turning[body], t)
+        variance += swing * swing
+    return sqrt(variance)
+
+
+@inlined
+def fineness(root, errors, tolerance, least):
+    """Factor of a tolerance (m) now, and its growth (1/s), which make it finer while the errors are smaller.
+
+    The gap of bodies that are near each other now, with errors that grow from 0, is small for the later errors only.
+    The factor is that of the deviations along the first axis of the root, see `gap_deviation`, relative to half of that
+    at errors.time; least (m): the tolerance is not smaller.
+    """
+    along = (1.0, 0.0, 0.0)
+    now, then = gap_deviation(along, root, errors, 0.0), gap_deviation(along, root, errors, errors.time)
+    if not (then > 0.0 and errors.time > 0.0):
+        return 1.0, 0.0
+    start = max(2.0 * now / then, least / tolerance)
+    return start, max(2.0 - start, 0.0) / errors.time
 
 
 @inlined
@@ -73,6 +116,22 @@ def turning_order(errors, body, tolerance):
 
 
 @inlined
+def coordinates_in_use(errors):
+    """Number of the coordinates of a sample that matter: those of position and velocity come first."""
+    one, other = errors.turning
+    if one[3] > 0.0 or other[3] > 0.0:
+        return DIMENSIONS
+    return LEFT_OVER if turns(one) or turns(other) else ORIENTATION
+
+
+@inlined
+def turning_rate(errors):
+    """Sum of the errors of the angular velocities of both bodies, one standard deviation (rad/s)."""
+    one, other = errors.turning
+    return one[1] + one[3] + other[1] + other[3]
+
+
+@inlined
 def straight_length(A, B, errors, bending):
     """Length (s) of a part of the time in which gaps deviate by less than `bending` stddevs from a straight line.
 
@@ -81,17 +140,36 @@ def straight_length(A, B, errors, bending):
     speed = sqrt((B.vx - A.vx) ** 2 + (B.vy - A.vy) ** 2 + (B.vz - A.vz) ** 2)
     rate = spin_rate(A) if errors.radius[0] > 0.0 else 0.0  # the rotation of a ball moves nothing
     rate += spin_rate(B) if errors.radius[1] > 0.0 else 0.0
-    rate += TURNED * (errors.turning[0][1] + errors.turning[1][1])
+    rate += TURNED * turning_rate(errors)
     bend = errors.bend + speed * rate
     return sqrt(8.0 * bending * max(errors.sigma, 1e-300) / bend) if bend > 0.0 else inf
 
 
 @inlined
-def set_gap_covariance(multibody, spread, i, j, ages, t, sampling, work):
-    """Write the covariance of relative position at t and of relative velocity, along work.frame, into work.joint."""
+def set_gap_covariance(multibody, spread, i, j, ages, t, right, sampling, work):
+    """Write the covariance of relative position at t and of relative velocity, along work.frame, into work.joint.
+
+    right: see `add_covariance`.
+    """
     bodies = multibody.bodies
     work.joint[:] = 0.0
     if not bodies.static[i]:
-        add_covariance(spread, i, ages[0], t, sampling.stale_acceleration, sampling.planar, work)
+        add_covariance(spread, i, ages[0], t, right, sampling.stale_acceleration, sampling.planar, work)
     if not bodies.static[j]:
-        add_covariance(spread, j, ages[1], t, sampling.stale_acceleration, sampling.planar, work)
+        add_covariance(spread, j, ages[1], t, right, sampling.stale_acceleration, sampling.planar, work)
+
+
+@inlined
+def acceleration_terms(multibody, spread, i, j, ages):
+    """Factors (3,) of t^2, t^3 and t^4 in the variance of the gap from unknown accelerations from now on.
+
+    A body is off by e (age + t)^2 / 2 then, with the same e before now, which `add_covariance` includes.
+    """
+    bodies = multibody.bodies
+    a = b = c = 0.0
+    for side in range(2):
+        k, age = (i, ages[0]) if side == 0 else (j, ages[1])
+        if not bodies.static[k]:
+            square = unknown_acceleration(spread, k, False, 0, 0.0) ** 2
+            a, b, c = a + 0.5 * square * age * age, b + square * age, c + 0.25 * square
+    return a, b, c

@@ -33,10 +33,13 @@ from collision_monitor.prediction.obstacle_planes import (
 from collision_monitor.prediction.pair_errors import (
     BENDING,
     TURNED,
+    coordinates_in_use,
+    fineness,
     spin_rate,
     straight_length,
     turned_at,
     turning_order,
+    turning_rate,
 )
 from collision_monitor.prediction.quiet_segments import stay_apart
 from collision_monitor.prediction.sample_count import latest
@@ -66,7 +69,7 @@ and a pair with more than MOST_PARTS is left to the exact method."""
 SPINS: Final = 4.0
 """Standard deviations of the angular velocity above which a body counts as one that turns."""
 
-VERIFIED_IN_PILOT: Final = 4
+VERIFIED_IN_PILOT: Final = 8
 VERIFIED: Final = 48
 """Samples of the pilot lattice, and of all, that must need no new plane of a segment. Twice as many if it is
 careful."""
@@ -78,7 +81,7 @@ position, and one for the velocity along the miss."""
 LONGEST: Final = 1.4
 """Factor by which segments may exceed `straight_length` if MOST_SEGMENTS do not suffice: gaps bend twice as much."""
 
-SURE_BENDING: Final = 0.3
+SURE_BENDING: Final = 0.2
 """In place of BENDING for bodies that surely meet, because only their times are sought."""
 
 TOO_FAST: Final = -1
@@ -123,7 +126,8 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
         not flat and errors.radius[1] > 0.0 and turning[1] + spin_rate(B) > 0.0,
     )
     careful = max(turned_at(errors, 0), turned_at(errors, 1)) > CAREFUL
-    settings = CutSettings(margin, tolerance, samples, follows, turning, careful)
+    fine_now = fineness(work.joint, errors, tolerance, sampling.query.tolerance)
+    settings = CutSettings(margin, tolerance, fine_now, samples, follows, turning, careful)
     for n in range(samples):
         alone[n] = inf
     wide = Tube(FURTHEST * errors.tube.start, FURTHEST * errors.tube.growth)
@@ -145,7 +149,7 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
     segments = set_nodes(table, parts, pair, window, length, errors.turning, errors.yaw_only, scratch, memory.obstacle)
     turned = max(turned_at(errors, 0), turned_at(errors, 1))
     large = TURNED * turned > SMALL or sigma > 2.0 * SMALL * min(table.radius[a], table.radius[b])
-    spins = spin_rate(A) + spin_rate(B) > SPINS * (errors.turning[0][1] + errors.turning[1][1])
+    spins = spin_rate(A) + spin_rate(B) > SPINS * turning_rate(errors)
     is_rough = segments > MOST_PARTS and large and spins
     if segments > MOST_PARTS and (careful or (is_rough and not sampling.stated)):
         return Laid(segments, settings, False)
@@ -190,7 +194,9 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
     there are planes enough.
     """
     segments, pilots, _ = laid
-    settings = CutSettings(pilots.margin, tolerance, pilots.pilot, pilots.follows, pilots.turning, pilots.careful)
+    settings = CutSettings(
+        pilots.margin, tolerance, pilots.fineness, pilots.pilot, pilots.follows, pilots.turning, pilots.careful
+    )
     alone, times = memory.alone, memory.times
     for n in range(samples):
         alone[n] = inf
@@ -238,7 +244,7 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
         until = min(end, latest(times, pilot))
         laid = _lay_planes(table, parts, pair, errors, search, until, sampling, memory, work)
     until = latest(times, pilot)
-    samples = choose_samples(times, lattice, sampling, laid.settings.careful, memory.chosen)
+    samples = choose_samples(times, lattice, coordinates_in_use(errors), sampling, laid.settings.careful, memory.chosen)
     if samples == 0:
         return 0
     meets, points = until < inf, memory.chosen.points
@@ -255,8 +261,7 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
         pair = ShapePair(A, B, a, b)
         laid = _lay_planes(table, parts, pair, errors, search, min(end, until), sampling, memory, work)
         if not (
-            laid.complete
-            and _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work)
+            laid.complete and _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work)
         ):
             return TOO_FAST
         a, b = next_pair(parts, first_b, a, b)

@@ -7,42 +7,24 @@ segment gives the direction, which is at rest.
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import Final
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import device
 from collision_monitor.narrow_phase.gjk import Accuracy
 from collision_monitor.prediction.normal_samples import FURTHEST
 from collision_monitor.prediction.obstacle_planes import NOT_OFF, separation_at
+from collision_monitor.prediction.pair_errors import gap_deviation
 from collision_monitor.prediction.sample_gaps import stated_gap
 
 SLACK: Final = 0.02
 """Part of the standard deviation of the gap by which the plane may be farther from the shapes than one that touches."""
 
 
-@inlined
-def _deviation(n, root, since, errors, t):
-    """Standard deviation (m) of the gap along n (3,), in the axes of the root, at time t; since (s): errors.time.
-
-    root (6, 6): lower Cholesky factor of the covariance of position at errors.time and of velocity.
-    """
-    variance = 0.0
-    for c in range(6):
-        factor = 0.0
-        for r in range(3):
-            factor += n[r] * (root[r, c] + since * root[3 + r, c])
-        variance += factor * factor
-    for body in range(2):
-        swing = errors.radius[body] * (errors.turning[body][0] + t * errors.turning[body][1])
-        variance += swing * swing
-    return sqrt(variance)
-
-
 @device
 def stay_apart(table, parts, pair, k, errors, margin, obstacle, work):
     """Whether a pair of shapes stays apart in segment k of the obstacle, with errors of FURTHEST standard deviations.
 
-    work.joint: see `_deviation`, along work.frame.
+    work.joint: see `gap_deviation`, along work.frame.
     """
     first, last = obstacle.node[k], obstacle.node[k + 1]
     scratch, frame = work.scratch, work.frame
@@ -59,7 +41,7 @@ def stay_apart(table, parts, pair, k, errors, margin, obstacle, work):
     margin += 0.125 * errors.bend * length * length
     for end in range(2):
         node = last if end else first
-        away = FURTHEST * _deviation(along, work.joint, node.time - errors.time, errors, node.time)
+        away = FURTHEST * gap_deviation(along, work.joint, errors, node.time)
         if not stated_gap(table, pair, n, node, margin) > away:
             return False
     return True

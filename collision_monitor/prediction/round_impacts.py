@@ -15,6 +15,7 @@ from collision_monitor.narrow_phase.cylinder_cylinder import is_parallel
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.vector import cross, dot
 from collision_monitor.prediction.bodies import place_shape
+from collision_monitor.prediction.error_samples import LEFT_OVER, ORIENTATION, turns
 from collision_monitor.prediction.motion import half_acceleration
 from collision_monitor.prediction.normal_samples import FURTHEST
 from collision_monitor.prediction.pair_errors import spin_rate, turned_at
@@ -32,6 +33,9 @@ NOT_ROUND, ROUND, TILTED = 0, 1, 2
 
 SAGGING: Final = 0.1
 """Distance by which discs at LEVELS heights may miss tilted cylinders, in standard deviations of the gap."""
+
+UPRIGHT: Final = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+"""Leaning of a body whose stated axis is vertical, see `tilt`."""
 
 LEVELS: Final = 3
 """Number of heights at which the discs of tilted cylinders are followed."""
@@ -66,25 +70,24 @@ def round_form(table, parts, pair, errors, margin, work):
     A, B, a, b = pair
     if parts.next[a] >= 0 or parts.next[b] >= 0 or half_acceleration(A, B) > 0.0:
         return NOT_ROUND
-    turning = errors.turning
-    turns = errors.bend > 0.0 or turning[0][0] + turning[0][1] + turning[1][0] + turning[1][1] > 0.0
+    is_off = errors.bend > 0.0 or turns(errors.turning[0]) or turns(errors.turning[1])
     if table.kind[a] == SPHERE and table.kind[b] == SPHERE:
-        return NOT_ROUND if turns else ROUND
+        return NOT_ROUND if is_off else ROUND
     if not (table.kind[a] == table.kind[b] == CYLINDER) or table.margin[a] + table.margin[b] + margin > 0.0:
         return NOT_ROUND
     R = work.scratch.rotation
     oa, ob = place_shape(table, parts, a, A.rotation, R[0]), place_shape(table, parts, b, B.rotation, R[1])
-    by_yaw = (errors.yaw_only[0] and turned_at(errors, 0) > 0.0) or (errors.yaw_only[1] and turned_at(errors, 1) > 0.0)
+    by_yaw = (errors.yaw_only[0] and turns(errors.turning[0])) or (errors.yaw_only[1] and turns(errors.turning[1]))
     if by_yaw:
         return NOT_ROUND
-    if not turns and is_parallel(table, a, PairPose(R[0], R[1], (0.0, 0.0, 0.0))):
+    if not is_off and is_parallel(table, a, PairPose(R[0], R[1], (0.0, 0.0, 0.0))):
         return ROUND
     one, other = _axis(R, 0), _axis(R, 1)
     aslant = sqrt((one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2 + (one[2] - other[2]) ** 2)
     for side in range(2):
         m, axis, o = (A, one, oa) if side == 0 else (B, other, ob)
         rate = cross((m.wx, m.wy, m.wz), axis)
-        aslant += sqrt(dot(rate, rate)) * errors.time
+        aslant += sqrt(dot(rate, rate)) * errors.late
         across = cross(o, axis)
         if sqrt(dot(across, across)) * (turned_at(errors, side) + spin_rate(m)) > 0.0:
             return NOT_ROUND
@@ -135,8 +138,12 @@ def _enter_tilted(table, parts, pair, errors, end, first, last, points, memory, 
     for n in range(first, last):
         times[n] = inf
     for _level in range(LEVELS):
-        tilt(points, 6, one, lifts[0], errors.turning[0], lean_a, first, last, off)
-        tilt(points, 9, other, lifts[1], errors.turning[1], lean_b, first, last, off)
+        for side in range(2):
+            axis, lean, off_by = (one, lean_a, errors.turning[0]) if side == 0 else (other, lean_b, errors.turning[1])
+            turning, left = (off_by[0], off_by[1]), (off_by[2], off_by[3])
+            tilt(points, ORIENTATION + 3 * side, axis, lifts[side], turning, lean, first, last, off)
+            if left[1] > 0.0:
+                tilt(points, LEFT_OVER + 3 * side, axis, lifts[side], left, UPRIGHT, first, last, off)
         enter_cylinder(p, v, other, reach, half, end, off, first, last, memory.alone)
         for n in range(first, last):
             times[n] = min(times[n], memory.alone[n])

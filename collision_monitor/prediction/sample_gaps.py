@@ -27,6 +27,7 @@ from collision_monitor.geometry.shape_table import (
 )
 from collision_monitor.narrow_phase.core import rounding
 from collision_monitor.narrow_phase.support_value import core_support
+from collision_monitor.prediction.error_samples import LEFT_OVER, ORIENTATION
 from collision_monitor.prediction.linear_gaps import (
     LINEAR,
     add_reach,
@@ -72,11 +73,21 @@ def make_sample_rows(samples: int) -> SampleRows:
     )
 
 
+@inlined
+def _is_zero(matrix):
+    """Whether all numbers of a matrix (3, 3) are 0."""
+    total = 0.0
+    for r in range(3):
+        for c in range(3):
+            total += abs(matrix[r, c])
+    return total == 0.0
+
+
 @device
 def set_samples(obstacle, k, off, points, turning, first, last, rows):
     """Write the samples first:last at both ends and in the middle of segment k into rows.node.
 
-    off (6, S): errors of position and velocity; points (DIMENSIONS, S): the last six are unit errors of orientation;
+    off (6, S): errors of position and velocity; points (DIMENSIONS, S): unit errors;
     turning (int, int): NOT_TURNED, FIRST_ORDER or SERIES for both bodies.
     """
     for place in range(3):
@@ -91,15 +102,26 @@ def set_samples(obstacle, k, off, points, turning, first, last, rows):
         for body in range(2):
             if turning[body] == NOT_TURNED:
                 continue
-            x = points[6 + 3 * body, first:last]
-            y = points[7 + 3 * body, first:last]
-            z = points[8 + 3 * body, first:last]
+            x = points[ORIENTATION + 3 * body, first:last]
+            y = points[ORIENTATION + 1 + 3 * body, first:last]
+            z = points[ORIENTATION + 2 + 3 * body, first:last]
             for c in range(3):
                 m = stated_node.turn[body, c]
                 u, v, w = m[0], m[1], m[2]
                 row = node[3 + 3 * body + c, first:last]
                 for n in range(row.size):
                     row[n] = u * x[n] + v * y[n] + w * z[n]
+            if _is_zero(stated_node.left[body]):
+                continue
+            x = points[LEFT_OVER + 3 * body, first:last]
+            y = points[LEFT_OVER + 1 + 3 * body, first:last]
+            z = points[LEFT_OVER + 2 + 3 * body, first:last]
+            for c in range(3):
+                m = stated_node.left[body, c]
+                u, v, w = m[0], m[1], m[2]
+                row = node[3 + 3 * body + c, first:last]
+                for n in range(row.size):
+                    row[n] += u * x[n] + v * y[n] + w * z[n]
 
 
 @device
@@ -224,9 +246,7 @@ def _gaps_at(table, pair, plane, node, margin, turning, first, last, state, rows
         for body in range(2):
             if varies_b if body else varies_a:
                 of = (turning[body] != NOT_TURNED, mode, turned)
-                count = add_reach(
-                    table, b if body else a, body, R[body], o[body], n, of, node.turn, terms, count
-                )
+                count = add_reach(table, b if body else a, body, R[body], o[body], n, of, node, terms, count)
         sum_terms(n, mode, turned, terms, count, state, first, last, rows.local, gap)
         return
     u, v, w = rows.normal[0, first:last], rows.normal[1, first:last], rows.normal[2, first:last]

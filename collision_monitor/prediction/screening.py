@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import inf, sqrt
 from statistics import NormalDist
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,9 @@ SAME_TIME: Final = 0.02
 
 DESIGN_STEPS: Final = 3
 """Largest number of separations towards a design point. The line between the origins is tried before them."""
+
+NODES: Final = 8
+"""Parts of a window at whose ends the deviations are computed if accelerations are unknown."""
 
 SLACK: Final = 0.02
 """Part of the standard deviation of the surfaces by which a plane may be farther from a shape than one that touches."""
@@ -69,6 +72,15 @@ def meeting(table, parts, pair, horizon, margin, tube, work):
     return sphere_interval(p, (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz), reach, tube.growth + bent, horizon, 1.0)
 
 
+class GapGrowth(NamedTuple):
+    """How the gap of a pair may change, beside the errors of position and velocity."""
+
+    turning: Any  # (m now, m/s): standard deviation of the surfaces from errors of orientation
+    accelerations: Any  # (3,): see `acceleration_terms`
+    bend: float  # m/s^2: bound on the acceleration of the surfaces, by which a gap may be smaller between two times
+    # than on a straight line
+
+
 @inlined
 def _quadratic(block, row, column, n):
     """n^T C n for the 3 x 3 block of a matrix that begins at (row, column)."""
@@ -79,14 +91,25 @@ def _quadratic(block, row, column, n):
     return total
 
 
-@device
-def _least_beta(gaps, n, turning, joint, t, at, window):
-    """Standard deviations between a pair and contact along n (3,) at a time; when they are fewest; a bound.
+@inlined
+def _beta(gap, variance, accelerations, t):
+    """Standard deviations between a pair and contact at time t; variance (3,): of position and velocity, by powers."""
+    c, d, e = variance
+    a, b, q = accelerations
+    return gap / sqrt(max(c + t * (2.0 * d + t * (e + a + t * (b + t * q))), 1e-300))
 
-    gaps: at both ends of the window (m). turning: standard deviation of the surfaces from errors of orientation (m now,
-    m/s). joint (6, 6): covariance of position at time t and of velocity. The gap is linear in time, so that it closes
-    in the window only if it is closed at one end: the bound is the sum of both probabilities.
+
+@device
+def _least_beta(gaps, n, growth, joint, t, window):
+    """Deviations between a pair and contact along n (3,) as a function of time, when they are fewest, and a bound.
+
+    gaps: at both ends of the window (m). growth: GapGrowth. joint (6, 6): covariance of position at time t and of
+    velocity. The gap is linear in time, so that it closes in the window only if it is closed at one end: the bound is
+    the sum of both probabilities. An acceleration towards the other body leaves that true, and one away from it only
+    helps, so that twice the sum is a bound with accelerations.
+    Returns the variance (3,) by powers of time, that time, and the bound.
     """
+    turning, accelerations = growth.turning, growth.accelerations
     pp, pv, vv = _quadratic(joint, 0, 0, n), _quadratic(joint, 0, 3, n), _quadratic(joint, 3, 3, n)
     # variance c + 2 d s + e s^2
     c = pp - 2.0 * t * pv + t * t * vv + turning[0] * turning[0]
@@ -95,19 +118,20 @@ def _least_beta(gaps, n, turning, joint, t, at, window):
     begin, end = window
     r = (gaps[1] - gaps[0]) / (end - begin) if end > begin else 0.0
     g = gaps[0] - r * begin
-    at_begin = gaps[0] / sqrt(max(c + begin * (2.0 * d + begin * e), 1e-300))
-    at_end = gaps[1] / sqrt(max(c + end * (2.0 * d + end * e), 1e-300))
+    variance, accelerates = (c, d, e), accelerations[2] > 0.0
+    at_begin = _beta(gaps[0], variance, accelerations, begin)
+    at_end = _beta(gaps[1], variance, accelerations, end)
     beta, when = (at_begin, begin) if at_begin < at_end else (at_end, end)
     slope = r * d - g * e
-    if slope != 0.0:
-        s = (g * d - r * c) / slope
+    for k in range(1, NODES if accelerates else 2):
+        s = begin + k * (end - begin) / NODES if accelerates else (g * d - r * c) / slope if slope != 0.0 else begin
         if begin < s < end:
-            between = (g + r * s) / sqrt(max(c + s * (2.0 * d + s * e), 1e-300))
+            between = _beta(g + r * s, variance, accelerations, s)
             if between < beta:
                 beta, when = between, s
-    both_signs = 2.0 if turning[0] + turning[1] > 0.0 else 1.0  # a turn either way closes the gap
-    here = (g + r * at) / sqrt(max(c + at * (2.0 * d + at * e), 1e-300))
-    return here, when, both_signs * (_tail(at_begin) + _tail(at_end))
+    times = 2.0 if turning[0] + turning[1] > 0.0 else 1.0  # a turn either way closes the gap
+    times *= 2.0 if accelerates else 1.0
+    return variance, when, times * (_tail(at_begin) + _tail(at_end))
 
 
 @inlined
@@ -127,29 +151,28 @@ def _set_window(table, parts, pair, window, bend, work, obstacle):
 
 
 @inlined
-def _bound(table, pair, n, times, turning, margin, obstacle, work):
+def _bound(table, pair, n, times, growth, margin, obstacle, work):
     """`_least_beta` along n (3,) in the window that is set.
 
-    times: see work.joint, that of the deviations, and both ends of the window (s).
+    times: that of work.joint, and both ends of the window (s).
     """
-    t, at, begin, end = times
+    t, begin, end = times
     first = stated_gap(table, pair, n, obstacle.node[0], margin)
     last = stated_gap(table, pair, n, obstacle.node[1], margin) if begin < end else first
-    return _least_beta((first, last), n, turning, work.joint, t, at, Window(begin, end))
+    return _least_beta((first, last), n, growth, work.joint, t, Window(begin, end))
 
 
 @inlined
-def design_point(multibody, i, j, tube, turning, bend, sampling, t, obstacle, work):
+def design_point(multibody, i, j, tube, growth, sampling, t, obstacle, work):
     """Return (bound, time): a bound on the probability of contact, and the time at which contact is likeliest.
 
-    t: time of closest approach; bend: bound on the acceleration of the surfaces (m/s^2), by which a gap may be smaller
-    between the ends of a window than a straight line. Writes the direction of the gap then into work.frame[0]: the
-    design point of reliability theory. The bound is that of one plane for each pair of shapes.
-    work.joint: covariance of position at t and of velocity, in world axes.
+    t: time of closest approach; growth: GapGrowth. Writes the direction of the gap then into work.frame[0]: the design
+    point of reliability theory. The bound is that of one plane for each pair of shapes.
+    work.joint: covariance of position at t and of velocity, in world axes, without accelerations from now on.
     """
     table, parts, bodies = multibody
     A, B, frame, scratch = work.motion[0], work.motion[1], work.frame, work.scratch
-    margin = sampling.query.margin
+    margin, bend = sampling.query.margin, growth.bend
     wide = Tube(FURTHEST * tube.start, FURTHEST * tube.growth)
     bound, least, likeliest = 0.0, inf, t
     a, first_b = bodies.first_shape[i], bodies.first_shape[j]
@@ -164,7 +187,7 @@ def design_point(multibody, i, j, tube, turning, bend, sampling, t, obstacle, wo
                 bent = _set_window(table, parts, pair, Window(begin, end), bend, work, obstacle)
                 at = min(max(t, begin), end)
                 n = _towards(A, B, at)
-                own = _bound(table, pair, n, (t, at, begin, end), turning, margin + bent, obstacle, work)[2]
+                own = _bound(table, pair, n, (t, begin, end), growth, margin + bent, obstacle, work)[2]
         if own >= ENOUGH * sampling.min_probability:
             status = HIT
             if bend > 0.0 and begin < end:
@@ -180,14 +203,16 @@ def design_point(multibody, i, j, tube, turning, bend, sampling, t, obstacle, wo
                 wanted = Accuracy(margin, SLACK * tube.start)
                 stated = (NOT_OFF, NOT_OFF)
                 for _ in range(DESIGN_STEPS):
-                    if separation_at(table, parts, pair, at, NOT_OFF, stated, wanted, obstacle, scratch) <= margin:
+                    gap = separation_at(table, parts, pair, at, NOT_OFF, stated, wanted, obstacle, scratch) - margin
+                    if gap <= 0.0:
                         own = 1.0
                         break
                     n = (scratch.out[0], scratch.out[1], scratch.out[2])
-                    beta, when, outside = _bound(
-                        table, pair, n, (t, at, begin, end), turning, margin + bent, obstacle, work
+                    variance, when, outside = _bound(
+                        table, pair, n, (t, begin, end), growth, margin + bent, obstacle, work
                     )
                     own = min(own, outside)
+                    beta = _beta(gap, variance, growth.accelerations, at)
                     if beta < least:  # at `when`, another direction may keep the bodies farther apart
                         least, likeliest = beta, at
                         frame[0, 0], frame[0, 1], frame[0, 2] = n

@@ -28,6 +28,8 @@ from collision_monitor.prediction.body_impact import (
 )
 from collision_monitor.prediction.chosen_samples import open_ranks
 from collision_monitor.prediction.error_samples import (
+    LEFT_OVER,
+    ORIENTATION,
     add_covariance,
     orientation_spread,
     set_frame,
@@ -35,6 +37,7 @@ from collision_monitor.prediction.error_samples import (
     shift,
     take_root,
     turn,
+    turns,
 )
 from collision_monitor.prediction.foretold_samples import (
     OPEN,
@@ -49,7 +52,8 @@ from collision_monitor.prediction.impact_distribution import summarise
 from collision_monitor.prediction.impact_record import CLEAR
 from collision_monitor.prediction.known_axes import parted_until, remember
 from collision_monitor.prediction.motion import carry_on, half_acceleration, relative_position
-from collision_monitor.prediction.normal_samples import DIMENSIONS, PILOT
+from collision_monitor.prediction.normal_samples import DIMENSIONS, PILOT, pilot_of
+from collision_monitor.prediction.obstacle_planes import NOT_OFF
 from collision_monitor.prediction.sphere_interval import sphere_interval
 from collision_monitor.prediction.spread import is_uncertain, surface_spread, swing_radius, turns_by_yaw
 from collision_monitor.prediction.tree_impact import spins
@@ -66,11 +70,11 @@ sample of a disc of 100 km that turns beside a mesh took 20 ms."""
 
 PILOT_PART: Final = 0.2
 """A pair that is stated to pass is left out if it meets with less than this fraction of min_probability in the first
-coarse lattice of samples. The test is repeated after each further one."""
+part of the samples. The test is repeated after each further one."""
 
 
-FEW_STRIDE: Final = 4
-"""Part of so few samples, one in so many, that decides which of the others are needed."""
+FEW_PARTS: Final = 4
+"""Parts of so few samples, the first of which decides which of the others are needed."""
 
 FEWEST_FORETOLD: Final = 4
 """Parts of the samples, of about PILOT each, from which on two of them foretell the outcome of others."""
@@ -218,20 +222,11 @@ def _lay_along(multibody, i, j, tube, sampling, work):
     return t
 
 
-@inlined
-def _coset(nth, stride):
-    """Which part of the samples comes as the nth: first the coarser lattices of every stride-th and every half-th."""
-    half = stride // 2
-    if nth < 2:
-        return nth * half
-    return nth - 1 if nth <= half else nth
-
-
 @device
-def _set_sides(multibody, i, j, t, turns, yaw_only, times, stride, sampling, work, sides):
-    """Find out from the times (S,) of every stride-th sample what foretells those of the others; see `foretell`.
+def _set_sides(multibody, i, j, t, turning, yaw_only, times, first, sampling, work, sides):
+    """Find out from the times (S,) of the first samples what foretells those of the others; see `foretell`.
 
-    The motions are the stated ones, t the time (s) that matters most, turns the errors of orientation, and yaw_only
+    The motions are the stated ones, t the time (s) that matters most, turning the errors of orientation, and yaw_only
     whether they are about the z axis alone.
     """
     points = sampling.points
@@ -240,9 +235,9 @@ def _set_sides(multibody, i, j, t, turns, yaw_only, times, stride, sampling, wor
     for r in range(3):
         for c in range(3):
             sides.turns[0, r, c] = sides.turns[1, r, c] = 0.0
-    set_turn(A, t, turns[0], yaw_only[0], sides.turns[0])
-    set_turn(B, t, turns[1], yaw_only[1], sides.turns[1])
-    middle = find_ends(points, times, stride, ends)
+    set_turn(A, t, (turning[0][0], turning[0][1]), yaw_only[0], sides.turns[0])
+    set_turn(B, t, (turning[1][0], turning[1][1]), yaw_only[1], sides.turns[1])
+    middle = find_ends(points, times, first, ends)
     x, y, z = B.x, B.y, B.z
     for side in range(2):
         sides.widening[side, :] = 0.0
@@ -255,7 +250,13 @@ def _set_sides(multibody, i, j, t, turns, yaw_only, times, stride, sampling, wor
         _gap_at(multibody, i, j, t, work)
         set_widening(block[0], block[1:3], sides.turns, L, F, sides.widening[side])
     B.x, B.y, B.z = x, y, z
-    set_limits(points, times, stride, middle, sides)
+    set_limits(points, times, first, middle, sides)
+
+
+@inlined
+def _unit(z, first, level):
+    """Three unit errors of orientation of a sample; level: 0.0 if they are about the z axis alone, else 1.0."""
+    return level * z[first], level * z[first + 1], z[first + 2]
 
 
 class Sampling(NamedTuple):
@@ -270,10 +271,10 @@ class Sampling(NamedTuple):
     min_probability: float
     confidence: float
     planar: bool
-    points: Any  # (S, 12): normal_samples
+    points: Any  # (S, DIMENSIONS): normal_samples
     weights: Any  # (S,)
     only_screens: bool = False  # bounds in place of answers, see likely_impacts
-    stops_early: bool = False  # pairs that meet in a coarse lattice of the samples need no others
+    stops_early: bool = False  # pairs that meet in the first part of the samples need no others
 
 
 @allocating_kernel
@@ -314,13 +315,15 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
         wide = Tube(sampling.safe_sigmas * tube.start, sampling.safe_sigmas * tube.growth)
         safe = first_contact(multibody, i, j, whole, wide, roughly, work)
         t = _lay_along(multibody, i, j, tube, sampling, work)
-        work.joint[:] = 0.0
+        work.joint[:], right = 0.0, t if t > 0.0 else horizon
         if not bodies.static[i]:
-            add_covariance(spread, i, age_i, t, stale_acceleration, sampling.planar, work)
+            add_covariance(spread, i, age_i, t, right, stale_acceleration, sampling.planar, work)
         if not bodies.static[j]:
-            add_covariance(spread, j, age_j, t, stale_acceleration, sampling.planar, work)
+            add_covariance(spread, j, age_j, t, right, stale_acceleration, sampling.planar, work)
         take_root(work.joint)
-        turn_i, turn_j = orientation_spread(spread, i, r_i, age_i, t), orientation_spread(spread, j, r_j, age_j, t)
+        turn_i = orientation_spread(spread, i, r_i, age_i, t, right)
+        turn_j = orientation_spread(spread, j, r_j, age_j, t, right)
+        turns_i, turns_j = turns(turn_i), turns(turn_j)
         for r in range(3):
             for c in range(3):
                 work.rotation[0, r, c] = A.rotation[r, c]
@@ -335,40 +338,37 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
         bias = 0.0 if exact else -0.75 * coarse
         p, v = (B.x, B.y, B.z), (B.vx, B.vy, B.vz)
         w_i, w_j = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
-        straight = (
-            _is_straight(parts, bodies, i, j, A, B)
-            and turn_i[0] + turn_i[1] + turn_j[0] + turn_j[1] == 0.0
-        )
+        straight = _is_straight(parts, bodies, i, j, A, B) and not (turns_i or turns_j)
         work.axes[:, 3] = inf  # no axis is known yet
-        stride = max(1, weights.size // PILOT)
-        few = stride == 1 and sampling.stops_early and weights.size >= PILOT
-        stride = FEW_STRIDE if few else stride
-        order, share, is_open = np.arange(0, weights.size, stride), weights.copy(), (0, stride, stride, stride)
-        foretells = sampling.stops_early and stride >= FEWEST_FORETOLD and not has_mesh
+        few = sampling.stops_early and PILOT <= weights.size < 2 * PILOT
+        size = weights.size // FEW_PARTS if few else pilot_of(weights.size)
+        count = -(-weights.size // size)
+        order, share, is_open = np.argsort(points[0:size, 0]), weights.copy(), (0, size, size, size)
+        ranked = points[order, 0]
+        foretells = sampling.stops_early and count >= FEWEST_FORETOLD and not has_mesh
         seen, met, begun = 0.0, 0, followed
         likely, surely = True, False
-        for nth in range(stride):
-            first = _coset(nth, stride) if foretells else nth
-            likely = stated or first == 0 or seen * stride >= PILOT_PART * sampling.min_probability * nth
+        for nth in range(count):
+            likely = stated or nth == 0 or seen * count >= PILOT_PART * sampling.min_probability * nth
             surely = stated and sampling.stops_early and nth == 1 and met == followed - begun
             if not likely or surely:
                 break
-            if few and first == 1:
+            if few and nth == 1:
                 is_open = open_ranks(times, order, FEW_SPARE)
             if foretells and nth == 2:
                 shift(work, np.zeros(DIMENSIONS), t, p, v)
-                turn(A, work.rotation[0], w_i, turn_i, (0.0, 0.0, 0.0))
-                turn(B, work.rotation[1], w_j, turn_j, (0.0, 0.0, 0.0))
-                _set_sides(multibody, i, j, t, (turn_i, turn_j), yaw_only, times, stride // 2, sampling, work, sides)
-                weigh_followed(points, weights, stride // 2, sides)
-            for n in range(first, weights.size, stride):
-                rank = n // stride
-                if few and first > 0 and not (is_open[0] <= rank < is_open[1] or is_open[2] <= rank < is_open[3]):
+                turn(A, work.rotation[0], w_i, turn_i, NOT_OFF, NOT_OFF)
+                turn(B, work.rotation[1], w_j, turn_j, NOT_OFF, NOT_OFF)
+                _set_sides(multibody, i, j, t, (turn_i, turn_j), yaw_only, times, 2 * size, sampling, work, sides)
+                weigh_followed(points, weights, 2 * size, sides)
+            for n in range(nth * size, min((nth + 1) * size, weights.size)):
+                z = points[n]
+                rank = max(np.searchsorted(ranked, z[0], "right") - 1, 0) if few else 0
+                if few and nth > 0 and not (is_open[0] <= rank < is_open[1] or is_open[2] <= rank < is_open[3]):
                     share[order[rank]] += weights[n]
                     share[n], times[n] = 0.0, inf
                     seen += weights[n] if times[order[rank]] < inf else 0.0
                     continue
-                z = points[n]
                 outcome = foretell(sides, z) if foretells and nth > 1 else OPEN
                 if outcome != OPEN and sides.followed[outcome] > 0.0:
                     share[n], times[n] = 0.0, inf
@@ -376,10 +376,11 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                     continue
                 followed += 1
                 shift(work, z, t, p, v)
-                if turn_i[0] + turn_i[1] > 0.0:
-                    turn(A, work.rotation[0], w_i, turn_i, (level_i * z[6], level_i * z[7], z[8]))
-                if turn_j[0] + turn_j[1] > 0.0:
-                    turn(B, work.rotation[1], w_j, turn_j, (level_j * z[9], level_j * z[10], z[11]))
+                if turns_i:
+                    turn(A, work.rotation[0], w_i, turn_i, _unit(z, ORIENTATION, level_i), _unit(z, LEFT_OVER, level_i))
+                if turns_j:
+                    own, left = _unit(z, ORIENTATION + 3, level_j), _unit(z, LEFT_OVER + 3, level_j)
+                    turn(B, work.rotation[1], w_j, turn_j, own, left)
                 parted = 0.0
                 if straight:
                     parted = parted_until(work.axes, A, B, horizon, query.margin + bias + 0.5 * coarse)
@@ -394,9 +395,9 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                 met += 1 if times[n] < inf else 0
                 seen += weights[n] if times[n] < inf else 0.0
         if foretells and likely and not surely:
-            stand_for_skipped(points, share, stride // 2, sides)
+            stand_for_skipped(points, share, 2 * size, sides)
         if surely:
-            some, part = times[0::stride].copy(), weights[0::stride].copy()
+            some, part = times[0:size].copy(), weights[0:size].copy()
             summarise(some, part, np.argsort(some), sampling.confidence, safe, answers[k], part.sum())
         elif likely:
             summarise(times, share, np.argsort(times), sampling.confidence, safe, answers[k], 1.0)

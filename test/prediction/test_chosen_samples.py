@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.prediction.body_impact import ImpactQuery
 from collision_monitor.prediction.chosen_samples import choose_samples
-from collision_monitor.prediction.normal_samples import BASE, SampleColumns, normal_samples, sample_columns
+from collision_monitor.prediction.normal_samples import BASE, DIMENSIONS, SampleColumns, normal_samples, sample_columns
 from collision_monitor.prediction.plane_memory import ChosenSamples, make_plane_memory
 from collision_monitor.prediction.uncertainty import Sampling
 
@@ -25,7 +25,7 @@ def chosen(meets: NDArray[np.bool_], *, careful: bool = False, lattice: SampleCo
         ImpactQuery(0.0, 1e-3, 50), 2.0, 0.0, False, 3.0, 4.0, 0.01, 0.95, False, *normal_samples(count)
     )  # fmt: skip
     memory = make_plane_memory(count).chosen
-    n = choose_samples(np.where(meets, 1.0, inf), lattice, sampling, careful, memory)
+    n = choose_samples(np.where(meets, 1.0, inf), lattice, DIMENSIONS, sampling, careful, memory)
     return ChosenSamples(memory.points[:, :n], memory.weights[:n], memory.sums[:, :n])
 
 

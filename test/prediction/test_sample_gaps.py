@@ -14,7 +14,7 @@ from collision_monitor.prediction.body_impact import ShapePair, Window
 from collision_monitor.prediction.error_samples import make_workspace
 from collision_monitor.prediction.motion import carry_on
 from collision_monitor.prediction.normal_samples import sample_columns
-from collision_monitor.prediction.obstacle_planes import ABOUT_ALL, MODE, set_middles, set_nodes
+from collision_monitor.prediction.obstacle_planes import ABOUT_ALL, MODE, NO_TURNS, set_middles, set_nodes
 from collision_monitor.prediction.plane_memory import make_plane_memory
 from collision_monitor.prediction.sample_gaps import (
     FIRST_ORDER,
@@ -105,7 +105,7 @@ def test_gaps_are_those_of_the_turned_shapes(order: int, mode: int, axis: int | 
         poses, twists = np.column_stack([p, q]), rng.normal(size=(2, 6))
         table, parts, pair, work, memory = moving_pair((name_a, name_b), poses, twists)
         obstacle, rows, points = memory.obstacle, memory.rows, sample_columns(SAMPLES).points
-        turning = ((spread, 0.5 * spread), (0.7 * spread, 0.0))
+        turning = ((spread, 0.5 * spread, -0.1 * spread, 0.4 * spread), (0.7 * spread, 0.0, 0.0, 0.0))
         assert set_nodes(table, parts, pair, Window(0.0, 0.4), 0.4, turning, ABOUT_ALL, work.scratch, obstacle) == 1
         memory.off[:] = rng.normal(0, 0.1, memory.off.shape)
         orders = (order, order)
@@ -121,6 +121,11 @@ def test_gaps_are_those_of_the_turned_shapes(order: int, mode: int, axis: int | 
         )
         for end in range(2):
             node, state = obstacle.node[end], rows.node[end]
+            if order != NOT_TURNED:
+                for k in range(2):
+                    own, left = points[6 + 3 * k : 9 + 3 * k], points[12 + 3 * k : 15 + 3 * k]
+                    turned = node["turn"][k] @ own + node["left"][k] @ left
+                    np.testing.assert_allclose(state[3 + 3 * k : 6 + 3 * k, :SAMPLES], turned, atol=1e-12)
             for m in range(SAMPLES):
                 R = [turn(state[3 + 3 * k : 6 + 3 * k, m]) @ node["rotation"][k] for k in range(2)]
                 u = planes[0, :3] if mode == 2 else R[mode] @ planes[0, :3]
@@ -148,7 +153,7 @@ def test_parabolas_give_the_times_behind_a_plane_of_bodies_that_turn(mode: int) 
     """Straight lines between the ends of the segment are off by more than four times as much, in the mean."""
     rng = np.random.default_rng(mode)
     off: dict[bool, list[float]] = {False: [], True: []}
-    end, orders, still = 0.3, (NOT_TURNED, NOT_TURNED), ((0.0, 0.0), (0.0, 0.0))
+    end, orders, still = 0.3, (NOT_TURNED, NOT_TURNED), NO_TURNS
     for name in ("capsule", "cylinder", "ellipsoid", "cone") * 20:
         q, p, n = rng.normal(size=(2, 4)), np.zeros((2, 3)), rng.normal(size=3)
         n /= np.linalg.norm(n)

@@ -11,6 +11,7 @@ from collision_monitor.geometry.pose import from_rotation_vector, multiply
 from collision_monitor.records import STATE, StateFlag
 
 HORIZON = 2.0
+BOX_CORNERS = np.stack(np.meshgrid([-0.25, 0.25], [-0.25, 0.25], [-0.4, 0.4]), axis=-1).reshape(-1, 3)
 NAMES = ("position", "orientation", "velocity", "angular_velocity")
 
 
@@ -205,3 +206,74 @@ def test_errors_of_yaw_alone(seed: int, profile: str) -> None:
     rows["flags"] = StateFlag.YAW_ONLY, StateFlag.YAW_ONLY if seed % 4 else 0
     reported, times = predicted_and_true(shapes, rows, 20_000, profile=profile)
     assert reported["probability"] == pytest.approx(np.mean(times < np.inf), abs=0.03)
+
+
+@pytest.mark.parametrize("profile", ["balanced", "exact"])
+@pytest.mark.parametrize(("stddevs", "rise"), [((0.1, 0.1), 0.1), ((0.05, 0.2), 0.0), ((0.0, 0.1), 0.0), ((0.2, 0.02), 0.2)])
+def test_a_rod_above_a_floor_with_errors_of_orientation_and_of_its_rate(
+    stddevs: tuple[float, float], rise: float, profile: str
+) -> None:
+    """They are two errors: one that is right at one time was off by 0.1, and lost if that time was now."""
+    rows = np.zeros(2, STATE)
+    rows["id"], rows["quaternion"] = (0, 1), ((0, 0, 0, 1), (0, 2**-0.5, 0, 2**-0.5))
+    rows["position"], rows["linear"][1] = ((0, 0, -0.5), (0, 0, 0.31)), (0, 0, rise)
+    rows["orientation_stddev"][1], rows["angular_velocity_stddev"][1] = stddevs
+    shapes = cm.Box((40, 40, 1)), cm.Capsule(0.01, 4)
+    reported, times = predicted_and_true(shapes, rows, 20_000, profile=profile)
+    assert reported["probability"] == pytest.approx(np.mean(times < np.inf), abs=0.02)
+    assert np.mean(times[times < np.inf] < reported["earliest"]) <= 0.06
+
+
+@pytest.mark.parametrize("gap", [0.003, 0.01, 0.02, 0.05, 0.07])
+@pytest.mark.parametrize("name", ["velocity_stddev", "angular_velocity_stddev"])
+def test_a_body_at_rest_beside_a_wall_may_stay_there(gap: float, name: str) -> None:
+    """A gap that is small for the errors at the horizon is none now."""
+    rows = np.zeros(2, STATE)
+    rows["id"], rows["quaternion"] = (0, 1), (0, 0, 0, 1)
+    rows["position"] = (0, -0.5, 0), (0, 0.25 + gap, 0)
+    rows[name][1] = 0.5
+    for shape in (cm.Cylinder(0.25, 1.75), cm.Box((0.5, 0.5, 0.8)), cm.ConvexHull(BOX_CORNERS)):
+        if name == "angular_velocity_stddev" and isinstance(shape, cm.Cylinder):
+            continue
+        reported, true = stated_and_true((cm.Box((20, 1, 10)), shape), rows, 10_000)
+        assert reported == pytest.approx(true, abs=0.025), shape
+
+
+@pytest.mark.parametrize("profile", ["balanced", "exact"])
+@pytest.mark.parametrize(("velocity", "position"), [(0.0, 0.0), (0.1, 0.0), (0.0, 0.05)])
+def test_a_ball_above_a_floor_may_accelerate(velocity: float, position: float, profile: str) -> None:
+    """The time at which it is likeliest to touch is not now, where its acceleration has moved nothing."""
+    rng = np.random.default_rng(0)
+    directions = rng.normal(size=(100_000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    up = directions[:, 2] * rng.random(100_000) ** (1 / 3)
+    t = np.linspace(0.0, HORIZON, 101)[:, None]
+    height = 0.2 + position * rng.normal(size=100_000) + velocity * t + 0.5 * up * t * t
+    monitor = cm.Monitor(cm.Profile.named(profile).replace(horizon=HORIZON))
+    monitor.add(0, cm.Box((40, 40, 1)), static=True, pose=cm.Pose((0, 0, -0.5)))
+    monitor.add(1, cm.Sphere(0.5), max_linear_acceleration=1.0)
+    rows = np.zeros(1, STATE)
+    rows["id"], rows["quaternion"], rows["position"] = 1, (0, 0, 0, 1), (0, 0, 0.7)
+    rows["linear"], rows["position_stddev"] = (0, 0, velocity), position
+    reported = monitor.step(0, rows).predictions[0]
+    assert reported["probability"] == pytest.approx(np.mean(height.min(axis=0) < 0.0), abs=0.035)
+
+
+@pytest.mark.parametrize("horizon", [1.0, 2.0, 4.0])
+def test_a_box_that_turns_above_a_floor(horizon: float) -> None:
+    """Its gap is smallest now, and its errors are largest at the horizon."""
+    rng = np.random.default_rng(0)
+    shape, floor, q = cm.Box((1.6, 0.6, 1.5)), cm.Box((40, 40, 1)), np.array((0.521, 0.13, -0.174, 0.825))
+    monitor = cm.Monitor(cm.Profile(horizon=horizon))
+    monitor.add(0, floor, static=True, pose=cm.Pose((0, 0, -0.5)))
+    monitor.add(1, shape)
+    rows = np.zeros(1, STATE)
+    rows["id"], rows["position"], rows["quaternion"], rows["angular"] = 1, (0, 0, 1.1), q / np.linalg.norm(q), (0, 0.4, 0)
+    rows["angular_velocity_stddev"], rows["position_stddev"] = 0.1, 0.05
+    reported = monitor.step(0, rows).predictions[0]
+    n = 10_000
+    poses = np.column_stack([rows["position"] + rng.normal(0, 0.05, (n, 3)), np.tile(rows["quaternion"], (n, 1))])
+    twists = np.column_stack([np.zeros((n, 3)), rows["angular"] + rng.normal(0, 0.1, (n, 3))])
+    still = np.tile((0, 0, -0.5, 0, 0, 0, 1.0), (n, 1)), np.zeros((n, 6))
+    true = cm.time_of_impact_batch(floor, *still, shape, poses, twists, horizon, tolerance=1e-5)
+    assert reported["probability"] == pytest.approx(np.mean(true.status != "clear"), abs=0.025)
