@@ -140,16 +140,22 @@ class UncertainPredictions(Stage):
             self.spread = spread
 
     def describe(self, i: int, d: ObjectDescription) -> None:
-        """Store the acceleration bounds that the object in slot i declares."""
-        bounds = (0.0, 0.0) if d.static else (d.max_linear_acceleration, d.max_angular_acceleration)
+        """Store the acceleration bounds that the object in slot i declares. A static object has no uncertainty."""
+        if d.static:
+            self._clear(i)
+            return
+        bounds = d.max_linear_acceleration, d.max_angular_acceleration
         self.spread.acceleration[i] = bounds
         self.active |= any(bounds)
 
     def forget(self, i: int) -> None:
         """Clear the uncertainty of the body in slot i, which is removed."""
+        self._clear(i)
+        self.active = bool(self.spread.stddev.any() or self.spread.acceleration.any())
+
+    def _clear(self, i: int) -> None:
         for array in self.spread:
             array[i] = 0.0
-        self.active = bool(self.spread.stddev.any() or self.spread.acceleration.any())
 
     def take(
         self, slots: Pairs, numbers: Any, flags: NDArray[np.uint32], covariance: NDArray[np.float64], planar: bool

@@ -12,6 +12,7 @@ from collision_monitor.prediction.body_impact import Scratch, make_scratch
 from collision_monitor.prediction.foretold_samples import SIDES
 from collision_monitor.prediction.known_axes import AXES
 from collision_monitor.prediction.motion import MOTION
+from collision_monitor.prediction.normal_samples import DIMENSIONS
 from collision_monitor.prediction.spread import FIFTH_ROOT, unknown_acceleration
 from collision_monitor.prediction.trigonometry import sin_cos
 
@@ -33,6 +34,7 @@ class Workspace(NamedTuple):
     block: Any  # (3, 3)
     axes: Any  # (AXES, 4): directions that separated the bodies in other samples
     sides: Any  # (1,) SIDES: what foretells the outcomes of samples
+    sample: Any  # (DIMENSIONS,): unit errors of one sample
     scratch: Scratch
 
 
@@ -47,6 +49,7 @@ def make_workspace() -> Workspace:
         np.zeros((3, 3)),
         np.zeros((AXES, 4)),
         np.zeros(1, SIDES),
+        np.zeros(DIMENSIONS),
         make_scratch(),
     )
 

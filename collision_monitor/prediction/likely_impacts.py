@@ -86,9 +86,11 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         flat = not (r_i < inf and r_j < inf)
         if not sampling.stated:
             _set_axes(work.frame)
-            answer = answers[k]
+            answer = answers[k]  # NaN so far
             if sampling.only_screens:
                 first = _first_meeting(A, B, tube, sampling)
+                if first == inf:
+                    continue
                 answer[EARLIEST], answer[MOST_LIKELY], answer[PROBABILITY] = first, first, LEFT
             if has_mesh:
                 answer[PROBABILITY] = LEFT

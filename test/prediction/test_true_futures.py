@@ -209,7 +209,9 @@ def test_errors_of_yaw_alone(seed: int, profile: str) -> None:
 
 
 @pytest.mark.parametrize("profile", ["balanced", "exact"])
-@pytest.mark.parametrize(("stddevs", "rise"), [((0.1, 0.1), 0.1), ((0.05, 0.2), 0.0), ((0.0, 0.1), 0.0), ((0.2, 0.02), 0.2)])
+@pytest.mark.parametrize(
+    ("stddevs", "rise"), [((0.1, 0.1), 0.1), ((0.05, 0.2), 0.0), ((0.0, 0.1), 0.0), ((0.2, 0.02), 0.2)]
+)
 def test_a_rod_above_a_floor_with_errors_of_orientation_and_of_its_rate(
     stddevs: tuple[float, float], rise: float, profile: str
 ) -> None:
@@ -268,7 +270,8 @@ def test_a_box_that_turns_above_a_floor(horizon: float) -> None:
     monitor.add(0, floor, static=True, pose=cm.Pose((0, 0, -0.5)))
     monitor.add(1, shape)
     rows = np.zeros(1, STATE)
-    rows["id"], rows["position"], rows["quaternion"], rows["angular"] = 1, (0, 0, 1.1), q / np.linalg.norm(q), (0, 0.4, 0)
+    rows["id"], rows["position"], rows["quaternion"] = 1, (0, 0, 1.1), q / np.linalg.norm(q)
+    rows["angular"] = (0, 0.4, 0)
     rows["angular_velocity_stddev"], rows["position_stddev"] = 0.1, 0.05
     reported = monitor.step(0, rows).predictions[0]
     n = 10_000

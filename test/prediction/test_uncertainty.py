@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import collision_monitor as cm
 from collision_monitor.errors import InputError, Refusal
 from collision_monitor.prediction.normal_samples import DIMENSIONS, normal_samples
-from collision_monitor.records import STATE, ContactStatus, PredictionStatus
+from collision_monitor.records import STATE, ContactStatus, PredictionStatus, StateFlag
 from collision_monitor.settings.profile import Profile
 
 SECOND = 1_000_000_000
@@ -218,3 +218,37 @@ def test_the_answers_are_the_same_bytes_on_two_threads_and_when_replayed() -> No
         digests.append(monitor.digest)
     assert len(reported) > 10
     assert len(set(digests)) == 1
+
+
+def test_an_object_that_becomes_static_has_no_uncertainty() -> None:
+    rows = np.concatenate([state(1, (0, 0, 0), (0, 0, 0), 0.5, 0.3), state(2, (3, 0, 0), (-1, 0, 0), 0.0, 0.0)])
+    rows["orientation_stddev"][0] = 0.3
+    answers = []
+    for redescribed in (False, True):
+        monitor = cm.Monitor(Profile(horizon=2.5))
+        monitor.add(2, cm.Sphere(0.5))
+        if redescribed:
+            monitor.add(1, cm.Box((1, 1, 1)))
+            assert monitor.step(0, rows).predictions["probability"][0] < 1.0
+        monitor.add(1, cm.Box((1, 1, 1)), static=True, pose=cm.Pose((0, 0, 0)), replace=redescribed)
+        answers.append(monitor.step(SECOND // 100, rows[1:]).predictions[0])
+    for answer in answers:
+        assert answer["lower"] == pytest.approx(2.0, abs=1e-3)
+        assert all(np.isnan(answer[name]) for name in ("probability", "earliest", "most_likely", "latest"))
+
+
+def test_pairs_that_never_meet_are_not_put_off() -> None:
+    """Spheres that accelerate along a diagonal: the first test bounds them more coarsely than the second."""
+    count = 30
+    monitor = cm.Monitor(Profile(pairs_per_step=1))
+    monitor.add(0, cm.Points([(0, 0, 0)], 0.5))
+    for k in range(1, count):
+        monitor.add(k, cm.Sphere(0.5))
+    rows = np.zeros(count, STATE)
+    rows["id"], rows["quaternion"][:, 3], rows["position_stddev"] = range(count), 1, 0.01
+    rows["acceleration"][1:], rows["flags"] = (-1, -1, -1), StateFlag.ACCELERATION_VALID
+    rows["position"][1:] = np.linspace(4.47, 5.5, count - 1)[:, None] * np.array([1, 1, 1]) / 3**0.5
+    predictions = monitor.step(0, rows).predictions
+    assert len(predictions) > 2
+    assert np.isfinite(predictions["lower"]).all()
+    assert (predictions["lower"] <= 2.0).all()
