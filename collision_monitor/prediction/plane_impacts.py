@@ -69,7 +69,7 @@ and a pair with more than MOST_PARTS is left to the exact method."""
 SPINS: Final = 4.0
 """Standard deviations of the angular velocity above which a body counts as one that turns."""
 
-VERIFIED_IN_PILOT: Final = 8
+VERIFIED_IN_PILOT: Final = 4
 VERIFIED: Final = 48
 """Samples of the pilot lattice, and of all, that must need no new plane of a segment. Twice as many if it is
 careful."""
