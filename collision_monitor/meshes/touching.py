@@ -8,7 +8,7 @@ from typing import Any, Final
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.meshes.boxes import box_separations, triangle_bounds
 from collision_monitor.meshes.layout import CHILD, FACE, RADIUS, WIDTH
-from collision_monitor.meshes.leaf_planes import may_cross
+from collision_monitor.meshes.leaf_planes import may_cross, may_touch
 from collision_monitor.meshes.nearest import (
     BOUNDS,
     NEAR_A,
@@ -35,6 +35,10 @@ MOST_LEAVES: Final = 100_000
 answer then says that it is not complete."""
 
 
+FEWER_LEAVES: Final = 2_000
+"""The same with a slack, about 1 ms."""
+
+
 @inlined
 def repeats(blocks: Any, block: int, k: int) -> bool:
     """Whether a member of a block of triangles repeats the one before."""
@@ -43,13 +47,16 @@ def repeats(blocks: Any, block: int, k: int) -> bool:
 
 @device
 def touching(
-    blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, X: Any, most: int, work: Any
+    blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, X: Any, most: int, slack: float, work: Any
 ) -> tuple[int, bool]:
     """Find pairs of triangles that meet, `most` at most; return their number, and whether these are all.
 
+    slack: distance (m) at which they count as meeting; with 0, round-off may hide two that touch in one plane. Fewer
+    leaves are examined then, because who asks so makes guesses from the pairs.
+
     Pair k is at work[PAIRS + 2 k]: the places of both triangles. Other arguments as in `nearest`.
     """
-    Y = inverse(X)
+    Y, near = inverse(X), max(slack, OPEN)
     work[0], work[1], work[2] = 0.0, WIDTH * root_a, WIDTH * root_b
     waiting, found, leaves = 1, 0, 0
     while waiting > 0:  # terminates: each pair of boxes is opened once
@@ -60,19 +67,23 @@ def touching(
         if child_a < 0.0 and child_b < 0.0:
             leaf_a, leaf_b = root_a - int(child_a), root_b - int(child_b)
             leaves += 1
-            if leaves > MOST_LEAVES:
+            if leaves > (MOST_LEAVES if slack == 0.0 else FEWER_LEAVES):
                 return found, False
             triangle_bounds(blocks_a, a, i, blocks_b, leaf_b, X, work, NEAR_B)
             triangle_bounds(blocks_b, b, j, blocks_a, leaf_a, Y, work, NEAR_A)
             for m in range(WIDTH):
-                if work[NEAR_B + m] > 0.0 or repeats(blocks_b, leaf_b, m):
+                if work[NEAR_B + m] > slack * slack or repeats(blocks_b, leaf_b, m):
                     continue
                 T, own = place_triangle(X, triangle_at(blocks_b, leaf_b, m)), blocks_b[leaf_b, RADIUS, m]
-                may = may_cross((*T.a, *T.b, *T.c), own, blocks_a, leaf_a)
+                corners = (*T.a, *T.b, *T.c)
+                if slack > 0.0:
+                    may = may_touch(corners, own, blocks_a, leaf_a, slack)
+                else:
+                    may = may_cross(corners, own, blocks_a, leaf_a)
                 for k in range(WIDTH):
-                    if not (may >> k) & 1 or work[NEAR_A + k] > 0.0 or repeats(blocks_a, leaf_a, k):
+                    if not (may >> k) & 1 or work[NEAR_A + k] > slack * slack or repeats(blocks_a, leaf_a, k):
                         continue
-                    if meet(triangle_at(blocks_a, leaf_a, k), T, own + blocks_a[leaf_a, RADIUS, k]):
+                    if meet(triangle_at(blocks_a, leaf_a, k), T, own + blocks_a[leaf_a, RADIUS, k] + slack):
                         work[PAIRS + 2 * found], work[PAIRS + 2 * found + 1] = WIDTH * leaf_a + k, WIDTH * leaf_b + m
                         found += 1
                         if found == most:
@@ -80,11 +91,11 @@ def touching(
         elif opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
             block = root_b + int(child_b)
             box_separations(blocks_a, a, i, blocks_b, block, X, work, BOUNDS)
-            waiting = push_nearest_last(blocks_b, block, work, waiting, OPEN, float(place_a), True)
+            waiting = push_nearest_last(blocks_b, block, work, waiting, near, float(place_a), True)
         else:
             block = root_a + int(child_a)
             box_separations(blocks_b, b, j, blocks_a, block, Y, work, BOUNDS)
-            waiting = push_nearest_last(blocks_a, block, work, waiting, OPEN, float(place_b), False)
+            waiting = push_nearest_last(blocks_a, block, work, waiting, near, float(place_b), False)
     return found, True
 
 
@@ -190,4 +201,4 @@ def deepest(
 def trees_touch(tree_a, R_a, p_a, tree_b, R_b, p_b, most, work):
     """`touching` of two trees at poses given by rotations (3, 3) and positions (3,) (m)."""
     p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
-    return touching(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), most, work)
+    return touching(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), most, 0.0, work)

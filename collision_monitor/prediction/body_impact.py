@@ -32,6 +32,7 @@ from collision_monitor.prediction.impact_record import (
 from collision_monitor.prediction.mesh_impact import mesh_impact
 from collision_monitor.prediction.mesh_pair import has_mesh, shapes_within, triangles_contact
 from collision_monitor.prediction.motion import half_acceleration, relative_position, relative_velocity, rotation_at
+from collision_monitor.prediction.overlap_time import overlap_time
 from collision_monitor.prediction.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
 from collision_monitor.tolerances import EPSILON
 
@@ -320,11 +321,15 @@ def body_impact(multibody, i, j, window, query, scratch, event):
     sure = _certain_overlap(multibody, pair, lower, guess, places, window, tube, query, scratch)
     if sure == inf and places[0] >= 0:  # the first triangles may slide off each other
         sure = _certain_overlap(multibody, pair, lower, 0.0, NO_PLACES, window, tube, query, scratch)
-    if sure == inf:
+    seen = sure
+    if event.status == HIT and has_mesh(table, pair.a, pair.b):  # if triangles are in one plane, none overlap, or late
+        sure = overlap_time(table, parts, pair, (lower, sure), window, tube, query, scratch)
+    if sure == inf or sure < seen:
         contact_at(table, parts, pair, lower, scratch)
+        seen = lower
     event.lower, event.upper = lower, sure
     event.status = HIT if sure < inf else UNRESOLVED
-    _set_geometry(event, A, sure if sure < inf else lower, scratch.out)
+    _set_geometry(event, A, seen, scratch.out)
     return queries
 
 

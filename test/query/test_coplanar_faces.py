@@ -32,7 +32,8 @@ STILL = Motion(Pose())
 MOTIONS = [((0.0, 0, 0), (0.0, 0, 0)), ((0.01, 0.013, 0), (0.0, 0, 0)), ((0.01, 0.013, 0), (0.0, 0, 0.3))]
 
 
-def test_the_plate_is_closed_and_concave() -> None:
+def test_the_meshes_are_closed() -> None:
+    assert block(1.0).surface.volume == pytest.approx(HEIGHT) and block(1.5).surface.certain
     assert U.surface.certain and U.surface.volume == pytest.approx(HEIGHT * (1.0 - 0.4 * 0.7))
 
 
@@ -60,33 +61,35 @@ def test_plates_that_only_touch_and_part_are_clear() -> None:
 
 
 def test_plates_that_touch_and_press_on_are_a_hit() -> None:
-    moving = Motion(Pose((1.0, 0.0, 0.0)), (-0.1, 0, 0))
-    for pair in ((U, STILL, U, moving), (U, moving, U, STILL)):
-        impact = cm.time_of_impact(*pair, horizon=2.0)
-        assert impact.status == "hit" and impact.lower == 0.0 and impact.upper < 1e-3
+    """Their front triangles start in one plane: without an inside they would go through each other."""
+    for turn in [Rotation.identity(), *Rotation.random(4, rng=np.random.default_rng(1))]:
+        place = Pose((0.0, 0.0, 0.0), turn.as_quat())
+        still, moving = Motion(place), Motion(place @ Pose((1.0, 0.0, 0.0)), turn.apply((-0.1, 0, 0)))
+        for pair in ((U, still, U, moving), (U, moving, U, still)):
+            impact = cm.time_of_impact(*pair, horizon=2.0)
+            assert impact.status == "hit" and impact.lower == 0.0 and impact.upper < 1e-3
 
 
-def box_mesh(size: tuple[float, float, float]) -> cm.Mesh:
-    hull = cm.ConvexHull(np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * np.array(size) / 2)
-    return cm.Mesh(hull.vertices, hull.faces)
+FRONT = np.array([(-0.5, -0.5, -0.2), (-0.5, -0.5, 0.2), (-0.5, 0.5, 0.2), (-0.5, 0.5, -0.2)])
+"""The outline of the plate's side at x = -0.5, anticlockwise as seen from there."""
 
 
-def plug() -> cm.Mesh:
-    """A block that becomes wider behind its front, whose outline is that of the plate's front: no face is common."""
-    front = np.array([(-0.5, -0.5, -0.2), (-0.5, 0.5, -0.2), (-0.5, 0.5, 0.2), (-0.5, -0.5, 0.2)])
-    hull = cm.ConvexHull(np.concatenate([front, front * (-1.0, 1.5, 1.5)]))
-    return cm.Mesh(hull.vertices, hull.faces)
+def block(back: float) -> cm.Mesh:
+    """A block with this front, whose back is so many times as wide; above 1, only fronts are in one plane."""
+    sides = [face for k in range(4) for face in ((k, k + 4, (k + 1) % 4), ((k + 1) % 4, k + 4, (k + 1) % 4 + 4))]
+    vertices = np.concatenate([FRONT, FRONT * (-1.0, back, back)])
+    return cm.Mesh(vertices, np.array([(0, 1, 2), (0, 2, 3), (4, 6, 5), (4, 7, 6), *sides]))
 
 
 THIN = plate(1e-3)
 FRONTAL = {
     "plates": (U, U),
     "plate and box": (U, cm.Box((1.0, 1.0, HEIGHT))),
-    "plate and closed mesh": (U, box_mesh((1.0, 1.0, HEIGHT))),
+    "plate and closed mesh": (U, block(1.0)),
     "thin plates": (THIN, THIN),
     "thinner than the steps": (plate(1e-6), plate(1e-6)),
     "faces look inward": (plate(inward=True), U),
-    "plug": (U, plug()),
+    "plug": (U, block(1.5)),
 }
 """Shapes whose whole fronts, at x = 0.5 and x = -0.5 of the second one, meet with equal outlines."""
 
@@ -132,7 +135,7 @@ def test_a_hit_does_not_depend_on_the_frame(name: str) -> None:
 def test_a_plate_that_swings_is_a_hit() -> None:
     """It turns about an axis 50 m away, at -y; both fronts are in one plane at 0.5 s."""
     rate, arm = 0.02, 50.0
-    swung = cm.Mesh(U.vertices + (1.0, arm, 0.0), U.faces)
+    swung = cm.Mesh(U.vertices + np.array((1.0, arm, 0.0)), U.faces)
     turning = Motion(Pose.from_euler(0.0, 0.0, -0.5 * rate), angular=(0, 0, rate))
     impact = cm.time_of_impact(U, Motion(Pose((0.0, arm, 0.0))), swung, turning)
     assert impact.status == "hit" and impact.lower <= 0.5 + 1e-9 <= impact.upper + 2e-9
