@@ -75,7 +75,7 @@ def common_part(S: Triangle, T: Triangle, n: Vector, m: Vector, slack: float) ->
 
     Its corners are where edges of one leave the other, or pass through it.
     """
-    count, total, squares = 0, (0.0, 0.0, 0.0), 0.0
+    count, first_corner, total, squares = 0, S.a, (0.0, 0.0, 0.0), 0.0
     for k in range(6):
         U, V, up = (S, T, m) if k < 3 else (T, S, n)
         p = corner(U, k % 3)
@@ -90,12 +90,15 @@ def common_part(S: Triangle, T: Triangle, n: Vector, m: Vector, slack: float) ->
         if first > last:
             continue
         for s in (first, last):
-            x = minus(along(p, s, d), S.a)
+            x = along(p, s, d)
+            if count == 0:
+                first_corner = x
+            x = minus(x, first_corner)
             count, total, squares = count + 1, plus(total, x), squares + dot(x, x)
     if count == 0:
         return CommonPart(S.a, 0.0, 0.0)
     mean = scaled(total, 1.0 / count)
-    middle, room = plus(mean, S.a), inf
+    middle, room = plus(mean, first_corner), inf
     for k in range(6):
         U, up = (S, n) if k < 3 else (T, m)
         a, side = _inward(U, k % 3, up)

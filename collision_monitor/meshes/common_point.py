@@ -97,9 +97,9 @@ def _is_ball_along(both: _Both, x: Vector, u: Vector, depth: float, radius: floa
         return False
     for _ in range(DEPTHS):
         y = along(x, depth, u)
-        if _is_ball_in(both.blocks, both.root_a, y, radius, work):
-            if _is_ball_in(both.blocks, both.root_b, place_point(both.Y, y), radius, work):
-                return True
+        in_a = _is_ball_in(both.blocks, both.root_a, y, radius, work)
+        if in_a and _is_ball_in(both.blocks, both.root_b, place_point(both.Y, y), radius, work):
+            return True
         depth *= LESS
     return False
 
