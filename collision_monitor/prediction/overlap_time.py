@@ -17,13 +17,12 @@ from collision_monitor.tolerances import GJK_TOUCHING, SAT_ROUND_OFF
 
 MOST_TIMES: Final = 5
 """Most times to try: the begin, and others from the one at which the meshes may be two tolerances deep. More: solids
-that slide with faces in one plane take longer. Fewer: impacts at a flat angle stay UNRESOLVED; those of solids that
-slide first, and overlap later, stay so anyway."""
+that slide with faces in one plane take longer. Fewer: impacts of surfaces that close slowly stay UNRESOLVED; those of
+solids that slide first, and overlap later, stay so anyway."""
 
 LATER: Final = 4.0
 """Ratio of a time after the start to the one before. Larger: the interval of an oblique impact is wider. Smaller: more
 times."""
-
 
 LATE: Final = 64.0
 """A known time is late if the meshes may be two tolerances deep in a 64th of it. Larger: it is sought less often.
