@@ -15,7 +15,7 @@ from collision_monitor.meshes.inside import INSIDE, OUTSIDE, is_clear, locate
 from collision_monitor.meshes.layout import CLOSED, WIDTH
 from collision_monitor.meshes.nearest import PAIRS, triangle_at
 from collision_monitor.meshes.placing import Placing, inverse, place_point, place_triangle
-from collision_monitor.meshes.touching import touching
+from collision_monitor.meshes.touching import nearly_touching
 from collision_monitor.narrow_phase.vector import Vector, along, direction, plus, scaled
 
 MOST_TOUCHING: Final = 256
@@ -63,7 +63,7 @@ def common_ball(
     X: pose of B in A's frame. slack: distance at which triangles count as touching (m). far: about as deep as the
     solids may be in each other (m), or infinite. work (MEMORY,).
     """
-    count, _ = touching(blocks, root_a, blocks, root_b, X, MOST_TOUCHING, slack, work)
+    count = nearly_touching(blocks, root_a, blocks, root_b, X, slack, MOST_TOUCHING, work)
     both = _Both(blocks, root_a, root_b, inverse(X))
     for side_a, side_b in SIDES:
         for flat in (True, False):  # what is in one plane, and has the same side inside, is certainly in both

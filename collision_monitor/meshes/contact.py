@@ -60,7 +60,7 @@ def tree_contact(
     # beyond the limit by round-off, because a search for less than 0 would find no surfaces that touch
     distance = nearest(blocks_a, root_a, blocks_b, root_b, X, limit + round_off, answer, work)
     if distance == 0.0:
-        count, _ = touching(blocks_a, root_a, blocks_b, root_b, X, MOST_PAIRS, 0.0, work)
+        count, _ = touching(blocks_a, root_a, blocks_b, root_b, X, MOST_PAIRS, work)
         if count > 0:
             depth, n, on_a = deepest(blocks_a, blocks_b, X, work, count, answer)
         else:  # round-off says so of the distance alone

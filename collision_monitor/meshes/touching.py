@@ -36,7 +36,7 @@ answer then says that it is not complete."""
 
 
 FEWER_LEAVES: Final = 2_000
-"""The same with a slack, about 1 ms."""
+"""The same for `nearly_touching`, about 1 ms."""
 
 
 @inlined
@@ -45,20 +45,14 @@ def repeats(blocks: Any, block: int, k: int) -> bool:
     return k > 0 and blocks[block, FACE, k] == blocks[block, FACE, k - 1]
 
 
-@device
-def touching(
-    blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, X: Any, most: int, slack: float, work: Any
+@inlined
+def _pairs_within(
+    blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, X: Any, slack: float, most: int, leaves: int, work: Any
 ) -> tuple[int, bool]:
-    """Find pairs of triangles that meet, `most` at most; return their number, and whether these are all.
-
-    slack: distance (m) at which they count as meeting; with 0, round-off may hide two that touch in one plane. Fewer
-    leaves are examined then, because who asks so makes guesses from the pairs.
-
-    Pair k is at work[PAIRS + 2 k]: the places of both triangles. Other arguments as in `nearest`.
-    """
+    """`touching` of triangles at most `slack` (m) apart, until so many pairs of leaves are examined."""
     Y, near = inverse(X), max(slack, OPEN)
     work[0], work[1], work[2] = 0.0, WIDTH * root_a, WIDTH * root_b
-    waiting, found, leaves = 1, 0, 0
+    waiting, found = 1, 0
     while waiting > 0:  # terminates: each pair of boxes is opened once
         waiting -= 1
         place_a, place_b = int(work[3 * waiting + 1]), int(work[3 * waiting + 2])
@@ -66,8 +60,8 @@ def touching(
         child_a, child_b = blocks_a[a, CHILD, i], blocks_b[b, CHILD, j]
         if child_a < 0.0 and child_b < 0.0:
             leaf_a, leaf_b = root_a - int(child_a), root_b - int(child_b)
-            leaves += 1
-            if leaves > (MOST_LEAVES if slack == 0.0 else FEWER_LEAVES):
+            leaves -= 1
+            if leaves < 0:
                 return found, False
             triangle_bounds(blocks_a, a, i, blocks_b, leaf_b, X, work, NEAR_B)
             triangle_bounds(blocks_b, b, j, blocks_a, leaf_a, Y, work, NEAR_A)
@@ -97,6 +91,29 @@ def touching(
             box_separations(blocks_b, b, j, blocks_a, block, Y, work, BOUNDS)
             waiting = push_nearest_last(blocks_a, block, work, waiting, near, float(place_b), False)
     return found, True
+
+
+@device
+def touching(
+    blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, X: Any, most: int, work: Any
+) -> tuple[int, bool]:
+    """Find pairs of triangles that meet, `most` at most; return their number, and whether these are all.
+
+    Pair k is at work[PAIRS + 2 k]: the places of both triangles. Other arguments as in `nearest`.
+    """
+    return _pairs_within(blocks_a, root_a, blocks_b, root_b, X, 0.0, most, MOST_LEAVES, work)
+
+
+@device
+def nearly_touching(
+    blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, X: Any, slack: float, most: int, work: Any
+) -> int:
+    """Number of some pairs of triangles at most `slack` (m) apart, as `touching` finds them.
+
+    Round-off may hide triangles that touch in one plane from `touching`.
+    """
+    found, _ = _pairs_within(blocks_a, root_a, blocks_b, root_b, X, slack, most, FEWER_LEAVES, work)
+    return found
 
 
 @inlined
@@ -201,4 +218,4 @@ def deepest(
 def trees_touch(tree_a, R_a, p_a, tree_b, R_b, p_b, most, work):
     """`touching` of two trees at poses given by rotations (3, 3) and positions (3,) (m)."""
     p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
-    return touching(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), most, 0.0, work)
+    return touching(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), most, work)

@@ -90,7 +90,7 @@ def _meet(table, a, b, pose, row, scratch):
         if scratch.out[DISTANCE] <= 0.0:
             return True
     X, work = relative(pose.R_A, pose.R_B, pose.p), scratch.tree
-    found, _ = touching(table.blocks, root_of(table, a), table.blocks, root_of(table, b), X, 1, 0.0, work)
+    found, _ = touching(table.blocks, root_of(table, a), table.blocks, root_of(table, b), X, 1, work)
     if found == 0:
         return False
     row[PLACE_I], row[PLACE_J] = work[PAIRS] - first, work[PAIRS + 1] - second

@@ -135,7 +135,7 @@ def trees_overlap(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: An
     R = memory[_ROTATIONS:_ANSWER].reshape((2, 3, 3))
     p = _place(pose_a, pose_b, R)
     X = relative(R[0], R[1], p)
-    if not touching(tree_a, 0, tree_b, 0, X, 1, 0.0, memory)[1]:
+    if not touching(tree_a, 0, tree_b, 0, X, 1, memory)[1]:
         return True
     return is_either_in(tree_a, 0, tree_b, 0, X, 0.0, memory) != OUTSIDE
 
