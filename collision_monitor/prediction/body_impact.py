@@ -260,6 +260,20 @@ def _certain_overlap(multibody, pair, start, guess, places, window, tube, query,
     return inf
 
 
+@outlined
+def _overlap_in_plane(table, parts, pair, known, is_near, window, tube, query, scratch):
+    """`overlap_time` of shapes that are near each other at the first known time, and the time of the contact.
+
+    The contact in scratch.out is that of the known overlap, or if it is not the answer, that of the first time.
+    """
+    lower, sure = known
+    first = overlap_time(table, parts, pair, known, window, tube, query, scratch) if is_near else sure
+    if first == sure and sure < inf:
+        return sure, sure
+    contact_at(table, parts, pair, lower, scratch)
+    return first, lower
+
+
 @inlined
 def tube_of(A, B, begin):
     """The tube of two motions (MOTION) together, from `begin` on. Stale objects have widened it (tracking.py)."""
@@ -322,11 +336,9 @@ def body_impact(multibody, i, j, window, query, scratch, event):
     if sure == inf and places[0] >= 0:  # the first triangles may slide off each other
         sure = _certain_overlap(multibody, pair, lower, 0.0, NO_PLACES, window, tube, query, scratch)
     seen = sure
-    if event.status == HIT and has_mesh(table, pair.a, pair.b):  # if triangles are in one plane, none overlap, or late
-        sure = overlap_time(table, parts, pair, (lower, sure), window, tube, query, scratch)
-    if sure == inf or sure < seen:
-        contact_at(table, parts, pair, lower, scratch)
-        seen = lower
+    if sure == inf or has_mesh(table, pair.a, pair.b):
+        is_near = event.status == HIT
+        sure, seen = _overlap_in_plane(table, parts, pair, (lower, sure), is_near, window, tube, query, scratch)
     event.lower, event.upper = lower, sure
     event.status = HIT if sure < inf else UNRESOLVED
     _set_geometry(event, A, seen, scratch.out)

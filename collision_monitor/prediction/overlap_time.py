@@ -11,7 +11,7 @@ from collision_monitor.meshes.common_point import bounds_solid, common_ball
 from collision_monitor.meshes.contact import reach_in
 from collision_monitor.meshes.placing import relative
 from collision_monitor.narrow_phase.vector import dot, sum_of_sizes
-from collision_monitor.prediction.mesh_pair import have_trees, root_of
+from collision_monitor.prediction.mesh_pair import has_mesh, have_trees, root_of
 from collision_monitor.prediction.tree_impact import approach_at
 from collision_monitor.tolerances import GJK_TOUCHING, SAT_ROUND_OFF
 
@@ -47,7 +47,7 @@ def overlap_time(table, parts, pair, known, window, tube, query, scratch):
     """
     start, sure = known
     a, b = pair.a, pair.b
-    if not have_trees(table, a, b):
+    if not (has_mesh(table, a, b) and have_trees(table, a, b)):
         return sure
     blocks, root_a, root_b = table.blocks, root_of(table, a), root_of(table, b)
     if not (bounds_solid(blocks, root_a) and bounds_solid(blocks, root_b)):
