@@ -230,7 +230,7 @@ def closing_speed(v, wa, wb, p, out):
 
 
 @device
-def _certain_overlap(multibody, pair, start, guess, places, window, tube, query, scratch):
+def _certain_overlap(table, parts, pair, start, guess, places, window, tube, query, scratch):
     """Return a time in [start, window.end] at which a pair overlaps by more than the tube; inf: none found.
 
     places: as for `_contact_at`; two triangles that overlap are enough.
@@ -242,7 +242,7 @@ def _certain_overlap(multibody, pair, start, guess, places, window, tube, query,
     guessed = 0.0 < guess < end - start
     t = start + guess if guessed else start
     for _ in range(NEWTON_STEPS):
-        distance = _contact_at(multibody.table, multibody.parts, pair, t, places, scratch)
+        distance = _contact_at(table, parts, pair, t, places, scratch)
         excess = distance + scratch.out[BOUND] - query.margin + tube.start + tube.growth * (t - begin)
         if excess <= 0.0:
             return t
@@ -261,17 +261,23 @@ def _certain_overlap(multibody, pair, start, guess, places, window, tube, query,
 
 
 @outlined
-def _overlap_in_plane(table, parts, pair, known, is_near, window, tube, query, scratch):
-    """`overlap_time` of shapes that are near each other at the first known time, and the time of the contact.
+def _first_overlap(table, parts, pair, near, window, tube, query, scratch):
+    """Return a time at which a pair of shapes certainly overlaps, infinite for none, and that of the contact found.
 
-    The contact in scratch.out is that of the known overlap, or if it is not the answer, that of the first time.
+    near: what `shape_impact` found: status, time, guess, and places as for `_contact_at`. The contact in scratch.out is
+    that at the first of these times, or at that of the impact if no triangles overlap because they are in one plane.
     """
-    lower, sure = known
-    first = overlap_time(table, parts, pair, known, window, tube, query, scratch) if is_near else sure
+    status, start, guess, places = near
+    sure = _certain_overlap(table, parts, pair, start, guess, places, window, tube, query, scratch)
+    if sure == inf and places[0] >= 0:  # the first triangles may slide off each other
+        sure = _certain_overlap(table, parts, pair, start, 0.0, NO_PLACES, window, tube, query, scratch)
+    first = sure
+    if status == HIT and has_mesh(table, pair.a, pair.b):
+        first = overlap_time(table, parts, pair, (start, sure), window, tube, query, scratch)
     if first == sure and sure < inf:
         return sure, sure
-    contact_at(table, parts, pair, lower, scratch)
-    return first, lower
+    contact_at(table, parts, pair, start, scratch)
+    return first, start
 
 
 @inlined
@@ -332,13 +338,8 @@ def body_impact(multibody, i, j, window, query, scratch, event):
     if event.status == CLEAR:
         return queries
     pair = ShapePair(A, B, event.shape_i, event.shape_j)
-    sure = _certain_overlap(multibody, pair, lower, guess, places, window, tube, query, scratch)
-    if sure == inf and places[0] >= 0:  # the first triangles may slide off each other
-        sure = _certain_overlap(multibody, pair, lower, 0.0, NO_PLACES, window, tube, query, scratch)
-    seen = sure
-    if sure == inf or has_mesh(table, pair.a, pair.b):
-        is_near = event.status == HIT
-        sure, seen = _overlap_in_plane(table, parts, pair, (lower, sure), is_near, window, tube, query, scratch)
+    near = event.status, lower, guess, places
+    sure, seen = _first_overlap(table, parts, pair, near, window, tube, query, scratch)
     event.lower, event.upper = lower, sure
     event.status = HIT if sure < inf else UNRESOLVED
     _set_geometry(event, A, seen, scratch.out)
