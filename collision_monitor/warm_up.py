@@ -150,6 +150,7 @@ def warm_up_functions() -> None:
     contact(box, Pose(), ball, Pose())
     contact([(box, Pose())], Pose(), ball, Pose())  # the general search
     time_of_impact(box, Motion(Pose(), angular=(0, 0, 1)), ball, Motion(Pose((3, 0, 0)), acceleration=(-1, 0, 0)))
+    time_of_impact(box, Motion(Pose()), box, Motion(Pose((1, 0, 0))))  # they touch
     poses, twists = np.zeros((2, 7)), np.zeros((2, 6))
     poses[:, 6] = 1.0
     contacts(box, poses, ball, poses + np.eye(1, 7))

@@ -73,6 +73,8 @@ for kinds in ([*solids, corner, [(solids[0], still), (solids[1], aside)]], flat)
             moving = cm.Motion(cm.Pose((5, 0, 0)), (-1, 0, 0), (0, 0, 0.5))
             cm.time_of_impact(a, cm.Motion(still), b, moving)
             cm.time_of_impact(a, cm.Motion(still), b, cm.Motion(moving.pose, acceleration=(-1, 0, 0)))
+for a, x in ((solids[1], 1), (corner, 2)):  # they touch
+    cm.time_of_impact(a, cm.Motion(still), a, cm.Motion(cm.Pose((x, 0, 0)), (-1, 0, 0)))
 poses = np.zeros((9, 7)); poses[:, 6] = 1
 for a in (*solids, corner):
     cm.time_of_impact_batch(a, poses, np.ones((9, 6)), corner, poses + 5 * np.eye(1, 7), np.zeros((9, 6)))

@@ -100,7 +100,7 @@ def _is_some_in(blocks: Any, root: int, other: Any, other_root: int, X: Placing,
                 if 4.0 * dot(e, e) >= clear * clear:
                     located += 1
                     c = other[block, CENTER, k], other[block, CENTER + 1, k], other[block, CENTER + 2, k]
-                    if not _is_clear(blocks, root, place_point(X, c), sqrt(dot(e, e)) * (1.0 + 1e-9), work):
+                    if not is_clear(blocks, root, place_point(X, c), sqrt(dot(e, e)) * (1.0 + 1e-9), work):
                         work[PAIRS + waiting] = WIDTH * block + k
                         waiting += 1
                         continue
@@ -119,7 +119,7 @@ def _is_some_in(blocks: Any, root: int, other: Any, other_root: int, X: Placing,
 
 
 @device
-def _is_clear(blocks: Any, root: int, x: Vector, radius: float, work: Any) -> bool:
+def is_clear(blocks: Any, root: int, x: Vector, radius: float, work: Any) -> bool:
     """Whether no triangle is in the sphere of a radius (m) about a point."""
     work[0] = WIDTH * root
     waiting = 1

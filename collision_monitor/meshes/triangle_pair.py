@@ -119,7 +119,8 @@ def crossing_point(S, T):
 
 
 @inlined
-def _corner(S, k):
+def corner(S, k):
+    """Corner k of a triangle."""
     return S.a if k == 0 else (S.b if k == 1 else S.c)
 
 
@@ -128,16 +129,16 @@ def closest_points(S, T):
     """Closest points of two triangles (Closest)."""
     best, on_s, on_t = inf, S.a, T.a
     for i in range(3):
-        p = _corner(S, i)
-        d = minus(_corner(S, (i + 1) % 3), p)
-        third = _corner(S, (i + 2) % 3)
+        p = corner(S, i)
+        d = minus(corner(S, (i + 1) % 3), p)
+        third = corner(S, (i + 2) % 3)
         for j in range(3):
-            q = _corner(T, j)
-            e = minus(_corner(T, (j + 1) % 3), q)
+            q = corner(T, j)
+            e = minus(corner(T, (j + 1) % 3), q)
             squared, x, y, w = _segments(p, d, q, e)
             if squared < best:
                 best, on_s, on_t = squared, x, y
-                up, down = minus(third, x), minus(y, _corner(T, (j + 2) % 3))
+                up, down = minus(third, x), minus(y, corner(T, (j + 2) % 3))
                 gap_s, gap_t = -dot(up, w), -dot(down, w)
                 if squared > 0.0 and gap_s >= 0.0 and gap_t >= 0.0:
                     slack = SAT_ROUND_OFF * (sum_of_sizes(x) + sum_of_sizes(d) + sum_of_sizes(e))
@@ -147,7 +148,7 @@ def closest_points(S, T):
     nn, mm = dot(n, n), dot(m, m)
     g, h = _heights(T, S, n), _heights(S, T, m)
     for k in range(3):
-        x, y = _corner(S, k), _corner(T, k)
+        x, y = corner(S, k), corner(T, k)
         up, over = g[k], h[k]
         if nn > 0.0 and up * up < best * nn and _is_over(y, S, n, nn):
             best, on_s, on_t = up * up / nn, along(y, -up / nn, n), y

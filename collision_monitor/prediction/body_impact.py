@@ -32,6 +32,7 @@ from collision_monitor.prediction.impact_record import (
 from collision_monitor.prediction.mesh_impact import mesh_impact
 from collision_monitor.prediction.mesh_pair import has_mesh, shapes_within, triangles_contact
 from collision_monitor.prediction.motion import half_acceleration, relative_position, relative_velocity, rotation_at
+from collision_monitor.prediction.overlap_time import overlap_time
 from collision_monitor.prediction.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
 from collision_monitor.tolerances import EPSILON
 
@@ -229,7 +230,7 @@ def closing_speed(v, wa, wb, p, out):
 
 
 @device
-def _certain_overlap(multibody, pair, start, guess, places, window, tube, query, scratch):
+def _certain_overlap(table, parts, pair, start, guess, places, window, tube, query, scratch):
     """Return a time in [start, window.end] at which a pair overlaps by more than the tube; inf: none found.
 
     places: as for `_contact_at`; two triangles that overlap are enough.
@@ -241,7 +242,7 @@ def _certain_overlap(multibody, pair, start, guess, places, window, tube, query,
     guessed = 0.0 < guess < end - start
     t = start + guess if guessed else start
     for _ in range(NEWTON_STEPS):
-        distance = _contact_at(multibody.table, multibody.parts, pair, t, places, scratch)
+        distance = _contact_at(table, parts, pair, t, places, scratch)
         excess = distance + scratch.out[BOUND] - query.margin + tube.start + tube.growth * (t - begin)
         if excess <= 0.0:
             return t
@@ -257,6 +258,26 @@ def _certain_overlap(multibody, pair, start, guess, places, window, tube, query,
             return inf
         guessed = False
     return inf
+
+
+@outlined
+def _first_overlap(table, parts, pair, near, window, tube, query, scratch):
+    """Return a time at which a pair of shapes certainly overlaps, infinite for none, and that of the contact found.
+
+    near: what `shape_impact` found: status, time, guess, and places as for `_contact_at`. The contact in scratch.out is
+    that at the first of these times, or at that of the impact if no triangles overlap because they are in one plane.
+    """
+    status, start, guess, places = near
+    sure = _certain_overlap(table, parts, pair, start, guess, places, window, tube, query, scratch)
+    if sure == inf and places[0] >= 0:  # the first triangles may slide off each other
+        sure = _certain_overlap(table, parts, pair, start, 0.0, NO_PLACES, window, tube, query, scratch)
+    first = sure
+    if status == HIT and has_mesh(table, pair.a, pair.b):
+        first = overlap_time(table, parts, pair, (start, sure), window, tube, query, scratch)
+    if first == sure and sure < inf:
+        return sure, sure
+    contact_at(table, parts, pair, start, scratch)
+    return first, start
 
 
 @inlined
@@ -317,14 +338,11 @@ def body_impact(multibody, i, j, window, query, scratch, event):
     if event.status == CLEAR:
         return queries
     pair = ShapePair(A, B, event.shape_i, event.shape_j)
-    sure = _certain_overlap(multibody, pair, lower, guess, places, window, tube, query, scratch)
-    if sure == inf and places[0] >= 0:  # the first triangles may slide off each other
-        sure = _certain_overlap(multibody, pair, lower, 0.0, NO_PLACES, window, tube, query, scratch)
-    if sure == inf:
-        contact_at(table, parts, pair, lower, scratch)
+    near = event.status, lower, guess, places
+    sure, seen = _first_overlap(table, parts, pair, near, window, tube, query, scratch)
     event.lower, event.upper = lower, sure
     event.status = HIT if sure < inf else UNRESOLVED
-    _set_geometry(event, A, sure if sure < inf else lower, scratch.out)
+    _set_geometry(event, A, seen, scratch.out)
     return queries
 
 

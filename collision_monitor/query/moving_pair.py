@@ -25,7 +25,7 @@ from collision_monitor.prediction.bodies import Bodies, Multibody, make_bodies, 
 from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.body_layout import lay_out_body
 from collision_monitor.prediction.impact_record import IMPACT
-from collision_monitor.prediction.pair_impacts import predict_pairs
+from collision_monitor.prediction.pair_impacts import bodies_overlap_time, predict_pairs
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.surface_pair import points_near
 
@@ -194,3 +194,12 @@ def first_impacts(
     search = ImpactQuery(wanted, query.tolerance, query.iterations)
     found, _ = predict_pairs(multibody, pairs, begin, search, events, make_scratch())
     return events[:found]
+
+
+def deep_by(multibody: Multibody, query: MotionQuery, round_off: float) -> float:
+    """Time (s) at which a point is certainly in two solids, both deeper than `round_off` (m), or infinity.
+
+    Only for meshes; it finds overlaps where no triangles cross because they lie in one plane.
+    """
+    search = ImpactQuery(query.separation - 2.0 * round_off, query.tolerance, query.iterations)
+    return float(bodies_overlap_time(multibody, query.horizon, search, make_scratch()))

@@ -22,6 +22,7 @@ from collision_monitor.query.fillings import fillings
 from collision_monitor.query.moving_pair import (
     MotionQuery,
     MovingShape,
+    deep_by,
     first_impacts,
     in_convex_pieces,
     lay_out_pair,
@@ -168,8 +169,12 @@ def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain:
     least = start.signed_distance - (start.error_bound if uncertain else 0.0)
     if least < query.separation - round_off:
         return Impact("hit", 0.0, 0.0, start)
+    arguments = a.shapes, a.motion, b.shapes, b.motion
     if _may_overlap(a, b, start, query.separation, round_off):
-        return _impact(0.0, math.inf, Method.CONSERVATIVE_ADVANCEMENT, (a.shapes, a.motion, b.shapes, b.motion))
+        upper = deep_by(multibody, query, round_off)
+        if upper <= 0.0:
+            return Impact("hit", 0.0, 0.0, start)
+        return _impact(0.0, upper, Method.CONSERVATIVE_ADVANCEMENT, arguments)
     events = first_impacts(multibody, np.array([[0, 1]], np.int32), 0.0, query)
     if not len(events):
         return _CLEAR
@@ -181,9 +186,12 @@ def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain:
             lower, upper = follow(in_convex_pieces(a, b, near), in_convex_pieces(b, a, near), query, round_off)
         except TooCostlyError:
             lower, upper = 0.0, math.inf
+        sure = deep_by(multibody, query, round_off)
+        if sure < lower:  # triangles that start in one plane go through each other, and do not meet again
+            lower = 0.0
+        upper = min(upper, sure)
         if lower == math.inf:
             return _CLEAR
-    arguments = a.shapes, a.motion, b.shapes, b.motion
     return _impact(lower, upper if upper <= query.horizon else math.inf, Method(int(events[0]["method"])), arguments)
 
 

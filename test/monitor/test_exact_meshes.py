@@ -98,6 +98,39 @@ def test_its_impacts_are_certified_and_those_of_time_of_impact(other):
     assert hits >= 2
 
 
+def slab(height: float) -> cm.Mesh:
+    """An L of constant height: 1 x 0.3 in x and y, and 0.3 x 0.7 behind its end at -x."""
+    outline = [(-0.5, -0.5), (0.5, -0.5), (0.5, -0.2), (-0.2, -0.2), (-0.2, 0.5), (-0.5, 0.5)]
+    flat = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5)]
+    faces = [(a, c, b) for a, b, c in flat] + [(a + 6, b + 6, c + 6) for a, b, c in flat]
+    faces += [face for k in range(6) for j in [(k + 1) % 6] for face in ((k, j, j + 6), (k, j + 6, k + 6))]
+    return cm.Mesh([(*p, z) for z in (0.0, height) for p in outline], faces)
+
+
+@pytest.mark.parametrize("profile", ["exact", "balanced", Profile()], ids=["exact", "balanced", "default"])
+@pytest.mark.parametrize("turn", [Rotation.identity(), Rotation.from_rotvec((0.3, -1.0, 0.7))], ids=["level", "turned"])
+def test_slabs_on_one_floor_that_meet_end_to_end_are_a_hit(profile, turn):
+    """Their tops, bottoms and sides lie in one plane each, so that no triangles cross while they go into each other."""
+    slabs, end = slab(0.2), np.array((1.5, 0.0, 0.0))
+    for other in (cm.Box((1.0, 1.0, 0.2)), slab(0.2)):
+        level = (0.0, 0.0, 0.1) if isinstance(other, cm.Box) else (0.0, 0.0, 0.0)
+        for sign, when in ((-1.0, 0.5), (1.0, None)):
+            monitor = cm.Monitor(profile)
+            monitor.add(1, slabs)
+            monitor.add(2, [(other, cm.Pose(level))])
+            quaternion = turn.as_quat()
+            poses = np.array([(*np.zeros(3), *quaternion), (*turn.apply(end), *quaternion)])
+            twists = np.zeros((2, 6))
+            twists[1, :3] = turn.apply((sign, 0, 0))
+            found = monitor.step(0, [1, 2], poses, twists).predictions
+            assert len(found) == (when is not None)
+            for row in found:
+                assert row["status"] == PredictionStatus.HIT
+                assert row["lower"] <= when <= row["upper"] + 1e-9 and row["upper"] - row["lower"] < 1e-3
+                assert np.abs(turn.inv().apply(row["normal"])) == pytest.approx([1, 0, 0], abs=1e-3)
+                assert row["closing_speed"] == pytest.approx(1.0, abs=1e-3)
+
+
 def scene(profile: Profile) -> Monitor:
     monitor = Monitor(profile)
     for k, shape in enumerate(OTHERS):
