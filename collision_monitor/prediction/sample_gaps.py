@@ -105,23 +105,20 @@ def set_samples(obstacle, k, off, points, turning, first, last, rows):
             x = points[ORIENTATION + 3 * body, first:last]
             y = points[ORIENTATION + 1 + 3 * body, first:last]
             z = points[ORIENTATION + 2 + 3 * body, first:last]
+            p = points[LEFT_OVER + 3 * body, first:last]
+            q = points[LEFT_OVER + 1 + 3 * body, first:last]
+            r = points[LEFT_OVER + 2 + 3 * body, first:last]
+            is_whole = _is_zero(stated_node.left[body])
             for c in range(3):
-                m = stated_node.turn[body, c]
-                u, v, w = m[0], m[1], m[2]
+                m, left = stated_node.turn[body, c], stated_node.left[body, c]
+                u, v, w, a, b, d = m[0], m[1], m[2], left[0], left[1], left[2]
                 row = node[3 + 3 * body + c, first:last]
-                for n in range(row.size):
-                    row[n] = u * x[n] + v * y[n] + w * z[n]
-            if _is_zero(stated_node.left[body]):
-                continue
-            x = points[LEFT_OVER + 3 * body, first:last]
-            y = points[LEFT_OVER + 1 + 3 * body, first:last]
-            z = points[LEFT_OVER + 2 + 3 * body, first:last]
-            for c in range(3):
-                m = stated_node.left[body, c]
-                u, v, w = m[0], m[1], m[2]
-                row = node[3 + 3 * body + c, first:last]
-                for n in range(row.size):
-                    row[n] += u * x[n] + v * y[n] + w * z[n]
+                if is_whole:
+                    for n in range(row.size):
+                        row[n] = u * x[n] + v * y[n] + w * z[n]
+                else:
+                    for n in range(row.size):
+                        row[n] = u * x[n] + v * y[n] + w * z[n] + (a * p[n] + b * q[n] + d * r[n])
 
 
 @device
