@@ -7,6 +7,7 @@ Prints a Markdown table and ends with exit code 1 if a probability is off by mor
     python benchmarks/calibration.py                              about a minute
     python benchmarks/calibration.py --png docs/images/calibration.png
     python benchmarks/calibration.py --scenes 1000 --futures 5000 --seed 7
+    python benchmarks/calibration.py --near            bodies near each other now, at rest or spinning fast
 """
 
 from __future__ import annotations
@@ -91,6 +92,25 @@ def random_scene(rng: np.random.Generator, turning: bool) -> Scene:
     scale = rng.choice([0.05, 0.2, 0.5])
     most = scale * np.array([1.0, 0.5 if turning else 0.0, 1.0, 0.5 if turning else 0.0])
     return Scene(kinds, shapes, (states[0], states[1]), (most * rng.uniform(0.1, 1, 4), most * rng.uniform(0.1, 1, 4)))
+
+
+def near_scene(rng: np.random.Generator) -> Scene:
+    """Two bodies that are near each other now, half of them above a floor; errors are large, small or none."""
+    names = list(KINDS)
+    kind = names[rng.integers(1, len(names))]
+    shape, floor = KINDS[kind](rng), bool(rng.random() < 0.5)
+    direction = np.array([0.0, 0.0, 1.0]) if floor else rng.normal(0, 1, 3)
+    direction *= (0.5 + rng.uniform(0, 1.2) if floor else rng.uniform(0.5, 2.5)) / np.linalg.norm(direction)
+    q = rng.normal(0, 1, (2, 4))
+    q /= np.linalg.norm(q, axis=1, keepdims=True)
+    velocity, spin = rng.normal(0, rng.choice([0, 0.1, 0.5]), 3), rng.choice([0, 0.3, 2.0, 5.0]) * rng.normal(0, 0.6, 3)
+    own = np.concatenate([direction, q[0], velocity, spin])
+    other = np.concatenate([np.zeros(3), (0.0, 0.0, 0.0, 1.0) if floor else q[1], np.zeros(6)])
+    sigmas = rng.choice([0.0, 0.02, 0.1, 0.3], 4), np.zeros(4) if floor else rng.choice([0.0, 0.05], 4)
+    if floor:
+        return Scene((kind, "floor"), (shape, cm.Box((30, 30, 1))), (own, other), sigmas)
+    beside = names[rng.integers(1, len(names))]
+    return Scene((kind, beside), (shape, KINDS[beside](rng)), (own, other), sigmas)
 
 
 def predicted(scene: Scene, profile: Profile) -> tuple[np.void | None, bool, float]:
@@ -245,6 +265,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--profile", default="balanced", choices=Profile.names())
     parser.add_argument("--samples", type=int, help="samples for each pair (default: the profile's)")
+    parser.add_argument("--near", action="store_true", help="bodies near each other now, at rest or spinning fast")
     parser.add_argument("--png", type=Path)
     args = parser.parse_args()
     profile = Profile.named(args.profile).replace(horizon=HORIZON)
@@ -253,7 +274,8 @@ def main() -> int:
     rng = np.random.default_rng(args.seed)
     rows: list[Row] = []
     while len(rows) < args.scenes:
-        row = compare(random_scene(rng, turning=len(rows) % 2 == 1), profile, args.futures, rng)
+        scene = near_scene(rng) if args.near else random_scene(rng, turning=len(rows) % 2 == 1)
+        row = compare(scene, profile, args.futures, rng)
         if row is not None:
             rows.append(row)
     print("\n".join(table(rows, profile.confidence)))

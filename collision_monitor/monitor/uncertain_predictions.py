@@ -296,16 +296,16 @@ class UncertainPredictions(Stage):
     def _screen(self, step: StepContext, slots: Pairs) -> NDArray[np.float64]:
         """Bound pairs of body slots (n, 2) that are stated to pass; NaN if they meet with too little probability."""
         sampling = self._sampling(step, False)._replace(only_screens=True)
-        lattice, multibody = sample_columns(step.profile.uncertainty_samples), step.roster.multibody
+        columns, multibody = sample_columns(step.profile.uncertainty_samples), step.roster.multibody
         exact, planes = self._workspaces[0]
         bounds = np.empty((len(slots), len(ANSWERS)))
-        likely_impacts(multibody, self.spread, slots, step.now, sampling, lattice, planes, exact, bounds)
+        likely_impacts(multibody, self.spread, slots, step.now, sampling, columns, planes, exact, bounds)
         return bounds
 
     def _judge(self, step: StepContext, slots: Pairs, stated: bool, pool: Pool) -> NDArray[np.float64]:
         """Compute the answers (n, 4) for pairs of body slots (n, 2) on all threads; their number changes no answer."""
         p, sampling = step.profile, self._sampling(step, stated)
-        lattice, multibody = sample_columns(p.uncertainty_samples), step.roster.multibody
+        columns, multibody = sample_columns(p.uncertainty_samples), step.roster.multibody
 
         def part(slots: Pairs, work: Workspaces) -> tuple[NDArray[np.float64], int]:
             answers, followed = np.full((len(slots), len(ANSWERS)), LEFT), 0
@@ -322,7 +322,7 @@ class UncertainPredictions(Stage):
             if p.impact_tolerance >= FINEST_WITH_PLANES:
                 exact, planes = work
                 followed = likely_impacts(
-                    multibody, self.spread, slots, step.now, sampling, lattice, planes, exact, answers
+                    multibody, self.spread, slots, step.now, sampling, columns, planes, exact, answers
                 )
             left = answers[:, PROBABILITY] == LEFT
             if left.any():

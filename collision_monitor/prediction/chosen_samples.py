@@ -47,57 +47,57 @@ def open_ranks(times, order, spare):
 
 
 @inlined
-def _represent(lattice, weights, begin, end):
+def _represent(columns, weights, begin, end):
     """Let the first weights (BASE,) of these ranks of the pilot stand for all samples of the ranks."""
     if begin >= end:
         return
-    first, order = lattice.points[0], lattice.order
+    first, order = columns.points[0], columns.order
     low = first[order[begin]] if begin > 0 else -inf
     high = first[order[end]] if end < order.size else inf
     own = 0.0
     for n in range(weights.size):
         own += weights[n] if low <= first[n] < high else 0.0
-    others = lattice.ranked_sums[lattice.place[end]] - lattice.ranked_sums[lattice.place[begin]]
+    others = columns.ranked_sums[columns.place[end]] - columns.ranked_sums[columns.place[begin]]
     factor = (own + others) / own if own > 0.0 else 1.0
     for n in range(weights.size):
         weights[n] *= factor if low <= first[n] < high else 1.0
 
 
 @device
-def choose_samples(times, lattice, used, sampling, careful, chosen):
+def choose_samples(times, columns, used, sampling, careful, chosen):
     """Choose samples (ChosenSamples) for bodies with these times (S,) of the pilot; infinite: they do not meet.
 
     Returns their number. 0: the bodies are stated to pass, and hardly meet in the pilot. The first ones are the pilot.
     used: number of the coordinates in use; careful: choose all unless the whole pilot meets.
     """
-    pilot = lattice.pilot
-    if samples_needed(times, lattice, sampling, careful) == 0:
+    pilot = columns.pilot
+    if samples_needed(times, columns, sampling, careful) == 0:
         return 0
-    base, is_open = min(BASE, lattice.weights.size), (0, pilot, pilot, pilot)
+    base, is_open = min(BASE, columns.weights.size), (0, pilot, pilot, pilot)
     if latest(times, pilot) < inf:
         is_open = (0, 0, pilot, pilot)
     elif not careful:
-        is_open = open_ranks(times, lattice.order, SPARE)
+        is_open = open_ranks(times, columns.order, SPARE)
     weights = chosen.weights[0:base]
     for n in range(base):
-        weights[n] = lattice.weights[n]
+        weights[n] = columns.weights[n]
     for row in range(used):
-        source, target = lattice.points[row, 0:base], chosen.points[row, 0:base]
+        source, target = columns.points[row, 0:base], chosen.points[row, 0:base]
         for n in range(base):
             target[n] = source[n]
-    _represent(lattice, weights, 0, is_open[0])
-    _represent(lattice, weights, is_open[1], is_open[2])
-    _represent(lattice, weights, is_open[3], pilot)
+    _represent(columns, weights, 0, is_open[0])
+    _represent(columns, weights, is_open[1], is_open[2])
+    _represent(columns, weights, is_open[3], pilot)
     count = base
     for zone in range(2):
-        begin, end = lattice.place[is_open[2 * zone]], lattice.place[is_open[2 * zone + 1]]
-        ranked = lattice.ranked[begin:end]
+        begin, end = columns.place[is_open[2 * zone]], columns.place[is_open[2 * zone + 1]]
+        ranked = columns.ranked[begin:end]
         for row in range(used):
-            source, target = lattice.points[row], chosen.points[row, count : count + ranked.size]
+            source, target = columns.points[row], chosen.points[row, count : count + ranked.size]
             for n in range(ranked.size):
                 target[n] = source[ranked[n]]
         for n in range(ranked.size):
-            chosen.weights[count + n] = lattice.weights[ranked[n]]
+            chosen.weights[count + n] = columns.weights[ranked[n]]
         count += ranked.size
     whole = squares = 0.0
     for n in range(count):

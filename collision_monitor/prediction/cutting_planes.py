@@ -55,7 +55,7 @@ class CutSettings(NamedTuple):
     margin: float  # m
     tolerance: float  # m: gap up to which a sample has entered
     fineness: Any  # (float, 1/s): factor of the tolerance now, up to 1, and its growth
-    pilot: int  # number of samples of the pilot lattice
+    pilot: int  # number of samples of the pilot
     follows: Any  # (bool, bool): whether normals may turn with the bodies
     turning: Any  # (int, int): how errors of orientation turn the bodies, see sample_gaps
     careful: bool  # errors of orientation are large: compare more samples

@@ -23,7 +23,7 @@ NOT_FOUND: Final = -1.0
 def summarise_by_bins(times, weights, sums, outward, confidence, memory, answer):
     """Write earliest, most likely and latest time (s) and probability into answer (4,); see `summarise`.
 
-    times (n,): of the first samples of a lattice; inf: no impact. weights, sums: those of the lattice, see
+    times (n,): of the first samples; inf: no impact. weights, sums: see
     SampleColumns. outward: standard errors by which both quantiles are moved outward. Returns the first impact (s).
     """
     met, weight, bins = memory.trial[0], memory.trial[1], memory.bins

@@ -53,12 +53,12 @@ def _approach(A, B, horizon):
 
 
 @kernel
-def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, work, answers):
+def likely_impacts(multibody, spread, pairs, now, sampling, columns, memory, work, answers):
     """Write times (s after `now`) and probabilities of impact of pairs (P, 2) of body slots into answers (P, 4).
 
     An answer is NaN if neither body has declared an uncertainty, or if the pair is stated to pass and its probability
     is below min_probability for certain. The probability is LEFT for pairs that `impact_probabilities` has to answer.
-    sampling: its own samples are not used; lattice: sample_columns. `find_near` comes before it.
+    sampling: its own samples are not used; columns: sample_columns. `find_near` comes before it.
     sampling.only_screens: for pairs that are stated to pass, write a time before which bodies grown by safe_sigmas do
     not meet, the likeliest time of contact, and a bound on its probability, LEFT if unknown.
     Returns the number of samples of all pairs.
@@ -131,24 +131,24 @@ def likely_impacts(multibody, spread, pairs, now, sampling, lattice, memory, wor
         errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, late, (far_i, far_j), yaw_only)
         form = round_form(table, parts, pair, errors, query.margin, work)
         if form != NOT_ROUND:
-            samples = enter_round_bodies(table, parts, pair, form, errors, sure, sampling, lattice, memory, work)
+            samples = enter_round_bodies(table, parts, pair, form, errors, sure, sampling, columns, memory, work)
         elif sure:
-            samples = enter_surely(multibody, i, j, errors, sampling, lattice, memory, work)
+            samples = enter_surely(multibody, i, j, errors, sampling, columns, memory, work)
         else:
-            samples = enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work)
+            samples = enter_bodies(multibody, i, j, errors, sampling, columns, memory, work)
         if samples < 0:
             answers[k, PROBABILITY] = LEFT
             continue
         if samples == 0:
-            followed += lattice.pilot
+            followed += columns.pilot
             continue
         followed += samples
         answer = answers[k]
         weights, sums = (memory.chosen.weights, memory.chosen.sums)
         if sure:
-            weights, sums = lattice.even, lattice.even_sums
+            weights, sums = columns.even, columns.even_sums
         elif form != NOT_ROUND:
-            weights, sums = lattice.weights, lattice.sums
+            weights, sums = columns.weights, columns.sums
         outward = EVENLY_OUTWARD if sure else OUTWARD
         first = summarise_by_bins(memory.times[0:samples], weights, sums, outward, sampling.confidence, memory, answer)
         if answer[EARLIEST] == NOT_FOUND:

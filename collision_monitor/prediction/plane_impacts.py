@@ -52,7 +52,7 @@ FACETS: Final = 0.015
 """Distance between the planes and the obstacle, in standard deviations of the gap, up to which no plane is added."""
 
 FACETS_IN_PILOT: Final = 0.06
-"""The same for the pilot lattice, which decides how many samples a pair needs, and if only the times matter."""
+"""The same for the pilot, which decides how many samples a pair needs, and if only the times matter."""
 
 TURNED_FACETS: Final = 0.04
 """Distance by which errors of orientation of TURNED standard deviations may move a surface beyond the first order."""
@@ -71,7 +71,7 @@ SPINS: Final = 4.0
 
 VERIFIED_IN_PILOT: Final = 4
 VERIFIED: Final = 48
-"""Samples of the pilot lattice, and of all, that must need no new plane of a segment. Twice as many if it is
+"""Samples of the pilot, and of all, that must need no new plane of a segment. Twice as many if it is
 careful."""
 
 SURE_EXTREMES: Final = 4
@@ -217,19 +217,19 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
 
 
 @device
-def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
+def enter_bodies(multibody, i, j, errors, sampling, columns, memory, work):
     """Write the times of the samples' impacts of bodies i and j into memory.times.
 
     work.joint: root of the covariance of the pair. Returns the number of samples, see `choose_samples`, or TOO_FAST.
     """
     table, parts, bodies = multibody
     A, B = work.motion[0], work.motion[1]
-    times, pilot, end, points = memory.times, lattice.pilot, sampling.horizon, lattice.points
+    times, pilot, end, points = memory.times, columns.pilot, sampling.horizon, columns.points
     first_a, first_b = bodies.first_shape[i], bodies.first_shape[j]
     set_errors(work.joint, work.frame, errors.time, points, 0, pilot, memory.off)
     for n in range(times.size):
         times[n] = inf
-    search = Search(points, pilot, lattice.extremes, VERIFIED_IN_PILOT, TURNED_FACETS, BENDING)
+    search = Search(points, pilot, columns.extremes, VERIFIED_IN_PILOT, TURNED_FACETS, BENDING)
     a, b = first_a, first_b
     pair = ShapePair(A, B, a, b)
     laid = _lay_planes(table, parts, pair, errors, search, end, sampling, memory, work)
@@ -244,7 +244,7 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
         until = min(end, latest(times, pilot))
         laid = _lay_planes(table, parts, pair, errors, search, until, sampling, memory, work)
     until = latest(times, pilot)
-    samples = choose_samples(times, lattice, coordinates_in_use(errors), sampling, laid.settings.careful, memory.chosen)
+    samples = choose_samples(times, columns, coordinates_in_use(errors), sampling, laid.settings.careful, memory.chosen)
     if samples == 0:
         return 0
     meets, points = until < inf, memory.chosen.points
@@ -269,18 +269,18 @@ def enter_bodies(multibody, i, j, errors, sampling, lattice, memory, work):
 
 
 @device
-def enter_surely(multibody, i, j, errors, sampling, lattice, memory, work):
+def enter_surely(multibody, i, j, errors, sampling, columns, memory, work):
     """`enter_bodies` for bodies that surely meet until errors.time: only the times of their impacts are sought.
 
     The samples are those of the pilot, with equal weights, because no error matters more than the others.
     """
     table, parts, bodies = multibody
-    times, points, samples = memory.times, lattice.points, lattice.pilot
+    times, points, samples = memory.times, columns.points, columns.pilot
     draw_evenly(work.joint)
     set_errors(work.joint, work.frame, errors.time, points, 0, samples, memory.off)
     for n in range(samples):
         times[n] = inf
-    extremes = lattice.extremes[0:SURE_EXTREMES]
+    extremes = columns.extremes[0:SURE_EXTREMES]
     search = Search(points, samples, extremes, VERIFIED_IN_PILOT, FACETS_IN_PILOT, SURE_BENDING)
     a, first_b = bodies.first_shape[i], bodies.first_shape[j]
     b = first_b

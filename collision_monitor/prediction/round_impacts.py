@@ -169,18 +169,18 @@ def _enter_round(table, parts, pair, form, errors, end, margin, first, last, poi
 
 
 @device
-def enter_round_bodies(table, parts, pair, form, errors, sure, sampling, lattice, memory, work):
+def enter_round_bodies(table, parts, pair, form, errors, sure, sampling, columns, memory, work):
     """Write the times of the samples' impacts of bodies of a form, see `round_form`, into memory.times.
 
     work.joint: root of the covariance of the pair; sure: they surely meet. Returns the number of samples, see
     `samples_needed`; those of the pilot, with equal weights, if the bodies surely meet.
     """
-    margin, end, pilot, points = sampling.query.margin, sampling.horizon, lattice.pilot, lattice.points
+    margin, end, pilot, points = sampling.query.margin, sampling.horizon, columns.pilot, columns.points
     if sure:
         draw_evenly(work.joint)
     set_errors(work.joint, work.frame, errors.time, points, 0, pilot, memory.off)
     _enter_round(table, parts, pair, form, errors, end, margin, 0, pilot, points, memory, work)
-    samples = pilot if sure else samples_needed(memory.times, lattice, sampling, False)
+    samples = pilot if sure else samples_needed(memory.times, columns, sampling, False)
     if samples > pilot:
         set_errors(work.joint, work.frame, errors.time, points, pilot, samples, memory.off)
         _enter_round(table, parts, pair, form, errors, end, margin, pilot, samples, points, memory, work)

@@ -1,4 +1,4 @@
-"""Number of samples that a pair needs, from the times of those of the coarse lattice, the pilot."""
+"""Number of samples that a pair needs, from the times of those of the pilot."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ def latest(times, count):
 
 
 @device
-def samples_needed(times, lattice, sampling, careful):
+def samples_needed(times, columns, sampling, careful):
     """Number of samples for bodies with these times (S,) of the pilot's samples; infinite: they do not meet.
 
     0: the bodies are stated to pass, and hardly meet in the pilot. BASE: they meet in all of it.
     careful: take all samples also if nearly all of the pilot meets.
     """
-    weights, pilot = lattice.weights, lattice.pilot
+    weights, pilot = columns.weights, columns.pilot
     seen = part = 0.0
     for n in range(pilot):
         seen += weights[n] if times[n] < inf else 0.0

@@ -31,12 +31,12 @@ def test_the_order_of_the_pairs_changes_no_answer() -> None:
             monitor._settings.impact, p.horizon, p.stale_acceleration, stated, sigmas_for(p.min_probability), 3.7,
             p.min_probability, p.confidence, roster.planar, *normal_samples(SAMPLES),
         )  # fmt: skip
-        lattice, answers = sample_columns(SAMPLES), []
+        columns, answers = sample_columns(SAMPLES), []
         for order in (np.arange(len(pairs)), np.random.default_rng(0).permutation(len(pairs))):
             found = np.empty((len(pairs), 4))
             work, memory = make_workspace(), make_plane_memory(SAMPLES)
             some = np.ascontiguousarray(pairs[order])
-            likely_impacts(roster.multibody, spread, some, 0.0, sampling, lattice, memory, work, found)
+            likely_impacts(roster.multibody, spread, some, 0.0, sampling, columns, memory, work, found)
             answers.append(found[np.argsort(order)])
         assert (answers[0][:, 3] > 0.01).sum() > 5
         np.testing.assert_array_equal(*answers)

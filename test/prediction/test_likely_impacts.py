@@ -64,8 +64,8 @@ def both_methods(monitor: cm.Monitor, stated: bool, *, swapped: bool = False) ->
     roster, spread, sampling = monitor._roster, monitor._uncertain.spread, sampling_for(monitor, stated)
     pairs, work, answers = np.array([[1, 0] if swapped else [0, 1]], np.int32), make_workspace(), np.empty((2, 1, 4))
     impact_probabilities(roster.multibody, spread, pairs, 0.0, sampling, work, answers[0])
-    lattice, memory = sample_columns(SAMPLES), make_plane_memory(SAMPLES)
-    likely_impacts(roster.multibody, spread, pairs, 0.0, sampling, lattice, memory, work, answers[1])
+    columns, memory = sample_columns(SAMPLES), make_plane_memory(SAMPLES)
+    likely_impacts(roster.multibody, spread, pairs, 0.0, sampling, columns, memory, work, answers[1])
     return answers[0], answers[1]
 
 
