@@ -7,7 +7,7 @@ The metadata of rosbag2 may hold some, because PyYAML writes them for equal list
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -121,12 +121,22 @@ def _refused(expected: str, found: str, mark: Any) -> yaml.MarkedYAMLError:
     return yaml.MarkedYAMLError(None, None, f"{found} ({expected})", mark)
 
 
+def _events(text: str) -> Iterator[yaml.Event]:
+    """Parse text. PyYAML from 6.0.4 on has a limit of the nesting of its own, which is reached first by some texts."""
+    try:
+        yield from yaml.parse(text, SafeLoader)
+    except yaml.MarkedYAMLError as error:
+        if "nesting depth" not in str(error.problem):
+            raise
+        raise _refused(f"at most {DEEPEST} levels", "deeper nesting", error.problem_mark) from None
+
+
 def _check(text: str, aliases: bool, limit: int) -> None:
     """Compare depth, number of nodes and use of aliases with the limits, before anything is built. Raises YAMLError."""
     total = 0
     sizes: dict[str | None, int] = {}  # nodes of each anchor, expanded
     open_nodes: list[tuple[str | None, int]] = []  # anchor, and the total before it
-    for event in yaml.parse(text, SafeLoader):
+    for event in _events(text):
         if isinstance(event, yaml.CollectionEndEvent):
             anchor, before = open_nodes.pop()
             if anchor is not None:

@@ -26,7 +26,7 @@ def main() -> None:
         path = HERE / f"{name}.mcap"
         path.unlink(missing_ok=True)
         pipeline = Pipeline(name)
-        record(path, STEPS, pipeline=pipeline)
+        record(path, STEPS, pipeline=pipeline, pauses=(60, 180))
         print(f"{path.name}: {path.stat().st_size} bytes, digest {pipeline.monitor.digest:016x}")
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import time
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from collision_monitor.geometry.shapes import Box, Capsule, Sphere
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorder
+from collision_monitor.session.recording.recorder import FLUSH_PERIOD
 from collision_monitor.settings.profile import Profile
 
 NODE = "/object_monitor"
@@ -65,9 +67,11 @@ def record(
     close: bool = True,
     pipeline: Pipeline | None = None,
     switches: Mapping[int, Profile] | None = None,
+    pauses: Collection[int] = (),
     **options: Any,
 ) -> Recorder:
     """Record the scene like the node. switches: profile by the number of the input before which it is set.
+    pauses: numbers of the inputs before which it waits for the recorder's flush, which ends a chunk of the file.
     options: arguments of the recorder."""
     pipeline = pipeline or Pipeline("balanced")
     switches = switches or {}
@@ -77,6 +81,8 @@ def record(
     recorder.write(STATUS, pipeline.status(), now, now)
     for k, (topic, data) in enumerate(inputs(steps)):
         now += STEP
+        if k in pauses:
+            time.sleep(2.0 * FLUSH_PERIOD)
         if k in switches:
             change = pipeline.change_settings(switches[k], now, NODE)
             recorder.write(SETTINGS, change.settings, now, now, settings=pipeline.settings())
