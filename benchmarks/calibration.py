@@ -107,6 +107,8 @@ def near_scene(rng: np.random.Generator) -> Scene:
     own = np.concatenate([direction, q[0], velocity, spin])
     other = np.concatenate([np.zeros(3), (0.0, 0.0, 0.0, 1.0) if floor else q[1], np.zeros(6)])
     sigmas = rng.choice([0.0, 0.02, 0.1, 0.3], 4), np.zeros(4) if floor else rng.choice([0.0, 0.05], 4)
+    if not sigmas[0].any():
+        sigmas[0][0] = 0.1  # else nothing is uncertain
     if floor:
         return Scene((kind, "floor"), (shape, cm.Box((30, 30, 1))), (own, other), sigmas)
     beside = names[rng.integers(1, len(names))]

@@ -35,9 +35,21 @@ from collision_monitor.prediction.round_impacts import NOT_ROUND, enter_round_bo
 from collision_monitor.prediction.sample_gaps import TURNED_FARTHEST
 from collision_monitor.prediction.screening import GapGrowth, design_point
 from collision_monitor.prediction.sphere_interval import sphere_interval
-from collision_monitor.prediction.spread import is_uncertain, surface_spread, swing_radius, turns_by_yaw
+from collision_monitor.prediction.spread import (
+    accelerates,
+    is_uncertain,
+    surface_spread,
+    swing_radius,
+    turns_by_yaw,
+)
 from collision_monitor.prediction.sure_contact import surely_meet
-from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE, body_has_mesh, first_contact, likely_contact
+from collision_monitor.prediction.uncertainty import (
+    SAMPLE_TOLERANCE,
+    body_has_mesh,
+    first_contact,
+    likely_contact,
+    right_time,
+)
 
 LEFT: Final = -1.0
 """Probability of a pair that this method does not answer: very fast rotation, large errors of orientation, a mesh."""
@@ -108,8 +120,11 @@ def likely_impacts(multibody, spread, pairs, now, sampling, columns, memory, wor
             t = likely_contact(multibody, i, j, t, horizon, query, work)
         late = max(t, closest)
         late = late if late > 0.0 else horizon
-        turn_i = orientation_spread(spread, i, r_i, ages[0], late, late)
-        turn_j = orientation_spread(spread, j, r_j, ages[1], late, late)
+        right = t
+        if accelerates(spread, i) or accelerates(spread, j):
+            right = right_time(multibody, i, j, t, sampling, work)
+        turn_i = orientation_spread(spread, i, r_i, ages[0], late, right)
+        turn_j = orientation_spread(spread, j, r_j, ages[1], late, right)
         most = max(deviation_at(turn_i, late), deviation_at(turn_j, late))
         if has_mesh or most > TURNED_FARTHEST or (flat and most > 0.0):
             answers[k, PROBABILITY] = LEFT
@@ -120,7 +135,7 @@ def likely_impacts(multibody, spread, pairs, now, sampling, columns, memory, wor
             frame[0, 1] = B.y - A.y + t * (B.vy - A.vy)
             frame[0, 2] = B.z - A.z + t * (B.vz - A.vz)
         set_frame(work.frame, B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
-        set_gap_covariance(multibody, spread, i, j, ages, t, t if t > 0.0 else horizon, sampling, work)
+        set_gap_covariance(multibody, spread, i, j, ages, t, right, sampling, work)
         pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
         far_i, far_j = r_i if r_i < inf else 0.0, r_j if r_j < inf else 0.0  # a half-space does not turn
         swing = (far_i * deviation_at(turn_i, t), far_j * deviation_at(turn_j, t))

@@ -142,6 +142,9 @@ def straight_length(A, B, errors, bending):
     rate += spin_rate(B) if errors.radius[1] > 0.0 else 0.0
     rate += TURNED * turning_rate(errors)
     bend = errors.bend + speed * rate
+    for body in range(2):  # a surface that an error turns accelerates like one that spins
+        off, spin = TURNED * (errors.turning[body][1] + errors.turning[body][3]), spin_rate(A if body == 0 else B)
+        bend += errors.radius[body] * off * (2.0 * spin + off)
     return sqrt(8.0 * bending * max(errors.sigma, 1e-300) / bend) if bend > 0.0 else inf
 
 

@@ -33,7 +33,8 @@ DESIGN_STEPS: Final = 3
 """Largest number of separations towards a design point. The line between the origins is tried before them."""
 
 NODES: Final = 8
-"""Parts of a window at whose ends the deviations are computed if accelerations are unknown."""
+"""Parts of a window at which the deviations are computed if accelerations are unknown, and also separations if bodies
+turn, whose gap may be smallest at any time."""
 
 SLACK: Final = 0.02
 """Part of the standard deviation of the surfaces by which a plane may be farther from a shape than one that touches."""
@@ -202,7 +203,13 @@ def design_point(multibody, i, j, tube, growth, sampling, t, obstacle, work):
                 at = min(max(t, begin), end)
                 wanted = Accuracy(margin, SLACK * tube.start)
                 stated = (NOT_OFF, NOT_OFF)
-                for _ in range(DESIGN_STEPS):
+                scans = bend > 0.0 and growth.accelerations[2] > 0.0
+                is_done = False
+                for step in range(DESIGN_STEPS + (NODES if scans else 0)):
+                    if step >= DESIGN_STEPS:
+                        at = begin + (step - DESIGN_STEPS + 0.5) * (end - begin) / NODES
+                    elif is_done:
+                        continue
                     gap = separation_at(table, parts, pair, at, NOT_OFF, stated, wanted, obstacle, scratch) - margin
                     if gap <= 0.0:
                         own = 1.0
@@ -216,8 +223,7 @@ def design_point(multibody, i, j, tube, growth, sampling, t, obstacle, work):
                     if beta < least:  # at `when`, another direction may keep the bodies farther apart
                         least, likeliest = beta, at
                         frame[0, 0], frame[0, 1], frame[0, 2] = n
-                    if abs(when - at) <= SAME_TIME * (end - begin):
-                        break
+                    is_done = abs(when - at) <= SAME_TIME * (end - begin)
                     at = when
         bound += own
         a, b = next_pair(parts, first_b, a, b)

@@ -99,9 +99,15 @@ def take_spread(spread, slots, numbers, flags, covariance, planar):
 @device
 def is_uncertain(spread, i):
     """Whether body i has declared any uncertainty, or a bound on its acceleration."""
-    s, a = spread.stddev, spread.acceleration
+    s = spread.stddev
     declared = s[i, 0] > 0.0 or s[i, 1] > 0.0 or s[i, 2] > 0.0 or s[i, 3] > 0.0
-    return declared or a[i, 0] > 0.0 or a[i, 1] > 0.0
+    return declared or accelerates(spread, i)
+
+
+@inlined
+def accelerates(spread, i):
+    """Whether body i has declared a bound on its acceleration."""
+    return spread.acceleration[i, 0] > 0.0 or spread.acceleration[i, 1] > 0.0
 
 
 @inlined

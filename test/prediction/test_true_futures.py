@@ -21,9 +21,11 @@ def predicted_and_true(
     futures: int,
     samples: int = 1024,
     profile: str = "balanced",
+    min_probability: float = 0.01,
 ) -> tuple[np.void, NDArray[np.float64]]:
     """Prediction of two objects with the states `rows`, and times (s) of impact of their futures; infinite: none."""
-    monitor = cm.Monitor(cm.Profile.named(profile).replace(horizon=HORIZON, uncertainty_samples=samples))
+    settings = {"horizon": HORIZON, "uncertainty_samples": samples, "min_probability": min_probability}
+    monitor = cm.Monitor(cm.Profile.named(profile).replace(**settings))
     motions, rng = [], np.random.default_rng(0)
     for k, row in enumerate(rows):
         monitor.add(k, shapes[k])
@@ -280,3 +282,79 @@ def test_a_box_that_turns_above_a_floor(horizon: float) -> None:
     still = np.tile((0, 0, -0.5, 0, 0, 0, 1.0), (n, 1)), np.zeros((n, 6))
     true = cm.time_of_impact_batch(floor, *still, shape, poses, twists, horizon, tolerance=1e-5)
     assert reported["probability"] == pytest.approx(np.mean(true.status != "clear"), abs=0.025)
+
+
+def above_floor(
+    height: float, quaternion: tuple[float, ...], linear: tuple[float, ...], angular: tuple[float, ...],
+    stddevs: tuple[float, ...],
+) -> NDArray[np.void]:  # fmt: skip
+    """States of a floor whose top is at 0, and of a body above it; stddevs: as NAMES, of the body."""
+    rows = np.zeros(2, STATE)
+    rows["id"], rows["position"] = (0, 1), ((0, 0, -0.5), (0, 0, height))
+    rows["quaternion"] = (0, 0, 0, 1), np.array(quaternion) / np.linalg.norm(quaternion)
+    rows["linear"][1], rows["angular"][1] = linear, angular
+    for name, off in zip(NAMES, stddevs, strict=True):
+        rows[f"{name}_stddev"][1] = off
+    return rows
+
+
+@pytest.mark.parametrize("profile", ["balanced", "exact"])
+@pytest.mark.parametrize(("gap", "speed", "turned"), [(0.01, 0.7, 0.005), (0.006, 0.3, 0.005), (0.003, 0.3, 0.0)])
+def test_a_box_that_leaves_a_floor_nearby(gap: float, speed: float, turned: float, profile: str) -> None:
+    """Samples that are followed one by one counted as touching while their gap was small for the later errors."""
+    rows = above_floor(0.45 + gap, (0, 0, 0, 1), (0, 0, speed), (0, 0, 0.16), (0.0, turned, 0.3, 0.0))
+    reported, times = predicted_and_true(
+        (cm.Box((40, 40, 1)), cm.Box((0.8, 0.8, 0.9))), rows, 10_000, profile=profile, min_probability=1e-4
+    )
+    assert reported["probability"] == pytest.approx(np.mean(times < np.inf), abs=0.02)
+
+
+@pytest.mark.parametrize("rate", [5.0, 10.0, 15.0])
+def test_a_box_that_spins_fast_above_a_floor(rate: float) -> None:
+    """A sample whose search ends before the horizon, after too few iterations, counts as an impact."""
+    spin = 0.6 * rate, 0.7 * rate, -0.39 * rate
+    rows = above_floor(0.84, (0.3, 0.2, 0.1, 0.9), (0, 0, 0), spin, (0.03, 0.01, 0, 0))
+    shapes = cm.Box((40, 40, 1)), cm.Box((0.8, 0.6, 1.2))
+    reported, times = predicted_and_true(shapes, rows, 5_000, min_probability=1e-3)
+    assert reported["probability"] == pytest.approx(np.mean(times < np.inf), abs=0.015)
+
+
+@pytest.mark.parametrize("rate", [0.1, 0.2, 0.3])
+def test_a_box_at_rest_beside_a_ball_that_only_errors_turn(rate: float) -> None:
+    """Its corners go along arcs, which are no straight line until the horizon."""
+    rows = np.zeros(2, STATE)
+    rows["id"], rows["quaternion"][:, 3], rows["position"][1] = (0, 1), 1.0, (0.75, 0, 0)
+    rows["angular_velocity_stddev"][1], rows["position_stddev"][1] = rate, 0.03
+    reported, true = stated_and_true((cm.Sphere(0.2), cm.Box((0.9, 1.6, 0.2))), rows, 20_000)
+    assert reported == pytest.approx(true, abs=0.015)
+
+
+@pytest.mark.parametrize(("gap", "speed"), [(0.02, 0.5), (0.1, 0.8)])
+def test_balls_that_meet_whatever_their_acceleration_is(gap: float, speed: float) -> None:
+    """Their centres are closest long after they meet, when an acceleration could have parted them."""
+    monitor = cm.Monitor()
+    monitor.add(0, cm.Sphere(0.6), max_linear_acceleration=2.0)
+    monitor.add(1, cm.Sphere(0.3))
+    rows = np.zeros(2, STATE)
+    rows["id"], rows["quaternion"][:, 3] = (0, 1), 1.0
+    rows["position"][1, 0], rows["linear"][1, 0] = 0.9 + gap, -speed
+    assert monitor.step(0, rows).predictions["probability"][0] > 0.99
+
+
+def test_a_rod_that_spins_beside_a_floor_and_may_accelerate() -> None:
+    """It is likeliest to touch where its end passes the floor, not at the ends of the time nor at once."""
+    rng, half = np.random.default_rng(0), np.array((0.085, 0.794, 0.139))
+    directions = rng.normal(size=(5_000, 3))
+    up = 8.0 * rng.random(5_000) ** (1 / 3) * directions[:, 2] / np.linalg.norm(directions, axis=1)
+    q = np.array((-0.31774, -0.48201, 0.04227, -0.81543))
+    spin, low = np.array((-4.6836, 5.3659, -3.2235)), np.full(5_000, np.inf)
+    for t in np.linspace(0.0, 0.5, 101):
+        x, y, z, w = multiply(from_rotation_vector(spin[None] * t), q[None] / np.linalg.norm(q))[0]
+        rise = np.abs((2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))) @ half
+        low = np.minimum(low, 0.9212 + 0.5 * up * t * t - rise)
+    monitor = cm.Monitor(cm.Profile(horizon=0.5))
+    monitor.add(0, cm.Box((60, 60, 1)), static=True, pose=cm.Pose((0, 0, -0.5)))
+    monitor.add(1, cm.Box(2.0 * half), max_linear_acceleration=8.0)
+    rows = above_floor(0.9212, tuple(q), (0, 0, 0), tuple(spin), (0.02, 0.0, 0.0, 0.08))[1:]
+    reported = monitor.step(0, rows).predictions[0]
+    assert reported["probability"] == pytest.approx(np.mean(low < 0.0), abs=0.06)
