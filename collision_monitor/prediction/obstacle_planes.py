@@ -84,7 +84,7 @@ def make_obstacle() -> Obstacle:
     )
 
 
-@inlined
+@device
 def _set_turns(m, t, off, yaw_only, turn, left):
     """Write the rotation vectors of a body with motion m at time t for unit errors; off: see `orientation_spread`."""
     set_turn(m, t, (off[0], off[1]), yaw_only, turn)

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from collision_monitor._jit import allocating_kernel, device, inlined, kernel, outlined
+from collision_monitor._jit import allocating_kernel, device, inlined, kernel
 from collision_monitor.geometry.shape_table import MESH, POINTS
 from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
 from collision_monitor.prediction.bodies import next_pair
@@ -137,7 +137,7 @@ def first_contact(multibody, i, j, window, tube, query, work):
     return best
 
 
-@outlined
+@device
 def _gap_at(multibody, i, j, t, work):
     """Signed distance (m) of the shapes of bodies i and j at t.
 
@@ -363,6 +363,15 @@ def _set_sides(multibody, i, j, t, turning, yaw_only, times, first, sampling, wo
 
 
 @inlined
+def _rank_of(value, firsts):
+    """Rank of the largest of some numbers (n,) that is at most the value; 0 for none."""
+    rank = -1
+    for m in range(firsts.size):
+        rank += 1 if firsts[m] <= value else 0
+    return max(rank, 0)
+
+
+@inlined
 def _unit(z, first, level):
     """Three unit errors of orientation of a sample; level: 0.0 if they are about the z axis alone, else 1.0."""
     return level * z[first], level * z[first + 1], z[first + 2]
@@ -459,8 +468,8 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
         few = sampling.stops_early and PILOT <= weights.size < 2 * PILOT
         size = weights.size // FEW_PARTS if few else pilot_of(weights.size)
         count = -(-weights.size // size)
-        order, share, is_open = np.argsort(points[0:size, 0]), weights.copy(), (0, size, size, size)
-        ranked = points[order, 0]
+        firsts, share, is_open = points[0:size, 0].copy(), weights.copy(), (0, size, size, size)
+        order = np.argsort(firsts)
         foretells = sampling.stops_early and count >= FEWEST_FORETOLD and not has_mesh
         seen, met, begun = 0.0, 0, followed
         mirrors = has_mesh and not stated
@@ -482,7 +491,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                 weigh_followed(points, weights, 2 * size, sides)
             for n in range(nth * size, min((nth + 1) * size, weights.size)):
                 z = points[n]
-                rank = max(np.searchsorted(ranked, z[0], "right") - 1, 0) if few else 0
+                rank = _rank_of(z[0], firsts) if few else 0
                 if few and nth > 0 and not (is_open[0] <= rank < is_open[1] or is_open[2] <= rank < is_open[3]):
                     share[order[rank]] += weights[n]
                     share[n], times[n] = 0.0, inf
