@@ -6,7 +6,7 @@ from math import inf, sqrt
 from typing import Any, NamedTuple
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.meshes.triangle_pair import Triangle, corner
+from collision_monitor.meshes.triangle_pair import Triangle, corner, normal
 from collision_monitor.narrow_phase.vector import Vector, along, cross, direction, dot, minus, plus, scaled
 
 
@@ -25,7 +25,7 @@ class CommonPart(NamedTuple):
 @inlined
 def normal_of(T: Triangle) -> Vector:
     """Unit normal of a triangle, +z for a flat one."""
-    _, n = direction(cross(minus(T.b, T.a), minus(T.c, T.a)))
+    _, n = direction(normal(T))
     return n
 
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.shape_table import CONE, CYLINDER, ELLIPSOID
-from collision_monitor.meshes.triangle_pair import Triangle
+from collision_monitor.meshes.triangle_pair import Triangle, normal
 from collision_monitor.narrow_phase.contact_row import EDGE, FACE, VERTEX
 from collision_monitor.narrow_phase.gjk import closest_on_triangle, weighted
 from collision_monitor.narrow_phase.vector import Vector, along, dot, minus
@@ -110,8 +110,7 @@ def number_in_hull(table: Any, s: int, T: Triangle, kind: float, c: float, reach
     number = min(number, float(_nearest_vertex(table, s, second)))
     if kind == EDGE:
         return number
-    u, v = minus(T.b, T.a), minus(T.c, T.a)
-    m = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+    m = normal(T)
     number = min(number, float(_nearest_vertex(table, s, T.c)))
     level = reach * sqrt(dot(m, m))
     for k in range(table.vertex_start[s], table.vertex_start[s] + table.vertex_count[s]):

@@ -75,7 +75,8 @@ def _pierces(x, y, S, n):
 
 
 @inlined
-def _normal(S):
+def normal(S):
+    """Normal of a triangle, as long as twice its area."""
     return cross(minus(S.b, S.a), minus(S.c, S.a))
 
 
@@ -105,7 +106,7 @@ def _all_on_one_side(h):
 @device
 def crossing_point(S, T):
     """Whether an edge of either triangle passes through the other, and a point of both (m)."""
-    n, m = _normal(S), _normal(T)
+    n, m = normal(S), normal(T)
     h = _heights(S, T, m)
     if _all_on_one_side(h):
         return False, S.a
@@ -144,7 +145,7 @@ def closest_points(S, T):
                     slack = SAT_ROUND_OFF * (sum_of_sizes(x) + sum_of_sizes(d) + sum_of_sizes(e))
                     if gap_s >= slack * sum_of_sizes(up) and gap_t >= slack * sum_of_sizes(down):
                         return Closest(best, on_s, on_t)
-    n, m = _normal(S), _normal(T)
+    n, m = normal(S), normal(T)
     nn, mm = dot(n, n), dot(m, m)
     g, h = _heights(T, S, n), _heights(S, T, m)
     for k in range(3):

@@ -125,7 +125,7 @@ def add_covariance(spread, i, age, t, right, stale_acceleration, planar, work):
 
 @device
 def take_root(joint):
-    """Replace a covariance (6, 6), given by its upper triangle, by its lower Cholesky factor.
+    """Replace a covariance (6, 6), given by its upper triangle, by its lower Cholesky factor, with zeros above it.
 
     A coordinate without variance of its own gets a zero column.
     """
@@ -141,9 +141,12 @@ def take_root(joint):
                 value -= joint[r, k] * joint[c, k]
             joint[r, c] = value / root if root > 0.0 else 0.0
         joint[c, c] = root
+    for r in range(6):
+        for c in range(r + 1, 6):
+            joint[r, c] = 0.0
 
 
-@inlined
+@device
 def turn(m, R, w, off, error, left):
     """Set rotation and angular velocity of m (MOTION) to R and w (3,), off by unit errors, see `orientation_spread`.
 

@@ -35,13 +35,7 @@ from collision_monitor.prediction.round_impacts import NOT_ROUND, enter_round_bo
 from collision_monitor.prediction.sample_gaps import TURNED_FARTHEST
 from collision_monitor.prediction.screening import GapGrowth, design_point
 from collision_monitor.prediction.sphere_interval import sphere_interval
-from collision_monitor.prediction.spread import (
-    accelerates,
-    is_uncertain,
-    surface_spread,
-    swing_radius,
-    turns_by_yaw,
-)
+from collision_monitor.prediction.spread import is_uncertain, surface_spread, swing_radius, turns_by_yaw
 from collision_monitor.prediction.sure_contact import surely_meet
 from collision_monitor.prediction.uncertainty import (
     SAMPLE_TOLERANCE,
@@ -120,9 +114,7 @@ def likely_impacts(multibody, spread, pairs, now, sampling, columns, memory, wor
             t = likely_contact(multibody, i, j, t, horizon, query, work)
         late = max(t, closest)
         late = late if late > 0.0 else horizon
-        right = t
-        if accelerates(spread, i) or accelerates(spread, j):
-            right = right_time(multibody, i, j, t, sampling, work)
+        right = right_time(multibody, spread, i, j, t, sampling, work)
         turn_i = orientation_spread(spread, i, r_i, ages[0], late, right)
         turn_j = orientation_spread(spread, j, r_j, ages[1], late, right)
         most = max(deviation_at(turn_i, late), deviation_at(turn_j, late))
@@ -141,7 +133,6 @@ def likely_impacts(multibody, spread, pairs, now, sampling, columns, memory, wor
         swing = (far_i * deviation_at(turn_i, t), far_j * deviation_at(turn_j, t))
         sure = sampling.stated and surely_meet(table, parts, pair, work.joint, swing, t, query.margin, work.scratch)
         take_root(work.joint)
-        _clear_upper(work.joint)
         yaw_only = (turns_by_yaw(spread, i, sampling.planar), turns_by_yaw(spread, j, sampling.planar))
         errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, late, (far_i, far_j), yaw_only)
         form = round_form(table, parts, pair, errors, query.margin, work)
@@ -183,14 +174,6 @@ def _first_meeting(A, B, tube, sampling):
     growth = sampling.safe_sigmas * tube.growth + half_acceleration(A, B) * sampling.horizon
     p, v = (B.x - A.x, B.y - A.y, B.z - A.z), (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
     return sphere_interval(p, v, reach, growth, sampling.horizon, 1.0)[0]
-
-
-@inlined
-def _clear_upper(joint):
-    """Set the numbers above the diagonal to 0, which `take_root` leaves."""
-    for r in range(6):
-        for c in range(r + 1, 6):
-            joint[r, c] = 0.0
 
 
 @inlined

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
-from collision_monitor._jit import inlined
+from collision_monitor._jit import device, inlined
 from collision_monitor.prediction.error_samples import LEFT_OVER, ORIENTATION, add_covariance, turns
 from collision_monitor.prediction.normal_samples import DIMENSIONS
 from collision_monitor.prediction.sample_gaps import FIRST_ORDER, NOT_TURNED, SERIES
@@ -72,7 +72,7 @@ def deviation_at(off, t):
     return sqrt(own * own + left * left) if left != 0.0 else own
 
 
-@inlined
+@device
 def gap_deviation(n, root, errors, t):
     """Standard deviation (m) of the gap along n (3,), in the axes of the root, at time t.
 
@@ -90,7 +90,7 @@ def gap_deviation(n, root, errors, t):
     return sqrt(variance)
 
 
-@inlined
+@device
 def fineness(root, errors, tolerance, least):
     """Factor of a tolerance (m) now, and its growth (1/s), which make it finer while the errors are smaller.
 

@@ -54,6 +54,7 @@ from collision_monitor.prediction.known_axes import parted_until, remember
 from collision_monitor.prediction.motion import carry_on, half_acceleration, relative_position
 from collision_monitor.prediction.normal_samples import DIMENSIONS, PILOT, pilot_of
 from collision_monitor.prediction.obstacle_planes import NOT_OFF
+from collision_monitor.prediction.pair_errors import spin_rate
 from collision_monitor.prediction.sphere_interval import sphere_interval
 from collision_monitor.prediction.spread import (
     accelerates,
@@ -95,7 +96,7 @@ part of the samples. The test is repeated after each further one."""
 
 
 FEW_PARTS: Final = 4
-"""Parts of so few samples, the first of which decides which of the others are needed."""
+"""Parts of so few samples. The samples of the first part decide which samples of the others are needed."""
 
 FEWEST_FORETOLD: Final = 4
 """Parts of the samples, of about PILOT each, from which on two of them foretell the outcome of others."""
@@ -179,10 +180,10 @@ def likely_contact(multibody, i, j, t, horizon, query, work):
 def _is_straight(parts, bodies, i, j, A, B):
     """Whether each body is one shape that moves straight and does not turn, and they are not both spheres."""
     a, b = bodies.first_shape[i], bodies.first_shape[j]
-    turns = A.wx != 0.0 or A.wy != 0.0 or A.wz != 0.0 or B.wx != 0.0 or B.wy != 0.0 or B.wz != 0.0
+    bends = A.wx != 0.0 or A.wy != 0.0 or A.wz != 0.0 or B.wx != 0.0 or B.wy != 0.0 or B.wz != 0.0
     round = bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0
-    turns = turns or half_acceleration(A, B) > 0.0
-    return not turns and not round and parts.next[a] < 0 and parts.next[b] < 0
+    bends = bends or half_acceleration(A, B) > 0.0
+    return not bends and not round and parts.next[a] < 0 and parts.next[b] < 0
 
 
 @inlined
@@ -264,11 +265,13 @@ def _least_tolerance(multibody, i, j, turning, t, margin, work):
 
 
 @device
-def right_time(multibody, i, j, t, sampling, work):
+def right_time(multibody, spread, i, j, t, sampling, work):
     """Time (s) at which unknown accelerations are right: that of the stated first contact, t, or the horizon if t is 0.
 
-    Bodies touch where they meet first, and their origins may be closest long after that.
+    Bodies touch where they meet first, and their origins may be closest long after that. t if there are none.
     """
+    if not (accelerates(spread, i) or accelerates(spread, j)):
+        return t
     if not (sampling.stated and t > 0.0):
         return t if t > 0.0 else sampling.horizon
     before, first = 0.0, t
@@ -284,8 +287,18 @@ def right_time(multibody, i, j, t, sampling, work):
 @inlined
 def spins_far(A, B, horizon):
     """Whether two bodies spin by more than FAR within the horizon (s)."""
-    rate = sqrt(A.wx * A.wx + A.wy * A.wy + A.wz * A.wz) + sqrt(B.wx * B.wx + B.wy * B.wy + B.wz * B.wz)
-    return rate * horizon > FAR
+    return (spin_rate(A) + spin_rate(B)) * horizon > FAR
+
+
+@device
+def _set_unit_turns(t, turning, yaw_only, work, sides):
+    """Write the rotation vectors of both bodies at time t for unit errors of orientation at t into sides.turns."""
+    for side in range(2):
+        for r in range(3):
+            for c in range(3):
+                sides.turns[side, r, c] = 0.0
+        off = turning[side]
+        set_turn(work.motion[side], t, (off[0], off[1]), yaw_only[side], sides.turns[side])
 
 
 @device
@@ -295,12 +308,8 @@ def _set_mirror(multibody, i, j, t, turning, yaw_only, work, sides):
     sides.widening[0] becomes a unit vector, see `_mirrored`, or 0 if it is the first coordinate already. With few
     samples, the probability is only as good as the first coordinate decides it; errors of orientation may decide alone.
     """
-    A, B, block, mirror = work.motion[0], work.motion[1], work.block, sides.widening[0]
-    for r in range(3):
-        for c in range(3):
-            sides.turns[0, r, c] = sides.turns[1, r, c] = 0.0
-    set_turn(A, t, (turning[0][0], turning[0][1]), yaw_only[0], sides.turns[0])
-    set_turn(B, t, (turning[1][0], turning[1][1]), yaw_only[1], sides.turns[1])
+    block, mirror = work.block, sides.widening[0]
+    _set_unit_turns(t, turning, yaw_only, work, sides)
     _gap_at(multibody, i, j, t, work)
     set_widening(block[0], block[1:3], sides.turns, work.joint, work.frame, mirror)
     length = _length(mirror)
@@ -312,7 +321,7 @@ def _set_mirror(multibody, i, j, t, turning, yaw_only, work, sides):
         mirror[c] = mirror[c] / length if length > 1e-6 else 0.0
 
 
-@inlined
+@device
 def _length(v):
     """Length of a vector (DIMENSIONS,)."""
     total = 0.0
@@ -339,13 +348,9 @@ def _set_sides(multibody, i, j, t, turning, yaw_only, times, first, sampling, wo
     whether they are about the z axis alone.
     """
     points = sampling.points
-    A, B, L, F, block = work.motion[0], work.motion[1], work.joint, work.frame, work.block
+    B, L, F, block = work.motion[1], work.joint, work.frame, work.block
     ends = sides.ends
-    for r in range(3):
-        for c in range(3):
-            sides.turns[0, r, c] = sides.turns[1, r, c] = 0.0
-    set_turn(A, t, (turning[0][0], turning[0][1]), yaw_only[0], sides.turns[0])
-    set_turn(B, t, (turning[1][0], turning[1][1]), yaw_only[1], sides.turns[1])
+    _set_unit_turns(t, turning, yaw_only, work, sides)
     middle = find_ends(points, times, first, ends)
     x, y, z = B.x, B.y, B.z
     for side in range(2):
@@ -408,6 +413,11 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
     points, weights, stale_acceleration = sampling.points, sampling.weights, sampling.stale_acceleration
     times = np.empty(weights.size)
     A, B, sides = work.motion[0], work.motion[1], work.sides[0]
+    few = sampling.stops_early and PILOT <= weights.size < 2 * PILOT
+    size = weights.size // FEW_PARTS if few else pilot_of(weights.size)
+    count = -(-weights.size // size)
+    firsts = points[0:size, 0].copy()
+    order = np.argsort(firsts)
     followed = 0
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
@@ -433,9 +443,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
         wide = Tube(sampling.safe_sigmas * tube.start, sampling.safe_sigmas * tube.growth)
         safe = first_contact(multibody, i, j, whole, wide, roughly, work)
         t = _lay_along(multibody, i, j, tube, sampling, work)
-        work.joint[:], right = 0.0, t
-        if accelerates(spread, i) or accelerates(spread, j):
-            right = right_time(multibody, i, j, t, sampling, work)
+        work.joint[:], right = 0.0, right_time(multibody, spread, i, j, t, sampling, work)
         if not bodies.static[i]:
             add_covariance(spread, i, age_i, t, right, stale_acceleration, sampling.planar, work)
         if not bodies.static[j]:
@@ -465,11 +473,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
         w_i, w_j = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
         straight = _is_straight(parts, bodies, i, j, A, B) and not (turns_i or turns_j)
         work.axes[:, 3] = inf  # no axis is known yet
-        few = sampling.stops_early and PILOT <= weights.size < 2 * PILOT
-        size = weights.size // FEW_PARTS if few else pilot_of(weights.size)
-        count = -(-weights.size // size)
-        firsts, share, is_open = points[0:size, 0].copy(), weights.copy(), (0, size, size, size)
-        order = np.argsort(firsts)
+        share, is_open = weights.copy(), (0, size, size, size)
         foretells = sampling.stops_early and count >= FEWEST_FORETOLD and not has_mesh
         seen, met, begun = 0.0, 0, followed
         mirrors = has_mesh and not stated
@@ -504,7 +508,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                     continue
                 followed += 1
                 if mirrors:
-                    _mirrored(points[n], sides.widening[0], work.sample)
+                    _mirrored(z, sides.widening[0], work.sample)
                     z = work.sample
                 shift(work, z, t, p, v)
                 if turns_i:

@@ -18,7 +18,7 @@ ACROSS = [(0, 1, 2), (1, 2, 0), (2, 0, 1)]
 
 
 def random_cells(rng: np.random.Generator, count: int) -> Cells:
-    """Cells (x, y, z) of a connected solid, of which each but the first shares a face with one before."""
+    """Cells (x, y, z) of a connected solid: each one after the first shares a face with an earlier one."""
     cells = {(0, 0, 0)}
     while len(cells) < count:
         x, y, z = sorted(cells)[rng.integers(len(cells))]
