@@ -7,7 +7,7 @@ search begins at that time.
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, sqrt
 from typing import Final
 
 from collision_monitor._jit import device, inlined
@@ -23,13 +23,17 @@ AXES: Final = 8
 def remember(table, parts, pair, passed, n, scratch, axes):
     """Store the direction in scratch.out as one of the axes (AXES, 4) of a pair of shapes (ShapePair).
 
-    n: index of the sample, which selects the axis to replace; passed: whether the sample passed.
+    n: index of the sample, which selects the axis to replace; passed: whether the sample passed. Behind one whose
+    bounding spheres did not meet, scratch.out has any vector, which is an axis too once its length is 1.
     """
     A, B, a, b = pair
     R_a, R_b, out = scratch.rotation[2], scratch.rotation[3], scratch.out
     oa = place_shape(table, parts, a, A.rotation, R_a)
     ob = place_shape(table, parts, b, B.rotation, R_b)
-    x, y, z = out[0], out[1], out[2]
+    length = sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2])
+    if not 0.0 < length < inf:
+        return
+    x, y, z = out[0] / length, out[1] / length, out[2] / length
     reach = rounding(table, a) + rounding(table, b) + x * (oa[0] - ob[0]) + y * (oa[1] - ob[1]) + z * (oa[2] - ob[2])
     reach += core_support(
         table, a,

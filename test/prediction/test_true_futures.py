@@ -66,6 +66,19 @@ def test_a_rod_that_turns_past_a_box(samples: int, most: float) -> None:
     assert reported == pytest.approx(true, abs=most)
 
 
+@pytest.mark.parametrize("profile", ["balanced", "exact"])
+def test_a_rod_with_round_ends_that_reaches_a_ball_at_the_horizon(profile: str) -> None:
+    """The vector behind a sample whose bounding spheres miss was longer than 1, and kept others apart: 0.028."""
+    rows = np.zeros(2, STATE)
+    rows["id"] = 0, 1
+    rows["position"][1], rows["linear"][1] = (2.1118, 1.2212, 2.1059), (-0.8639, -0.4769, -0.7878)
+    rows["quaternion"] = (0.9633, 0.0367, 0.1605, -0.212), (0.0, 0.0, 0.0, 1.0)
+    rows["quaternion"] /= np.linalg.norm(rows["quaternion"], axis=1, keepdims=True)
+    rows["position_stddev"], rows["velocity_stddev"] = (0.018, 0.0113), (0.0445, 0.0458)
+    reported, times = predicted_and_true((cm.Capsule(0.0675, 0.3792), cm.Sphere(0.5444)), rows, 20_000, 1024, profile)
+    assert reported["probability"] == pytest.approx(np.mean(times < np.inf), abs=0.015)
+
+
 def test_a_person_that_reaches_a_long_wall_at_the_horizon() -> None:
     """The origins are closest now, but the errors of orientation count when the person is at the wall."""
     rows = np.zeros(2, STATE)
