@@ -21,7 +21,7 @@ from collision_monitor.prediction.obstacle_planes import (
     separation_at,
     set_plane,
 )
-from collision_monitor.prediction.sample_gaps import NOT_TURNED, enter_planes, gaps_at_begin, set_bow
+from collision_monitor.prediction.sample_gaps import NOT_TURNED, enter_planes, gaps_at_begin, set_bends
 
 TRIED: Final = 32
 """Number of samples that decide how the normal of a plane turns: a block of the samples, which are spread out. The
@@ -139,9 +139,9 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
     trial_entry, trial_leave = memory.trial[0], memory.trial[1]
     if tried != NO_MODE:
         set_plane(direction, tried, obstacle, planes[0])
-        set_bow(table, pair, planes[0], nodes, middle, least)
+        set_bends(table, pair, planes[0], nodes, middle, least)
         _copy(entry, leave, trial_entry, trial_leave, 0, samples)
-        enter_planes(table, pair, planes, margin, turning, nodes, 0, samples, rows, trial_entry, trial_leave)
+        enter_planes(table, pair, planes, margin, turning, nodes, middle, 0, samples, rows, trial_entry, trial_leave)
         if trial_leave[n] - trial_entry[n] < before:
             _copy(trial_entry, trial_leave, entry, leave, 0, samples)
             obstacle.count[k] += 1
@@ -153,12 +153,12 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
         if mode == tried or (mode != AT_REST and not settings.follows[mode]):
             continue
         set_plane(direction, mode, obstacle, planes[0])
-        set_bow(table, pair, planes[0], nodes, middle, least)
+        set_bends(table, pair, planes[0], nodes, middle, least)
         _copy(entry, leave, trial_entry, trial_leave, first, last)
-        enter_planes(table, pair, planes, margin, turning, nodes, first, last, rows, trial_entry, trial_leave)
+        enter_planes(table, pair, planes, margin, turning, nodes, middle, first, last, rows, trial_entry, trial_leave)
         if n >= last:
             trial_entry[n], trial_leave[n] = entry[n], leave[n]
-            enter_planes(table, pair, planes, margin, turning, nodes, n, n + 1, rows, trial_entry, trial_leave)
+            enter_planes(table, pair, planes, margin, turning, nodes, middle, n, n + 1, rows, trial_entry, trial_leave)
         if not trial_leave[n] - trial_entry[n] < before:
             continue
         total = 0.0
@@ -170,8 +170,8 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
         return False
     obstacle.count[k] += 1
     set_plane(direction, best, obstacle, planes[0])
-    set_bow(table, pair, planes[0], nodes, middle, least)
-    enter_planes(table, pair, planes, margin, turning, nodes, 0, samples, rows, entry, leave)
+    set_bends(table, pair, planes[0], nodes, middle, least)
+    enter_planes(table, pair, planes, margin, turning, nodes, middle, 0, samples, rows, entry, leave)
     return True
 
 
@@ -306,8 +306,6 @@ def carry_planes(table, pair, k, settings, memory):
         if kept:
             for c in range(PLANE_SIZE):
                 obstacle.planes[k, obstacle.count[k], c] = obstacle.planes[k - 1, m, c]
-            plane, nodes = obstacle.planes[k, obstacle.count[k]], obstacle.node[k : k + 2]
-            set_bow(table, pair, plane, nodes, obstacle.middle[k], LEAST_BEND * settings.tolerance)
             obstacle.count[k] += 1
 
 
@@ -325,7 +323,10 @@ def begin_segment(table, pair, k, samples, settings, memory):
         memory.live[n] = n
     live, _ = drop_missed(samples, 0, settings.turning, memory)
     planes, nodes, margin = obstacle.planes[k, 0 : obstacle.count[k]], obstacle.node[k : k + 2], plane_margin(settings)
-    enter_planes(table, pair, planes, margin, settings.turning, nodes, 0, live, rows, entry, leave)
+    middle = obstacle.middle[k]
+    for m in range(obstacle.count[k]):
+        set_bends(table, pair, planes[m], nodes, middle, LEAST_BEND * settings.tolerance)
+    enter_planes(table, pair, planes, margin, settings.turning, nodes, middle, 0, live, rows, entry, leave)
     return live
 
 

@@ -48,7 +48,7 @@ def drop_missed(count, at, turning, memory):
             kept[left] = n
             left += 1
             moved += 1 if n < at else 0
-    for place in range(2):
+    for place in range(3):
         for part in range(3):
             if part > 0 and turning[part - 1] == NOT_TURNED:
                 continue

@@ -26,8 +26,8 @@ MOST_SEGMENTS: Final = 48
 MOST_PLANES: Final = 64
 """Largest number of planes in a segment. Each costs 1 to 10 ns per sample."""
 
-MODE, BOW, PLANE_SIZE = 3, 4, 5
-"""Columns of a plane behind its normal: mode; bow of the stated gap in the segment (m), see `set_bow`; number of
+MODE, BENDS, PLANE_SIZE = 3, 4, 5
+"""Columns of a plane behind its normal: mode; 1 if gaps bend in the segment, 0 if they are straight lines; number of
 columns."""
 
 AT_REST: Final = 2
@@ -95,9 +95,14 @@ def _place(table, parts, pair, t, scratch, node):
 
 @inlined
 def set_middle(table, parts, pair, k, scratch, obstacle):
-    """Place the shapes of the pair (ShapePair) in the middle of segment k."""
-    t = 0.5 * (obstacle.node[k].time + obstacle.node[k + 1].time)
-    _place(table, parts, pair, t, scratch, obstacle.middle[k])
+    """Place the shapes of the pair (ShapePair) in the middle of segment k; errors turn them by the mean of its ends."""
+    first, last, middle = obstacle.node[k], obstacle.node[k + 1], obstacle.middle[k]
+    _place(table, parts, pair, 0.5 * (first.time + last.time), scratch, middle)
+    for body in range(2):
+        for r in range(3):
+            for c in range(3):
+                middle.turn[body, r, c] = 0.5 * (first.turn[body, r, c] + last.turn[body, r, c])
+                middle.left[body, r, c] = 0.5 * (first.left[body, r, c] + last.left[body, r, c])
 
 
 @device

@@ -36,7 +36,7 @@ from collision_monitor.prediction.linear_gaps import (
     make_terms,
     sum_terms,
 )
-from collision_monitor.prediction.obstacle_planes import AT_REST, BOW, MODE, from_plane
+from collision_monitor.prediction.obstacle_planes import AT_REST, BENDS, MODE, from_plane
 
 TURNED_FARTHEST: Final = 0.7
 """Largest standard deviation of an orientation (rad) for which the series of `_turn` are exact to 0.001 rad."""
@@ -52,12 +52,12 @@ APART: Final = 8
 
 
 class SampleRows(NamedTuple):
-    """Samples at both ends of a segment; scratch memory of one thread for S samples."""
+    """Samples at both ends and in the middle of a segment; scratch memory of one thread for S samples."""
 
-    node: Any  # (2, STATE, S)
+    node: Any  # (3, STATE, S): the last one in the middle
     normal: Any  # (3, S)
     local: Any  # (3, S): directions in the axes of a shape
-    gap: Any  # (3, S): gaps at both ends (m), support values
+    gap: Any  # (4, S): gaps at both ends (m), support values, and gaps in the middle (m)
     terms: Any  # (TERMS, COLUMNS): see linear_gaps
 
 
@@ -65,10 +65,10 @@ def make_sample_rows(samples: int) -> SampleRows:
     """Make the scratch memory of one thread."""
     length = samples + APART
     return SampleRows(
-        np.zeros((2, STATE, length)),
+        np.zeros((3, STATE, length)),
         np.zeros((3, length)),
         np.zeros((3, length)),
-        np.zeros((3, length)),
+        np.zeros((4, length)),
         make_terms(),
     )
 
@@ -85,7 +85,7 @@ def _is_zero(matrix):
 
 @device
 def set_samples(obstacle, k, off, points, turning, first, last, rows):
-    """Write the samples first:last at both ends of segment k into rows.node.
+    """Write the samples first:last at both ends and in the middle of segment k, the mean of both, into rows.node.
 
     off (6, S): errors of position and velocity; points (DIMENSIONS, S): unit errors;
     turning (int, int): NOT_TURNED, FIRST_ORDER or SERIES for both bodies.
@@ -118,6 +118,11 @@ def set_samples(obstacle, k, off, points, turning, first, last, rows):
                 else:
                     for n in range(row.size):
                         row[n] = u * x[n] + v * y[n] + w * z[n] + (a * p[n] + b * q[n] + d * r[n])
+    for c in range(STATE):
+        if c < 3 or turning[c // 3 - 1] != NOT_TURNED:
+            row, one, other = rows.node[2, c, first:last], rows.node[0, c, first:last], rows.node[1, c, first:last]
+            for n in range(row.size):
+                row[n] = 0.5 * (one[n] + other[n])
 
 
 @device
@@ -272,15 +277,15 @@ def gaps_at_begin(table, pair, plane, margin, turning, node, count, rows):
 
 
 @inlined
-def set_bow(table, pair, plane, nodes, middle, least):
-    """Set column BOW of a plane in a segment with these ends and this middle (NODE): of the stated gap.
+def set_bends(table, pair, plane, nodes, middle, least):
+    """Set column BENDS of a plane in a segment with these ends and this middle (NODE).
 
-    Gaps count as straight lines if it deviates from a line by at most `least` (m).
+    Gaps count as straight lines if the stated one deviates from a line by at most `least` (m).
     """
     bow = stated_gap(table, pair, from_plane(plane, middle.rotation), middle, 0.0)
     for end in range(2):
         bow -= 0.5 * stated_gap(table, pair, from_plane(plane, nodes[end].rotation), nodes[end], 0.0)
-    plane[BOW] = 4.0 * bow if abs(bow) > least else 0.0
+    plane[BENDS] = 1.0 if abs(bow) > least else 0.0
 
 
 @inlined
@@ -306,33 +311,33 @@ def _enter_line(g, h, begin, length, entry, leave):
 
 
 @inlined
-def _enter_parabola(g, h, bow, begin, length, entry, leave):
-    """`_enter_line` for gaps that deviate from a straight line by bow s (1 - s) at a share s of the segment.
+def _enter_parabola(g, h, middle, begin, length, entry, leave):
+    """`_enter_line` for gaps with these values (n,) in the middle. One that is closed at both ends counts as closed.
 
-    One that is closed at both ends counts as closed. Roots without cancellation, as in Press et al., Numerical Recipes,
-    section 5.6.
+    At a share s of the segment, a gap deviates from a straight line by bow s (1 - s). Roots without cancellation, as in
+    Press et al., Numerical Recipes, section 5.6.
     """
-    dips, shortened = bow < 0.0, 1.0 / bow
     for n in range(entry.size):
+        bow = 4.0 * middle[n] - 2.0 * (g[n] + h[n])
         slope = h[n] - g[n] + bow
         inside = slope * slope + 4.0 * bow * g[n]
         root = sqrt(max(inside, 0.0))
         half = 0.5 * (slope + (root if slope >= 0.0 else -root))
-        one, other = half * shortened, -g[n] / half
+        one, other = half / bow, -g[n] / half
         first, last = (one, other) if one < other else (other, one)
         first, last = begin + length * first, begin + length * last
-        closes = inside >= 0.0
+        dips, closes = bow < 0.0, inside >= 0.0
         enters = (first if closes else inf) if dips else last if g[n] > 0.0 else -inf
         leaves = last if dips else first if h[n] > 0.0 else inf
         _restrict(n, enters, leaves, entry, leave)
 
 
 @device
-def enter_planes(table, pair, planes, margin, turning, nodes, first, last, rows, entry, leave):
+def enter_planes(table, pair, planes, margin, turning, nodes, middle, first, last, rows, entry, leave):
     """Restrict the intervals [entry, leave] (S,) of samples first:last in a segment to the time behind planes.
 
-    planes (M, PLANE_SIZE); nodes (2,): NODE at both ends of the segment; rows: see `set_samples`; margin (m): the gap
-    from which on a sample is behind a plane.
+    planes (M, PLANE_SIZE); nodes (2,), middle: NODE at both ends and in the middle of the segment; rows: see
+    `set_samples`; margin (m): the gap from which on a sample is behind a plane.
     """
     begin, length = nodes[0].time, nodes[1].time - nodes[0].time
     entry, leave = entry[first:last], leave[first:last]
@@ -341,7 +346,9 @@ def enter_planes(table, pair, planes, margin, turning, nodes, first, last, rows,
         for end in range(2):
             gap = rows.gap[end, first:last]
             _gaps_at(table, pair, planes[m], nodes[end], margin, turning, first, last, rows.node[end], rows, gap)
-        if planes[m, BOW] != 0.0:
-            _enter_parabola(g, h, planes[m, BOW], begin, length, entry, leave)
+        if planes[m, BENDS] > 0.0:
+            gap = rows.gap[3, first:last]
+            _gaps_at(table, pair, planes[m], middle, margin, turning, first, last, rows.node[2], rows, gap)
+            _enter_parabola(g, h, gap, begin, length, entry, leave)
         else:
             _enter_line(g, h, begin, length, entry, leave)

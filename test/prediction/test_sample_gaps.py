@@ -22,7 +22,7 @@ from collision_monitor.prediction.sample_gaps import (
     NOT_TURNED,
     SERIES,
     enter_planes,
-    set_bow,
+    set_bends,
     set_samples,
 )
 
@@ -111,6 +111,7 @@ def test_gaps_are_those_of_the_turned_shapes(order: int, mode: int, axis: int | 
         errors = PairErrors(Tube(0.0, 0.0), turning, 0.0, 0.1, 0.0, 0.0, (1.0, 1.0), (False, False), 0.0)
         for node in obstacle.node[:2]:
             turn_node(pair, errors, 0.0, node)
+        set_middle(table, parts, pair, 0, work.scratch, obstacle)
         memory.off[:] = rng.normal(0, 0.1, memory.off.shape)
         orders = (order, order)
         set_samples(obstacle, 0, memory.off, points, orders, 0, SAMPLES, rows)
@@ -120,7 +121,8 @@ def test_gaps_are_those_of_the_turned_shapes(order: int, mode: int, axis: int | 
         planes = obstacle.planes[0, :1]
         planes[0, :3], planes[0, MODE] = n / np.linalg.norm(n), mode
         enter_planes(
-            table, pair, planes, 0.05, orders, obstacle.node[:2], 0, SAMPLES, rows, memory.entry, memory.leave
+            table, pair, planes, 0.05, orders, obstacle.node[:2], obstacle.middle[0], 0, SAMPLES, rows, memory.entry,
+            memory.leave,
         )
         for end in range(2):
             node, state = obstacle.node[end], rows.node[end]
@@ -182,9 +184,9 @@ def test_parabolas_give_the_times_behind_a_plane_of_bodies_that_turn(mode: int) 
         set_samples(obstacle, 0, memory.off, points, orders, 0, SAMPLES, rows)
         ends, middle, planes = obstacle.node[:2], obstacle.middle[0], obstacle.planes[0, :1]
         for bends in (False, True):
-            set_bow(table, pair, plane, ends, middle, 0.0 if bends else np.inf)
+            set_bends(table, pair, plane, ends, middle, 0.0 if bends else np.inf)
             entry, leave = np.zeros(SAMPLES), np.full(SAMPLES, end)
-            enter_planes(table, pair, planes, 0.0, orders, ends, 0, SAMPLES, rows, entry, leave)
+            enter_planes(table, pair, planes, 0.0, orders, ends, middle, 0, SAMPLES, rows, entry, leave)
             for m in range(SAMPLES):
                 first, last = times_behind(gaps[:, m], times)
                 if first <= last and entry[m] <= leave[m]:
