@@ -89,22 +89,21 @@ def likely_impacts(multibody, spread, pairs, now, sampling, columns, memory, wor
         t = closest = _approach(A, B, horizon) if A.radius + B.radius < inf else 0.0
         swing_i, swing_j = swing_bound(spread, i, r_i, ages[0], horizon), swing_bound(spread, j, r_j, ages[1], horizon)
         turning = (swing_i[0] + swing_j[0], swing_i[1] + swing_j[1])
-        first = 0.0
         flat = not (r_i < inf and r_j < inf)
         if not sampling.stated:
             _set_axes(work.frame)
             answer = answers[k]  # NaN so far
             if sampling.only_screens:
-                meet = _first_meeting(A, B, tube, sampling)
-                if meet == inf:
+                first = _first_meeting(A, B, tube, sampling)
+                if first == inf:
                     continue
-                answer[EARLIEST], answer[MOST_LIKELY], answer[PROBABILITY] = meet, meet, LEFT
+                answer[EARLIEST], answer[MOST_LIKELY], answer[PROBABILITY] = first, first, LEFT
             if has_mesh:
                 answer[PROBABILITY] = LEFT
                 continue
             set_gap_covariance(multibody, spread, i, j, ages, t, 0.0, sampling, work)
             growth = GapGrowth(turning, acceleration_terms(multibody, spread, i, j, ages), bend)
-            bound, t, first = design_point(multibody, i, j, tube, growth, sampling, t, memory.obstacle, work)
+            bound, t = design_point(multibody, i, j, tube, growth, sampling, t, memory.obstacle, work)
             if bound < sampling.min_probability:
                 answer[:] = nan
                 continue
@@ -135,7 +134,7 @@ def likely_impacts(multibody, spread, pairs, now, sampling, columns, memory, wor
         sure = sampling.stated and surely_meet(table, parts, pair, work.joint, swing, t, query.margin, work.scratch)
         take_root(work.joint)
         yaw_only = (turns_by_yaw(spread, i, sampling.planar), turns_by_yaw(spread, j, sampling.planar))
-        errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, late, (far_i, far_j), yaw_only, first)
+        errors = PairErrors(tube, (turn_i, turn_j), bend, work.joint[0, 0], t, late, (far_i, far_j), yaw_only)
         form = round_form(table, parts, pair, errors, query.margin, work)
         if form != NOT_ROUND:
             samples = enter_round_bodies(table, parts, pair, form, errors, sure, sampling, columns, memory, work)
@@ -157,12 +156,12 @@ def likely_impacts(multibody, spread, pairs, now, sampling, columns, memory, wor
         elif form != NOT_ROUND:
             weights, sums = columns.weights, columns.sums
         outward = EVENLY_OUTWARD if sure else OUTWARD
-        lowest = summarise_by_bins(memory.times[0:samples], weights, sums, outward, sampling.confidence, memory, answer)
+        first = summarise_by_bins(memory.times[0:samples], weights, sums, outward, sampling.confidence, memory, answer)
         if answer[EARLIEST] == NOT_FOUND:
             wide = Tube(sampling.safe_sigmas * tube.start, sampling.safe_sigmas * tube.growth)
             roughly = ImpactQuery(query.margin, max(query.tolerance, SAMPLE_TOLERANCE * tube.start), query.iterations)
             safe = first_contact(multibody, i, j, Window(0.0, horizon), wide, roughly, work)
-            answer[EARLIEST] = min(safe, lowest)
+            answer[EARLIEST] = min(safe, first)
     return followed
 
 

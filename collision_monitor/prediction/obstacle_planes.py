@@ -16,7 +16,7 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.narrow_phase.dispatch import separation
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.bodies import place_shape
-from collision_monitor.prediction.error_samples import set_turn
+from collision_monitor.prediction.error_samples import NOT_TURNING, set_turn
 from collision_monitor.prediction.motion import relative_position, rotation_at
 from collision_monitor.prediction.trigonometry import sin_cos
 
@@ -34,11 +34,18 @@ AT_REST: Final = 2
 """Mode of a plane: its normal, in world axes, does not turn. 0 and 1: it turns with the first or the second shape, and
 is in the axes of that shape."""
 
+
 LOUD, QUIET, APART = 0, 1, 2
 """Segments: some samples of the pilot meet, none does, and none of all samples can."""
 
 NOT_OFF: Final = (0.0, 0.0, 0.0)
 """Error of a position, or rotation vector of an error, of the stated motion."""
+
+NO_TURNS: Final = (NOT_TURNING, NOT_TURNING)
+"""Turning of two bodies without errors of orientation, see `set_nodes`."""
+
+ABOUT_ALL: Final = (False, False)
+"""Errors of orientation of neither body are about the z axis alone, see `set_nodes`."""
 
 
 NODE = np.dtype(
@@ -77,9 +84,21 @@ def make_obstacle() -> Obstacle:
     )
 
 
+@device
+def _set_turns(m, t, off, yaw_only, turn, left):
+    """Write the rotation vectors of a body with motion m at time t for unit errors; off: see `orientation_spread`."""
+    set_turn(m, t, (off[0], off[1]), yaw_only, turn)
+    if off[3] > 0.0:
+        set_turn(m, t, (off[2], off[3]), yaw_only, left)
+        return
+    for r in range(3):
+        for c in range(3):
+            left[r, c] = 0.0
+
+
 @inlined
-def _place(table, parts, pair, t, scratch, node):
-    """Set a node to time t: the shapes of the pair (ShapePair) there."""
+def _place(table, parts, pair, t, turning, yaw_only, scratch, node):
+    """Set a node to time t, see `set_nodes`."""
     A, B, a, b = pair
     R_i, R_j = scratch.rotation[0], scratch.rotation[1]
     node.time = t
@@ -91,60 +110,37 @@ def _place(table, parts, pair, t, scratch, node):
     for c in range(3):
         node.position[c] = p[c]
         node.offset[0, c], node.offset[1, c] = oa[c], ob[c]
+    _set_turns(A, t, turning[0], yaw_only[0], node.turn[0], node.left[0])
+    _set_turns(B, t, turning[1], yaw_only[1], node.turn[1], node.left[1])
 
 
 @inlined
-def set_middle(table, parts, pair, k, scratch, obstacle):
-    """Place the shapes of the pair (ShapePair) in the middle of segment k; errors turn them by the mean of its ends."""
-    first, last, middle = obstacle.node[k], obstacle.node[k + 1], obstacle.middle[k]
-    _place(table, parts, pair, 0.5 * (first.time + last.time), scratch, middle)
-    for body in range(2):
-        for r in range(3):
-            for c in range(3):
-                middle.turn[body, r, c] = 0.5 * (first.turn[body, r, c] + last.turn[body, r, c])
-                middle.left[body, r, c] = 0.5 * (first.left[body, r, c] + last.left[body, r, c])
+def set_middles(table, parts, pair, segments, turning, yaw_only, scratch, obstacle):
+    """Place the shapes of the pair (ShapePair) in the middle of each segment. turning, yaw_only: see `set_nodes`."""
+    for k in range(segments):
+        middle = 0.5 * (obstacle.node[k].time + obstacle.node[k + 1].time)
+        _place(table, parts, pair, middle, turning, yaw_only, scratch, obstacle.middle[k])
 
 
 @device
-def set_nodes(table, parts, pair, window, length, scratch, obstacle):
+def set_nodes(table, parts, pair, window, length, turning, yaw_only, scratch, obstacle):
     """Divide the window into segments of this length (s) without planes; return their number, at most MOST_SEGMENTS.
 
     The last one is shorter, or the segments end before the window. Places the shapes of the pair (ShapePair) at their
-    ends.
+    ends. turning: for both bodies, see `orientation_spread`.
+    yaw_only: for both, whether it is about the z axis alone.
     """
     begin, end = window
     segments = 0
     for k in range(MOST_SEGMENTS + 1):
         t = min(begin + k * length, end)
-        _place(table, parts, pair, t, scratch, obstacle.node[k])
+        _place(table, parts, pair, t, turning, yaw_only, scratch, obstacle.node[k])
         segments = k
         if t >= end:
             break
     for k in range(segments):
         obstacle.count[k], obstacle.quiet[k] = 0, LOUD
     return segments
-
-
-@device
-def turn_node(pair, errors, unnoticed, node):
-    """Set the rotation vectors of the bodies at a node for unit errors (PairErrors).
-
-    unnoticed (m): what is left of the errors of orientation, see `orientation_spread`, is 0 if it moves the surface by
-    less, one standard deviation.
-    """
-    for body in range(2):
-        m, off, radius = pair.B if body else pair.A, errors.turning[body], errors.radius[body]
-        set_turn(m, node.time, (off[0], off[1]), errors.yaw_only[body], node.turn[body])
-        left, squares = node.left[body], 0.0
-        if off[3] > 0.0:
-            set_turn(m, node.time, (off[2], off[3]), errors.yaw_only[body], left)
-            for r in range(3):
-                for c in range(3):
-                    squares += left[r, c] * left[r, c]
-        if radius * radius * squares <= 2.0 * unnoticed * unnoticed:  # two of the three axes move a surface
-            for r in range(3):
-                for c in range(3):
-                    left[r, c] = 0.0
 
 
 @inlined

@@ -29,7 +29,6 @@ class PairErrors(NamedTuple):
     late: float  # s: when errors of orientation, which grow, count most
     radius: Any  # (m, m): of the bodies; 0: rotation moves nothing
     yaw_only: Any  # (bool, bool): whether errors of their orientations are about the z axis alone
-    first: float  # s: they do not meet before with FURTHEST standard deviations; 0: unknown
 
 
 @inlined

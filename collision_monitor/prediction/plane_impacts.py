@@ -27,9 +27,8 @@ from collision_monitor.prediction.obstacle_planes import (
     LOUD,
     MOST_SEGMENTS,
     QUIET,
-    set_middle,
+    set_middles,
     set_nodes,
-    turn_node,
 )
 from collision_monitor.prediction.pair_errors import (
     BENDING,
@@ -72,17 +71,8 @@ SPINS: Final = 4.0
 
 VERIFIED_IN_PILOT: Final = 4
 VERIFIED: Final = 48
-VERIFIED_EACH: Final = 8
-"""Samples of the pilot, and of all, that must need no new plane of a segment: VERIFIED in a few segments, or
-VERIFIED_EACH in each of many. Twice as many if the search is careful."""
-
-FEW_PARTS: Final = 8.0
-"""Parts of the time up to which its begin is that of the bounding spheres: to leave parts out takes less time than to
-find the time at which the shapes may first meet."""
-
-UNNOTICED: Final = 0.05
-"""Standard deviations of the gap by which what is left of errors of orientation may move a surface unnoticed. It is
-independent of the other errors, so that it would widen the deviation of the gap by 0.00125 of it."""
+"""Samples of the pilot, and of all, that must need no new plane of a segment. Twice as many if it is
+careful."""
 
 SURE_EXTREMES: Final = 4
 """Number of the extreme samples at which the planes of bodies that surely meet are checked: one for each axis of the
@@ -107,7 +97,6 @@ class Search(NamedTuple):
     verified: int  # number of others that must need no new plane of a segment
     fineness: float  # standard deviations of the gap by which errors of orientation may move a surface unnoticed
     bending: float  # standard deviations by which a gap may deviate from a straight line in a segment
-    sure: Any  # whether all meet: no segment behind one in which they meet is examined for whether they stay apart
 
 
 class Laid(NamedTuple):
@@ -143,13 +132,11 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
         alone[n] = inf
     wide = Tube(FURTHEST * errors.tube.start, FURTHEST * errors.tube.growth)
     begin, end = meeting(table, parts, pair, sampling.horizon, margin, wide, work)
-    begin, end = max(begin, errors.first), min(end, until)
+    end = min(end, until)
     if not begin < end:
         return Laid(0, settings, True)
     length = straight_length(A, B, errors, search.bending)
-    large = TURNED * max(turned_at(errors, 0), turned_at(errors, 1)) > SMALL
-    large |= sigma > 2.0 * SMALL * min(table.radius[a], table.radius[b])
-    if errors.first == 0.0 and (1.0 if large else FEW_PARTS) * length < end - begin:
+    if length < end - begin:
         coarse = max(sampling.query.tolerance, SAMPLE_TOLERANCE * sigma)
         roughly = ImpactQuery(margin, coarse, sampling.query.iterations)
         there = Tube(wide.start + wide.growth * begin, wide.growth)
@@ -158,28 +145,22 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
             return Laid(0, settings, True)
     length = max(length, min((end - begin) / MOST_SEGMENTS, LONGEST * length))
     length = (end - begin) / (1.0 + np.floor((end - begin) / length))
-    obstacle = memory.obstacle
-    segments = set_nodes(table, parts, pair, Window(begin, end), length, scratch, obstacle)
-    is_rough = segments > MOST_PARTS and large and spin_rate(A) + spin_rate(B) > SPINS * turning_rate(errors)
+    window = Window(begin, end)
+    segments = set_nodes(table, parts, pair, window, length, errors.turning, errors.yaw_only, scratch, memory.obstacle)
+    turned = max(turned_at(errors, 0), turned_at(errors, 1))
+    large = TURNED * turned > SMALL or sigma > 2.0 * SMALL * min(table.radius[a], table.radius[b])
+    spins = spin_rate(A) + spin_rate(B) > SPINS * turning_rate(errors)
+    is_rough = segments > MOST_PARTS and large and spins
     if segments > MOST_PARTS and (careful or (is_rough and not sampling.stated)):
         return Laid(segments, settings, False)
-    unnoticed = UNNOTICED * min(fine_now[0], 1.0) * sigma
-    left = samples
+    set_middles(table, parts, pair, segments, errors.turning, errors.yaw_only, scratch, memory.obstacle)
+    left, skips = samples, not flat and search.verified > 0
     for k in range(segments):
-        if left == 0 and search.sure:
-            break
-        is_next = k > 0 and obstacle.quiet[k - 1] != APART
-        is_examined = left > 0 and not (flat or (search.sure and is_next))
-        if is_examined and stay_apart(table, parts, pair, k, errors, margin, obstacle, work):
-            obstacle.quiet[k] = APART
+        if skips and stay_apart(table, parts, pair, k, errors, margin, memory.obstacle, work):
+            memory.obstacle.quiet[k] = APART
             continue
-        for node in range(k + is_next, k + 2):
-            turn_node(pair, errors, unnoticed, obstacle.node[node])
-        set_middle(table, parts, pair, k, scratch, obstacle)
-        if left == 0:  # all of the pilot have met; others may meet later
-            continue
-        set_samples(obstacle, k, memory.off, search.points, turning, 0, samples, memory.rows)
-        if is_next:
+        set_samples(memory.obstacle, k, memory.off, search.points, turning, 0, samples, memory.rows)
+        if k > 0 and memory.obstacle.quiet[k - 1] != APART:
             carry_planes(table, pair, k, settings, memory)
         live = begin_segment(table, pair, k, samples, settings, memory)
         cut_extremes(table, parts, pair, k, search.extremes, live, settings, memory, scratch)
@@ -188,8 +169,10 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
         if not has_enough:
             return Laid(segments, settings, False)
         before, left = left, end_segment(live, samples, memory)
-        obstacle.quiet[k] = QUIET if left == before and not settings.careful else LOUD
-    return Laid(segments, settings, left == 0 or (obstacle.node[segments].time >= end and not is_rough))
+        memory.obstacle.quiet[k] = QUIET if left == before and not settings.careful else LOUD
+        if left == 0:
+            break
+    return Laid(segments, settings, left == 0 or (memory.obstacle.node[segments].time >= end and not is_rough))
 
 
 @inlined
@@ -217,7 +200,7 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
     alone, times = memory.alone, memory.times
     for n in range(samples):
         alone[n] = inf
-    each = max(VERIFIED_EACH, verified // max(segments - 3, 1)) if verified > 0 or settings.careful else 0
+    each = max(VERIFIED_IN_PILOT, verified // max(segments - 3, 1)) if verified > 0 or settings.careful else 0
     each *= 1 + settings.careful
     for k in range(segments):
         if _is_left_out(memory.obstacle.quiet, k, segments):
@@ -246,7 +229,7 @@ def enter_bodies(multibody, i, j, errors, sampling, columns, memory, work):
     set_errors(work.joint, work.frame, errors.time, points, 0, pilot, memory.off)
     for n in range(times.size):
         times[n] = inf
-    search = Search(points, pilot, columns.extremes, VERIFIED_IN_PILOT, TURNED_FACETS, BENDING, False)
+    search = Search(points, pilot, columns.extremes, VERIFIED_IN_PILOT, TURNED_FACETS, BENDING)
     a, b = first_a, first_b
     pair = ShapePair(A, B, a, b)
     laid = _lay_planes(table, parts, pair, errors, search, end, sampling, memory, work)
@@ -298,7 +281,7 @@ def enter_surely(multibody, i, j, errors, sampling, columns, memory, work):
     for n in range(samples):
         times[n] = inf
     extremes = columns.extremes[0:SURE_EXTREMES]
-    search = Search(points, samples, extremes, VERIFIED_IN_PILOT, FACETS_IN_PILOT, SURE_BENDING, True)
+    search = Search(points, samples, extremes, VERIFIED_IN_PILOT, FACETS_IN_PILOT, SURE_BENDING)
     a, first_b = bodies.first_shape[i], bodies.first_shape[j]
     b = first_b
     while a >= 0:

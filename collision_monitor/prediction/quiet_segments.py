@@ -12,7 +12,7 @@ from typing import Final
 from collision_monitor._jit import device
 from collision_monitor.narrow_phase.gjk import Accuracy
 from collision_monitor.prediction.normal_samples import FURTHEST
-from collision_monitor.prediction.obstacle_planes import APART, NOT_OFF, separation_at
+from collision_monitor.prediction.obstacle_planes import NOT_OFF, separation_at
 from collision_monitor.prediction.pair_errors import gap_deviation
 from collision_monitor.prediction.sample_gaps import stated_gap
 
@@ -24,30 +24,24 @@ SLACK: Final = 0.02
 def stay_apart(table, parts, pair, k, errors, margin, obstacle, work):
     """Whether a pair of shapes stays apart in segment k of the obstacle, with errors of FURTHEST standard deviations.
 
-    work.joint: see `gap_deviation`, along work.frame. Behind a segment in which they stay apart, the direction that
-    shows it is in work.scratch.out, and is tried first.
+    work.joint: see `gap_deviation`, along work.frame.
     """
     first, last = obstacle.node[k], obstacle.node[k + 1]
     scratch, frame = work.scratch, work.frame
     middle, length = 0.5 * (first.time + last.time), last.time - first.time
     wanted = Accuracy(margin, SLACK * errors.sigma)
-    reach = margin + 0.125 * errors.bend * length * length
-    for attempt in range(k == 0 or obstacle.quiet[k - 1] != APART, 2):
-        if attempt > 0:
-            gap = separation_at(table, parts, pair, middle, NOT_OFF, (NOT_OFF, NOT_OFF), wanted, obstacle, scratch)
-            if gap <= margin:
-                return False
-        n = (scratch.out[0], scratch.out[1], scratch.out[2])
-        along = (
-            frame[0, 0] * n[0] + frame[0, 1] * n[1] + frame[0, 2] * n[2],
-            frame[1, 0] * n[0] + frame[1, 1] * n[1] + frame[1, 2] * n[2],
-            frame[2, 0] * n[0] + frame[2, 1] * n[1] + frame[2, 2] * n[2],
-        )
-        is_apart = True
-        for end in range(2):
-            node = last if end else first
-            away = FURTHEST * gap_deviation(along, work.joint, errors, node.time)
-            is_apart = is_apart and stated_gap(table, pair, n, node, reach) > away
-        if is_apart:
-            return True
-    return False
+    if separation_at(table, parts, pair, middle, NOT_OFF, (NOT_OFF, NOT_OFF), wanted, obstacle, scratch) <= margin:
+        return False
+    n = (scratch.out[0], scratch.out[1], scratch.out[2])
+    along = (
+        frame[0, 0] * n[0] + frame[0, 1] * n[1] + frame[0, 2] * n[2],
+        frame[1, 0] * n[0] + frame[1, 1] * n[1] + frame[1, 2] * n[2],
+        frame[2, 0] * n[0] + frame[2, 1] * n[1] + frame[2, 2] * n[2],
+    )
+    margin += 0.125 * errors.bend * length * length
+    for end in range(2):
+        node = last if end else first
+        away = FURTHEST * gap_deviation(along, work.joint, errors, node.time)
+        if not stated_gap(table, pair, n, node, margin) > away:
+            return False
+    return True

@@ -85,13 +85,14 @@ def _is_zero(matrix):
 
 @device
 def set_samples(obstacle, k, off, points, turning, first, last, rows):
-    """Write the samples first:last at both ends and in the middle of segment k, the mean of both, into rows.node.
+    """Write the samples first:last at both ends and in the middle of segment k into rows.node.
 
     off (6, S): errors of position and velocity; points (DIMENSIONS, S): unit errors;
     turning (int, int): NOT_TURNED, FIRST_ORDER or SERIES for both bodies.
     """
-    for place in range(2):
-        stated_node, node = obstacle.node[k + place], rows.node[place]
+    for place in range(3):
+        stated_node = obstacle.node[k + place] if place < 2 else obstacle.middle[k]
+        node = rows.node[place]
         t = stated_node.time
         for c in range(3):
             row, x, v = node[c, first:last], off[c, first:last], off[3 + c, first:last]
@@ -118,11 +119,6 @@ def set_samples(obstacle, k, off, points, turning, first, last, rows):
                 else:
                     for n in range(row.size):
                         row[n] = u * x[n] + v * y[n] + w * z[n] + (a * p[n] + b * q[n] + d * r[n])
-    for c in range(STATE):
-        if c < 3 or turning[c // 3 - 1] != NOT_TURNED:
-            row, one, other = rows.node[2, c, first:last], rows.node[0, c, first:last], rows.node[1, c, first:last]
-            for n in range(row.size):
-                row[n] = 0.5 * (one[n] + other[n])
 
 
 @device

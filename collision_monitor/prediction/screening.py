@@ -19,7 +19,7 @@ from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tub
 from collision_monitor.prediction.impact_record import CLEAR, HIT
 from collision_monitor.prediction.motion import half_acceleration, relative_position
 from collision_monitor.prediction.normal_samples import FURTHEST
-from collision_monitor.prediction.obstacle_planes import NOT_OFF, separation_at, set_nodes
+from collision_monitor.prediction.obstacle_planes import ABOUT_ALL, NO_TURNS, NOT_OFF, separation_at, set_nodes
 from collision_monitor.prediction.sample_gaps import stated_gap
 from collision_monitor.prediction.sphere_interval import sphere_interval
 
@@ -147,7 +147,7 @@ def _towards(A, B, t):
 def _set_window(table, parts, pair, window, bend, work, obstacle):
     """Place the shapes of a pair at both ends of a window. Return how far a gap may bend between them (m)."""
     length = window.end - window.begin
-    set_nodes(table, parts, pair, window, length, work.scratch, obstacle)
+    set_nodes(table, parts, pair, window, length, NO_TURNS, ABOUT_ALL, work.scratch, obstacle)
     return 0.125 * bend * length * length
 
 
@@ -165,10 +165,7 @@ def _bound(table, pair, n, times, growth, margin, obstacle, work):
 
 @inlined
 def design_point(multibody, i, j, tube, growth, sampling, t, obstacle, work):
-    """Return (bound, time, first): a bound on the probability of contact, and the time at which contact is likeliest.
-
-    first (s): the bodies do not meet before with errors of FURTHEST standard deviations; 0 if several of their shapes
-    may meet.
+    """Return (bound, time): a bound on the probability of contact, and the time at which contact is likeliest.
 
     t: time of closest approach; growth: GapGrowth. Writes the direction of the gap then into work.frame[0]: the design
     point of reliability theory. The bound is that of one plane for each pair of shapes.
@@ -178,7 +175,7 @@ def design_point(multibody, i, j, tube, growth, sampling, t, obstacle, work):
     A, B, frame, scratch = work.motion[0], work.motion[1], work.frame, work.scratch
     margin, bend = sampling.query.margin, growth.bend
     wide = Tube(FURTHEST * tube.start, FURTHEST * tube.growth)
-    bound, least, likeliest, first = 0.0, inf, t, inf
+    bound, least, likeliest = 0.0, inf, t
     a, first_b = bodies.first_shape[i], bodies.first_shape[j]
     b = first_b
     while a >= 0:
@@ -202,7 +199,6 @@ def design_point(multibody, i, j, tube, growth, sampling, t, obstacle, work):
             if status == CLEAR or not begin <= end:
                 own = 0.0
             else:
-                first = begin if first == inf else 0.0
                 bent = _set_window(table, parts, pair, Window(begin, end), bend, work, obstacle)
                 at = min(max(t, begin), end)
                 wanted = Accuracy(margin, SLACK * tube.start)
@@ -229,8 +225,6 @@ def design_point(multibody, i, j, tube, growth, sampling, t, obstacle, work):
                         frame[0, 0], frame[0, 1], frame[0, 2] = n
                     is_done = abs(when - at) <= SAME_TIME * (end - begin)
                     at = when
-        elif begin <= end:
-            first = begin if first == inf else 0.0
         bound += own
         a, b = next_pair(parts, first_b, a, b)
-    return bound, likeliest, first
+    return bound, likeliest

@@ -10,7 +10,7 @@ from collision_monitor.prediction.body_impact import ShapePair, Tube, Window
 from collision_monitor.prediction.error_samples import make_workspace
 from collision_monitor.prediction.motion import carry_on
 from collision_monitor.prediction.normal_samples import FURTHEST
-from collision_monitor.prediction.obstacle_planes import make_obstacle, set_nodes
+from collision_monitor.prediction.obstacle_planes import ABOUT_ALL, make_obstacle, set_nodes
 from collision_monitor.prediction.pair_errors import PairErrors, spin_rate, surface_bend
 from collision_monitor.prediction.quiet_segments import stay_apart
 from collision_monitor.records import STATE
@@ -31,9 +31,9 @@ def apart(shapes: list[cm.Shape], rows: np.ndarray, root: np.ndarray, turned: fl
     radii = (float(bodies.spin_radius[0]), float(bodies.spin_radius[1]))
     turning = ((turned, 0.0, 0.0, 0.0), (turned, 0.0, 0.0, 0.0))
     bend = float(surface_bend(A, radii[0]) + surface_bend(B, radii[1])) if spin_rate(A) + spin_rate(B) > 0.0 else 0.0
-    errors = PairErrors(Tube(0.0, 0.0), turning, bend, float(root[0, 0]), 0.0, 0.0, radii, (False, False), 0.0)
+    errors = PairErrors(Tube(0.0, 0.0), turning, bend, float(root[0, 0]), 0.0, 0.0, radii, ABOUT_ALL)
     pair = ShapePair(A, B, bodies.first_shape[0], bodies.first_shape[1])
-    set_nodes(table, parts, pair, window, window.end - window.begin, work.scratch, obstacle)
+    set_nodes(table, parts, pair, window, window.end - window.begin, turning, ABOUT_ALL, work.scratch, obstacle)
     return bool(stay_apart(table, parts, pair, 0, errors, 0.0, obstacle, work))
 
 

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 import collision_monitor as cm
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.prediction.body_impact import ShapePair, Tube, Window
+from collision_monitor.prediction.body_impact import ShapePair, Window
 from collision_monitor.prediction.error_samples import make_workspace
 from collision_monitor.prediction.motion import carry_on
 from collision_monitor.prediction.normal_samples import sample_columns
-from collision_monitor.prediction.obstacle_planes import MODE, set_middle, set_nodes, turn_node
-from collision_monitor.prediction.pair_errors import PairErrors
+from collision_monitor.prediction.obstacle_planes import ABOUT_ALL, MODE, NO_TURNS, set_middles, set_nodes
 from collision_monitor.prediction.plane_memory import make_plane_memory
 from collision_monitor.prediction.sample_gaps import (
     FIRST_ORDER,
@@ -107,11 +106,7 @@ def test_gaps_are_those_of_the_turned_shapes(order: int, mode: int, axis: int | 
         table, parts, pair, work, memory = moving_pair((name_a, name_b), poses, twists)
         obstacle, rows, points = memory.obstacle, memory.rows, sample_columns(SAMPLES).points
         turning = ((spread, 0.5 * spread, -0.1 * spread, 0.4 * spread), (0.7 * spread, 0.0, 0.0, 0.0))
-        assert set_nodes(table, parts, pair, Window(0.0, 0.4), 0.4, work.scratch, obstacle) == 1
-        errors = PairErrors(Tube(0.0, 0.0), turning, 0.0, 0.1, 0.0, 0.0, (1.0, 1.0), (False, False), 0.0)
-        for node in obstacle.node[:2]:
-            turn_node(pair, errors, 0.0, node)
-        set_middle(table, parts, pair, 0, work.scratch, obstacle)
+        assert set_nodes(table, parts, pair, Window(0.0, 0.4), 0.4, turning, ABOUT_ALL, work.scratch, obstacle) == 1
         memory.off[:] = rng.normal(0, 0.1, memory.off.shape)
         orders = (order, order)
         set_samples(obstacle, 0, memory.off, points, orders, 0, SAMPLES, rows)
@@ -158,7 +153,7 @@ def test_parabolas_give_the_times_behind_a_plane_of_bodies_that_turn(mode: int) 
     """Straight lines between the ends of the segment are off by more than four times as much, in the mean."""
     rng = np.random.default_rng(mode)
     off: dict[bool, list[float]] = {False: [], True: []}
-    end, orders = 0.3, (NOT_TURNED, NOT_TURNED)
+    end, orders, still = 0.3, (NOT_TURNED, NOT_TURNED), NO_TURNS
     for name in ("capsule", "cylinder", "ellipsoid", "cone") * 20:
         q, p, n = rng.normal(size=(2, 4)), np.zeros((2, 3)), rng.normal(size=3)
         n /= np.linalg.norm(n)
@@ -169,7 +164,7 @@ def test_parabolas_give_the_times_behind_a_plane_of_bodies_that_turn(mode: int) 
         obstacle, rows, points = memory.obstacle, memory.rows, sample_columns(SAMPLES).points
         memory.off[:] = rng.normal(0, 0.1, memory.off.shape)
         errors, window = memory.off[:6, :SAMPLES], Window(0.0, end)
-        parts_of_time = set_nodes(table, parts, pair, window, end / 40, work.scratch, obstacle)
+        parts_of_time = set_nodes(table, parts, pair, window, end / 40, still, ABOUT_ALL, work.scratch, obstacle)
         nodes = obstacle.node[: parts_of_time + 1].copy()
         plane, times = obstacle.planes[0, 0], nodes["time"]
         plane[:3], plane[MODE] = (nodes["rotation"][20, mode].T @ n) if mode < 2 else n, mode
@@ -179,8 +174,8 @@ def test_parabolas_give_the_times_behind_a_plane_of_bodies_that_turn(mode: int) 
             u = R[mode] @ plane[:3] if mode < 2 else n
             reach = SHAPES[name][1](R[0].T @ u) + ellipsoid(-R[1].T @ u)
             gap[:] = u @ (node["position"][:, None] + errors[:3] + node["time"] * errors[3:]) - reach
-        set_nodes(table, parts, pair, window, end, work.scratch, obstacle)
-        set_middle(table, parts, pair, 0, work.scratch, obstacle)
+        set_nodes(table, parts, pair, window, end, still, ABOUT_ALL, work.scratch, obstacle)
+        set_middles(table, parts, pair, 1, still, ABOUT_ALL, work.scratch, obstacle)
         set_samples(obstacle, 0, memory.off, points, orders, 0, SAMPLES, rows)
         ends, middle, planes = obstacle.node[:2], obstacle.middle[0], obstacle.planes[0, :1]
         for bends in (False, True):
