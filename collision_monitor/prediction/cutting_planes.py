@@ -9,6 +9,8 @@ from __future__ import annotations
 from math import inf
 from typing import Any, Final, NamedTuple
 
+from numpy import float32
+
 from collision_monitor._jit import inlined
 from collision_monitor.narrow_phase.gjk import Accuracy
 from collision_monitor.prediction.flat_sides import has_side
@@ -21,7 +23,7 @@ from collision_monitor.prediction.obstacle_planes import (
     separation_at,
     set_plane,
 )
-from collision_monitor.prediction.sample_gaps import NOT_TURNED, enter_planes, gaps_at_begin, set_bends
+from collision_monitor.prediction.sample_gaps import NEVER, NOT_TURNED, ONE, ZERO, enter_planes, gaps_at_begin, set_bends
 
 TRIED: Final = 32
 """Number of samples that decide how the normal of a plane turns: a block of the samples, which are spread out. The
@@ -79,8 +81,8 @@ def _briefest(entry, leave, checked, first, last, inside):
     entry, leave, checked, inside = entry[first:last], leave[first:last], checked[first:last], inside[first:last]
     for n in range(inside.size):  # without branches, see sample_gaps.py
         length = leave[n] - entry[n]
-        inside[n] = (length if length >= 0.0 else inf) + checked[n]
-    chosen, shortest = -1 - first, inf
+        inside[n] = (length if length >= ZERO else NEVER) + checked[n]
+    chosen, shortest = -1 - first, NEVER
     for n in range(inside.size):
         if inside[n] < shortest:
             chosen, shortest = n, inside[n]
@@ -148,7 +150,7 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
             return True
     first = 0 if settings.careful else n // TRIED * TRIED
     last = min(first + TRIED, samples)
-    best, latest, span = -1, -inf, nodes[1].time - nodes[0].time
+    best, latest = -1, -inf
     for mode in (AT_REST, 0, 1):
         if mode == tried or (mode != AT_REST and not settings.follows[mode]):
             continue
@@ -163,7 +165,7 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
             continue
         total = 0.0
         for m in range(first, last):
-            total += min(max(trial_entry[m] - trial_leave[m], -span), span)
+            total += min(max(trial_entry[m] - trial_leave[m], -ONE), ONE)
         if total > latest:
             best, latest = mode, total
     if best < 0:
@@ -176,11 +178,17 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
 
 
 @inlined
-def _separation_of(table, parts, pair, n, t, k, turning, accuracy, memory, scratch):
-    """Separation (m) of live sample n at time t in segment k; accuracy: see `separation`."""
+def _time_at(obstacle, k, share):
+    """Time (s) at this share of segment k."""
+    begin = obstacle.node[k].time
+    return begin + share * (obstacle.node[k + 1].time - begin)
+
+
+@inlined
+def _separation_of(table, parts, pair, n, share, k, turning, accuracy, memory, scratch):
+    """Separation (m) of live sample n at a share of segment k; accuracy: see `separation`."""
     obstacle, off, first, last = memory.obstacle, memory.off, memory.rows.node[0], memory.rows.node[1]
-    begin, end, m = obstacle.node[k].time, obstacle.node[k + 1].time, memory.live[n]
-    share = (t - begin) / (end - begin)
+    t, m = _time_at(obstacle, k, share), memory.live[n]
     error = (off[0, m] + t * off[3, m], off[1, m] + t * off[4, m], off[2, m] + t * off[5, m])
     turned_a = _between(first, last, 3, n, share) if turning[0] != NOT_TURNED else NOT_OFF
     turned_b = _between(first, last, 6, n, share) if turning[1] != NOT_TURNED else NOT_OFF
@@ -199,7 +207,7 @@ def _between(first, last, row, n, share):
 
 @inlined
 def _check(table, parts, pair, n, at, samples, k, tolerance, settings, memory, scratch):
-    """Add a plane to segment k if sample n is apart at that time by more than the tolerance (m).
+    """Add a plane to segment k if sample n is apart at this share of it by more than the tolerance (m).
 
     Returns whether that shortens its time inside, and the gap (m).
     """
@@ -222,7 +230,7 @@ def cut_extremes(table, parts, pair, k, extremes, samples, settings, memory, scr
         n = place_of(extreme, memory.live, samples)
         while n >= 0 and entry[n] <= leave[n] and obstacle.count[k] < MOST_PLANES:
             at = entry[n]
-            tolerance = settings.tolerance * _part(settings, at)
+            tolerance = settings.tolerance * _part(settings, _time_at(obstacle, k, at))
             if not _check(table, parts, pair, n, at, samples, k, tolerance, settings, memory, scratch)[0]:
                 break
 
@@ -263,7 +271,7 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
             continue
         idle, checked[n] = 0, inf
         at = 0.5 * (entry[n] + leave[n]) if is_brief else entry[n]
-        part = _part(settings, at)
+        part = _part(settings, _time_at(obstacle, k, at))
         is_cut, gap = _check(table, parts, pair, n, at, samples, k, part * tolerance, settings, memory, scratch)
         if is_cut and is_full:
             obstacle.count[k] -= 1
@@ -292,10 +300,10 @@ def carry_planes(table, pair, k, settings, memory):
         widest[n], winner[n] = -inf, -1.0
     for m in range(obstacle.count[k - 1]):
         gaps_at_begin(table, pair, obstacle.planes[k - 1, m], margin, turning, begin, pilot, rows)
-        gap = rows.gap[0, 0:pilot]
+        gap, this = rows.gap[0, 0:pilot], float32(m)
         for n in range(gap.size):
-            before, widest_before = winner[n] + 0.0, widest[n] + 0.0  # see enter_planes
-            winner[n] = m if gap[n] > widest_before else before
+            before, widest_before = winner[n] + ZERO, widest[n] + ZERO  # see enter_planes
+            winner[n] = this if gap[n] > widest_before else before
             widest[n] = gap[n] if gap[n] > widest_before else widest_before
     for n in range(pilot):
         winner[n] = winner[n] if memory.alone[n] == inf else -1.0
@@ -313,13 +321,14 @@ def carry_planes(table, pair, k, settings, memory):
 def begin_segment(table, pair, k, samples, settings, memory):
     """Set the intervals of the samples in memory.rows to those behind the planes of segment k. Returns the live ones.
 
+    The intervals are shares of the segment.
+
     memory.alone (S,): times of the samples that met in an earlier segment, whose intervals are empty, else infinite.
     """
     obstacle, rows, entry, leave, times = memory.obstacle, memory.rows, memory.entry, memory.leave, memory.alone
-    begin, end = obstacle.node[k].time, obstacle.node[k + 1].time
     for n in range(samples):
-        entry[n] = begin if times[n] == inf else inf
-        leave[n] = end
+        entry[n] = ZERO if times[n] == inf else NEVER
+        leave[n] = ONE
         memory.live[n] = n
     live, _ = drop_missed(samples, 0, settings.turning, memory)
     planes, nodes, margin = obstacle.planes[k, 0 : obstacle.count[k]], obstacle.node[k : k + 2], plane_margin(settings)
@@ -331,12 +340,12 @@ def begin_segment(table, pair, k, samples, settings, memory):
 
 
 @inlined
-def end_segment(live, samples, memory):
-    """Set memory.alone of the live samples that met in a segment; return the number of all that never met."""
+def end_segment(live, samples, k, memory):
+    """Set memory.alone of the live samples that met in segment k; return the number of all that never met."""
     entry, leave, times = memory.entry, memory.leave, memory.alone
     for n in range(live):
         if entry[n] <= leave[n]:
-            times[memory.live[n]] = entry[n]
+            times[memory.live[n]] = _time_at(memory.obstacle, k, entry[n])
     left = 0
     for n in range(samples):
         left += 1 if times[n] == inf else 0

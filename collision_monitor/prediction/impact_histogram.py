@@ -26,7 +26,7 @@ def summarise_by_bins(times, weights, sums, outward, confidence, memory, answer)
     times (n,): of the first samples; inf: no impact. weights, sums: see
     SampleColumns. outward: standard errors by which both quantiles are moved outward. Returns the first impact (s).
     """
-    met, weight, bins = memory.trial[0], memory.trial[1], memory.bins
+    met, weight, bins = memory.spare[0], memory.spare[1], memory.bins
     hits = 0
     for n in range(times.size):  # without a branch, because no processor predicts which samples meet
         met[hits], weight[hits] = times[n], weights[n]

@@ -3,7 +3,7 @@
 Turn a box with half axes e_k by a small rotation vector w. To first order, its support value along n is the sum of
 |n . e_k + w . (e_k x n)|. An axis for which no sample changes the sign contributes a linear function of w, and so
 does the rim of a cylinder unless n is close to its axis. These functions are added up once for all samples. Each other
-axis costs each sample a term of its own.
+axis costs each sample a term of its own. Samples are in single precision, see sample_gaps.py.
 """
 
 from __future__ import annotations
@@ -12,10 +12,12 @@ from math import sqrt
 from typing import Final
 
 import numpy as np
+from numpy import float32
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.shape_table import BOX, CAPSULE, CIRCLE, CYLINDER, SPHERE
+from collision_monitor.narrow_phase.vector import cross
 from collision_monitor.prediction.normal_samples import FURTHEST
 
 STEEP: Final = 0.8
@@ -44,12 +46,6 @@ def is_linear(table, s):
 
 
 @inlined
-def _cross(a, b):
-    """Cross product of two vectors (3,)."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@inlined
 def _add(row, body, own, mode, turned, factor, v):
     """Add factor times v . (w_mode - w_body) to a row: errors turn the plane with one body, and the body itself."""
     for c in range(3):
@@ -74,11 +70,26 @@ def _most(row, node):
 
 
 @inlined
-def begin_term(row, along, size):
+def _begin_term(row, along, size):
     """Set a row to a value without errors, and its factor."""
     for c in range(COLUMNS):
         row[c] = 0.0
     row[ALONG], row[SIZE] = along, size
+
+
+@inlined
+def begin_terms(n, p, reach, mode, turned, terms):
+    """Set the linear part to the gap of points, less a reach (m). Returns 1: the number of rows in use.
+
+    n, p (3,): stated normal, and position of B relative to A. mode, turned: see `sum_terms`.
+    """
+    total = terms[LINEAR]
+    _begin_term(total, n[0] * p[0] + n[1] * p[1] + n[2] * p[2] - reach, 0.0)
+    if turned:
+        lever = cross(n, p)
+        for c in range(3):
+            total[OWN + 3 * mode + c] = lever[c]
+    return 1
 
 
 @inlined
@@ -91,7 +102,7 @@ def add_reach(table, s, body, R, o, n, plane, node, terms, count):
     own, mode, turned = plane
     total, sign = terms[LINEAR], -1.0 if body else 1.0
     total[ALONG] -= sign * (n[0] * o[0] + n[1] * o[1] + n[2] * o[2])
-    _add(total, body, own, mode, turned, -sign, _cross(n, o))
+    _add(total, body, own, mode, turned, -sign, cross(n, o))
     kind, size = table.kind[s], table.size
     across = 0.0
     for k in range(3):
@@ -107,8 +118,8 @@ def add_reach(table, s, body, R, o, n, plane, node, terms, count):
         if length == 0.0:
             continue
         row = terms[count]
-        begin_term(row, along, length)
-        lever = _cross(n, axis)
+        _begin_term(row, along, length)
+        lever = cross(n, axis)
         _add(row, body, own, mode, turned, 1.0, lever)
         if abs(along) > _most(row, node):
             up = length if along > 0.0 else -length
@@ -124,12 +135,12 @@ def add_reach(table, s, body, R, o, n, plane, node, terms, count):
             if is_steep:
                 up = size[s, 0] * along / rim
                 total[ALONG] -= up * along
-                _add(total, body, own, mode, turned, -up, _cross(n, axis))
+                _add(total, body, own, mode, turned, -up, cross(n, axis))
             else:
                 row = terms[count]
-                begin_term(row, along, size[s, 0])
+                _begin_term(row, along, size[s, 0])
                 row[ROUND] = 1.0 - k
-                _add(row, body, own, mode, turned, 1.0, _cross(n, axis))
+                _add(row, body, own, mode, turned, 1.0, cross(n, axis))
                 count += 1
     return count
 
@@ -137,8 +148,9 @@ def add_reach(table, s, body, R, o, n, plane, node, terms, count):
 @inlined
 def _project(row, state, first, last, out):
     """Write the values of a row for samples first:last into out (last - first,)."""
-    along = row[ALONG]
-    ax, ay, az, bx, by, bz = row[OWN], row[OWN + 1], row[OWN + 2], row[OWN + 3], row[OWN + 4], row[OWN + 5]
+    along = float32(row[ALONG])
+    ax, ay, az = float32(row[OWN]), float32(row[OWN + 1]), float32(row[OWN + 2])
+    bx, by, bz = float32(row[OWN + 3]), float32(row[OWN + 4]), float32(row[OWN + 5])
     turns_a, turns_b = ax != 0.0 or ay != 0.0 or az != 0.0, bx != 0.0 or by != 0.0 or bz != 0.0
     u, v, w = state[3, first:last], state[4, first:last], state[5, first:last]
     p, q, r = state[6, first:last], state[7, first:last], state[8, first:last]
@@ -163,12 +175,13 @@ def sum_terms(n, mode, turned, terms, count, state, first, last, local, gap):
     state (STATE, S): the samples; mode, turned: the body with which the plane turns, whether errors turn it; local
     (3, S): scratch. The plane and the relative position may both be off: their product is exact.
     """
-    nx, ny, nz = n
+    nx, ny, nz = float32(n[0]), float32(n[1]), float32(n[2])
     x, y, z = state[0, first:last], state[1, first:last], state[2, first:last]
     if turned:
         total, own, other = terms[LINEAR], 3 * mode, 3 - 3 * mode
-        along, ax, ay, az = total[ALONG], total[OWN + own], total[OWN + own + 1], total[OWN + own + 2]
-        bx, by, bz = total[OWN + other], total[OWN + other + 1], total[OWN + other + 2]
+        along, ax = float32(total[ALONG]), float32(total[OWN + own])
+        ay, az = float32(total[OWN + own + 1]), float32(total[OWN + own + 2])
+        bx, by, bz = float32(total[OWN + other]), float32(total[OWN + other + 1]), float32(total[OWN + other + 2])
         u, v, w = state[3 + own, first:last], state[4 + own, first:last], state[5 + own, first:last]
         p, q, r = state[3 + other, first:last], state[4 + other, first:last], state[5 + other, first:last]
         for k in range(gap.size):
@@ -187,7 +200,7 @@ def sum_terms(n, mode, turned, terms, count, state, first, last, local, gap):
     one, other = local[0, first:last], local[1, first:last]
     m = 1
     while m < count:
-        size = terms[m, SIZE]
+        size = float32(terms[m, SIZE])
         _project(terms[m], state, first, last, one)
         if terms[m, ROUND] > 0.0:
             _project(terms[m + 1], state, first, last, other)

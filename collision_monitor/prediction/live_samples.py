@@ -43,11 +43,11 @@ def drop_missed(count, at, turning, memory):
         return count, at
     kept = memory.kept
     left, moved = 0, 0
-    for n in range(count):
-        if entry[n] <= leave[n]:
-            kept[left] = n
-            left += 1
-            moved += 1 if n < at else 0
+    for n in range(count):  # without a branch, because no processor predicts which samples meet
+        kept[left] = n
+        meets = 1 if entry[n] <= leave[n] else 0
+        left += meets
+        moved += meets if n < at else 0
     for place in range(3):
         for part in range(3):
             if part > 0 and turning[part - 1] == NOT_TURNED:

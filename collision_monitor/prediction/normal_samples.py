@@ -63,9 +63,9 @@ def normal_samples(count: int) -> NormalSamples:
 
 
 class SampleColumns(NamedTuple):
-    """The same samples by coordinate."""
+    """The same samples by coordinate, in single precision."""
 
-    points: NDArray[np.float64]  # (DIMENSIONS, n)
+    points: NDArray[np.float32]  # (DIMENSIONS, n)
     weights: NDArray[np.float64]  # (n,)
     sums: NDArray[np.float64]
     """(2, n): sum of the weights up to each sample, and of their squares."""
@@ -91,7 +91,7 @@ class SampleColumns(NamedTuple):
 def sample_columns(count: int) -> SampleColumns:
     """Make the samples of `normal_samples`, for loops over many samples."""
     points, weights = normal_samples(count)
-    pilot, columns = pilot_of(count), np.ascontiguousarray(points.T)
+    pilot, columns = pilot_of(count), np.ascontiguousarray(points.T, np.float32)
     sums = np.cumsum([weights, weights**2], axis=1)
     even = np.full(count, 1.0 / count)
     even_sums = np.cumsum([even, even**2], axis=1)
@@ -114,7 +114,7 @@ def sample_columns(count: int) -> SampleColumns:
     )
 
 
-def _extremes(points: NDArray[np.float64]) -> NDArray[np.int64]:
+def _extremes(points: NDArray[np.float32]) -> NDArray[np.int64]:
     """Indices of the points (6, n) that are farthest along both ways of each axis, then of diagonals with the first."""
     axes = np.eye(6)
     diagonals = np.concatenate([axes[0] + axes[1:], axes[0] - axes[1:]])

@@ -17,6 +17,12 @@ BENDING: Final = 0.1
 TURNED: Final = 2.0
 """Standard deviations of the errors of angular velocity for which gaps are that straight."""
 
+ROUNDING: Final = 2e-6
+"""Ten times the error of a gap in single precision, in radii of the bodies, if errors turn them: see sample_gaps.py."""
+
+SINGLE: Final = (1e-12, 1e12)
+"""Standard deviations of a gap (m) whose squares are in single precision too."""
+
 
 class PairErrors(NamedTuple):
     """Uncertainty of a pair of bodies."""
@@ -104,6 +110,15 @@ def fineness(root, errors, tolerance, least):
         return 1.0, 0.0
     start = max(2.0 * now / then, least / tolerance)
     return start, max(2.0 - start, 0.0) / errors.time
+
+
+@inlined
+def are_fine(errors, tolerance):
+    """Whether samples in single precision are exact enough for a tolerance (m) of the planes, see sample_gaps.py."""
+    turned, sigma = turned_at(errors, 0) + turned_at(errors, 1) > 0.0, errors.sigma
+    if turned and ROUNDING * (errors.radius[0] + errors.radius[1]) > tolerance:
+        return False
+    return sigma == 0.0 or SINGLE[0] < sigma < SINGLE[1]
 
 
 @inlined

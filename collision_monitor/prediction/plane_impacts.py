@@ -85,7 +85,7 @@ SURE_BENDING: Final = 0.2
 """In place of BENDING for bodies that surely meet, because only their times are sought."""
 
 TOO_FAST: Final = -1
-"""Number of samples of bodies that turn too fast for planes, or need too many."""
+"""Number of samples of bodies that turn too fast for planes, or need too many, or finer numbers."""
 
 
 class Search(NamedTuple):
@@ -168,7 +168,7 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
         has_enough, live = cut_planes(table, parts, pair, k, live, wanted, settings, memory, scratch)
         if not has_enough:
             return Laid(segments, settings, False)
-        before, left = left, end_segment(live, samples, memory)
+        before, left = left, end_segment(live, samples, k, memory)
         memory.obstacle.quiet[k] = QUIET if left == before and not settings.careful else LOUD
         if left == 0:
             break
@@ -210,7 +210,7 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
         has_enough, live = cut_planes(table, parts, pair, k, live, each, settings, memory, work.scratch)
         if not has_enough:
             return False
-        if end_segment(live, samples, memory) == 0:
+        if end_segment(live, samples, k, memory) == 0:
             break
     _lower(times, alone, samples)
     return True

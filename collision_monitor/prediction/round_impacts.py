@@ -133,7 +133,7 @@ def _enter_tilted(table, parts, pair, errors, end, first, last, points, memory, 
     middle = dot(offsets[1], other) - dot(offsets[0], other)
     p = (B.x - A.x + middle * other[0], B.y - A.y + middle * other[1], B.z - A.z + middle * other[2])
     v = (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
-    lifts, step = memory.trial, memory.entry
+    lifts, step = memory.spare[0:2], memory.spare[2]
     _set_lowest(then, errors.time, other, first, last, off, lifts, step)
     for n in range(first, last):
         times[n] = inf

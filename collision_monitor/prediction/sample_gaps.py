@@ -4,6 +4,10 @@ A direction separates two bodies by the gap along it, which the support values o
 bodies that are turned by an error. The loops over samples have no branches, so that LLVM computes several samples at a
 time. They run over slices, because an index that may be negative prevents that. Each sample is rounded as if it were
 alone.
+
+What differs between samples, their errors and gaps, is in single precision: twice as many fit into a vector register.
+What they share, the stated gap, is added up in double precision. Times are shares of the segment. `are_fine` says for
+which errors that is exact enough.
 """
 
 from __future__ import annotations
@@ -12,6 +16,7 @@ from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy import float32
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.shape_table import (
@@ -28,14 +33,7 @@ from collision_monitor.geometry.shape_table import (
 from collision_monitor.narrow_phase.core import rounding
 from collision_monitor.narrow_phase.support_value import core_support
 from collision_monitor.prediction.error_samples import LEFT_OVER, ORIENTATION
-from collision_monitor.prediction.linear_gaps import (
-    LINEAR,
-    add_reach,
-    begin_term,
-    is_linear,
-    make_terms,
-    sum_terms,
-)
+from collision_monitor.prediction.linear_gaps import add_reach, begin_terms, is_linear, make_terms, sum_terms
 from collision_monitor.prediction.obstacle_planes import AT_REST, BENDS, MODE, from_plane
 
 TURNED_FARTHEST: Final = 0.7
@@ -45,7 +43,16 @@ NOT_TURNED, FIRST_ORDER, SERIES = 0, 1, 2
 """How errors of the orientation of a body turn directions: there are none, to first order, or exactly."""
 
 STATE: Final = 9
-"""Rows of the samples at a node: position of B relative to A (m), rotation vectors of the errors of A and B (rad)."""
+"""Rows of the samples at a node: error of the position of B relative to A (m), rotation vectors of the errors of A and
+B (rad)."""
+
+ZERO, HALF, ONE, TWO, FOUR = float32(0.0), float32(0.5), float32(1.0), float32(2.0), float32(4.0)
+NEVER: Final = float32(inf)
+"""Numbers in single precision. A literal would make LLVM compute in double precision."""
+
+SINE: Final = (float32(1.0 / 6.0), float32(1.0 / 120.0), float32(1.0 / 5040.0))
+COSINE: Final = (float32(1.0 / 24.0), float32(1.0 / 720.0), float32(1.0 / 40320.0))
+"""Coefficients of the series of sin(x) / x and (1 - cos(x)) / x^2 after the first."""
 
 APART: Final = 8
 """Unused numbers at the end of each row, because rows of exactly 1024 samples share the same few lines of the cache."""
@@ -65,10 +72,10 @@ def make_sample_rows(samples: int) -> SampleRows:
     """Make the scratch memory of one thread."""
     length = samples + APART
     return SampleRows(
-        np.zeros((3, STATE, length)),
-        np.zeros((3, length)),
-        np.zeros((3, length)),
-        np.zeros((4, length)),
+        np.zeros((3, STATE, length), np.float32),
+        np.zeros((3, length), np.float32),
+        np.zeros((3, length), np.float32),
+        np.zeros((4, length), np.float32),
         make_terms(),
     )
 
@@ -89,16 +96,16 @@ def set_samples(obstacle, k, off, points, turning, first, last, rows):
 
     off (6, S): errors of position and velocity; points (DIMENSIONS, S): unit errors;
     turning (int, int): NOT_TURNED, FIRST_ORDER or SERIES for both bodies.
+
+    The errors in the middle are the mean of those at the ends: within a segment, they change evenly.
     """
-    for place in range(3):
-        stated_node = obstacle.node[k + place] if place < 2 else obstacle.middle[k]
-        node = rows.node[place]
-        t = stated_node.time
+    for end in range(2):
+        stated_node, node = obstacle.node[k + end], rows.node[end]
+        t = float32(stated_node.time)
         for c in range(3):
             row, x, v = node[c, first:last], off[c, first:last], off[3 + c, first:last]
-            stated = stated_node.position[c]
             for n in range(row.size):
-                row[n] = stated + x[n] + t * v[n]
+                row[n] = x[n] + t * v[n]
         for body in range(2):
             if turning[body] == NOT_TURNED:
                 continue
@@ -111,7 +118,8 @@ def set_samples(obstacle, k, off, points, turning, first, last, rows):
             is_whole = _is_zero(stated_node.left[body])
             for c in range(3):
                 m, left = stated_node.turn[body, c], stated_node.left[body, c]
-                u, v, w, a, b, d = m[0], m[1], m[2], left[0], left[1], left[2]
+                u, v, w = float32(m[0]), float32(m[1]), float32(m[2])
+                a, b, d = float32(left[0]), float32(left[1]), float32(left[2])
                 row = node[3 + 3 * body + c, first:last]
                 if is_whole:
                     for n in range(row.size):
@@ -119,6 +127,13 @@ def set_samples(obstacle, k, off, points, turning, first, last, rows):
                 else:
                     for n in range(row.size):
                         row[n] = u * x[n] + v * y[n] + w * z[n] + (a * p[n] + b * q[n] + d * r[n])
+    for part in range(3):
+        if part > 0 and turning[part - 1] == NOT_TURNED:
+            continue
+        for c in range(3 * part, 3 * part + 3):
+            one, other, row = rows.node[0, c, first:last], rows.node[1, c, first:last], rows.node[2, c, first:last]
+            for n in range(row.size):
+                row[n] = HALF * (one[n] + other[n])
 
 
 @device
@@ -127,6 +142,7 @@ def _turn(vectors, by, row, sign, order, first, last):
 
     Only samples first:last. order: FIRST_ORDER, or SERIES for sine and cosine, see TURNED_FARTHEST.
     """
+    sign = float32(sign)
     x, y, z = vectors[0, first:last], vectors[1, first:last], vectors[2, first:last]
     bx, by_, bz = by[row, first:last], by[row + 1, first:last], by[row + 2, first:last]
     if order == FIRST_ORDER:
@@ -138,8 +154,8 @@ def _turn(vectors, by, row, sign, order, first, last):
     for n in range(x.size):
         u, v, w = sign * bx[n], sign * by_[n], sign * bz[n]
         q = u * u + v * v + w * w
-        s = 1.0 - q * (1.0 / 6.0 - q * (1.0 / 120.0 - q * (1.0 / 5040.0)))
-        c = 0.5 - q * (1.0 / 24.0 - q * (1.0 / 720.0 - q * (1.0 / 40320.0)))
+        s = ONE - q * (SINE[0] - q * (SINE[1] - q * SINE[2]))
+        c = HALF - q * (COSINE[0] - q * (COSINE[1] - q * COSINE[2]))
         px, py, pz = x[n], y[n], z[n]
         ax, ay, az = v * pz - w * py, w * px - u * pz, u * py - v * px
         x[n] = px + s * ax + c * (v * az - w * ay)
@@ -178,14 +194,16 @@ def _subtract_reaches(table, s, R, o, sign, local, gap, first, last, best):
     Only samples first:last. Overwrites local. best (last - first,): scratch.
     """
     x, y, z = local[0, first:last], local[1, first:last], local[2, first:last]
-    ox, oy, oz = o[0], o[1], o[2]
-    xx, xy, xz, yx, yy, yz = R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2]
-    zx, zy, zz = R[2, 0], R[2, 1], R[2, 2]
+    sign, ox, oy, oz = float32(sign), float32(o[0]), float32(o[1]), float32(o[2])
+    xx, xy, xz = float32(R[0, 0]), float32(R[0, 1]), float32(R[0, 2])
+    yx, yy, yz = float32(R[1, 0]), float32(R[1, 1]), float32(R[1, 2])
+    zx, zy, zz = float32(R[2, 0]), float32(R[2, 1]), float32(R[2, 2])
     for n in range(gap.size):
         u, v, w = sign * x[n], sign * y[n], sign * z[n]
         gap[n] -= u * ox + v * oy + w * oz
         x[n], y[n], z[n] = u * xx + v * yx + w * zx, u * xy + v * yy + w * zy, u * xz + v * yz + w * zz
-    kind, s0, s1, s2 = table.kind[s], table.size[s, 0], table.size[s, 1], table.size[s, 2]
+    kind, size = table.kind[s], table.size
+    s0, s1, s2 = float32(size[s, 0]), float32(size[s, 1]), float32(size[s, 2])
     if kind == BOX:
         for n in range(gap.size):
             gap[n] -= abs(x[n]) * s0 + abs(y[n]) * s1 + abs(z[n]) * s2
@@ -193,7 +211,7 @@ def _subtract_reaches(table, s, R, o, sign, local, gap, first, last, best):
         for n in range(gap.size):
             gap[n] -= abs(z[n]) * s1
     elif kind == CYLINDER or kind == CIRCLE:
-        height = s1 if kind == CYLINDER else 0.0
+        height = s1 if kind == CYLINDER else ZERO
         for n in range(gap.size):
             gap[n] -= abs(z[n]) * height + s0 * sqrt(x[n] * x[n] + y[n] * y[n])
     elif kind == CONE:
@@ -209,7 +227,8 @@ def _subtract_reaches(table, s, R, o, sign, local, gap, first, last, best):
             best[n] = -inf
         start = table.vertex_start[s]
         for k in range(start, start + table.vertex_count[s]):
-            u, v, w = table.vertices[0, k], table.vertices[1, k], table.vertices[2, k]
+            vertices = table.vertices
+            u, v, w = float32(vertices[0, k]), float32(vertices[1, k]), float32(vertices[2, k])
             for n in range(gap.size):
                 value = x[n] * u + y[n] * v + z[n] * w
                 best[n] = value if value > best[n] else best[n]
@@ -221,7 +240,7 @@ def _subtract_reaches(table, s, R, o, sign, local, gap, first, last, best):
 def _gaps_at(table, pair, plane, node, margin, turning, first, last, state, rows, gap):
     """Write the gaps (last - first,) of samples along a plane at a node (NODE); state (STATE, S): the samples there."""
     a, b, mode = pair.a, pair.b, int(plane[MODE])
-    R, o = node.rotation, node.offset
+    R, o, p = node.rotation, node.offset, node.position
     n = from_plane(plane, R)
     nx, ny, nz = n
     reach = rounding(table, a) + rounding(table, b) + margin
@@ -234,12 +253,14 @@ def _gaps_at(table, pair, plane, node, margin, turning, first, last, state, rows
         reach += reach_of(table, b, R[1], o[1], (-nx, -ny, -nz))
     x, y, z = state[0, first:last], state[1, first:last], state[2, first:last]
     if turning[0] == NOT_TURNED and turning[1] == NOT_TURNED:
+        stated = float32(nx * p[0] + ny * p[1] + nz * p[2] - reach)
+        nx, ny, nz = float32(nx), float32(ny), float32(nz)
         for k in range(gap.size):
-            gap[k] = nx * x[k] + ny * y[k] + nz * z[k] - reach
+            gap[k] = stated + (nx * x[k] + ny * y[k] + nz * z[k])
         return
     if max(turning[0], turning[1]) == FIRST_ORDER and is_linear(table, a) and is_linear(table, b):
-        terms, count = rows.terms, 1
-        begin_term(terms[LINEAR], -reach, 0.0)
+        terms = rows.terms
+        count = begin_terms(n, p, reach, mode, turned, terms)
         for body in range(2):
             if varies_b if body else varies_a:
                 of = (turning[body] != NOT_TURNED, mode, turned)
@@ -247,12 +268,14 @@ def _gaps_at(table, pair, plane, node, margin, turning, first, last, state, rows
         sum_terms(n, mode, turned, terms, count, state, first, last, rows.local, gap)
         return
     u, v, w = rows.normal[0, first:last], rows.normal[1, first:last], rows.normal[2, first:last]
+    reach = float32(reach)
+    px, py, pz, nx, ny, nz = float32(p[0]), float32(p[1]), float32(p[2]), float32(nx), float32(ny), float32(nz)
     for k in range(gap.size):
         u[k], v[k], w[k] = nx, ny, nz
     if turned:
         _turn(rows.normal, state, 3 + 3 * mode, 1.0, turning[mode], first, last)
     for k in range(gap.size):
-        gap[k] = u[k] * x[k] + v[k] * y[k] + w[k] * z[k] - reach
+        gap[k] = u[k] * (px + x[k]) + v[k] * (py + y[k]) + w[k] * (pz + z[k]) - reach
     for body in range(2):
         if not (varies_b if body else varies_a):
             continue
@@ -286,45 +309,41 @@ def set_bends(table, pair, plane, nodes, middle, least):
 
 @inlined
 def _restrict(n, enters, leaves, entry, leave):
-    """Restrict [entry, leave] of sample n. With + 0.0, LLVM stores every lane; to leave some unchanged takes longer."""
-    before, after = entry[n] + 0.0, leave[n] + 0.0
+    """Restrict [entry, leave] of sample n. With + ZERO, LLVM stores every lane; to leave some unchanged takes longer."""
+    before, after = entry[n] + ZERO, leave[n] + ZERO
     entry[n] = enters if enters > before else before
     leave[n] = leaves if leaves < after else after
 
 
 @inlined
-def _enter_line(g, h, begin, length, entry, leave):
-    """Restrict [entry, leave] (n,) to the time when gaps are closed that change evenly from g to h (n,).
-
-    begin, length: of the segment (s).
-    """
+def _enter_line(g, h, entry, leave):
+    """Restrict [entry, leave] (n,) to the time when gaps are closed that change evenly from g to h (n,)."""
     for n in range(entry.size):
-        change = h[n] - g[n] + 0.0  # -0.0 becomes 0.0
-        at = begin + length * (-g[n] / change)
-        closes = change < 0.0
-        enters, leaves = at if closes else -inf, inf if closes else at
+        change = h[n] - g[n] + ZERO  # -0.0 becomes 0.0
+        at = -g[n] / change
+        closes = change < ZERO
+        enters, leaves = at if closes else -NEVER, NEVER if closes else at
         _restrict(n, enters, leaves, entry, leave)
 
 
 @inlined
-def _enter_parabola(g, h, middle, begin, length, entry, leave):
+def _enter_parabola(g, h, middle, entry, leave):
     """`_enter_line` for gaps with these values (n,) in the middle. One that is closed at both ends counts as closed.
 
     At a share s of the segment, a gap deviates from a straight line by bow s (1 - s). Roots without cancellation, as in
     Press et al., Numerical Recipes, section 5.6.
     """
     for n in range(entry.size):
-        bow = 4.0 * middle[n] - 2.0 * (g[n] + h[n])
+        bow = FOUR * middle[n] - TWO * (g[n] + h[n])
         slope = h[n] - g[n] + bow
-        inside = slope * slope + 4.0 * bow * g[n]
-        root = sqrt(max(inside, 0.0))
-        half = 0.5 * (slope + (root if slope >= 0.0 else -root))
+        inside = slope * slope + FOUR * bow * g[n]
+        root = sqrt(max(inside, ZERO))
+        half = HALF * (slope + (root if slope >= ZERO else -root))
         one, other = half / bow, -g[n] / half
         first, last = (one, other) if one < other else (other, one)
-        first, last = begin + length * first, begin + length * last
-        dips, closes = bow < 0.0, inside >= 0.0
-        enters = (first if closes else inf) if dips else last if g[n] > 0.0 else -inf
-        leaves = last if dips else first if h[n] > 0.0 else inf
+        dips, closes = bow < ZERO, inside >= ZERO
+        enters = (first if closes else NEVER) if dips else last if g[n] > ZERO else -NEVER
+        leaves = last if dips else first if h[n] > ZERO else NEVER
         _restrict(n, enters, leaves, entry, leave)
 
 
@@ -332,10 +351,10 @@ def _enter_parabola(g, h, middle, begin, length, entry, leave):
 def enter_planes(table, pair, planes, margin, turning, nodes, middle, first, last, rows, entry, leave):
     """Restrict the intervals [entry, leave] (S,) of samples first:last in a segment to the time behind planes.
 
+    entry, leave: shares of the segment, from 0 at its begin to 1 at its end.
     planes (M, PLANE_SIZE); nodes (2,), middle: NODE at both ends and in the middle of the segment; rows: see
     `set_samples`; margin (m): the gap from which on a sample is behind a plane.
     """
-    begin, length = nodes[0].time, nodes[1].time - nodes[0].time
     entry, leave = entry[first:last], leave[first:last]
     g, h = rows.gap[0, first:last], rows.gap[1, first:last]
     for m in range(planes.shape[0]):
@@ -345,6 +364,6 @@ def enter_planes(table, pair, planes, margin, turning, nodes, middle, first, las
         if planes[m, BENDS] > 0.0:
             gap = rows.gap[3, first:last]
             _gaps_at(table, pair, planes[m], middle, margin, turning, first, last, rows.node[2], rows, gap)
-            _enter_parabola(g, h, gap, begin, length, entry, leave)
+            _enter_parabola(g, h, gap, entry, leave)
         else:
-            _enter_line(g, h, begin, length, entry, leave)
+            _enter_line(g, h, entry, leave)

@@ -9,6 +9,8 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Final
 
+from numpy import float32
+
 from collision_monitor._jit import device, inlined
 from collision_monitor.prediction.normal_samples import WIDENED
 
@@ -46,6 +48,8 @@ def set_errors(root, frame, t, points, first, last, off):
             f3 += z * (root[row + 2, 3] - back * root[5, 3])
             f4 += z * (root[row + 2, 4] - back * root[5, 4])
             f5 += z * (root[row + 2, 5] - back * root[5, 5])
+            f0, f1, f2 = float32(f0), float32(f1), float32(f2)
+            f3, f4, f5 = float32(f3), float32(f4), float32(f5)
             target = off[3 * part + c, first:last]
             z0, z1, z2 = points[0, first:last], points[1, first:last], points[2, first:last]
             z3, z4, z5 = points[3, first:last], points[4, first:last], points[5, first:last]
