@@ -23,7 +23,16 @@ from collision_monitor.prediction.obstacle_planes import (
     separation_at,
     set_plane,
 )
-from collision_monitor.prediction.sample_gaps import NEVER, NOT_TURNED, ONE, ZERO, enter_planes, gaps_at_begin, set_bends
+from collision_monitor.prediction.sample_gaps import (
+    HALF,
+    NEVER,
+    NOT_TURNED,
+    ONE,
+    ZERO,
+    enter_planes,
+    gaps_at_begin,
+    set_bends,
+)
 
 TRIED: Final = 32
 """Number of samples that decide how the normal of a plane turns: a block of the samples, which are spread out. The
@@ -270,7 +279,7 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
             idle += 1
             continue
         idle, checked[n] = 0, inf
-        at = 0.5 * (entry[n] + leave[n]) if is_brief else entry[n]
+        at = HALF * (entry[n] + leave[n]) if is_brief else entry[n]
         part = _part(settings, _time_at(obstacle, k, at))
         is_cut, gap = _check(table, parts, pair, n, at, samples, k, part * tolerance, settings, memory, scratch)
         if is_cut and is_full:

@@ -309,7 +309,7 @@ def set_bends(table, pair, plane, nodes, middle, least):
 
 @inlined
 def _restrict(n, enters, leaves, entry, leave):
-    """Restrict [entry, leave] of sample n. With + ZERO, LLVM stores every lane; to leave some unchanged takes longer."""
+    """Restrict [entry, leave] of sample n. With + ZERO, LLVM stores every lane; to leave some as they are is slower."""
     before, after = entry[n] + ZERO, leave[n] + ZERO
     entry[n] = enters if enters > before else before
     leave[n] = leaves if leaves < after else after
