@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from numpy import float32
 
-from collision_monitor._jit import inlined
+from collision_monitor._jit import device, inlined
 from collision_monitor.narrow_phase.gjk import Accuracy
 from collision_monitor.prediction.flat_sides import has_side
 from collision_monitor.prediction.live_samples import drop_missed, place_of
@@ -133,7 +133,7 @@ def _copy(entry, leave, to_entry, to_leave, first, last):
         to_leave[n] = leave[n]
 
 
-@inlined
+@device
 def _cut(table, pair, n, samples, direction, k, settings, memory):
     """Add the plane along the direction that separates sample n. Its normal may turn with a body.
 

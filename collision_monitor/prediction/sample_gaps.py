@@ -64,7 +64,7 @@ class SampleRows(NamedTuple):
     node: Any  # (3, STATE, S): the last one in the middle
     normal: Any  # (3, S)
     local: Any  # (3, S): directions in the axes of a shape
-    gap: Any  # (4, S): gaps at both ends (m), support values, and gaps in the middle (m)
+    gap: Any  # (4, S): gaps at both ends and in the middle (m), support values
     terms: Any  # (TERMS, COLUMNS): see linear_gaps
 
 
@@ -284,7 +284,7 @@ def _gaps_at(table, pair, plane, node, margin, turning, first, last, state, rows
             x[k], y[k], z[k] = u[k], v[k], w[k]
         if turning[body] != NOT_TURNED:
             _turn(rows.local, state, 3 + 3 * body, -1.0, turning[body], first, last)
-        best = rows.gap[2, first:last]
+        best = rows.gap[3, first:last]
         s, sign = (b, -1.0) if body else (a, 1.0)
         _subtract_reaches(table, s, R[body], o[body], sign, rows.local, gap, first, last, best)
 
@@ -356,14 +356,13 @@ def enter_planes(table, pair, planes, margin, turning, nodes, middle, first, las
     `set_samples`; margin (m): the gap from which on a sample is behind a plane.
     """
     entry, leave = entry[first:last], leave[first:last]
-    g, h = rows.gap[0, first:last], rows.gap[1, first:last]
+    g, h, between = rows.gap[0, first:last], rows.gap[1, first:last], rows.gap[2, first:last]
     for m in range(planes.shape[0]):
-        for end in range(2):
-            gap = rows.gap[end, first:last]
-            _gaps_at(table, pair, planes[m], nodes[end], margin, turning, first, last, rows.node[end], rows, gap)
-        if planes[m, BENDS] > 0.0:
-            gap = rows.gap[3, first:last]
-            _gaps_at(table, pair, planes[m], middle, margin, turning, first, last, rows.node[2], rows, gap)
-            _enter_parabola(g, h, gap, entry, leave)
+        bends = planes[m, BENDS] > 0.0
+        for place in range(3 if bends else 2):
+            node, gap = nodes[place] if place < 2 else middle, rows.gap[place, first:last]
+            _gaps_at(table, pair, planes[m], node, margin, turning, first, last, rows.node[place], rows, gap)
+        if bends:
+            _enter_parabola(g, h, between, entry, leave)
         else:
             _enter_line(g, h, entry, leave)
