@@ -57,7 +57,8 @@ deviate too far from parabolas for less."""
 
 
 MOST_APART: Final = 8
-"""See `cut_planes`. Cylinders that lean need more than MOST_PLANES for all samples, but few samples need the others."""
+"""One in this many of the verified samples, or one, may be apart by more than COARSER tolerances behind all planes.
+Cylinders that lean need more than MOST_PLANES for all samples, but few samples need the others."""
 
 
 class CutSettings(NamedTuple):
@@ -250,9 +251,9 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
 
     Every second sample is the one that passes the planes most briefly in a BLOCK of samples, in turn, because it may
     miss the shapes. The search ends when `wanted` samples needed no plane, half of them after the last plane.
-    `begin_segment` comes before it. Returns whether there are planes enough: once the segment is full of them, further
-    ones are used but not kept, and at most one in MOST_APART of the wanted samples may need one, beside the brief ones.
-    Also returns the number of samples that are live then.
+    `begin_segment` comes before it. Returns whether there are planes enough, and the number of samples that are live
+    then. Once the segment is full of planes, further ones are used but not kept. Too many samples may need one then, or
+    no plane may separate them, because gaps deviate far from parabolas: see MOST_APART.
     """
     obstacle, entry, leave, checked = memory.obstacle, memory.entry, memory.leave, memory.checked
     for n in range(samples):
@@ -285,14 +286,15 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
         if is_cut and is_full:
             obstacle.count[k] -= 1
             apart += 0 if is_brief else 1
-            if apart > wanted // MOST_APART:
-                return False, samples
         if is_cut and not is_full:
             checked[n] = 0.0
             verified //= 2
         else:
             verified += 1
+            apart += 1 if not is_cut and gap > part * coarsest else 0
             tolerance = min(max(tolerance, gap / part), coarsest)
+        if apart > max(1, wanted // MOST_APART):
+            return False, samples
     return True, samples
 
 

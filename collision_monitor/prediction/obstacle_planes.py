@@ -96,7 +96,7 @@ def _set_turns(m, t, off, yaw_only, turn, left):
             left[r, c] = 0.0
 
 
-@inlined
+@device
 def _place(table, parts, pair, t, turning, yaw_only, scratch, node):
     """Set a node to time t, see `set_nodes`."""
     A, B, a, b = pair
@@ -141,6 +141,23 @@ def set_nodes(table, parts, pair, window, length, turning, yaw_only, scratch, ob
     for k in range(segments):
         obstacle.count[k], obstacle.quiet[k] = 0, LOUD
     return segments
+
+
+@device
+def split_segment(table, parts, pair, k, segments, turning, yaw_only, scratch, obstacle):
+    """Divide segment k of the obstacle, with its planes, into two halves. There is room for one more segment."""
+    planes, count, node, middle = obstacle.planes, obstacle.count, obstacle.node, obstacle.middle
+    for m in range(segments, k, -1):
+        count[m], obstacle.quiet[m] = count[m - 1], obstacle.quiet[m - 1]
+        node[m + 1], middle[m] = node[m], middle[m - 1]
+        for p in range(count[m]):
+            for c in range(PLANE_SIZE):
+                planes[m, p, c] = planes[m - 1, p, c]
+    node[k + 1] = middle[k]
+    if count[k] > MOST_PLANES // 2:  # each half needs other ones
+        count[k] = count[k + 1] = 0
+    for m in range(k, k + 2):
+        _place(table, parts, pair, 0.5 * (node[m].time + node[m + 1].time), turning, yaw_only, scratch, middle[m])
 
 
 @inlined

@@ -29,6 +29,7 @@ from collision_monitor.prediction.obstacle_planes import (
     QUIET,
     set_middles,
     set_nodes,
+    split_segment,
 )
 from collision_monitor.prediction.pair_errors import (
     BENDING,
@@ -83,6 +84,9 @@ LONGEST: Final = 1.4
 
 SURE_BENDING: Final = 0.2
 """In place of BENDING for bodies that surely meet, because only their times are sought."""
+
+MOST_SPLITS: Final = 6
+"""Number of times that a segment of a pair of shapes is divided because its planes do not separate the samples."""
 
 TOO_FAST: Final = -1
 """Number of samples of bodies that turn too fast for planes, or need too many, or finer numbers."""
@@ -154,24 +158,29 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
     if segments > MOST_PARTS and (careful or (is_rough and not sampling.stated)):
         return Laid(segments, settings, False)
     set_middles(table, parts, pair, segments, errors.turning, errors.yaw_only, scratch, memory.obstacle)
-    left, skips = samples, not flat and search.verified > 0
-    for k in range(segments):
-        if skips and stay_apart(table, parts, pair, k, errors, margin, memory.obstacle, work):
-            memory.obstacle.quiet[k] = APART
+    left, skips, obstacle = samples, not flat and search.verified > 0, memory.obstacle
+    k, splits = 0, 0
+    while k < segments and left > 0:
+        if skips and stay_apart(table, parts, pair, k, errors, margin, obstacle, work):
+            obstacle.quiet[k] = APART
+            k += 1
             continue
-        set_samples(memory.obstacle, k, memory.off, search.points, turning, 0, samples, memory.rows)
-        if k > 0 and memory.obstacle.quiet[k - 1] != APART:
+        set_samples(obstacle, k, memory.off, search.points, turning, 0, samples, memory.rows)
+        if k > 0 and obstacle.quiet[k - 1] != APART and obstacle.count[k] == 0:
             carry_planes(table, pair, k, settings, memory)
         live = begin_segment(table, pair, k, samples, settings, memory)
         cut_extremes(table, parts, pair, k, search.extremes, live, settings, memory, scratch)
         wanted = (1 + careful) * search.verified
         has_enough, live = cut_planes(table, parts, pair, k, live, wanted, settings, memory, scratch)
         if not has_enough:
-            return Laid(segments, settings, False)
+            if splits == MOST_SPLITS or segments == MOST_SEGMENTS:
+                return Laid(segments, settings, False)
+            split_segment(table, parts, pair, k, segments, errors.turning, errors.yaw_only, scratch, obstacle)
+            segments, splits = segments + 1, splits + 1
+            continue
         before, left = left, end_segment(live, samples, k, memory)
-        memory.obstacle.quiet[k] = QUIET if left == before and not settings.careful else LOUD
-        if left == 0:
-            break
+        obstacle.quiet[k] = QUIET if left == before and not settings.careful else LOUD
+        k += 1
     return Laid(segments, settings, left == 0 or (memory.obstacle.node[segments].time >= end and not is_rough))
 
 
@@ -187,7 +196,7 @@ def _is_left_out(quiet, k, segments):
 
 
 @device
-def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work):
+def _enter_pair(table, parts, pair, laid, errors, points, samples, verified, tolerance, memory, work):
     """Lower memory.times to the impacts of the first `samples` with the planes that are laid, and some more.
 
     verified: number of samples of all that must need no new plane; tolerance (m): see CutSettings. Returns whether
@@ -197,21 +206,27 @@ def _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, 
     settings = CutSettings(
         pilots.margin, tolerance, pilots.fineness, pilots.pilot, pilots.follows, pilots.turning, pilots.careful
     )
-    alone, times = memory.alone, memory.times
+    alone, times, obstacle = memory.alone, memory.times, memory.obstacle
     for n in range(samples):
         alone[n] = inf
     each = max(VERIFIED_IN_PILOT, verified // max(segments - 3, 1)) if verified > 0 or settings.careful else 0
     each *= 1 + settings.careful
-    for k in range(segments):
-        if _is_left_out(memory.obstacle.quiet, k, segments):
+    k, left, splits = 0, samples, 0
+    while k < segments and left > 0:
+        if _is_left_out(obstacle.quiet, k, segments):
+            k += 1
             continue
-        set_samples(memory.obstacle, k, memory.off, points, settings.turning, 0, samples, memory.rows)
+        set_samples(obstacle, k, memory.off, points, settings.turning, 0, samples, memory.rows)
         live = begin_segment(table, pair, k, samples, settings, memory)
         has_enough, live = cut_planes(table, parts, pair, k, live, each, settings, memory, work.scratch)
         if not has_enough:
-            return False
-        if end_segment(live, samples, k, memory) == 0:
-            break
+            if splits == MOST_SPLITS or segments == MOST_SEGMENTS:
+                return False
+            split_segment(table, parts, pair, k, segments, errors.turning, errors.yaw_only, work.scratch, obstacle)
+            segments, splits = segments + 1, splits + 1
+            continue
+        left = end_segment(live, samples, k, memory)
+        k += 1
     _lower(times, alone, samples)
     return True
 
@@ -253,16 +268,16 @@ def enter_bodies(multibody, i, j, errors, sampling, columns, memory, work):
         times[n] = inf
     verified = 0 if meets else VERIFIED
     tolerance = max((FACETS_IN_PILOT if meets else FACETS) * errors.sigma, sampling.query.tolerance)
-    if not _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work):
+    if not _enter_pair(table, parts, pair, laid, errors, points, samples, verified, tolerance, memory, work):
         return TOO_FAST
     last_a, last_b = pair.a, pair.b  # its planes are still there; those of the others are laid again
     a, b = first_a, first_b
     while a != last_a or b != last_b:
         pair = ShapePair(A, B, a, b)
         laid = _lay_planes(table, parts, pair, errors, search, min(end, until), sampling, memory, work)
-        if not (
-            laid.complete and _enter_pair(table, parts, pair, laid, points, samples, verified, tolerance, memory, work)
-        ):
+        if not laid.complete:
+            return TOO_FAST
+        if not _enter_pair(table, parts, pair, laid, errors, points, samples, verified, tolerance, memory, work):
             return TOO_FAST
         a, b = next_pair(parts, first_b, a, b)
     return samples
