@@ -199,7 +199,7 @@ def _is_left_out(quiet, k, segments):
 def _enter_pair(table, parts, pair, laid, errors, points, samples, verified, tolerance, memory, work):
     """Lower memory.times to the impacts of the first `samples` with the planes that are laid, and some more.
 
-    verified: number of samples of all that must need no new plane; tolerance (m): see CutSettings. Returns whether
+    verified: number of samples that must need no new plane if all enter in the same segment; tolerance (m): see CutSettings. Returns whether
     there are planes enough.
     """
     segments, pilots, _ = laid
@@ -209,8 +209,7 @@ def _enter_pair(table, parts, pair, laid, errors, points, samples, verified, tol
     alone, times, obstacle = memory.alone, memory.times, memory.obstacle
     for n in range(samples):
         alone[n] = inf
-    each = max(VERIFIED_IN_PILOT, verified // max(segments - 3, 1)) if verified > 0 or settings.careful else 0
-    each *= 1 + settings.careful
+    fewest = VERIFIED_IN_PILOT if verified > 0 or settings.careful else 0
     k, left, splits = 0, samples, 0
     while k < segments and left > 0:
         if _is_left_out(obstacle.quiet, k, segments):
@@ -218,7 +217,11 @@ def _enter_pair(table, parts, pair, laid, errors, points, samples, verified, tol
             continue
         set_samples(obstacle, k, memory.off, points, settings.turning, 0, samples, memory.rows)
         live = begin_segment(table, pair, k, samples, settings, memory)
-        has_enough, live = cut_planes(table, parts, pair, k, live, each, settings, memory, work.scratch)
+        entering = 0
+        for n in range(live):
+            entering += 1 if memory.entry[n] <= memory.leave[n] else 0
+        wanted = (1 + settings.careful) * max(fewest, verified * entering // samples)
+        has_enough, live = cut_planes(table, parts, pair, k, live, wanted, settings, memory, work.scratch)
         if not has_enough:
             if splits == MOST_SPLITS or segments == MOST_SEGMENTS:
                 return False
