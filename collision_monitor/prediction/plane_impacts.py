@@ -209,7 +209,7 @@ def _enter_pair(table, parts, pair, laid, errors, points, samples, verified, tol
     alone, times, obstacle = memory.alone, memory.times, memory.obstacle
     for n in range(samples):
         alone[n] = inf
-    fewest = VERIFIED_IN_PILOT if verified > 0 or settings.careful else 0
+    fewest = max(VERIFIED_IN_PILOT, verified // (2 * segments - 1)) if verified > 0 or settings.careful else 0
     k, left, splits = 0, samples, 0
     while k < segments and left > 0:
         if _is_left_out(obstacle.quiet, k, segments):
