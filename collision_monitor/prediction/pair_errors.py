@@ -11,7 +11,7 @@ from collision_monitor.prediction.normal_samples import DIMENSIONS
 from collision_monitor.prediction.sample_gaps import FIRST_ORDER, NOT_TURNED, SERIES
 from collision_monitor.prediction.spread import unknown_acceleration
 
-BENDING: Final = 0.2
+BENDING: Final = 0.15
 """Largest deviation of a gap from a straight line in a segment, in standard deviations of the gap."""
 
 TURNED: Final = 2.0

@@ -49,7 +49,7 @@ from collision_monitor.prediction.screening import meeting
 from collision_monitor.prediction.straight_samples import draw_evenly, set_errors
 from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE
 
-FACETS: Final = 0.015
+FACETS: Final = 0.02
 """Distance between the planes and the obstacle, in standard deviations of the gap, up to which no plane is added."""
 
 FACETS_IN_PILOT: Final = 0.06
@@ -72,8 +72,8 @@ SPINS: Final = 4.0
 
 VERIFIED_IN_PILOT: Final = 4
 VERIFIED: Final = 48
-"""Samples of the pilot, and of all, that must need no new plane of a segment. Twice as many if it is
-careful."""
+"""Samples of the pilot, and of all, that must need no new plane of a segment. Of all, fewer if fewer enter in it. Twice
+as many if it is careful."""
 
 SURE_EXTREMES: Final = 4
 """Number of the extreme samples at which the planes of bodies that surely meet are checked: one for each axis of the
@@ -199,8 +199,8 @@ def _is_left_out(quiet, k, segments):
 def _enter_pair(table, parts, pair, laid, errors, points, samples, verified, tolerance, memory, work):
     """Lower memory.times to the impacts of the first `samples` with the planes that are laid, and some more.
 
-    verified: number of samples that must need no new plane if all enter in the same segment; tolerance (m): see CutSettings. Returns whether
-    there are planes enough.
+    verified: number of samples that must need no new plane if all enter in the same segment, or if there is but one;
+    tolerance (m): see CutSettings. Returns whether there are planes enough.
     """
     segments, pilots, _ = laid
     settings = CutSettings(
