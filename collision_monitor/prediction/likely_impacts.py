@@ -25,13 +25,12 @@ from collision_monitor.prediction.motion import carry_on, half_acceleration
 from collision_monitor.prediction.pair_errors import (
     PairErrors,
     acceleration_terms,
-    are_fine,
     deviation_at,
     set_gap_covariance,
     surface_bend,
     swing_bound,
 )
-from collision_monitor.prediction.plane_impacts import FACETS, TOO_FAST, enter_bodies, enter_surely
+from collision_monitor.prediction.plane_impacts import enter_bodies, enter_surely
 from collision_monitor.prediction.round_impacts import NOT_ROUND, enter_round_bodies, round_form
 from collision_monitor.prediction.sample_gaps import TURNED_FARTHEST
 from collision_monitor.prediction.screening import GapGrowth, design_point
@@ -139,8 +138,6 @@ def likely_impacts(multibody, spread, pairs, now, sampling, columns, memory, wor
         form = round_form(table, parts, pair, errors, query.margin, work)
         if form != NOT_ROUND:
             samples = enter_round_bodies(table, parts, pair, form, errors, sure, sampling, columns, memory, work)
-        elif not are_fine(errors, max(FACETS * errors.sigma, query.tolerance)):
-            samples = TOO_FAST
         elif sure:
             samples = enter_surely(multibody, i, j, errors, sampling, columns, memory, work)
         else:

@@ -34,6 +34,7 @@ from collision_monitor.prediction.obstacle_planes import (
 from collision_monitor.prediction.pair_errors import (
     BENDING,
     TURNED,
+    are_fine,
     coordinates_in_use,
     fineness,
     spin_rate,
@@ -132,6 +133,8 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
     careful = max(turned_at(errors, 0), turned_at(errors, 1)) > CAREFUL
     fine_now = fineness(work.joint, errors, tolerance, sampling.query.tolerance)
     settings = CutSettings(margin, tolerance, fine_now, samples, follows, turning, careful)
+    if not are_fine(errors, max(FACETS * sigma, sampling.query.tolerance)):
+        return Laid(0, settings, False)
     for n in range(samples):
         alone[n] = inf
     wide = Tube(FURTHEST * errors.tube.start, FURTHEST * errors.tube.growth)
@@ -159,7 +162,7 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
         return Laid(segments, settings, False)
     set_middles(table, parts, pair, segments, errors.turning, errors.yaw_only, scratch, memory.obstacle)
     left, skips, obstacle = samples, not flat and search.verified > 0, memory.obstacle
-    k, splits = 0, 0
+    k, most = 0, min(segments + MOST_SPLITS, MOST_SEGMENTS)
     while k < segments and left > 0:
         if skips and stay_apart(table, parts, pair, k, errors, margin, obstacle, work):
             obstacle.quiet[k] = APART
@@ -173,15 +176,15 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
         wanted = (1 + careful) * search.verified
         has_enough, live = cut_planes(table, parts, pair, k, live, wanted, settings, memory, scratch)
         if not has_enough:
-            if splits == MOST_SPLITS or segments == MOST_SEGMENTS:
+            if segments == most:
                 return Laid(segments, settings, False)
             split_segment(table, parts, pair, k, segments, errors.turning, errors.yaw_only, scratch, obstacle)
-            segments, splits = segments + 1, splits + 1
+            segments += 1
             continue
         before, left = left, end_segment(live, samples, k, memory)
         obstacle.quiet[k] = QUIET if left == before and not settings.careful else LOUD
         k += 1
-    return Laid(segments, settings, left == 0 or (memory.obstacle.node[segments].time >= end and not is_rough))
+    return Laid(segments, settings, left == 0 or (obstacle.node[segments].time >= end and not is_rough))
 
 
 @inlined
@@ -210,7 +213,7 @@ def _enter_pair(table, parts, pair, laid, errors, points, samples, verified, tol
     for n in range(samples):
         alone[n] = inf
     fewest = max(VERIFIED_IN_PILOT, verified // (2 * segments - 1)) if verified > 0 or settings.careful else 0
-    k, left, splits = 0, samples, 0
+    k, left, most = 0, samples, min(segments + MOST_SPLITS, MOST_SEGMENTS)
     while k < segments and left > 0:
         if _is_left_out(obstacle.quiet, k, segments):
             k += 1
@@ -223,10 +226,10 @@ def _enter_pair(table, parts, pair, laid, errors, points, samples, verified, tol
         wanted = (1 + settings.careful) * max(fewest, verified * entering // samples)
         has_enough, live = cut_planes(table, parts, pair, k, live, wanted, settings, memory, work.scratch)
         if not has_enough:
-            if splits == MOST_SPLITS or segments == MOST_SEGMENTS:
+            if segments == most:
                 return False
             split_segment(table, parts, pair, k, segments, errors.turning, errors.yaw_only, work.scratch, obstacle)
-            segments, splits = segments + 1, splits + 1
+            segments += 1
             continue
         left = end_segment(live, samples, k, memory)
         k += 1

@@ -59,13 +59,13 @@ APART: Final = 8
 
 
 class SampleRows(NamedTuple):
-    """Samples at both ends and in the middle of a segment; scratch memory of one thread for S samples."""
+    """Samples at both ends and in the middle of a segment; scratch memory of one thread for S samples, in float32."""
 
     node: Any  # (3, STATE, S): the last one in the middle
     normal: Any  # (3, S)
     local: Any  # (3, S): directions in the axes of a shape
     gap: Any  # (4, S): gaps at both ends and in the middle (m), support values
-    terms: Any  # (TERMS, COLUMNS): see linear_gaps
+    terms: Any  # (TERMS, COLUMNS) float64: see linear_gaps
 
 
 def make_sample_rows(samples: int) -> SampleRows:
@@ -225,9 +225,8 @@ def _subtract_reaches(table, s, R, o, sign, local, gap, first, last, best):
     elif kind == CONVEX_HULL or kind == POLYGON:
         for n in range(gap.size):
             best[n] = -inf
-        start = table.vertex_start[s]
+        start, vertices = table.vertex_start[s], table.vertices
         for k in range(start, start + table.vertex_count[s]):
-            vertices = table.vertices
             u, v, w = float32(vertices[0, k]), float32(vertices[1, k]), float32(vertices[2, k])
             for n in range(gap.size):
                 value = x[n] * u + y[n] * v + z[n] * w

@@ -14,6 +14,8 @@ from collision_monitor.monitor.uncertain_predictions import sigmas_for
 from collision_monitor.prediction.error_samples import make_workspace
 from collision_monitor.prediction.likely_impacts import LEFT, likely_impacts
 from collision_monitor.prediction.normal_samples import normal_samples, sample_columns
+from collision_monitor.prediction.pair_errors import ROUNDING
+from collision_monitor.prediction.plane_impacts import FACETS
 from collision_monitor.prediction.plane_memory import make_plane_memory
 from collision_monitor.prediction.uncertainty import Sampling, impact_probabilities
 from collision_monitor.records import STATE
@@ -231,8 +233,8 @@ def test_single_precision_is_enough_or_the_pair_is_left(size: float, stddev: flo
         if planes != LEFT:
             assert planes == pytest.approx(exact, abs=0.02), seed
             compared += 1
-    tolerance = max(0.015 * stddev * size, 1e-4)
-    left = (turned > 0.0 and 2e-6 * size > tolerance) or stddev * size >= 1e12
+    tolerance = max(FACETS * stddev * size, Profile().impact_tolerance)
+    left = (turned > 0.0 and ROUNDING * size > tolerance) or stddev * size >= 1e12
     assert compared == 0 if left else compared >= 6
 
 
