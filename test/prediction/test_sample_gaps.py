@@ -14,7 +14,17 @@ from collision_monitor.prediction.body_impact import ShapePair, Window
 from collision_monitor.prediction.error_samples import make_workspace
 from collision_monitor.prediction.motion import carry_on
 from collision_monitor.prediction.normal_samples import sample_columns
-from collision_monitor.prediction.obstacle_planes import ABOUT_ALL, MODE, NO_TURNS, set_middles, set_nodes
+from collision_monitor.prediction.obstacle_planes import (
+    ABOUT_ALL,
+    APART,
+    LOUD,
+    MODE,
+    NO_TURNS,
+    QUIET,
+    set_middles,
+    set_nodes,
+    split_segment,
+)
 from collision_monitor.prediction.plane_memory import make_plane_memory
 from collision_monitor.prediction.sample_gaps import (
     FIRST_ORDER,
@@ -136,6 +146,33 @@ def test_gaps_are_those_of_the_turned_shapes(order: int, mode: int, axis: int | 
                 second = angle**2 * (float(np.linalg.norm(p)) + 1.0) + 2e-6  # of a radius of at most 1 m
                 allowed = {NOT_TURNED: 1e-6, FIRST_ORDER: second, SERIES: 1e-3}[order]
                 assert rows.gap[end, m] == pytest.approx(expected, abs=allowed)
+
+
+def test_the_halves_of_a_segment_are_those_of_a_shorter_one() -> None:
+    poses = np.array([[0, 0, 0, 0.1, 0.2, 0.3, 0.9], [1.0, 0.5, 0, 0.4, 0.1, 0, 0.9]])
+    poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+    table, parts, pair, work, memory = moving_pair(("box", "hull"), poses, np.arange(12.0).reshape(2, 6) / 10)
+    turning, obstacle = ((0.02, 0.01, 0.0, 0.03), (0.03, 0.0, 0.0, 0.0)), memory.obstacle
+    whole, halved = ((table, parts, pair, Window(0.0, 0.6), length) for length in (0.2, 0.1))
+    count = set_nodes(*halved, turning, ABOUT_ALL, work.scratch, obstacle)
+    set_middles(table, parts, pair, count, turning, ABOUT_ALL, work.scratch, obstacle)
+    nodes, middles = obstacle.node[: count + 1].copy(), obstacle.middle[:count].copy()
+    count = set_nodes(*whole, turning, ABOUT_ALL, work.scratch, obstacle)
+    set_middles(table, parts, pair, count, turning, ABOUT_ALL, work.scratch, obstacle)
+    planes = np.random.default_rng(0).normal(size=obstacle.planes.shape)
+    obstacle.planes[:], obstacle.count[:3], obstacle.quiet[:3] = planes, (2, 40, 3), (LOUD, QUIET, APART)
+    later = obstacle.node[2:4].copy(), obstacle.middle[2].copy()
+    split_segment(table, parts, pair, 1, 3, turning, ABOUT_ALL, work.scratch, obstacle)
+    assert obstacle.count[:4].tolist() == [2, 0, 0, 3]  # each half of a segment with so many needs other ones
+    assert obstacle.quiet[:4].tolist() == [LOUD, QUIET, QUIET, APART]
+    np.testing.assert_array_equal(obstacle.planes[3, :3], planes[2, :3])
+    assert (obstacle.node[3:5] == later[0]).all() and obstacle.middle[3] == later[1]
+    for name in nodes.dtype.names or ():
+        np.testing.assert_allclose(obstacle.node[[1, 2, 3]][name], nodes[[2, 3, 4]][name], atol=1e-12)
+        np.testing.assert_allclose(obstacle.middle[[1, 2]][name], middles[[2, 3]][name], atol=1e-12)
+    split_segment(table, parts, pair, 0, 4, turning, ABOUT_ALL, work.scratch, obstacle)
+    assert obstacle.count[:5].tolist() == [2, 2, 0, 0, 3]
+    np.testing.assert_array_equal(obstacle.planes[:2, :2], np.stack([planes[0, :2]] * 2))
 
 
 def times_behind(gap: Vector, times: Vector) -> tuple[float, float]:
