@@ -1,15 +1,15 @@
-"""Arrays whose rows begin at cache lines, and structures of arrays in one block of memory."""
+"""Arrays whose rows begin at cache lines, and columns in one block of memory."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Mapping
+from itertools import accumulate
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from collision_monitor._jit.prefetch import CACHE_LINE
-
-Columns = TypeVar("Columns", bound=NamedTuple)
 
 
 def aligned_zeros(rows: int, dtype: np.dtype[Any]) -> NDArray[Any]:
@@ -19,18 +19,17 @@ def aligned_zeros(rows: int, dtype: np.dtype[Any]) -> NDArray[Any]:
     return memory[start : start + rows * dtype.itemsize].view(dtype)
 
 
-def in_one_block(columns: Columns) -> Columns:
-    """Copy the arrays of a structure into one block, each to the begin of a cache line.
+def columns_in_one_block(rows: int, types: Mapping[str, DTypeLike]) -> dict[str, NDArray[Any]]:
+    """Allocate `rows` zeros of each of these types, by name, in one block, each column at the begin of a cache line.
 
     A row of 32 bytes then never lies in two lines, and the system can use large pages, so that random accesses miss
     fewer pages. NumPy requests these for blocks of 4 MiB and more.
     """
-    sizes = [-(-column.nbytes // CACHE_LINE) * CACHE_LINE for column in columns]
+    dtypes = {name: np.dtype(given) for name, given in types.items()}
+    sizes = [-(-rows * dtype.itemsize // CACHE_LINE) * CACHE_LINE for dtype in dtypes.values()]
     block = aligned_zeros(sum(sizes), np.dtype(np.uint8))
-    copies = []
-    for column, end in zip(columns, np.cumsum(sizes).tolist(), strict=True):
-        start = end - (-(-column.nbytes // CACHE_LINE) * CACHE_LINE)
-        copy = block[start : start + column.nbytes].view(column.dtype).reshape(column.shape)
-        copy[...] = column
-        copies.append(copy)
-    return type(columns)(*copies)
+    starts = [0, *accumulate(sizes)]
+    return {
+        name: np.ndarray(rows, dtype, block.data, start)
+        for (name, dtype), start in zip(dtypes.items(), starts, strict=False)
+    }

@@ -258,20 +258,17 @@ def _unite(ids, used, version, pairs, events, carried, due, order, new_pairs, ne
 
 @inlined
 def _ask_for_body(table, parts, bodies, i):
-    row = np.intp(i)
+    row, shape = np.intp(i), np.intp(bodies.first_shape[i])
     prefetch(bodies.position, row)
-    prefetch(bodies.quaternion, row)
-    prefetch(bodies.linear, row)
-    prefetch(bodies.angular, row)
-    prefetch(bodies.acceleration, row)
+    prefetch(bodies.angular, row)  # the other half of LAST_STATE
     prefetch(bodies.time, row)
-    prefetch(bodies.excess, row)
-    shape = np.intp(bodies.first_shape[i])
     prefetch(table.size, shape)
-    prefetch(table.margin, shape)
-    prefetch(table.kind, shape)
-    prefetch(parts.next, shape)
-    prefetch(parts.placed, shape)
+    if bodies.plain[i] == 0:
+        prefetch(bodies.excess, row)
+        prefetch(table.margin, shape)
+        prefetch(table.kind, shape)
+        prefetch(parts.next, shape)
+        prefetch(parts.placed, shape)
 
 
 @inlined

@@ -157,14 +157,15 @@ def keep(multibody, i, j, touching, now, query, carrying, scratch, result, row, 
         return
     bodies, q = multibody.bodies, scratch.quaternion[0]
     relative = relative_now(bodies, i, j, now)
-    by_trees = result[DISTANCE] <= 0.0 and meets_by_trees(multibody, i, j)
+    are_plain = bodies.plain[i] != 0 and bodies.plain[j] != 0
+    by_trees = not are_plain and result[DISTANCE] <= 0.0 and meets_by_trees(multibody, i, j)
     if by_trees:
         if not lasts(bodies, i, j, relative.v, carrying):
             return
     else:
         if not _outlasts(bodies, i, j, relative.v, result[NORMAL : NORMAL + 3], carrying):
             return
-        if not (_is_convex(multibody, i) and _is_convex(multibody, j)):
+        if not (are_plain or (_is_convex(multibody, i) and _is_convex(multibody, j))):
             return
     for c in range(RESULT):
         row[c] = result[c]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from collision_monitor._jit import inlined
-from collision_monitor.geometry.shape_table import BOX, SPHERE
+from collision_monitor.geometry.shape_table import SPHERE
 from collision_monitor.narrow_phase.box_box import axis_direction, sat, touching_features
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A
 from collision_monitor.narrow_phase.core import half_extents
@@ -34,30 +34,20 @@ from collision_monitor.tolerances import FACE_PREFERENCE, SAT_ROUND_OFF
 
 
 @inlined
-def _is_plain(multibody: Any, i: int) -> Any:
-    """Whether body i is one shape at its origin, which is the object itself."""
-    _, parts, bodies = multibody
-    s = bodies.first_shape[i]
-    return parts.next[s] < 0 and not parts.placed[s] and bodies.excess[i] == 0.0
-
-
-@inlined
 def plain_contact(
     multibody: Any, i: int, j: int, now: float, query: Any, has_details: bool, scratch: Any, result: Any
 ) -> Any:
     """Write the contact of bodies i and j at `now` (s) into a result row, if both are balls, or boxes that overlap.
 
-    Both are plain, and boxes have no margin. Without details, the contact of boxes has no witness points, no closing
-    speed (all 0) and no features (UNKNOWN). query, scratch, result: as of `body_contact`, which answers the pair where
-    this returns False.
+    Both are plain (`note_plain`). Without details, the contact of boxes has no witness points, no closing speed (all 0)
+    and no features (UNKNOWN). query, scratch, result: as of `body_contact`, which answers the pair where this returns
+    False.
     """
-    if not (_is_plain(multibody, i) and _is_plain(multibody, j)):
-        return False
     table, _, bodies = multibody
-    a, b = bodies.first_shape[i], bodies.first_shape[j]
-    kind = table.kind[a]
-    if kind != table.kind[b] or not (kind == SPHERE or (kind == BOX and table.margin[a] + table.margin[b] == 0.0)):
+    kind = bodies.plain[i]
+    if kind == 0 or kind != bodies.plain[j]:
         return False
+    a, b = bodies.first_shape[i], bodies.first_shape[j]
     result[SHAPE_I], result[SHAPE_J], result[STATUS] = a, b, TOUCHING
     relative = relative_now(bodies, i, j, now)
     is_swapped = a > b  # the order in which dispatch.py tests them

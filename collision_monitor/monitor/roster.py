@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
-from collision_monitor._jit.alignment import in_one_block
 from collision_monitor._jit.direct import forget
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, UnsupportedError
@@ -25,8 +24,8 @@ from collision_monitor.monitor.mesh_snapshot import mesh_arrays, plant_meshes
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled, monitored_model
-from collision_monitor.prediction.bodies import Bodies, Multibody, Parts, enlarge, make_bodies, make_parts
-from collision_monitor.prediction.body_layout import lay_out_body
+from collision_monitor.prediction.bodies import DERIVED, Bodies, Multibody, Parts, enlarge, make_bodies, make_parts
+from collision_monitor.prediction.body_layout import lay_out_body, note_plain
 from collision_monitor.prediction.impact_record import pair_keys
 from collision_monitor.records import Model, ShapeType
 from collision_monitor.settings.by_name import Classes, value_of
@@ -76,7 +75,7 @@ class Roster(Stage):
     CACHES = ("_last_ids", "_last_slots", "_allowed_keys", "_all_memory", "_by_name")
 
     def __init__(self) -> None:
-        self.bodies: Bodies = _empty_bodies(FIRST_CAPACITY)
+        self.bodies: Bodies = make_bodies(FIRST_CAPACITY)
         self.parts = make_parts(FIRST_CAPACITY)
         self.top = 0
         self.planar = False
@@ -240,6 +239,7 @@ class Roster(Stage):
         bodies.id[i] = d.object_id
         bodies.group[i], bodies.mask[i] = d.group, d.mask
         bodies.model[i], bodies.excess[i], bodies.concave[i] = modelled.model, modelled.excess, not modelled.convex
+        note_plain(self.multibody, np.array([i]))
         if d.static:
             assert pose is not None
             bodies.position[i], bodies.quaternion[i] = pose.position, pose.quaternion
@@ -301,7 +301,7 @@ class Roster(Stage):
         if self._free:
             return self._free.pop()
         if self.top == self.capacity:
-            bodies = _empty_bodies(2 * self.top)
+            bodies = make_bodies(2 * self.top)
             enlarge(self.bodies, bodies)
             self.bodies = bodies
         self.top += 1
@@ -337,7 +337,11 @@ class Roster(Stage):
         size[shapes.kind != ShapeType.HALF_SPACE, TREE] = 0.0  # `restore` builds the trees again
         snapshot.arrays.update(
             {
-                **{f"bodies.{name}": column[:top].copy() for name, column in self.bodies._asdict().items()},
+                **{
+                    f"bodies.{name}": column[:top].copy()
+                    for name, column in self.bodies._asdict().items()
+                    if name not in DERIVED
+                },
                 **{f"parts.{name}": column[: len(shapes.kind)].copy() for name, column in self.parts._asdict().items()},
                 **{f"shapes.{name}": getattr(shapes, name).copy() for name in shapes._fields if name != "blocks"},
                 "shapes.vertices": shapes.vertices.T.copy(),
@@ -364,13 +368,15 @@ class Roster(Stage):
         count, capacity = len(self._shapes.used.kind), self.capacity
         while capacity < top:
             capacity *= 2
-        bodies = Bodies(**snapshot.columns("bodies", self.bodies, top))
+        saved = snapshot.columns("bodies", self.bodies, top, without=DERIVED)
+        bodies = Bodies(**saved, plain=np.zeros(top, np.uint8))
         parts = Parts(**snapshot.columns("parts", self.parts, count))
         _check_chains(bodies, parts, self._shapes.used.kind)
-        self.top, self.bodies, self.parts = top, _empty_bodies(capacity), make_parts(len(self._shapes.table.kind))
+        self.top, self.bodies, self.parts = top, make_bodies(capacity), make_parts(len(self._shapes.table.kind))
         enlarge(bodies, self.bodies)
         enlarge(parts, self.parts)
         used = self.used()
+        note_plain(self.multibody, used)
         self._slots = dict(zip(bodies.id[used].tolist(), used.tolist(), strict=True))
         self._names = {object_id: facts["names"][str(object_id)] for object_id in self._slots}
         sizes = facts.get("memory", {})  # older sessions have none
@@ -410,10 +416,6 @@ class Roster(Stage):
         self._shapes = ShapeTableBuilder.restored(table, list(facts["free_shapes"]), free_blocks)
         plant_meshes(self._shapes, snapshot)
         self.mesh_faces = MeshFaces.restored(snapshot, table.kind)
-
-
-def _empty_bodies(capacity: int) -> Bodies:
-    return in_one_block(make_bodies(capacity))
 
 
 def _check_chains(bodies: Bodies, parts: Parts, kind: NDArray[Any]) -> None:

@@ -10,6 +10,7 @@ import json
 import math
 import zipfile
 from abc import ABC, abstractmethod
+from collections.abc import Collection
 from dataclasses import dataclass
 from io import BytesIO
 from typing import Any, ClassVar, Final, NamedTuple
@@ -72,9 +73,15 @@ class Snapshot:
             raise InputError(f"snapshot, {name}: expected {like.dtype} of shape {shape}, got {got}")
         return found.copy()
 
-    def columns(self, prefix: str, like: NamedTuple, rows: int) -> dict[str, NDArray[Any]]:
-        """Copy the arrays `prefix.NAME` for each field NAME of the named tuple `like`. Raises InputError."""
-        return {name: self.array(f"{prefix}.{name}", column, rows) for name, column in like._asdict().items()}
+    def columns(
+        self, prefix: str, like: NamedTuple, rows: int, without: Collection[str] = ()
+    ) -> dict[str, NDArray[Any]]:
+        """Copy the arrays `prefix.NAME` for each field NAME of the named tuple `like`. Raises InputError.
+
+        without: fields that are not saved.
+        """
+        fields = like._asdict().items()
+        return {name: self.array(f"{prefix}.{name}", column, rows) for name, column in fields if name not in without}
 
     def check_slots(self, name: str, rows: NDArray[np.void]) -> None:
         """Check the body slots `i` and `j` of rows of pairs, and clip their shape slots to the valid range.

@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from collision_monitor._jit import inlined
+from collision_monitor._jit.alignment import columns_in_one_block
 from collision_monitor.prediction.motion import MOTION
+
+LAST_STATE: Final = np.dtype(
+    [
+        ("position", np.float64, 3),
+        ("quaternion", np.float64, 4),
+        ("linear", np.float64, 3),
+        ("angular", np.float64, 3),
+        ("acceleration", np.float64, 3),  # 0 where it is not measured
+    ]
+)
+"""The last state of a body: two cache lines, because a contact reads it whole, of bodies in random memory order."""
 
 
 class Bodies(NamedTuple):
-    """N slots of bodies: a structure of arrays, except for the motions. World frame, SI units."""
+    """N slots of bodies: a structure of arrays, except for the motions and the last states. World frame, SI units."""
 
     used: Any  # (N,) bool: the slot holds a body
     id: Any  # (N,) uint32
@@ -22,6 +34,7 @@ class Bodies(NamedTuple):
     mask: Any  # (N,) uint32
     first_shape: Any  # (N,) int32: slot in the shape table; further shapes follow by Parts.next
     spin_radius: Any  # (N,) float64: distance of the farthest point that rotation moves (m); 0: none
+    plain: Any  # (N,) uint8: kind of its only shape, a ball or a box; 0: not plain (`note_plain`)
     revolved: Any  # (N,) bool: all shapes are solids of revolution about the body's z axis
     model: Any  # (N,) uint8: records.Model that represents the object
     excess: Any  # (N,) float64: largest distance by which the model exceeds the object (m)
@@ -29,13 +42,16 @@ class Bodies(NamedTuple):
     slack: Any  # (N,) float64: largest time beyond the horizon that is predicted (s); 0: not set
     motion: Any  # (N,) MOTION
     ref_quaternion: Any  # (N, 4): the reference motion's orientation at its time
-    # the last state
-    time: Any  # (N,) float64
-    position: Any  # (N, 3)
+    time: Any  # (N,) float64: of the last state
+    position: Any  # (N, 3): columns of LAST_STATE
     quaternion: Any  # (N, 4)
     linear: Any  # (N, 3)
     angular: Any  # (N, 3)
-    acceleration: Any  # (N, 3): 0 where it is not measured
+    acceleration: Any  # (N, 3)
+
+
+DERIVED: Final = ("plain",)
+"""Columns that follow from the others and from the shapes, so that a snapshot does not hold them."""
 
 
 class Parts(NamedTuple):
@@ -54,35 +70,26 @@ class Multibody(NamedTuple):
     bodies: Bodies
 
 
+_COLUMNS: Final[dict[str, Any]] = {
+    **dict.fromkeys(("used", "static", "seen", "revolved", "concave"), np.bool_),
+    **dict.fromkeys(("id", "version", "group", "mask"), np.uint32),
+    **dict.fromkeys(("spin_radius", "excess", "slack", "time"), np.float64),
+    **dict.fromkeys(("plain", "model"), np.uint8),
+    "first_shape": np.int32,
+    "motion": MOTION,
+    "ref_quaternion": (np.float64, 4),
+    "state": LAST_STATE,
+}
+
+
 def make_bodies(capacity: int) -> Bodies:
     """Make `capacity` empty slots."""
-    n = capacity
-    motion = np.zeros(n, MOTION)
-    motion["covered"] = -np.inf
-    return Bodies(
-        used=np.zeros(n, np.bool_),
-        id=np.zeros(n, np.uint32),
-        version=np.zeros(n, np.uint32),
-        static=np.zeros(n, np.bool_),
-        seen=np.zeros(n, np.bool_),
-        group=np.zeros(n, np.uint32),
-        mask=np.zeros(n, np.uint32),
-        first_shape=np.full(n, -1, np.int32),
-        spin_radius=np.zeros(n),
-        revolved=np.zeros(n, np.bool_),
-        model=np.zeros(n, np.uint8),
-        excess=np.zeros(n),
-        concave=np.zeros(n, np.bool_),
-        slack=np.zeros(n),
-        motion=motion,
-        ref_quaternion=np.zeros((n, 4)),
-        time=np.zeros(n),
-        position=np.zeros((n, 3)),
-        quaternion=np.zeros((n, 4)),
-        linear=np.zeros((n, 3)),
-        angular=np.zeros((n, 3)),
-        acceleration=np.zeros((n, 3)),
-    )
+    columns = columns_in_one_block(capacity, _COLUMNS)
+    state = columns.pop("state")
+    bodies = Bodies(**columns, **{name: state[name] for name in state.dtype.names or ()})
+    bodies.first_shape[:] = -1
+    bodies.motion["covered"] = -np.inf
+    return bodies
 
 
 def make_parts(capacity: int) -> Parts:

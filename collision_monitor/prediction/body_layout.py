@@ -1,4 +1,4 @@
-"""Layout of a body from its shapes: the chain of its parts, its bounding sphere, and its spin radius."""
+"""Layout of a body from its shapes: the chain of its parts, its bounding sphere, its spin radius, and what is plain."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.shape_table import CAPSULE, CIRCLE, CONE, CYLINDER, SPHERE, ShapeTable
+from collision_monitor.geometry.shape_table import BOX, CAPSULE, CIRCLE, CONE, CYLINDER, SPHERE, ShapeTable
 from collision_monitor.prediction.bodies import Multibody
 
 _REVOLVED = [SPHERE, CIRCLE, CAPSULE, CYLINDER, CONE]
@@ -38,3 +38,16 @@ def _are_revolved(table: ShapeTable, slots: NDArray[np.intp]) -> NDArray[np.bool
     along = np.abs(table.local_rotation[slots, 2, 2]) == 1.0
     is_ball = np.isin(table.kind[slots], [SPHERE, CIRCLE])
     return np.asarray(np.isin(table.kind[slots], _REVOLVED) & on_axis & (along | is_ball))
+
+
+def note_plain(multibody: Multibody, which: NDArray[np.intp]) -> None:
+    """Note which of the bodies `which` (M,) are plain: one ball or one box without margin, and the object itself.
+
+    A contact of two such bodies then reads one number of each, where it would read five columns to find that out.
+    """
+    table, parts, bodies = multibody
+    shape = bodies.first_shape[which]
+    kind = table.kind[shape]
+    is_alone = (parts.next[shape] < 0) & ~parts.placed[shape] & (bodies.excess[which] == 0.0)
+    is_plain = is_alone & ((kind == SPHERE) | (kind == BOX) & (table.margin[shape] == 0.0))
+    bodies.plain[which] = np.where(is_plain, kind, 0)

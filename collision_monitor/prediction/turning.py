@@ -9,12 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device
+from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.prediction.motion import chord_angle
 from collision_monitor.prediction.trigonometry import LARGEST, sin_cos_within
 
 BLOCK: Final = 128
 """Number of bodies whose data are copied into columns that fit the cache."""
 COLUMNS: Final = 12
+
+PREFETCH_AHEAD: Final = 16
+"""How many bodies ahead the motions are prefetched, because the processor itself looks ahead within a page at most."""
 
 
 def make_columns() -> NDArray[np.float64]:
@@ -31,6 +35,7 @@ def turned_away(bodies, start, count, columns, angles):
     """
     for k in range(count):
         i = start + k
+        prefetch(bodies.motion, np.intp(min(i + PREFETCH_AHEAD, bodies.motion.size - 1)))
         m = bodies.motion[i]
         for c in range(4):
             columns[c, k] = bodies.ref_quaternion[i, c]

@@ -1,26 +1,39 @@
-"""Arrays in one block: the same content, each at a cache line, apart from each other."""
+"""Columns in one block: zeros, each at a cache line, apart from each other."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from collision_monitor._jit.alignment import aligned_zeros, in_one_block
+from collision_monitor._jit.alignment import aligned_zeros, columns_in_one_block
 from collision_monitor._jit.prefetch import CACHE_LINE
-from collision_monitor.prediction.bodies import make_bodies
+from collision_monitor.prediction.bodies import LAST_STATE, make_bodies
 
 
-def test_columns_in_one_block_are_the_same_and_do_not_overlap() -> None:
-    for capacity in (1, 3, 64, 1000):
-        given = make_bodies(capacity)
-        copies = in_one_block(given)
-        assert type(copies) is type(given)
-        for number, (copy, column) in enumerate(zip(copies, given, strict=True)):
-            assert copy.dtype == column.dtype and copy.shape == column.shape
-            assert copy.tobytes() == column.tobytes()
-            assert copy.ctypes.data % CACHE_LINE == 0
-            copy.view(np.uint8)[...] = number
-        for number, copy in enumerate(copies):
-            assert (copy.view(np.uint8) == number).all()
+def test_columns_in_one_block_are_zeros_and_do_not_overlap() -> None:
+    record = np.dtype([("a", np.float64, 3), ("b", np.int32)])
+    types = {"flag": np.bool_, "number": np.float64, "row": (np.float64, 4), "record": record, "small": np.uint8}
+    for rows in (1, 3, 64, 1000):
+        columns = columns_in_one_block(rows, types)
+        assert list(columns) == list(types)
+        for name, column in columns.items():
+            like = np.zeros(rows, types[name])
+            assert column.dtype == like.dtype and column.shape == like.shape
+            assert column.tobytes() == like.tobytes()
+            assert column.ctypes.data % CACHE_LINE == 0
+        for number, column in enumerate(columns.values()):
+            column.view(np.uint8)[...] = number
+        for number, column in enumerate(columns.values()):
+            assert (column.view(np.uint8) == number).all()
+
+
+def test_a_last_state_takes_two_cache_lines() -> None:
+    bodies = make_bodies(3)
+    assert LAST_STATE.itemsize == 2 * CACHE_LINE
+    assert bodies.position.ctypes.data % CACHE_LINE == 0
+    for name in LAST_STATE.names or ():
+        assert getattr(bodies, name).strides == (LAST_STATE.itemsize, 8)
+        getattr(bodies, name)[1] = 1.0
+    assert bodies.position[[0, 2]].sum() == bodies.acceleration[[0, 2]].sum() == 0.0
 
 
 def test_no_rows_and_one_row() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from collision_monitor.errors import ProfileError
 from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Cylinder, Sphere
+from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Cylinder, Ellipsoid, HalfSpace, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.plain_contacts import plain_contact
 from collision_monitor.narrow_phase.contact_row import UNKNOWN
@@ -64,6 +64,37 @@ def test_without_details_all_other_numbers_are_the_same_bytes(shapes: str, toler
             assert (mine.contact_rows[name] == UNKNOWN).all()
         found += len(mine.contacts)
     assert found > 300
+
+
+PLAIN = [
+    (BOX, {}, True),
+    (Sphere(0.2), {}, True),
+    (Sphere(0.2), {"padding": 0.02}, True),
+    (Ellipsoid((0.2, 0.2, 0.2)), {}, True),  # a ball
+    ([(BOX, Pose())], {"static": True, "pose": Pose()}, True),
+    (BOX, {"padding": 0.02}, False),
+    (BOX, {"model": Model.SPHERE}, False),
+    (Capsule(0.15, 0.4), {"model": Model.OBB}, False),
+    ([(BOX, Pose((0.1, 0.0, 0.0)))], {}, False),
+    ([(Sphere(0.2), Pose((0.0, 0.0, 0.1)))], {}, False),
+    ([(BOX, Pose()), (BOX, Pose())], {}, False),
+    (Capsule(0.15, 0.4), {}, False),
+    (HalfSpace((0, 0, 1), 0.0), {"static": True, "pose": Pose()}, False),
+]
+
+
+def test_plain_bodies_are_single_balls_and_boxes_and_stay_so_in_a_snapshot() -> None:
+    monitor = Monitor()
+    for i, (shape, fields, _) in enumerate(PLAIN):
+        monitor.add(i, shape, **fields)
+    expected = [is_plain for *_, is_plain in PLAIN]
+    for each in (monitor, Monitor.restored("balanced", monitor.snapshot())):
+        slots = [each.roster.slot(i) for i in range(len(PLAIN))]
+        assert (each.roster.bodies.plain[slots] != 0).tolist() == expected
+    for i, (shape, fields, is_plain) in enumerate(reversed(PLAIN)):
+        if not fields.get("static"):
+            monitor.add(i, shape, replace=True, **fields)
+            assert (monitor.roster.bodies.plain[monitor.roster.slot(i)] != 0) == is_plain
 
 
 @pytest.mark.parametrize("shape", [BOX, Sphere(0.3)], ids=["boxes", "balls"])
