@@ -31,7 +31,13 @@ from collision_monitor.prediction.normal_samples import normal_samples, sample_c
 from collision_monitor.prediction.pair_impacts import cover_of
 from collision_monitor.prediction.plane_memory import PlaneMemory, make_plane_memory
 from collision_monitor.prediction.spread import Spread, is_uncertain, make_spread, take_spread
-from collision_monitor.prediction.uncertainty import Sampling, find_costly, impact_probabilities
+from collision_monitor.prediction.uncertainty import (
+    COSTLY_PARTS,
+    SPINNING_PARTS,
+    Sampling,
+    divide_samples,
+    impact_probabilities,
+)
 from collision_monitor.records import PREDICTION, Method, PredictionStatus
 from collision_monitor.settings.profile import Profile
 
@@ -60,8 +66,7 @@ FINEST_WITH_PLANES: Final = 1e-5
 `exact`, each sample is followed to its impact."""
 
 FEWEST_SAMPLES: Final = 16
-"""Fewest samples of a pair with a mesh, a cloud or a body that spins. It has an eighth of `uncertainty_samples`, since
-each sample takes as long as a hundred of convex shapes."""
+"""Fewest samples of a pair that has only a part of `uncertainty_samples`."""
 
 Records = NDArray[np.void]
 Pairs = NDArray[np.int32]
@@ -326,11 +331,11 @@ class UncertainPredictions(Stage):
                 )
             left = answers[:, PROBABILITY] == LEFT
             if left.any():
-                fewer = normal_samples(max(p.uncertainty_samples // 8, FEWEST_SAMPLES))
-                costly = np.empty(len(slots), bool)
-                find_costly(multibody, slots, p.horizon, costly)
-                followed += follow(left & costly, sampling._replace(**fewer._asdict()))
-                followed += follow(left & ~costly, sampling)
+                parts = np.empty(len(slots), np.uint8)
+                divide_samples(multibody, slots, p.horizon, parts)
+                for count in (COSTLY_PARTS, SPINNING_PARTS, 1):
+                    some = normal_samples(max(p.uncertainty_samples // count, FEWEST_SAMPLES))
+                    followed += follow(left & (parts == count), sampling._replace(**some._asdict()))
             return answers, followed
 
         if len(self._workspaces[0].planes.times) != p.uncertainty_samples:
