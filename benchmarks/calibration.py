@@ -8,6 +8,7 @@ Prints a Markdown table and ends with exit code 1 if a probability is off by mor
     python benchmarks/calibration.py --png docs/images/calibration.png
     python benchmarks/calibration.py --scenes 1000 --futures 5000 --seed 7
     python benchmarks/calibration.py --near            bodies near each other now, at rest or spinning fast
+    python benchmarks/calibration.py --spinning        bodies of 4 cm to 3 m that pass each other and may spin fast
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from collision_monitor.records import STATE
 from collision_monitor.settings.profile import Profile
 
 Array = NDArray[np.float64]
-Shape = cm.Sphere | cm.Box | cm.Capsule | cm.Cylinder | cm.Cone | cm.ConvexHull
+Shape = cm.Sphere | cm.Box | cm.Capsule | cm.Cylinder | cm.Cone | cm.ConvexHull | cm.Ellipsoid
 HORIZON = 2.0
 UNCERTAIN = ("position", "orientation", "velocity", "angular_velocity")
 MOST_OFF = 0.03
@@ -42,6 +43,18 @@ KINDS: dict[str, Callable[[np.random.Generator], Shape]] = {
     "cylinder": lambda rng: cm.Cylinder(rng.uniform(0.1, 0.4), rng.uniform(0.1, 1.8)),
     "hull": lambda rng: cm.ConvexHull(rng.normal(0, 0.3, (12, 3))),
 }
+
+
+SPINNING: dict[str, Callable[[np.random.Generator, Array], Shape]] = {
+    "sphere": lambda rng, size: cm.Sphere(size[0] / 2),
+    "box": lambda rng, size: cm.Box(size),
+    "capsule": lambda rng, size: cm.Capsule(size[0] / 4, size[1]),
+    "cylinder": lambda rng, size: cm.Cylinder(size[0] / 2, size[1]),
+    "cone": lambda rng, size: cm.Cone(size[0] / 2, size[1]),
+    "hull": lambda rng, size: cm.ConvexHull(rng.normal(0, size / 3, (rng.integers(4, 20), 3))),
+    "ellipsoid": lambda rng, size: cm.Ellipsoid(size / 2),
+}
+"""Shapes of `spinning_scene`, from their extents (3,) in m."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +126,29 @@ def near_scene(rng: np.random.Generator) -> Scene:
         return Scene((kind, "floor"), (shape, cm.Box((30, 30, 1))), (own, other), sigmas)
     beside = names[rng.integers(1, len(names))]
     return Scene((kind, beside), (shape, KINDS[beside](rng)), (own, other), sigmas)
+
+
+def spinning_scene(rng: np.random.Generator) -> Scene:
+    """Two bodies of 4 cm to 3 m that pass near each other and spin by up to 14 rad/s, with errors of 1 mm to 0.13 m."""
+    kinds = tuple(list(SPINNING)[rng.integers(len(SPINNING))] for _ in range(2))
+    shapes = tuple(SPINNING[kind](rng, rng.choice([0.2, 1, 3]) * rng.uniform(0.2, 1, 3)) for kind in kinds)
+    q = rng.normal(0, 1, (2, 4))
+    q /= np.linalg.norm(q, axis=1, keepdims=True)
+    toward, across = rng.normal(0, 1, (2, 3))
+    toward /= np.linalg.norm(toward)
+    across = np.cross(toward, across)
+    across /= np.linalg.norm(across)
+    reach, speed = rng.uniform(0.3, 2.0), rng.uniform(0.2, 2.0)
+    p = toward * (reach + speed * rng.uniform(0.1, 1.5)) + across * reach * rng.uniform(0, 1)
+    spin = rng.uniform(-1, 1, (2, 3)) * rng.choice([0, 0.5, 2, 8])
+    states = (
+        np.concatenate([np.zeros(3), q[0], np.zeros(3), spin[0]]),
+        np.concatenate([p, q[1], -speed * toward, spin[1]]),
+    )
+    sigmas = 10 ** rng.uniform(-2.7, -1.2) * rng.uniform(0.2, 2, 4)
+    if rng.random() < 0.3:
+        sigmas[[1, 3]] = 0.0
+    return Scene((kinds[0], kinds[1]), (shapes[0], shapes[1]), states, (sigmas, sigmas))
 
 
 def predicted(scene: Scene, profile: Profile) -> tuple[np.void | None, bool, float]:
@@ -267,7 +303,9 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--profile", default="balanced", choices=Profile.names())
     parser.add_argument("--samples", type=int, help="samples for each pair (default: the profile's)")
-    parser.add_argument("--near", action="store_true", help="bodies near each other now, at rest or spinning fast")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--near", action="store_true", help="bodies near each other now, at rest or spinning fast")
+    which.add_argument("--spinning", action="store_true", help="bodies of 4 cm to 3 m that pass and may spin fast")
     parser.add_argument("--png", type=Path)
     args = parser.parse_args()
     profile = Profile.named(args.profile).replace(horizon=HORIZON)
@@ -276,7 +314,10 @@ def main() -> int:
     rng = np.random.default_rng(args.seed)
     rows: list[Row] = []
     while len(rows) < args.scenes:
-        scene = near_scene(rng) if args.near else random_scene(rng, turning=len(rows) % 2 == 1)
+        if args.near or args.spinning:
+            scene = near_scene(rng) if args.near else spinning_scene(rng)
+        else:
+            scene = random_scene(rng, turning=len(rows) % 2 == 1)
         row = compare(scene, profile, args.futures, rng)
         if row is not None:
             rows.append(row)
