@@ -21,6 +21,7 @@ from collision_monitor.prediction.cutting_planes import (
     end_segment,
 )
 from collision_monitor.prediction.impact_record import CLEAR
+from collision_monitor.prediction.linear_gaps import is_linear
 from collision_monitor.prediction.normal_samples import FURTHEST
 from collision_monitor.prediction.obstacle_planes import (
     APART,
@@ -85,6 +86,9 @@ LONGEST: Final = 1.4
 
 SURE_BENDING: Final = 0.2
 """In place of BENDING for bodies that surely meet, because only their times are sought."""
+
+CORNER_BENDING: Final = 0.05
+"""The same for hulls, cones and ellipsoids: where a corner, a rim or an apex passes a normal, the gap is no parabola."""
 
 MOST_SPLITS: Final = 6
 """Number of times that a segment of a pair of shapes is divided because its planes do not separate the samples."""
@@ -302,12 +306,13 @@ def enter_surely(multibody, i, j, errors, sampling, columns, memory, work):
     for n in range(samples):
         times[n] = inf
     extremes = columns.extremes[0:SURE_EXTREMES]
-    search = Search(points, samples, extremes, VERIFIED_IN_PILOT, FACETS_IN_PILOT, SURE_BENDING)
     a, first_b = bodies.first_shape[i], bodies.first_shape[j]
     b = first_b
     while a >= 0:
         pair = ShapePair(work.motion[0], work.motion[1], a, b)
         until = min(errors.time, latest(times, samples))
+        bending = SURE_BENDING if is_linear(table, a) and is_linear(table, b) else CORNER_BENDING
+        search = Search(points, samples, extremes, VERIFIED_IN_PILOT, FACETS_IN_PILOT, bending)
         if not _lay_planes(table, parts, pair, errors, search, until, sampling, memory, work).complete:
             return TOO_FAST
         _lower(times, memory.alone, samples)

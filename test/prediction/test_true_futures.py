@@ -423,3 +423,18 @@ def test_two_small_bodies_that_spin_past_each_other() -> None:
         rows[f"{name}_stddev"] = sigma
     reported, true = stated_and_true((cm.Cone(0.1991, 0.4357), cm.Ellipsoid((0.113, 0.1141, 0.2705))), rows, 10_000)
     assert reported == pytest.approx(true, abs=0.03)
+
+
+def test_two_cones_that_spin_into_each_other() -> None:
+    """Points of the rims pass the normals of planes, so that gaps are no parabolas: 0.12 were after `latest`."""
+    rows = np.zeros(2, STATE)
+    rows["id"] = 0, 1
+    rows["position"][1], rows["linear"][1] = (-0.1934, -1.62945, -0.91124), (0.15639, 1.15684, 0.47795)
+    rows["quaternion"] = (-0.74316, -0.60067, 0.16552, 0.24396), (0.2059, -0.11356, 0.79273, 0.5624)
+    rows["quaternion"] /= np.linalg.norm(rows["quaternion"], axis=1, keepdims=True)
+    rows["angular"] = (-3.57309, -1.56385, -2.82811), (-3.62464, 5.97352, -6.51087)
+    rows["position_stddev"], rows["velocity_stddev"] = 0.0029, 0.00749
+    reported, times = predicted_and_true((cm.Cone(0.2471, 0.6581), cm.Cone(0.9545, 1.9379)), rows, 10_000)
+    assert reported["probability"] == 1.0
+    assert np.mean(times < reported["earliest"]) < 0.06
+    assert np.mean(times > reported["latest"]) < 0.06
