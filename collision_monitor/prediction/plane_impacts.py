@@ -88,7 +88,7 @@ SURE_BENDING: Final = 0.2
 """In place of BENDING for bodies that surely meet, because only their times are sought."""
 
 CORNER_BENDING: Final = 0.05
-"""The same for hulls, cones and ellipsoids: where a corner, a rim or an apex passes a normal, the gap is no parabola."""
+"""The same for hulls, cones and ellipsoids: where a corner or a rim passes a normal, the gap is no parabola."""
 
 MOST_SPLITS: Final = 6
 """Number of times that a segment of a pair of shapes is divided because its planes do not separate the samples."""
