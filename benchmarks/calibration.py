@@ -44,7 +44,6 @@ KINDS: dict[str, Callable[[np.random.Generator], Shape]] = {
     "hull": lambda rng: cm.ConvexHull(rng.normal(0, 0.3, (12, 3))),
 }
 
-
 SPINNING: dict[str, Callable[[np.random.Generator, Array], Shape]] = {
     "sphere": lambda rng, size: cm.Sphere(size[0] / 2),
     "box": lambda rng, size: cm.Box(size),
@@ -314,8 +313,10 @@ def main() -> int:
     rng = np.random.default_rng(args.seed)
     rows: list[Row] = []
     while len(rows) < args.scenes:
-        if args.near or args.spinning:
-            scene = near_scene(rng) if args.near else spinning_scene(rng)
+        if args.near:
+            scene = near_scene(rng)
+        elif args.spinning:
+            scene = spinning_scene(rng)
         else:
             scene = random_scene(rng, turning=len(rows) % 2 == 1)
         row = compare(scene, profile, args.futures, rng)

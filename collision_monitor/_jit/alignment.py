@@ -28,7 +28,7 @@ def columns_in_one_block(rows: int, types: Mapping[str, DTypeLike]) -> dict[str,
     dtypes = {name: np.dtype(given) for name, given in types.items()}
     sizes = [-(-rows * dtype.itemsize // CACHE_LINE) * CACHE_LINE for dtype in dtypes.values()]
     block = aligned_zeros(sum(sizes), np.dtype(np.uint8))
-    starts = [0, *accumulate(sizes)]
+    starts = accumulate(sizes, initial=0)
     return {
         name: np.ndarray(rows, dtype, block.data, start)
         for (name, dtype), start in zip(dtypes.items(), starts, strict=False)

@@ -35,7 +35,7 @@ from collision_monitor.prediction.uncertainty import (
     COSTLY_PARTS,
     SPINNING_PARTS,
     Sampling,
-    divide_samples,
+    find_divisors,
     impact_probabilities,
 )
 from collision_monitor.records import PREDICTION, Method, PredictionStatus
@@ -315,10 +315,12 @@ class UncertainPredictions(Stage):
         def part(slots: Pairs, work: Workspaces) -> tuple[NDArray[np.float64], int]:
             answers, followed = np.full((len(slots), len(ANSWERS)), LEFT), 0
 
-            def follow(some: NDArray[np.bool_], samples: Sampling) -> int:
-                """Follow each sample of some of the pairs exactly. Return the number of samples."""
+            def follow(some: NDArray[np.bool_], divisor: int) -> int:
+                """Follow a part of the samples exactly for some of the pairs. Return the number of samples."""
                 if not some.any():
                     return 0
+                fewer = normal_samples(max(p.uncertainty_samples // divisor, FEWEST_SAMPLES))
+                samples = sampling._replace(**fewer._asdict())
                 found = np.empty((np.count_nonzero(some), len(ANSWERS)))
                 count = impact_probabilities(multibody, self.spread, slots[some], step.now, samples, work.exact, found)
                 answers[some] = found
@@ -331,11 +333,10 @@ class UncertainPredictions(Stage):
                 )
             left = answers[:, PROBABILITY] == LEFT
             if left.any():
-                parts = np.empty(len(slots), np.uint8)
-                divide_samples(multibody, slots, p.horizon, parts)
-                for count in (COSTLY_PARTS, SPINNING_PARTS, 1):
-                    some = normal_samples(max(p.uncertainty_samples // count, FEWEST_SAMPLES))
-                    followed += follow(left & (parts == count), sampling._replace(**some._asdict()))
+                divisors = np.empty(len(slots), np.uint8)
+                find_divisors(multibody, slots, p.horizon, divisors)
+                for divisor in (COSTLY_PARTS, SPINNING_PARTS, 1):
+                    followed += follow(left & (divisors == divisor), divisor)
             return answers, followed
 
         if len(self._workspaces[0].planes.times) != p.uncertainty_samples:

@@ -96,11 +96,11 @@ part of the samples. The test is repeated after each further one."""
 
 
 COSTLY_PARTS: Final = 8
-"""Parts of the samples of which a pair with a mesh gets one, since each takes as long as a hundred of convex shapes."""
+"""A pair with a mesh has the number of samples divided by this: each takes as long as a hundred of convex shapes."""
 
 SPINNING_PARTS: Final = 4
-"""The same for bodies that spin by more than FAR: each sample takes as long as ten of others. With an eighth,
-probabilities were off by 0.015 (RMS) and up to 0.06 in random scenes; with a quarter by 0.01 and 0.04."""
+"""The same for two bodies that together spin by more than FAR. Larger: the probability is less exact. Smaller: slower,
+because each sample needs up to SPINNING_ITERATIONS."""
 
 FEW_PARTS: Final = 4
 """Parts of so few samples. The samples of the first part decide which samples of the others are needed."""
@@ -204,21 +204,19 @@ def body_has_mesh(table, parts, shape):
 
 
 @kernel
-def divide_samples(multibody, pairs, horizon, parts):
-    """Write to parts (P,) into how many parts the samples are divided, of which each pair (P, 2) gets one.
+def find_divisors(multibody, pairs, horizon, divisors):
+    """Write the number by which the samples of each pair (P, 2) are divided to divisors (P,).
 
     COSTLY_PARTS for a body with a mesh or a cloud, or one that turns too far for any search within the horizon (s);
     SPINNING_PARTS for two bodies that spin far; else 1.
     """
-    table, _, bodies = multibody
+    table, parts, bodies = multibody
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
         A, B = bodies.motion[i], bodies.motion[j]
-        is_costly = body_has_mesh(table, multibody.parts, bodies.first_shape[i])
-        is_costly |= body_has_mesh(table, multibody.parts, bodies.first_shape[j])
-        parts[k] = SPINNING_PARTS if spins_far(A, B, horizon) else 1
-        if is_costly or spins(A, B, horizon):
-            parts[k] = COSTLY_PARTS
+        is_costly = spins(A, B, horizon) or body_has_mesh(table, parts, bodies.first_shape[i])
+        is_costly |= body_has_mesh(table, parts, bodies.first_shape[j])
+        divisors[k] = COSTLY_PARTS if is_costly else (SPINNING_PARTS if spins_far(A, B, horizon) else 1)
 
 
 @device
