@@ -58,6 +58,10 @@ class Base:
         message = self.passed[-1]
         return (message.twist if self.kind is TwistStamped else message).linear.x
 
+    def hears(self, words):
+        """Say whether the guard's newest state, if one has arrived, contains these words."""
+        return bool(self.said) and words in self.said[-1]
+
     def drive(self, x, condition, states=None, timeout=30.0):
         """Send commands, and states if there are any, until the condition holds."""
 
@@ -81,7 +85,7 @@ def row(object_id, x):
 def test_commands_pass_and_stop_at_an_obstacle_and_without_answers(start, team, guard, kind):
     base = Base(team, kind)
     process = guard("robot:=robot_1", f"stamped:={'true' if kind is TwistStamped else 'false'}", "max_age:=1.0")
-    base.drive(0.4, lambda: base.passed and "no status of object_monitor: does the monitor run?" in base.said[-1])
+    base.drive(0.4, lambda: base.passed and base.hears("no status of object_monitor: does the monitor run?"))
     assert base.last() == 0.0
     monitor = start("run", "--rules", str(RULES))
     team.meet()
@@ -91,11 +95,11 @@ def test_commands_pass_and_stop_at_an_obstacle_and_without_answers(start, team, 
     team.status(lambda s: s.objects == 2)
     base.drive(0.4, lambda: base.last() == 0.4, [row(1, 0.0), row(2, 9.0)])
     base.drive(0.4, lambda: base.last() == 0.0, [row(1, 0.0), row(2, 0.8)])
-    team.until(lambda: "stops: critical: robot_1 and person: distance" in base.said[-1])
+    team.until(lambda: base.hears("stops: critical: robot_1 and person: distance"))
     base.drive(-0.4, lambda: base.last() == -0.4, [row(1, 0.0), row(2, 0.8)])  # it may retreat
     base.drive(0.4, lambda: base.last() == 0.4, [row(1, 0.0), row(2, 9.0)])
     base.drive(0.4, lambda: base.last() == 0.0)  # no more states
-    team.until(lambda: "stops: no step of object_monitor for 1." in base.said[-1])
+    team.until(lambda: base.hears("stops: no step of object_monitor for 1."))
     base.drive(0.4, lambda: base.last() == 0.4, [row(1, 0.0), row(2, 9.0)])
     monitor.kill()
     base.drive(0.4, lambda: base.last() == 0.0)
@@ -145,7 +149,7 @@ def test_objects_of_a_sources_file_are_guarded_too(start, team, guard, tmp_path)
 
     drive(9.0, 0.4)
     drive(0.8, 0.0)
-    team.until(lambda: "stops: critical: robot_1 and person: distance" in base.said[-1])
+    team.until(lambda: base.hears("stops: critical: robot_1 and person: distance"))
     drive(9.0, 0.4)
 
 
@@ -156,7 +160,7 @@ def test_a_monitor_without_rules_stops_the_robot(start, team, guard):
     team.meet()
     team.describe(ObjectDescription(1, Cylinder(0.3, 1), name="robot_1"))
     team.status(lambda s: s.objects == 1)
-    base.drive(0.4, lambda: base.said and "no alerts of object_monitor: has it rules?" in base.said[-1], [row(1, 0.0)])
+    base.drive(0.4, lambda: base.hears("no alerts of object_monitor: has it rules?"), [row(1, 0.0)])
     base.drive(0.4, lambda: base.passed and base.last() == 0.0, [row(1, 0.0)])
 
 
