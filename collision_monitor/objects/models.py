@@ -68,6 +68,8 @@ class Modelled(NamedTuple):
 
 def parse_model(model: Model | str | int) -> Model:
     """Return the model with a name such as "obb" or a number. Raises InputError for an unknown one."""
+    if isinstance(model, Model):
+        return model
     if isinstance(model, str):
         chosen = Model.__members__.get(model.upper())
     else:
