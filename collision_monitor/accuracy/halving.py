@@ -18,8 +18,6 @@ from collision_monitor.accuracy.tiles import Workers
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.settings.profile import NO_BUDGET, Profile
 
-RUN_SECONDS: Final = 0.4
-"""Longest time of the steps of one profile on one tile (s). A slower profile is measured on fewer steps."""
 HOPS: Final = 2
 """How often the best profile is varied, so that it may differ along two axes more than the first generation."""
 FINALISTS: Final = 3
@@ -51,8 +49,10 @@ class Trial:
 class Halving:
     """The tallies of all profiles measured so far, on the tiles of a recording."""
 
-    def __init__(self, name: str, space: Space, team: Workers, progress: Progress) -> None:
+    def __init__(self, name: str, space: Space, team: Workers, run_seconds: float, progress: Progress) -> None:
+        """run_seconds: longest time of the steps of one profile on one tile (s)."""
         self._name, self._space, self._team, self._progress = name, space, team, progress
+        self._run_seconds = run_seconds
         self._tallies: dict[Profile, Tally] = {}
         self._tiles: dict[Profile, int] = {}
         self._alone: dict[Profile, NDArray[np.float64]] = {}
@@ -95,7 +95,7 @@ class Halving:
             group = [each for each in profiles if self._tiles.get(each, 0) == have < tiles]
             if not group:
                 continue
-            parts = self._team.measure(self._order[have:tiles], group, RUN_SECONDS, self._progress)
+            parts = self._team.measure(self._order[have:tiles], group, self._run_seconds, self._progress)
             for profile, part in zip(group, parts, strict=True):
                 self._tallies[profile] = self._tallies.get(profile, Tally()) + part
                 self._tiles[profile] = tiles
@@ -106,10 +106,10 @@ class Halving:
         The time of a step is its shortest one of all rounds, because other programs only add time.
         """
         recording = self._team.recording
-        steps = recording.steps_of(self._order[0])
+        described, steps = recording.described, recording.steps_of(self._order[0])
         runs: dict[Profile, list[NDArray[np.float64]]] = {each: [] for each in profiles}
         for profile in list(profiles) * ROUNDS:
-            played = play(Monitor(profile, warns=False), recording.described, steps, lambda done: None, RUN_SECONDS)
+            played = play(Monitor(profile, warns=False), described, steps, lambda done: None, self._run_seconds)
             runs[profile].append(played.warm()[0])
         for profile, found in runs.items():
             fewest = min(map(len, found))

@@ -1,7 +1,7 @@
 """Measure profiles on parts of a recording, on all cores.
 
 A recording is cut into tiles of consecutive steps. A process measures some profiles on one tile at a time; the exact
-answers to the tile are computed once for all of them.
+answers to the tile are computed once for all of them, and kept for the next ones.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing import get_context
 from typing import Any, Final, Self
 
@@ -31,6 +31,8 @@ TILES: Final = 16
 """Tiles of a recording, at most."""
 SHORTEST: Final = 25
 """Fewest steps of a tile. Its first step initialises everything and does not count."""
+MOST_TRUTHS: Final = 4
+"""Tiles of which a process keeps the exact answers: those that the first generations of profiles share."""
 POLL: Final = 0.2
 """Time between two looks at the progress of the processes (s)."""
 
@@ -44,6 +46,7 @@ class Recording:
     begins: list[int]
     contacts: dict[float, Contacts]
     """By the horizon (s) that judges alarms."""
+    _truths: dict[tuple[Any, ...], Reported] = field(default_factory=dict, init=False, compare=False)
 
     @classmethod
     def cut(
@@ -75,20 +78,25 @@ class Recording:
     def measure(self, tile: int, profiles: Sequence[Profile], most_seconds: float, progress: Progress) -> list[Tally]:
         """Measure profiles on a tile, most_seconds (s) of steps of each. progress: called after each profile."""
         first, steps = self.begins[tile], self.steps_of(tile)
-        truths: dict[tuple[Any, ...], Reported] = {}
         found = []
         for profile in profiles:
-            key = tuple(compared(profile).values())
-            if key not in truths:
-                truths[key], _ = exact_answers(self.described, steps, profile, lambda done: None)
-            contacts = self.contacts[profile.horizon]
+            truth, contacts = self._truth(tile, profile), self.contacts[profile.horizon]
             found.append(
-                measure_profile(
-                    self.described, steps, profile, truths[key], contacts, first=first, most_seconds=most_seconds
-                )
+                measure_profile(self.described, steps, profile, truth, contacts, first=first, most_seconds=most_seconds)
             )
             progress(1)
         return found
+
+    def _truth(self, tile: int, profile: Profile) -> Reported:
+        """Return the exact answers to a tile. The last few are kept."""
+        truths, key = self._truths, (tile, *compared(profile).values())
+        truth = truths.pop(key, None)
+        if truth is None:
+            truth, _ = exact_answers(self.described, self.steps_of(tile), profile, lambda done: None)
+        truths[key] = truth
+        if len(truths) > MOST_TRUTHS:
+            del truths[next(iter(truths))]  # the one that was used longest ago
+        return truth
 
 
 def tiles_of(steps: int) -> int:

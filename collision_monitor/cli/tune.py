@@ -87,7 +87,8 @@ def tune_command(args: argparse.Namespace) -> int:
     """Run the command and return the exit code. Raises UsageError, InputError, SessionError."""
     from collision_monitor.accuracy.demands import Demands
     from collision_monitor.accuracy.inputs import recorded
-    from collision_monitor.accuracy.tune import estimate, parameter_file, space_of, tune
+    from collision_monitor.accuracy.search_time import plan_search
+    from collision_monitor.accuracy.tune import parameter_file, space_of, tune
     from collision_monitor.session import Session
 
     with usage():
@@ -104,9 +105,9 @@ def tune_command(args: argparse.Namespace) -> int:
     with usage():
         space = space_of(work, Session(args.session).profile, demands)
     used = min(jobs, cores)
-    seconds = estimate(work, space, used)
-    print(f"tune: {len(work.steps)} steps, about {seconds:.0f} s on {used} cores", file=sys.stderr, flush=True)
-    found = tune(work, space, progress_anywhere, jobs)
+    plan = plan_search(work, space, used)
+    print(f"tune: {len(work.steps)} steps, about {plan.seconds:.0f} s on {used} cores", file=sys.stderr, flush=True)
+    found = tune(work, space, progress_anywhere, jobs, plan.run_seconds)
     chosen = found.chosen
     if args.json:
         rows = [

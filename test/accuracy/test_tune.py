@@ -15,13 +15,15 @@ import pytest
 import session_scene
 import yaml
 
+from collision_monitor.accuracy import search_time
 from collision_monitor.accuracy.candidates import Space, models_of, with_threads
 from collision_monitor.accuracy.demands import Demands
-from collision_monitor.accuracy.halving import rungs_of
+from collision_monitor.accuracy.halving import Trial, rungs_of
 from collision_monitor.accuracy.inputs import Workload, recorded
 from collision_monitor.accuracy.measurement import Errors
-from collision_monitor.accuracy.profile_tradeoff import profile_tradeoff
-from collision_monitor.accuracy.tune import parameter_file, space_of, tune
+from collision_monitor.accuracy.profile_tradeoff import exact_answers, profile_tradeoff
+from collision_monitor.accuracy.tiles import MOST_TRUTHS, Recording
+from collision_monitor.accuracy.tune import explain, parameter_file, space_of, tune
 from collision_monitor.cli.main import main
 from collision_monitor.cli.parameter_file import check_parameter_file
 from collision_monitor.codec import encode_descriptions, encode_states
@@ -76,6 +78,46 @@ def test_each_axis_of_a_profile_is_tried(tuned) -> None:
 def test_three_lines_say_why(tuned) -> None:
     assert [line.partition(":")[0] for line in tuned.reasons] == ["chosen", "cheaper", "dearer"]
     assert tuned.chosen.name in tuned.reasons[0]
+
+
+def test_the_cost_of_probabilities_is_that_of_the_cheapest_profile_with_good_ones(tuned) -> None:
+    """Not that of the chosen tolerances: as tight as those of `exact`, each sample would be followed exactly."""
+    chosen = next(each for each in tuned.trials if each.profile is tuned.chosen)
+    row, off = chosen.measurement, replace(chosen, profile=tuned.chosen.replace(uncertainty=False))
+
+    def likely(name: str, step_ms: float, error: float) -> Trial:
+        measured = replace(row, step_ms=step_ms, ttc_error_s=Errors(error, error, error))
+        return replace(off, profile=Profile(name=name), measurement=measured, timed=False, failures=["step time"])
+
+    dear = [likely("wrong", 2 * row.step_ms, 0.5), likely("right", 3 * row.step_ms, 0.0)]
+    trials = [off, *dear, likely("tight", 99 * row.step_ms, 0.0)]
+    demands = Demands(ttc_error=0.01, budget_ms=1.5 * row.step_ms)
+    assert explain(off, trials, demands)[2] == "dearer: probabilities (right), 3 times the time; no demand needs them"
+
+
+def test_a_long_search_gets_shorter_runs(work: Workload, monkeypatch: pytest.MonkeyPatch) -> None:
+    space = space_of(work, Profile(), Demands(ttc_error=0.01))
+    plan = search_time.plan_search(work, space, 1)
+    assert plan.run_seconds == search_time.RUN_SECONDS and 0.0 < plan.seconds < search_time.LONGEST
+    monkeypatch.setattr(search_time, "LONGEST", 1e-3)
+    assert search_time.plan_search(work, space, 1).run_seconds == search_time.SHORTEST_RUN
+
+
+def test_the_exact_answers_to_a_few_tiles_are_kept(work: Workload) -> None:
+    steps = [(round(k * 1e8), work.steps[k % len(work.steps)][1]) for k in range(25 * (MOST_TRUTHS + 2))]
+    profile = Profile(uncertainty=False)
+    recording = Recording.cut(work.descriptions, steps, profile, [profile.horizon])
+    assert recording.tiles == MOST_TRUTHS + 2
+    (first,) = recording.measure(0, [profile], np.inf, lambda done: None)
+    for tile in range(recording.tiles):
+        recording.measure(tile, [profile], np.inf, lambda done: None)
+        assert len(recording._truths) <= MOST_TRUTHS
+        kept = recording._truth(tile, profile)
+        assert kept is recording._truth(tile, profile)
+        anew, _ = exact_answers(work.descriptions, recording.steps_of(tile), profile, lambda done: None)
+        assert kept.predictions.tobytes() == anew.predictions.tobytes()
+    (again,) = recording.measure(0, [profile], np.inf, lambda done: None)
+    assert (again.steps, again.pairs) == (first.steps, first.pairs)
 
 
 def test_each_demand_fails_with_its_measure(tuned) -> None:
