@@ -6,6 +6,7 @@ For each scene with noisy states: ms a step of the profile `fast` (without proba
     python benchmarks/uncertain_states.py                    about two minutes
     python benchmarks/uncertain_states.py --scene fleet hall
     python benchmarks/uncertain_states.py --scene fleet "clutter of 100" --noise 0.05      larger errors
+    python benchmarks/uncertain_states.py --scene "clutter of 1000" --threads 2
 """
 
 from __future__ import annotations
@@ -75,11 +76,12 @@ SCENES: dict[str, Callable[[float], Scene]] = {
 }
 
 
-def measure(name: str, steps: int, noise: float) -> str:
+def measure(name: str, steps: int, noise: float, threads: int) -> str:
     """One row of the table."""
     descriptions, states = SCENES[name](noise)
     ways = {"fast": ("fast", PLANES), "planes": ("balanced", PLANES), "samples": ("balanced", SAMPLES)}
-    monitors = {way: cm.Monitor(profile) for way, (profile, _) in ways.items()}
+    profiles = {way: cm.Profile.named(name).replace(threads=threads) for way, (name, _) in ways.items()}
+    monitors = {way: cm.Monitor(profile) for way, profile in profiles.items()}
     for monitor in monitors.values():
         for description in descriptions:
             monitor.describe(description)
@@ -115,6 +117,7 @@ def main() -> int:
     parser.add_argument("--scene", nargs="+", choices=SCENES, default=list(SCENES), metavar="NAME")
     parser.add_argument("--steps", type=int, default=12)
     parser.add_argument("--noise", type=float, default=0.005, help="of states, not in halls (m, rad, m/s, rad/s)")
+    parser.add_argument("--threads", type=int, default=1)
     args = parser.parse_args()
     print(
         "| scene | objects | fast (ms) | balanced (ms) | p99 (ms) | every sample (ms) | times as fast "
@@ -122,7 +125,7 @@ def main() -> int:
     )
     print("|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|")
     for name in args.scene:
-        print(measure(name, args.steps, args.noise), flush=True)
+        print(measure(name, args.steps, args.noise, args.threads), flush=True)
     return 0
 
 

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.monitor.shared_work import share
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.prediction.body_impact import Scratch, make_scratch
@@ -40,7 +41,7 @@ class FirstImpacts(Stage):
         if self.pool is not None:
             self.pool.shutdown()
         self._scratch = [make_scratch() for _ in range(threads)]
-        self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        self.pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
 
     @property
     def scratch(self) -> Scratch:
@@ -58,8 +59,8 @@ class FirstImpacts(Stage):
         def part(pairs: Pairs, scratch: Scratch) -> tuple[Events, int]:
             return find(step, pairs, scratch)
 
-        # the kernels release the GIL; the parts are joined in order, so any number of threads gives the same answer
-        parts = list(self.pool.map(part, np.array_split(pairs, len(self._scratch)), self._scratch))
+        # the parts are joined in order, so any number of threads gives the same answer
+        parts = share(self.pool, part, pairs, self._scratch)
         step.work.impact_queries += sum(queries for _, queries in parts)
         return joined([events for events, _ in parts])
 

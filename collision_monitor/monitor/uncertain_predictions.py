@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
 from collision_monitor.monitor.budget import SAMPLE, PairBudget
+from collision_monitor.monitor.shared_work import share
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.objects.description import ObjectDescription
@@ -347,8 +348,7 @@ class UncertainPredictions(Stage):
             return answers
         while len(self._workspaces) < p.threads:
             self._workspaces.append(make_workspaces(p.uncertainty_samples))
-        workspaces = self._workspaces[: p.threads]
-        parts = list(pool.map(part, np.array_split(slots, len(workspaces)), workspaces))
+        parts = share(pool, part, slots, self._workspaces[: p.threads])
         step.samples += sum(followed for _, followed in parts)
         return np.concatenate([answers for answers, _ in parts])
 

@@ -1,13 +1,17 @@
-"""Less effort while the node cannot keep up: fewer samples for each probability, and one point for each contact."""
+"""What a node does that cannot keep up: more threads, which change no answer; then fewer samples and contact points."""
 
 from __future__ import annotations
 
+import os
 from typing import Final
 
-from collision_monitor.settings.profile import Profile
+from collision_monitor.settings.profile import MOST_NAME, Profile
 
 TOO_MUCH: Final = 0.9
 """Load above which the effort is reduced. The load is the part of the last second that the steps took."""
+
+BEHIND: Final = 0.6
+"""The same if states were left out in that second: the rest of it went to reading and recording messages."""
 
 LITTLE: Final = 0.2
 """Load below which the effort may grow again. One level costs at most four times as much as the next."""
@@ -15,36 +19,59 @@ LITTLE: Final = 0.2
 PATIENCE: Final = 10
 """Looks in a row with little load until the effort grows by one level."""
 
-LEVELS: Final = 2
-"""The samples are divided by 4 and by 16."""
+LEVELS: Final = 3
+"""More threads; then the samples are divided by 4, and by 16."""
+
+LONG: Final = 0.5
+"""Mean duration of a step (s) above which more threads are not enough: the first two levels come at once."""
+
+MOST_THREADS: Final = 4
+"""Threads of the first level, at most: the others stay free for other programs."""
+
+LONGEST_WORDS: Final = 64
+"""Room for the words that follow the name of a profile (characters)."""
 
 FEWEST_SAMPLES: Final = 64
 """With fewer samples a probability is off by more than 0.05."""
 
 
 class Effort:
-    """The level to which the effort is reduced: 0 for the profile as it was chosen, at most LEVELS."""
+    """The level of what is done to keep up: 0 for the profile as it was chosen, at most LEVELS.
 
-    def __init__(self) -> None:
+    cores: number of cores that this process may use; None: ask the system.
+    """
+
+    def __init__(self, cores: int | None = None) -> None:
         self.level = 0
+        self._threads = min(cores or len(os.sched_getaffinity(0)), MOST_THREADS)
         self._quiet = 0  # looks in a row with little load
 
-    def look(self, load: float) -> bool:
-        """Take the load of the last second; call this once a second. Returns whether the level has changed."""
+    def look(self, load: float, step: float = 0.0, *, is_behind: bool = False) -> bool:
+        """Take the load of the last second; call this once a second. Returns whether the level has changed.
+
+        step: mean duration of a step (s). is_behind: whether states were left out in that second.
+        """
         level = self.level
         self._quiet = self._quiet + 1 if load < LITTLE else 0
-        if load > TOO_MUCH:
-            self.level = min(level + 1, LEVELS)
+        if load > (BEHIND if is_behind else TOO_MUCH):
+            self.level = min(level + (2 if level == 0 and step > LONG else 1), LEVELS)
         elif self._quiet >= PATIENCE:
             self.level, self._quiet = max(level - 1, 0), 0
         return self.level != level
 
     def reduced(self, profile: Profile) -> Profile:
-        """Return the profile with the effort of this level. Its name says so, and each status repeats the name."""
+        """Return the profile of this level. Its name says what differs, and each status repeats the name."""
         if not self.level:
             return profile
-        samples = max(profile.uncertainty_samples >> 2 * self.level, FEWEST_SAMPLES)
+        threads = max(profile.threads, self._threads)
+        name = profile.name[: MOST_NAME - LONGEST_WORDS]
+        name = name if threads == profile.threads else f"{name}, on {threads} threads"
+        divided = self.level - (threads > profile.threads)  # with no core to spare, the first level divides as well
+        faster = profile.replace(name=name, threads=threads)
+        if not divided:
+            return faster
+        samples = max(profile.uncertainty_samples >> 2 * min(divided, LEVELS - 1), FEWEST_SAMPLES)
         changes = {"uncertainty_samples": min(samples, profile.uncertainty_samples), "contact_points": 1}
         if not profile.differences(profile.replace(**changes)):
-            return profile
-        return profile.replace(name=f"{profile.name}, reduced to {changes['uncertainty_samples']} samples", **changes)
+            return faster
+        return faster.replace(name=f"{name}, reduced to {changes['uncertainty_samples']} samples", **changes)

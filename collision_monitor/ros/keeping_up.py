@@ -1,4 +1,4 @@
-"""What the node does when steps take longer than the period of the states: newest states, less effort, warnings."""
+"""What the node does when steps take longer than the period of the states: newest states, more threads, less effort."""
 
 from __future__ import annotations
 
@@ -38,6 +38,7 @@ class KeepingUp:
         self._backlog = Backlog(partial(take_waiting, states), states.qos_profile.depth)
         self._effort = Effort()
         self._last_look = monotonic_ns()
+        self._outdated = 0  # at that time
 
     @property
     def outdated(self) -> int:
@@ -46,8 +47,8 @@ class KeepingUp:
 
     @property
     def is_reduced(self) -> bool:
-        """Whether the profile in force has less effort than the chosen one."""
-        return self._in_force != self._profile
+        """Whether the profile in force answers less than the chosen one."""
+        return bool(self._profile.differences(self._in_force).keys() - {"name", "threads"})
 
     @property
     def mean_step(self) -> int:
@@ -89,7 +90,8 @@ class KeepingUp:
         if latency > LATE * horizon:
             text = f"the answers are {latency:.2f} s behind the stamps of the states, with a horizon of {horizon:g} s"
             self._log.note(self._topic, "late", text, 1, now)
-        if not (self._enabled and self._effort.look(self._times.load(now))):
+        is_behind, self._outdated = self.outdated > self._outdated, self.outdated
+        if not (self._enabled and self._effort.look(self._times.load(now), self._backlog.mean, is_behind=is_behind)):
             return None
         before = self._in_force
         if self.reduced(self._profile) == before:

@@ -45,6 +45,9 @@ if TYPE_CHECKING:
 WATCHDOG_PERIOD: Final = 0.5
 """s: without steps the status is still published at least this often, so that silence never means "clear"."""
 
+LATE_WATCHDOG: Final = 1_000_000_000
+"""ns after which a step calls the watchdog: rclpy's events executor runs no timer while messages wait."""
+
 MARKER_PERIOD: Final = 100_000_000
 """ns between two pictures. Without a subscriber there are none."""
 
@@ -78,7 +81,7 @@ class Monitoring:
         self._times = StepTimes(profile.max_time_step)
         self._peaks = StepPeaks()
         self._markers = MarkerView(self._pipeline.catalogue, settings.frame_id)
-        self._last_status = self._last_markers = self._last_log = time.monotonic_ns()
+        self._last_status = self._last_markers = self._last_log = self._last_watchdog = time.monotonic_ns()
         self._last_step: int | None = None  # when the monitor's time last changed
         self._last_stamp: int | None = None
         self._was_silent = False
@@ -178,6 +181,8 @@ class Monitoring:
         self._publish_status_if_due(ended)
         self._publish_markers_if_due(data, outputs, ended)
         self._recording.write_snapshot_if_due(self._pipeline.snapshot)
+        if ended - self._last_watchdog >= LATE_WATCHDOG:
+            self._on_watchdog()
 
     def _answer(self, states: bytes, received: int) -> Outputs | None:
         """Take one step and publish its answers, all within the step's budget."""
@@ -290,6 +295,7 @@ class Monitoring:
     # -- status
 
     def _on_watchdog(self) -> None:
+        self._last_watchdog = time.monotonic_ns()
         for each in (self._contacts_out, self._predictions_out, self._status_out):
             each.assert_liveliness()
         self._recording.log_problems()
