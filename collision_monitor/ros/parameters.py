@@ -121,8 +121,8 @@ def read_monitor_parameters(node: Node) -> MonitorParameters:
     if executor not in EXECUTORS:
         raise ProfileError(f"parameter executor: expected {' or '.join(EXECUTORS)}, got {executor!r}")
     text = (
-        "Whether to leave out outdated states and to use fewer samples while steps take longer than the period of the "
-        "states."
+        "Whether to leave out outdated states, and to use more threads and fewer samples, while steps take longer than "
+        "the period of the states."
     )
     keep_up = reader.read("keep_up", True, text)
     text = "Whether the node configures and activates itself. If not, a lifecycle manager or ros2 lifecycle does it."
