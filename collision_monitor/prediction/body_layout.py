@@ -8,7 +8,6 @@ from math import sqrt
 import numpy as np
 
 from collision_monitor._jit import inlined, kernel
-from collision_monitor._jit.direct import direct
 from collision_monitor.geometry.shape_table import BOX, CAPSULE, CIRCLE, CONE, CYLINDER, SPHERE
 from collision_monitor.prediction.bodies import Multibody
 
@@ -18,7 +17,6 @@ def lay_out_body(multibody: Multibody, i: int, slots: Sequence[int], shape_of: S
     _lay_out(multibody, i, np.array(slots), np.array(shape_of))
 
 
-@direct
 @kernel
 def _lay_out(multibody, i, slots, shape_of):
     table, parts, bodies = multibody
@@ -63,7 +61,6 @@ def _is_revolved(table, s):
     return _is_ball(kind) or (along and (kind == CAPSULE or kind == CYLINDER or kind == CONE))
 
 
-@direct
 @kernel
 def note_plain(multibody, which):
     """Note which of the bodies `which` (M,) are plain: one ball or one box without margin, and the object itself.
