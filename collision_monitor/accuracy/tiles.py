@@ -32,7 +32,7 @@ TILES: Final = 16
 SHORTEST: Final = 25
 """Fewest steps of a tile. Its first step initialises everything and does not count."""
 MOST_TRUTHS: Final = 4
-"""Tiles of which a process keeps the exact answers: those that the first generations of profiles share."""
+"""A process keeps the exact answers to this many tiles, because the first generations of profiles share their tiles."""
 POLL: Final = 0.2
 """Time between two looks at the progress of the processes (s)."""
 

@@ -55,12 +55,8 @@ class FirstImpacts(Stage):
             events, queries = find(step, pairs, self.scratch)
             step.work.impact_queries += queries
             return events
-
-        def part(pairs: Pairs, scratch: Scratch) -> tuple[Events, int]:
-            return find(step, pairs, scratch)
-
         # the parts are joined in order, so any number of threads gives the same answer
-        parts = share(self.pool, part, pairs, self._scratch)
+        parts = share(self.pool, partial(find, step), pairs, self._scratch)
         step.work.impact_queries += sum(queries for _, queries in parts)
         return joined([events for events, _ in parts])
 

@@ -19,8 +19,8 @@ LITTLE: Final = 0.2
 PATIENCE: Final = 10
 """Looks in a row with little load until the effort grows by one level."""
 
-LEVELS: Final = 3
-"""More threads; then the samples are divided by 4, and by 16."""
+LEVELS: Final = 2
+"""The samples are divided by 4 and by 16, after a level with more threads where there are cores."""
 
 LONG: Final = 0.5
 """Mean duration of a step (s) above which more threads are not enough: the first two levels come at once."""
@@ -36,7 +36,7 @@ FEWEST_SAMPLES: Final = 64
 
 
 class Effort:
-    """The level of what is done to keep up: 0 for the profile as it was chosen, at most LEVELS.
+    """The level of what is done to keep up: 0 for the profile as it was chosen, at most LEVELS, or one more with cores.
 
     cores: number of cores that this process may use; None: ask the system.
     """
@@ -44,6 +44,7 @@ class Effort:
     def __init__(self, cores: int | None = None) -> None:
         self.level = 0
         self._threads = min(cores or len(os.sched_getaffinity(0)), MOST_THREADS)
+        self._most = LEVELS + (self._threads > 1)
         self._quiet = 0  # looks in a row with little load
 
     def look(self, load: float, step: float = 0.0, *, is_behind: bool = False) -> bool:
@@ -54,7 +55,7 @@ class Effort:
         level = self.level
         self._quiet = self._quiet + 1 if load < LITTLE else 0
         if load > (BEHIND if is_behind else TOO_MUCH):
-            self.level = min(level + (2 if level == 0 and step > LONG else 1), LEVELS)
+            self.level = min(level + (2 if level == 0 and step > LONG else 1), self._most)
         elif self._quiet >= PATIENCE:
             self.level, self._quiet = max(level - 1, 0), 0
         return self.level != level
@@ -63,14 +64,13 @@ class Effort:
         """Return the profile of this level. Its name says what differs, and each status repeats the name."""
         if not self.level:
             return profile
-        threads = max(profile.threads, self._threads)
-        name = profile.name[: MOST_NAME - LONGEST_WORDS]
-        name = name if threads == profile.threads else f"{name}, on {threads} threads"
-        divided = self.level - (threads > profile.threads)  # with no core to spare, the first level divides as well
-        faster = profile.replace(name=name, threads=threads)
-        if not divided:
+        name, faster, divisions = profile.name[: MOST_NAME - LONGEST_WORDS], profile, self.level
+        if self._threads > profile.threads:
+            name = f"{name}, on {self._threads} threads"
+            faster, divisions = profile.replace(name=name, threads=self._threads), self.level - 1
+        if not divisions:
             return faster
-        samples = max(profile.uncertainty_samples >> 2 * min(divided, LEVELS - 1), FEWEST_SAMPLES)
+        samples = max(profile.uncertainty_samples >> 2 * min(divisions, LEVELS), FEWEST_SAMPLES)
         changes = {"uncertainty_samples": min(samples, profile.uncertainty_samples), "contact_points": 1}
         if not profile.differences(profile.replace(**changes)):
             return faster
