@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import collision_monitor as cm
-from collision_monitor.geometry.pose import from_rotation_vector, multiply
 from collision_monitor.records import STATE
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import from_rotation_vector, multiply
 
 Array = NDArray[np.float64]
 Shape = cm.Sphere | cm.Box | cm.Capsule | cm.Cylinder | cm.Cone | cm.ConvexHull | cm.Ellipsoid

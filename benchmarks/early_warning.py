@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 import collision_monitor as cm
-from collision_monitor.geometry.pose import rotation_matrix
-from collision_monitor.geometry.shape_table import ShapeTableBuilder
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import rotation_matrix
+from collision_monitor.shapes.shape_table import ShapeTableBuilder
 from collision_monitor.world.trajectory import FRAME_RATE, Trajectory
 
 Array = NDArray[np.float64]

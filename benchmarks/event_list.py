@@ -27,8 +27,8 @@ from rich.table import Table
 
 from collision_monitor import Box, Monitor, Sphere, records
 from collision_monitor.accuracy.reference_monitor import ReferenceMonitor, disagreements
-from collision_monitor.geometry.pose import from_rotation_vector, multiply
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import from_rotation_vector, multiply
 
 RATE = 100.0
 MOVES = ("steady", "turns", "noise", "jumps", "slow", "rest")

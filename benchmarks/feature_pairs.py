@@ -19,7 +19,7 @@ from scipy.spatial import ConvexHull as Qhull
 
 import collision_monitor as cm
 from collision_monitor.geometry.contact_features import FeaturePair
-from collision_monitor.geometry.pose import rotation_matrix
+from collision_monitor.shapes.pose import rotation_matrix
 from collision_monitor.world import make_scene
 
 Array = NDArray[np.float64]

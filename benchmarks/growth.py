@@ -29,12 +29,12 @@ from collision_monitor import codec, records
 from collision_monitor.cli.child import Child, ProcessError
 from collision_monitor.codec import Removal
 from collision_monitor.errors import CollisionMonitorError, Refusal
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import ConvexHull, Sphere
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.ros.domain import free_domain
 from collision_monitor.ros.process import ros_context, stay_on_this_machine
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import ConvexHull, Sphere
 
 LONGEST: Final = 30.0
 """s that one attack may take; then the rest of its messages is left out."""

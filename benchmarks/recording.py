@@ -31,11 +31,11 @@ import numpy as np
 
 from collision_monitor import records
 from collision_monitor.codec import encode_descriptions, encode_states
-from collision_monitor.geometry.shapes import Box
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorder, Session
 from collision_monitor.session.replaying.replay import replay
+from collision_monitor.shapes.shapes import Box
 
 NODE = "/object_monitor"
 TYPES = {

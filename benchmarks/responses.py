@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.cli.progress import progress_bar
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.report.footprint import footprint
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, Sphere
 from collision_monitor.world import make_scene
 from collision_monitor.world.impulse_response import ImpulseResponse
 from collision_monitor.world.penalty_response import PenaltyResponse

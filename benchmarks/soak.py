@@ -30,8 +30,6 @@ from rich.progress import BarColumn, Progress, TimeRemainingColumn
 
 from collision_monitor.accuracy.reference_monitor import ReferenceMonitor, disagreements
 from collision_monitor.codec import Removal, decode_status, encode_descriptions, encode_states
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Mesh, Shape, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.snapshot import Snapshot
@@ -40,6 +38,8 @@ from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.settings_event import encode_settings
 from collision_monitor.records import STATE, Phase
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Mesh, Shape, Sphere
 from collision_monitor.warm_up import warm_up_monitor
 
 RATE: Final = 10

@@ -29,11 +29,11 @@ from collision_monitor.accuracy.inputs import Workload, simulated
 from collision_monitor.accuracy.playback import Step
 from collision_monitor.accuracy.profile_tradeoff import exact_answers
 from collision_monitor.accuracy.reported import Reported
-from collision_monitor.geometry.pose import Pose, from_rotation_vector, multiply, rotation_matrix
-from collision_monitor.geometry.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from collision_monitor.objects.models import containing_model
 from collision_monitor.records import PredictionStatus
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply, rotation_matrix
+from collision_monitor.shapes.shapes import Box, Capsule, Cylinder, Shape, Sphere
 
 NOISE = 0.005
 MOST_PAIRS = 2_000

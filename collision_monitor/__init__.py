@@ -40,21 +40,21 @@ _HOME = {
     "Profile": "settings.profile",
     "ObjectDescription": "objects.description",
     "Model": "records",
-    "Pose": "geometry.pose",
-    "Motion": "geometry.pose",
-    "Sphere": "geometry.shapes",
-    "Box": "geometry.shapes",
-    "Capsule": "geometry.shapes",
-    "Cylinder": "geometry.shapes",
-    "Cone": "geometry.shapes",
-    "Ellipsoid": "geometry.shapes",
-    "ConvexHull": "geometry.shapes",
-    "Mesh": "geometry.shapes",
-    "Points": "geometry.shapes",
-    "HalfSpace": "geometry.shapes",
-    "Circle": "geometry.shapes",
-    "Polygon": "geometry.shapes",
-    "load_mesh": "geometry.mesh_file",
+    "Pose": "shapes.pose",
+    "Motion": "shapes.pose",
+    "Sphere": "shapes.shapes",
+    "Box": "shapes.shapes",
+    "Capsule": "shapes.shapes",
+    "Cylinder": "shapes.shapes",
+    "Cone": "shapes.shapes",
+    "Ellipsoid": "shapes.shapes",
+    "ConvexHull": "shapes.shapes",
+    "Mesh": "shapes.shapes",
+    "Points": "shapes.shapes",
+    "HalfSpace": "shapes.shapes",
+    "Circle": "shapes.shapes",
+    "Polygon": "shapes.shapes",
+    "load_mesh": "shapes.mesh_file",
     "contact": "query.contact",
     "Contact": "query.contact",
     "contact_features": "query.features",
@@ -106,21 +106,6 @@ if TYPE_CHECKING:
     from collision_monitor.errors import SessionError as SessionError
     from collision_monitor.errors import ShapeError as ShapeError
     from collision_monitor.errors import UnsupportedError as UnsupportedError
-    from collision_monitor.geometry.mesh_file import load_mesh as load_mesh
-    from collision_monitor.geometry.pose import Motion as Motion
-    from collision_monitor.geometry.pose import Pose as Pose
-    from collision_monitor.geometry.shapes import Box as Box
-    from collision_monitor.geometry.shapes import Capsule as Capsule
-    from collision_monitor.geometry.shapes import Circle as Circle
-    from collision_monitor.geometry.shapes import Cone as Cone
-    from collision_monitor.geometry.shapes import ConvexHull as ConvexHull
-    from collision_monitor.geometry.shapes import Cylinder as Cylinder
-    from collision_monitor.geometry.shapes import Ellipsoid as Ellipsoid
-    from collision_monitor.geometry.shapes import HalfSpace as HalfSpace
-    from collision_monitor.geometry.shapes import Mesh as Mesh
-    from collision_monitor.geometry.shapes import Points as Points
-    from collision_monitor.geometry.shapes import Polygon as Polygon
-    from collision_monitor.geometry.shapes import Sphere as Sphere
     from collision_monitor.monitor.monitor import Monitor as Monitor
     from collision_monitor.monitor.result import StepResult as StepResult
     from collision_monitor.monitor.result import StepStatus as StepStatus
@@ -151,6 +136,21 @@ if TYPE_CHECKING:
     from collision_monitor.query.times_of_impact import times_of_impact as times_of_impact
     from collision_monitor.records import Model as Model
     from collision_monitor.settings.profile import Profile as Profile
+    from collision_monitor.shapes.mesh_file import load_mesh as load_mesh
+    from collision_monitor.shapes.pose import Motion as Motion
+    from collision_monitor.shapes.pose import Pose as Pose
+    from collision_monitor.shapes.shapes import Box as Box
+    from collision_monitor.shapes.shapes import Capsule as Capsule
+    from collision_monitor.shapes.shapes import Circle as Circle
+    from collision_monitor.shapes.shapes import Cone as Cone
+    from collision_monitor.shapes.shapes import ConvexHull as ConvexHull
+    from collision_monitor.shapes.shapes import Cylinder as Cylinder
+    from collision_monitor.shapes.shapes import Ellipsoid as Ellipsoid
+    from collision_monitor.shapes.shapes import HalfSpace as HalfSpace
+    from collision_monitor.shapes.shapes import Mesh as Mesh
+    from collision_monitor.shapes.shapes import Points as Points
+    from collision_monitor.shapes.shapes import Polygon as Polygon
+    from collision_monitor.shapes.shapes import Sphere as Sphere
 
 
 def __getattr__(name: str) -> Any:

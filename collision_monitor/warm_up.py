@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from collision_monitor.alerts.alerts import Alerts
 from collision_monitor.alerts.rules import Rules
 from collision_monitor.geometry.point_tree import PointTree
-from collision_monitor.geometry.pose import Motion, Pose
-from collision_monitor.geometry.shapes import Box, ConvexHull, Cylinder, Mesh, Points, Shape, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.time_critical import TimeCritical
 from collision_monitor.objects.models import containing_model
 from collision_monitor.records import MOST_POINTS, STATE, Model
 from collision_monitor.settings.profile import NO_BUDGET, NO_LIMIT, Profile
+from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.shapes.shapes import Box, ConvexHull, Cylinder, Mesh, Points, Shape, Sphere
 
 Array = NDArray[np.float64]
 

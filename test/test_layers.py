@@ -18,6 +18,8 @@ PACKAGE = Path(__file__).parents[1] / NAME
 FLOORS: Final = (
     {"_jit", "errors", "tolerances", "records", "_version"},
     {"settings", "geometry"},
+    {"shapes"},
+    {"geometry.lecture"},
     {"broad_phase", "narrow_phase", "response"},
     {"meshes"},
     {"objects", "prediction", "robots"},
@@ -54,7 +56,7 @@ for name in sys.argv[1:]:
 
 
 def _dotted(path: Path) -> str:
-    """Dotted name such as `collision_monitor.geometry.pose`; a folder's `__init__` has the folder's name."""
+    """Dotted name such as `collision_monitor.shapes.pose`; a folder's `__init__` has the folder's name."""
     return ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
 
 
@@ -62,12 +64,16 @@ FILES: Final = {_dotted(path): path for path in sorted(PACKAGE.rglob("*.py"))}
 
 
 def top(module: str) -> str:
-    """Folder or file directly below the package that contains a module."""
-    return module.split(".")[1] if module != NAME else "__init__"
+    """Folder or file directly below the package that contains a module, or its inner room if that has its own floor."""
+    if module == NAME:
+        return "__init__"
+    folder, _, inner = module.removeprefix(f"{NAME}.").partition(".")
+    room = f"{folder}.{inner.split('.')[0]}"
+    return room if floor(room) is not None else folder
 
 
 def floor(name: str) -> int | None:
-    """Floor of a folder or file directly below the package, or None if FLOORS does not list it."""
+    """Floor of a folder, an inner room or a file, or None if FLOORS does not list it."""
     return next((height for height, names in enumerate(FLOORS) if name in names), None)
 
 

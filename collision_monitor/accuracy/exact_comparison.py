@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.accuracy import exact
-from collision_monitor.geometry.pose import Motion, Pose
-from collision_monitor.geometry.shapes import Box, Capsule, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.query.contact import contact
 from collision_monitor.query.time_of_impact import time_of_impact
+from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.shapes.shapes import Box, Capsule, Sphere
 
 Rng = np.random.Generator
 Floats = NDArray[np.float64]

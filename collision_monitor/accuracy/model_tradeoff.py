@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from collision_monitor.accuracy.measurement import Errors, Measurement
 from collision_monitor.accuracy.playback import Played, Step, contacts_by_pair, play
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import containing_model, parse_model
 from collision_monitor.query.contact import contact
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box
 
 NEAR: Final = 0.3
 """Largest distance of the pairs that are compared (m)."""

@@ -10,9 +10,9 @@ import numpy as np
 from collision_monitor.codec.cdr import Buffer, Floats, Ids, Reader, Writer, write_header
 from collision_monitor.codec.shape_fields import LEAST_SHAPE, make_shape, read_shape, write_shape
 from collision_monitor.errors import InputError, ShapeError, reason_of
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Sphere
 from collision_monitor.objects.description import MOST_SHAPES, ObjectDescription
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Sphere
 
 _ADD, _REMOVE = 0, 1
 _IDENTITY = Pose()

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from collision_monitor.codec.cdr import Floats, Ids, Reader, Writer
 from collision_monitor.errors import MessageError, ShapeError
-from collision_monitor.geometry.shapes import (
+from collision_monitor.records import ShapeType
+from collision_monitor.shapes.shapes import (
     Box,
     Capsule,
     Circle,
@@ -24,7 +25,6 @@ from collision_monitor.geometry.shapes import (
     Shape,
     Sphere,
 )
-from collision_monitor.records import ShapeType
 
 _POINT = ("<f8", 3)
 LEAST_SHAPE = 13
@@ -125,5 +125,5 @@ def _shape_fields(shape: Shape) -> tuple[ShapeType, tuple[float, ...], Floats, N
             level = np.column_stack([points, np.zeros(len(points))])
             return ShapeType.POLYGON, (radius,) if radius else (), level, no_triangles
     raise MessageError(
-        f"Shape: expected one of the shapes of collision_monitor.geometry.shapes, got {type(shape).__name__}"
+        f"Shape: expected one of the shapes of collision_monitor.shapes.shapes, got {type(shape).__name__}"
     )

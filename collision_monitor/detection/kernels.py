@@ -30,7 +30,6 @@ from collision_monitor.broad_phase.dense_grid import (
     searches,
     sort_by_cell,
 )
-from collision_monitor.geometry.shape_table import ShapeTable
 from collision_monitor.narrow_phase.box_box import axis_direction, sat, touching_features
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,
@@ -45,6 +44,7 @@ from collision_monitor.narrow_phase.dispatch import contact_within
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact
 from collision_monitor.narrow_phase.work_memory import WORK_SIZE
+from collision_monitor.shapes.shape_table import ShapeTable
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 
 SPHERES, BOXES, ANY = 0, 1, 2

@@ -14,9 +14,9 @@ from collision_monitor.broad_phase.boxes import in_order
 from collision_monitor.broad_phase.partitions import PARTITIONS
 from collision_monitor.detection.kernels import DETECTED
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.pose import rotation_matrix
 from collision_monitor.narrow_phase.contact_row import as_contacts
 from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.shapes.pose import rotation_matrix
 
 Array = NDArray[np.float64]
 

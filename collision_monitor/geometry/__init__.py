@@ -1,1 +1,1 @@
-"""Shapes, poses, bounding volumes and feature tests: pure functions on arrays."""
+"""Points, lines, polygons, polyhedra and bounding volumes: pure functions on arrays, which know no shapes."""

@@ -21,7 +21,7 @@ from collision_monitor.geometry.coordinates import Array, Booleans, Indices, tri
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.point_triangle import closest_point_on_triangle
 from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
-from collision_monitor.geometry.pose import Pose
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.tolerances import EPSILON, ROUNDED_UP
 
 DEEPEST: Final = 8

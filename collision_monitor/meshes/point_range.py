@@ -10,9 +10,9 @@ from math import inf, sqrt
 from typing import Any
 
 from collision_monitor._jit import device
-from collision_monitor.geometry.shape_table import CONE, ELLIPSOID
 from collision_monitor.meshes.point_solid import point_distance
 from collision_monitor.narrow_phase.vector import Vector, dot
+from collision_monitor.shapes.shape_table import CONE, ELLIPSOID
 
 
 @device

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.bounding_volumes import convex_hull
-from collision_monitor.geometry.convex_pieces import is_concave_mesh
-from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Mesh, Points, Shape, Sphere, Triangle
 from collision_monitor.meshes.cloud_tree import cloud_tree
 from collision_monitor.meshes.contact import reach_of
 from collision_monitor.meshes.tree import tree_of
+from collision_monitor.shapes.convex_pieces import is_concave_mesh
+from collision_monitor.shapes.shapes import Box, Capsule, ConvexHull, Mesh, Points, Shape, Sphere, Triangle
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,6 @@ from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor._jit.vectors import LANES
-from collision_monitor.geometry.shape_table import CONE, CONVEX_HULL, HALF_SPACE, SPHERE
 from collision_monitor.meshes.approach import Approach, time_until
 from collision_monitor.meshes.boxes import half_of
 from collision_monitor.meshes.contact import reach_in
@@ -50,6 +49,7 @@ from collision_monitor.narrow_phase.vector import (
     rotate_back,
     sum_of_sizes,
 )
+from collision_monitor.shapes.shape_table import CONE, CONVEX_HULL, HALF_SPACE, SPHERE
 from collision_monitor.tolerances import SAT_ROUND_OFF
 
 MOST_EXAMINED: Final = 5_000

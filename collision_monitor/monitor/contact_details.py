@@ -9,18 +9,6 @@ from math import inf, sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.shape_table import (
-    BOX,
-    CONE,
-    CONVEX_HULL,
-    CYLINDER,
-    HALF_SPACE,
-    MESH,
-    POINTS,
-    POLYGON,
-    SPHERE,
-    TREE,
-)
 from collision_monitor.meshes.extent import farthest
 from collision_monitor.meshes.feature import (
     ROUND_TIE,
@@ -65,6 +53,18 @@ from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUCHING, relative_now
 from collision_monitor.prediction.mesh_pair import has_mesh
 from collision_monitor.prediction.motion import age_of, position_now, rotation_now
+from collision_monitor.shapes.shape_table import (
+    BOX,
+    CONE,
+    CONVEX_HULL,
+    CYLINDER,
+    HALF_SPACE,
+    MESH,
+    POINTS,
+    POLYGON,
+    SPHERE,
+    TREE,
+)
 from collision_monitor.tolerances import FEATURE_TIE, SAT_ROUND_OFF
 
 LIFT: Final = 1e-3

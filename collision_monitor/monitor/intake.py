@@ -12,7 +12,6 @@ from collision_monitor import records
 from collision_monitor._jit import device, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor.errors import InputError, Refusal
-from collision_monitor.geometry.planar import flat_states
 from collision_monitor.monitor.result import Refused
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
@@ -21,6 +20,7 @@ from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.prediction.spread import worst_stddevs
 from collision_monitor.records import StateFlag
 from collision_monitor.settings.by_name import classes_of
+from collision_monitor.shapes.planar import flat_states
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 
 ACCEPTED: Final = 0

@@ -15,9 +15,6 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shape_table import CONVEX_HULL
-from collision_monitor.geometry.shapes import ConvexHull, Mesh
 from collision_monitor.meshes.feature import IN_FACE, feature_in_triangle, off_triangle, tie_of
 from collision_monitor.meshes.triangle_pair import Triangle
 from collision_monitor.monitor.contact_details import core_point, origin_now
@@ -40,6 +37,9 @@ from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J
 from collision_monitor.prediction.motion import rotation_now
 from collision_monitor.records import Model
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shape_table import CONVEX_HULL
+from collision_monitor.shapes.shapes import ConvexHull, Mesh
 from collision_monitor.tolerances import LARGEST_INPUT
 
 Array = NDArray[np.float64]

@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import InputError, Refusal, RefusalWarning
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Shape
 from collision_monitor.monitor.active_pairs import ActivePairs
 from collision_monitor.monitor.answers import Answers, mark_overtaken, step_status
 from collision_monitor.monitor.budget import PairBudget, StepClock
@@ -34,6 +32,8 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled, monitored_model, parse_model, shape_class
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Shape
 
 FACTS = "monitor"
 """Key of the monitor's entry in Snapshot.facts."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Any
 
 from collision_monitor._jit import inlined
-from collision_monitor.geometry.shape_table import SPHERE
 from collision_monitor.narrow_phase.box_box import axis_direction, sat, touching_features
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A
 from collision_monitor.narrow_phase.core import half_extents
@@ -30,6 +29,7 @@ from collision_monitor.prediction.body_contact import (
 )
 from collision_monitor.prediction.body_impact import CLOSING
 from collision_monitor.prediction.motion import rotation_now
+from collision_monitor.shapes.shape_table import SPHERE
 from collision_monitor.tolerances import FACE_PREFERENCE, SAT_ROUND_OFF
 
 

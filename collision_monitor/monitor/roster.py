@@ -14,9 +14,6 @@ from collision_monitor._jit import kernel
 from collision_monitor._jit.direct import forget
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, UnsupportedError
-from collision_monitor.geometry.planar import flat_pose, is_planar
-from collision_monitor.geometry.shape_table import POLYGON, SHARED, TREE, ShapeTable, ShapeTableBuilder
-from collision_monitor.geometry.shapes import HalfSpace, Mesh, Points, array_bytes
 from collision_monitor.meshes.shape_trees import shape_tree
 from collision_monitor.meshes.slot_trees import plant_trees
 from collision_monitor.monitor.mesh_faces import MeshFaces, faces_of
@@ -29,6 +26,9 @@ from collision_monitor.prediction.body_layout import lay_out_body, note_plain
 from collision_monitor.prediction.impact_record import pair_keys
 from collision_monitor.records import Model, ShapeType
 from collision_monitor.settings.by_name import Classes, value_of
+from collision_monitor.shapes.planar import flat_pose, is_planar
+from collision_monitor.shapes.shape_table import POLYGON, SHARED, TREE, ShapeTable, ShapeTableBuilder
+from collision_monitor.shapes.shapes import HalfSpace, Mesh, Points, array_bytes
 
 FIRST_CAPACITY = 64
 """Initial number of body slots; it is doubled when all are used."""

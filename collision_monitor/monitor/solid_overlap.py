@@ -10,7 +10,6 @@ from math import inf
 from typing import Any
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.shape_table import HALF_SPACE
 from collision_monitor.meshes.solid import SolidMemory
 from collision_monitor.meshes.solid_range import solid_range
 from collision_monitor.monitor.carried_triangles import (
@@ -39,6 +38,7 @@ from collision_monitor.prediction.body_contact import (
 )
 from collision_monitor.prediction.body_impact import CLOSING
 from collision_monitor.prediction.mesh_pair import has_mesh, have_trees, is_mesh, root_of
+from collision_monitor.shapes.shape_table import HALF_SPACE
 
 
 @inlined

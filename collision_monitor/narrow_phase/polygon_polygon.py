@@ -10,9 +10,9 @@ from math import inf, sqrt
 from typing import Any
 
 from collision_monitor._jit import device
-from collision_monitor.geometry.shape_table import CIRCLE
 from collision_monitor.narrow_phase.contact_row import write
 from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
+from collision_monitor.shapes.shape_table import CIRCLE
 from collision_monitor.tolerances import FEATURE_TIE, SAT_ROUND_OFF
 
 

@@ -6,7 +6,7 @@ from math import inf, sqrt
 from typing import Any
 
 from collision_monitor._jit import inlined
-from collision_monitor.geometry.shape_table import (
+from collision_monitor.shapes.shape_table import (
     BOX,
     CAPSULE,
     CIRCLE,

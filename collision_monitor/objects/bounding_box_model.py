@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import UnsupportedError
-from collision_monitor.geometry.planar import flat_pose, is_planar
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.reach import reach
-from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, Points, Polygon, Shape
 from collision_monitor.objects.models import Modelled
 from collision_monitor.records import Model
+from collision_monitor.shapes.planar import flat_pose, is_planar
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.reach import reach
+from collision_monitor.shapes.shapes import Box, ConvexHull, HalfSpace, Mesh, Points, Polygon, Shape
 from collision_monitor.tolerances import ROUNDED_UP
 
 Array = NDArray[np.float64]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.shapes import Mesh
 from collision_monitor.geometry.surface import first_equal
+from collision_monitor.shapes.shapes import Mesh
 
 
 def separated(mesh: Mesh) -> tuple[Mesh, ...]:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from collision_monitor.errors import InputError, ShapeError
-from collision_monitor.geometry.compound import shape_pairs
-from collision_monitor.geometry.pose import Pose
 from collision_monitor.records import Model
+from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.tolerances import LARGEST_INPUT
 
 ALL_GROUPS = 0xFFFFFFFF
@@ -78,7 +78,7 @@ class ObjectDescription:
     the message may omit get their defaults here: an empty name, a group or mask of 0, an acceleration of NaN.
     Raises InputError; ShapeError for the shapes.
 
-    >>> from collision_monitor.geometry.shapes import Sphere
+    >>> from collision_monitor.shapes.shapes import Sphere
     >>> ObjectDescription(7, Sphere(0.5), name="ball").name
     'ball'
     """

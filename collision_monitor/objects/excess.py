@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from collision_monitor.geometry.inside import locate_in_surface
 from collision_monitor.geometry.point_in_polygon import Location
-from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.qhull import Hull
-from collision_monitor.geometry.reach import reach
-from collision_monitor.geometry.shape_table import ShapeTableBuilder, take
-from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Shape, Sphere, Triangle
 from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.reach import reach
+from collision_monitor.shapes.shape_table import ShapeTableBuilder, take
+from collision_monitor.shapes.shapes import Box, ConvexHull, Mesh, Shape, Sphere, Triangle
 
 Array = NDArray[np.float64]
 PosedShapes = list[tuple[Shape, Pose]]

@@ -14,14 +14,18 @@ from numpy.typing import ArrayLike, NDArray
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.geometry.bounding_spheres import minimal_sphere
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
-from collision_monitor.geometry.convex_pieces import convex_pieces, is_concave_mesh
 from collision_monitor.geometry.coordinates import coordinates
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
-from collision_monitor.geometry.planar import is_planar
-from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.qhull import Hull
-from collision_monitor.geometry.reach import reach
-from collision_monitor.geometry.shapes import (
+from collision_monitor.objects.closed_parts import separated
+from collision_monitor.objects.convex_decomposition import convex_decomposition
+from collision_monitor.objects.excess import MANY_FACES, PosedShapes, corners, excess_of, excess_of_large
+from collision_monitor.records import Model
+from collision_monitor.shapes.convex_pieces import convex_pieces, is_concave_mesh
+from collision_monitor.shapes.planar import is_planar
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.reach import reach
+from collision_monitor.shapes.shapes import (
     Box,
     Capsule,
     Cone,
@@ -35,10 +39,6 @@ from collision_monitor.geometry.shapes import (
     Sphere,
     Triangle,
 )
-from collision_monitor.objects.closed_parts import separated
-from collision_monitor.objects.convex_decomposition import convex_decomposition
-from collision_monitor.objects.excess import MANY_FACES, PosedShapes, corners, excess_of, excess_of_large
-from collision_monitor.records import Model
 from collision_monitor.tolerances import ROUNDED_UP
 
 Array = NDArray[np.float64]

@@ -12,12 +12,12 @@ from math import inf
 from typing import Final
 
 from collision_monitor.errors import ShapeError
-from collision_monitor.geometry.convex_pieces import is_convex_mesh
 from collision_monitor.geometry.orientation import exact_limit
 from collision_monitor.geometry.polygons import is_convex
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import ConvexHull, HalfSpace, Mesh, Points, Polygon, Shape
 from collision_monitor.records import Model
+from collision_monitor.shapes.convex_pieces import is_convex_mesh
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import ConvexHull, HalfSpace, Mesh, Points, Polygon, Shape
 
 MESSAGE_MS: Final = 80.0
 """Estimated time (ms) for which the objects of one message may hold the thread that answers states. Larger: answers

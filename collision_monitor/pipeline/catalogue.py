@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.codec import Change, ObjectDescriptionArray, Removal
-from collision_monitor.geometry.planar import is_planar
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.shapes.planar import is_planar
 
 
 class Catalogue:

@@ -13,10 +13,10 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from collision_monitor.geometry import shapes
-from collision_monitor.geometry.pose import Array, Pose
 from collision_monitor.objects.models import Modelled
 from collision_monitor.records import Model
+from collision_monitor.shapes import shapes
+from collision_monitor.shapes.pose import Array, Pose
 
 _REASON: Final = "reason"
 _KINDS: Final = {kind.__name__: kind for kind in shapes.Shape.__subclasses__()}

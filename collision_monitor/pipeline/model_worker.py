@@ -75,11 +75,11 @@ def _make(data: bytes, number: int) -> bytes:
     from collision_monitor.codec import decode_descriptions
     from collision_monitor.errors import reason_of
     from collision_monitor.geometry.qhull import hull_vertices
-    from collision_monitor.geometry.shapes import ConvexHull
     from collision_monitor.objects.description import ObjectDescription
     from collision_monitor.objects.models import monitored_model
     from collision_monitor.pipeline.model_message import encode_model
     from collision_monitor.records import Model
+    from collision_monitor.shapes.shapes import ConvexHull
 
     try:
         (description,) = decode_descriptions(data).objects

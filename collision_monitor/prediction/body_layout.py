@@ -8,8 +8,8 @@ from math import sqrt
 import numpy as np
 
 from collision_monitor._jit import inlined, kernel
-from collision_monitor.geometry.shape_table import BOX, CAPSULE, CIRCLE, CONE, CYLINDER, SPHERE
 from collision_monitor.prediction.bodies import Multibody
+from collision_monitor.shapes.shape_table import BOX, CAPSULE, CIRCLE, CONE, CYLINDER, SPHERE
 
 
 def lay_out_body(multibody: Multibody, i: int, slots: Sequence[int], shape_of: Sequence[int]) -> None:

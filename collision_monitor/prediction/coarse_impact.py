@@ -16,7 +16,6 @@ import numpy as np
 from collision_monitor._jit import device, inlined, kernel, outlined
 from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
-from collision_monitor.geometry.shape_table import HALF_SPACE
 from collision_monitor.meshes.inside import OUTSIDE
 from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.vector import dot
@@ -35,6 +34,7 @@ from collision_monitor.prediction.mesh_pair import enclosure, has_mesh, have_tre
 from collision_monitor.prediction.motion import half_acceleration, relative_position, relative_velocity
 from collision_monitor.prediction.pair_impacts import PREFETCH_AHEAD, window_of
 from collision_monitor.prediction.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
+from collision_monitor.shapes.shape_table import HALF_SPACE
 
 TRIES: Final = (1.5, 4.0)
 """Times after the lower end at which triangles may meet: those in which the bodies move by so many gaps."""

@@ -16,9 +16,9 @@ from numpy import float32
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.shape_table import BOX, CAPSULE, CIRCLE, CYLINDER, SPHERE
 from collision_monitor.narrow_phase.vector import cross
 from collision_monitor.prediction.normal_samples import FURTHEST
+from collision_monitor.shapes.shape_table import BOX, CAPSULE, CIRCLE, CYLINDER, SPHERE
 
 STEEP: Final = 0.8
 """Length of the part of the normal across a cylinder's axis above which its rim counts as linear."""

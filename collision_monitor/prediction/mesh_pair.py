@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import inf, sqrt
 
 from collision_monitor._jit import device, inlined, outlined
-from collision_monitor.geometry.shape_table import CONVEX_HULL, HALF_SPACE, MESH, POINTS, TREE
 from collision_monitor.meshes.contact import FARTHER, OPEN, tree_contact
 from collision_monitor.meshes.feature import feature_in_triangle, number_in_hull, off_triangle, triangle_feature
 from collision_monitor.meshes.inside import INSIDE, OUTSIDE, is_either_in, locate
@@ -28,6 +27,7 @@ from collision_monitor.narrow_phase.contact_row import (
 from collision_monitor.narrow_phase.dispatch import contact_within, mirror
 from collision_monitor.narrow_phase.pair_pose import swapped
 from collision_monitor.narrow_phase.vector import along, dot, minus, opposite, rotate, rotate_back, sum_of_sizes
+from collision_monitor.shapes.shape_table import CONVEX_HULL, HALF_SPACE, MESH, POINTS, TREE
 from collision_monitor.tolerances import FEATURE_TIE, SAT_ROUND_OFF
 
 

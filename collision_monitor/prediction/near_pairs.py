@@ -10,10 +10,10 @@ from math import inf
 from typing import NamedTuple
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.geometry.shape_table import BOX
 from collision_monitor.prediction.body_contact import relative_now
 from collision_monitor.prediction.sphere_interval import sphere_interval
 from collision_monitor.prediction.spread import is_uncertain, surface_spread, swing_radius
+from collision_monitor.shapes.shape_table import BOX
 
 
 class Nearness(NamedTuple):

@@ -8,7 +8,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.shape_table import HALF_SPACE
 from collision_monitor.prediction.bodies import next_pair
 from collision_monitor.prediction.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
 from collision_monitor.prediction.chosen_samples import choose_samples
@@ -50,6 +49,7 @@ from collision_monitor.prediction.sample_gaps import set_samples
 from collision_monitor.prediction.screening import meeting
 from collision_monitor.prediction.straight_samples import draw_evenly, set_errors
 from collision_monitor.prediction.uncertainty import SAMPLE_TOLERANCE
+from collision_monitor.shapes.shape_table import HALF_SPACE
 
 FACETS: Final = 0.02
 """Distance between the planes and the obstacle, in standard deviations of the gap, up to which no plane is added."""

@@ -10,7 +10,6 @@ from math import inf, sqrt
 from typing import Final
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.shape_table import CYLINDER, SPHERE
 from collision_monitor.narrow_phase.cylinder_cylinder import is_parallel
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.vector import cross, dot
@@ -27,6 +26,7 @@ from collision_monitor.prediction.straight_samples import (
     set_errors,
     tilt,
 )
+from collision_monitor.shapes.shape_table import CYLINDER, SPHERE
 
 NOT_ROUND, ROUND, TILTED = 0, 1, 2
 """Forms of a pair: neither; balls, or parallel cylinders; cylinders with axes that differ a little or are uncertain."""

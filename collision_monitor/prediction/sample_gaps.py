@@ -19,7 +19,12 @@ import numpy as np
 from numpy import float32
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.shape_table import (
+from collision_monitor.narrow_phase.core import rounding
+from collision_monitor.narrow_phase.support_value import core_support
+from collision_monitor.prediction.error_samples import LEFT_OVER, ORIENTATION
+from collision_monitor.prediction.linear_gaps import add_reach, begin_terms, is_linear, make_terms, sum_terms
+from collision_monitor.prediction.obstacle_planes import AT_REST, BENDS, MODE, from_plane
+from collision_monitor.shapes.shape_table import (
     BOX,
     CAPSULE,
     CIRCLE,
@@ -30,11 +35,6 @@ from collision_monitor.geometry.shape_table import (
     HALF_SPACE,
     POLYGON,
 )
-from collision_monitor.narrow_phase.core import rounding
-from collision_monitor.narrow_phase.support_value import core_support
-from collision_monitor.prediction.error_samples import LEFT_OVER, ORIENTATION
-from collision_monitor.prediction.linear_gaps import add_reach, begin_terms, is_linear, make_terms, sum_terms
-from collision_monitor.prediction.obstacle_planes import AT_REST, BENDS, MODE, from_plane
 
 TURNED_FARTHEST: Final = 0.7
 """Largest standard deviation of an orientation (rad) for which the series of `_turn` are exact to 0.001 rad."""

@@ -9,7 +9,6 @@ from math import inf, sqrt
 from typing import Final
 
 from collision_monitor._jit import outlined
-from collision_monitor.geometry.shape_table import HALF_SPACE
 from collision_monitor.meshes.contact import reach_in
 from collision_monitor.meshes.layout import CHILD, WIDTH
 from collision_monitor.meshes.nearest import BOUNDS, PAIRS, size_of
@@ -31,6 +30,7 @@ from collision_monitor.prediction.tree_impact import (
     spins,
     times_of,
 )
+from collision_monitor.shapes.shape_table import HALF_SPACE
 
 EXAMINED: Final = 30
 """Steps that a triangle counts as, of the STEPS: GJK takes as long as 30 boxes. 50,000 slivers in one line need more

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.geometry.shape_table import BOX, CONVEX_HULL
 from collision_monitor.prediction.body_impact import Window, tube_of
 from collision_monitor.prediction.impact_record import CLEAR, TREE_BOUND
 from collision_monitor.prediction.motion import half_acceleration, rotation_at
 from collision_monitor.prediction.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
+from collision_monitor.shapes.shape_table import BOX, CONVEX_HULL
 from collision_monitor.tolerances import ROUNDED_UP
 
 Array = NDArray[np.float64]

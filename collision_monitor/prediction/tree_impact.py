@@ -13,7 +13,6 @@ from math import inf, sqrt
 from typing import Final
 
 from collision_monitor._jit import device, inlined, outlined
-from collision_monitor.geometry.shape_table import TREE
 from collision_monitor.meshes.approach import Approach, seen_from_b
 from collision_monitor.meshes.box_times import box_times
 from collision_monitor.meshes.contact import reach_in
@@ -25,6 +24,7 @@ from collision_monitor.narrow_phase.vector import cross, dot, minus, plus, rotat
 from collision_monitor.prediction.bodies import place_shape
 from collision_monitor.prediction.impact_record import CLEAR, HIT, UNRESOLVED
 from collision_monitor.prediction.motion import relative_position, relative_velocity, rotation_at
+from collision_monitor.shapes.shape_table import TREE
 from collision_monitor.tolerances import EPSILON
 
 KEEP: Final = 0.2

@@ -15,7 +15,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import allocating_kernel, device, inlined, kernel
-from collision_monitor.geometry.shape_table import MESH, POINTS
 from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
 from collision_monitor.prediction.bodies import next_pair
 from collision_monitor.prediction.body_impact import (
@@ -64,6 +63,7 @@ from collision_monitor.prediction.spread import (
     turns_by_yaw,
 )
 from collision_monitor.prediction.tree_impact import spins
+from collision_monitor.shapes.shape_table import MESH, POINTS
 
 GAP_NODES: Final = 9
 """Number of times from now to the horizon at which the gap is compared with its uncertainty."""

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from collision_monitor.errors import InputError, PoseError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Shape
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Shape
 
 Compound = Shape | Sequence[tuple[Shape, Pose]]
 """A shape, or several with their poses in the object's frame."""

@@ -12,10 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.inside import UNKNOWN
-from collision_monitor.geometry.planar import is_planar
 from collision_monitor.geometry.point_in_polygon import Location
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Mesh
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B, as_contacts
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.query.arguments import Compound
@@ -28,6 +25,9 @@ from collision_monitor.query.parting import parting_translation
 from collision_monitor.query.piece_table import exact_piece_table
 from collision_monitor.query.posed import check_in_plane, posed
 from collision_monitor.records import Model
+from collision_monitor.shapes.planar import is_planar
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Mesh
 from collision_monitor.tolerances import FEATURE_TIE
 
 Array = NDArray[np.float64]

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from collision_monitor.geometry.compound import shape_pairs
-from collision_monitor.geometry.planar import is_planar
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Circle, HalfSpace, Shape
-from collision_monitor.geometry.surfaces import surface_triangles
 from collision_monitor.query.contact import Contact
+from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.shapes.planar import is_planar
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Circle, HalfSpace, Shape
+from collision_monitor.shapes.surfaces import surface_triangles
 
 COLOURS = "tab:blue", "tab:orange"
 

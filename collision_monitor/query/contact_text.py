@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.contact_features import FeatureType
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Points, Shape
 from collision_monitor.query.features import feature_of, tie_of
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, ConvexHull, Mesh, Points, Shape
 
 if TYPE_CHECKING:
     from collision_monitor.geometry.coordinates import Array

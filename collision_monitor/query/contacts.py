@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.pose import Pose
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.query.batch_result import Batch, Pairs
 from collision_monitor.query.contact import Contact, contact, contact_of_row
@@ -24,6 +23,7 @@ from collision_monitor.query.pair_arrays import (
     pose_rows,
     ranges,
 )
+from collision_monitor.shapes.pose import Pose
 
 Array = NDArray[np.float64]
 

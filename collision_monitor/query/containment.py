@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.compound import shape_pairs
-from collision_monitor.geometry.containment import TESTS, inside
 from collision_monitor.geometry.coordinates import Booleans, coordinates
-from collision_monitor.geometry.planar import flat_pose, is_planar
-from collision_monitor.geometry.pose import Pose
 from collision_monitor.query.arguments import Compound, checked_pose
+from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.shapes.containment import TESTS, inside
+from collision_monitor.shapes.planar import flat_pose, is_planar
+from collision_monitor.shapes.pose import Pose
 
 
 def contains(shape: Compound, pose: Pose, points: ArrayLike, test: str = "closed form") -> Booleans:

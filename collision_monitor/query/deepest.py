@@ -8,10 +8,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.convex_pieces import is_concave_mesh
 from collision_monitor.geometry.inside import UNKNOWN, locate_in_surface
 from collision_monitor.geometry.point_in_polygon import Location
-from collision_monitor.geometry.shapes import Capsule, ConvexHull, Mesh, Points, Sphere
 from collision_monitor.meshes.contact import APART, OPEN, contact_of_trees, in_root_box, reach_of
 from collision_monitor.meshes.nearest import MEMORY, answer_row
 from collision_monitor.meshes.shape_trees import shape_tree
@@ -21,6 +19,8 @@ from collision_monitor.query.nearest_pieces import NearestPieces
 from collision_monitor.query.posed import Posed, place
 from collision_monitor.query.surface_pair import surface_contact
 from collision_monitor.records import Model
+from collision_monitor.shapes.convex_pieces import is_concave_mesh
+from collision_monitor.shapes.shapes import Capsule, ConvexHull, Mesh, Points, Sphere
 
 Array = NDArray[np.float64]
 

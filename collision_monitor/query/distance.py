@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collision_monitor.geometry.pose import Pose
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.contact import contact
 from collision_monitor.query.convex_pairs import convex_contact
+from collision_monitor.shapes.pose import Pose
 
 
 def distance(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -> float:

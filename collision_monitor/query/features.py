@@ -10,14 +10,16 @@ from numpy.typing import NDArray
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.contact_features import Feature, FeatureContact, FeatureType, feature_at
-from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.round_features import (
     ROUND_TIE,
     feature_of_cone,
     feature_of_cylinder,
     feature_of_outline,
 )
-from collision_monitor.geometry.shapes import (
+from collision_monitor.query.arguments import checked_pose
+from collision_monitor.query.contact import Contact
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import (
     Box,
     Capsule,
     Cone,
@@ -30,8 +32,6 @@ from collision_monitor.geometry.shapes import (
     Polygon,
     Shape,
 )
-from collision_monitor.query.arguments import checked_pose
-from collision_monitor.query.contact import Contact
 from collision_monitor.tolerances import FEATURE_TIE
 
 Array = NDArray[np.float64]

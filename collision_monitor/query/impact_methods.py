@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.errors import UnsupportedError
-from collision_monitor.geometry.pose import Motion, Pose, rotation_matrix
-from collision_monitor.geometry.shapes import Box, HalfSpace, Shape, Sphere
 from collision_monitor.prediction.bodies import Multibody, make_bodies
 from collision_monitor.prediction.body_impact import ShapePair, contact_at, make_scratch
 from collision_monitor.prediction.sphere_interval import sphere_interval
@@ -30,6 +28,8 @@ from collision_monitor.query.moving_pair import (
     make_moving_shape,
 )
 from collision_monitor.query.time_of_impact import ITERATIONS
+from collision_monitor.shapes.pose import Motion, Pose, rotation_matrix
+from collision_monitor.shapes.shapes import Box, HalfSpace, Shape, Sphere
 from collision_monitor.tolerances import PARALLEL_SIN2
 
 Array = NDArray[np.float64]

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
-from collision_monitor.geometry.compound import shape_pairs
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Shape
 from collision_monitor.objects.models import containing_kdop
 from collision_monitor.query.arguments import Compound
+from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Shape
 
 
 class Enclosure(NamedTuple):

@@ -8,8 +8,6 @@ import numpy as np
 
 from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.settled import settled
-from collision_monitor.geometry.pose import Motion
-from collision_monitor.geometry.shapes import Shape
 from collision_monitor.meshes.layout import FACE, WIDTH
 from collision_monitor.meshes.nearest import LEAST, PLACE_A, PLACE_B
 from collision_monitor.meshes.shape_trees import NEVER, have_kernels, kept_tree
@@ -24,6 +22,8 @@ from collision_monitor.query.convex_pairs import MEMORY
 from collision_monitor.query.packed import load_pair, packed_motion, packed_shape
 from collision_monitor.query.pair_impact_rows import set_motion
 from collision_monitor.query.pair_table import pair_table
+from collision_monitor.shapes.pose import Motion
+from collision_monitor.shapes.shapes import Shape
 from collision_monitor.tolerances import GJK_TOUCHING
 
 

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.settled import settled
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Shape
 from collision_monitor.meshes.boxes import box_separations
 from collision_monitor.meshes.contact import APART, tree_contact
 from collision_monitor.meshes.inside import OUTSIDE, is_either_in
@@ -24,6 +22,8 @@ from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DIST
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.prediction.motion import quaternion_to_matrix
 from collision_monitor.query.packed import packed_pose
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Shape
 from collision_monitor.tolerances import EPSILON
 
 Array = NDArray[np.float64]

@@ -10,14 +10,6 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import PoseError, TooCostlyError, UnsupportedError
 from collision_monitor.geometry.bounded_cache import bounded_cache
-from collision_monitor.geometry.compound import shape_pairs
-from collision_monitor.geometry.convex_pieces import is_concave_mesh
-from collision_monitor.geometry.forest import Forest
-from collision_monitor.geometry.planar import flat_pose, is_planar
-from collision_monitor.geometry.pose import Motion, Pose
-from collision_monitor.geometry.reach import reach
-from collision_monitor.geometry.shape_table import ShapeTableBuilder
-from collision_monitor.geometry.shapes import HalfSpace, Mesh, Points, Shape, Sphere, Triangle
 from collision_monitor.meshes.shape_trees import shape_tree
 from collision_monitor.objects.excess import PosedShapes
 from collision_monitor.objects.models import containing_model, exact_model
@@ -28,6 +20,14 @@ from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.prediction.pair_impacts import bodies_overlap_time, predict_pairs
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.surface_pair import points_near
+from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.shapes.convex_pieces import is_concave_mesh
+from collision_monitor.shapes.forest import Forest
+from collision_monitor.shapes.planar import flat_pose, is_planar
+from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.shapes.reach import reach
+from collision_monitor.shapes.shape_table import ShapeTableBuilder
+from collision_monitor.shapes.shapes import HalfSpace, Mesh, Points, Shape, Sphere, Triangle
 
 MANY_FACES: Final = 100
 """Faces of a mesh from which on only those near the other object are followed one by one, and the rest as one mesh.

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.boxes import ranges
-from collision_monitor.geometry.shape_table import ShapeTable, join
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.query.piece_table import PieceTable
+from collision_monitor.shapes.shape_table import ShapeTable, join
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -8,8 +8,6 @@ from itertools import product
 import numpy as np
 
 from collision_monitor.geometry.point_in_polygon import Location
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Shape
 from collision_monitor.meshes.contact import OPEN
 from collision_monitor.meshes.shape_trees import trees_of_pair
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE
@@ -17,6 +15,8 @@ from collision_monitor.query.deepest import by_clouds, by_pieces, by_trees, cont
 from collision_monitor.query.fillings import fillings
 from collision_monitor.query.posed import Posed, place
 from collision_monitor.records import Model
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Shape
 
 
 def distance_of_fillings(a: Posed, b: Posed) -> float:

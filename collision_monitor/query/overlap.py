@@ -7,18 +7,18 @@ from typing import Final
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import Hull, convex_hull
 from collision_monitor.geometry.cascade import polyhedra_intersect
-from collision_monitor.geometry.compound import shape_pairs
 from collision_monitor.geometry.coordinates import Array
-from collision_monitor.geometry.planar import flat_pose
 from collision_monitor.geometry.polygon_overlap import Evidence, polygons_intersect, sat_2d
 from collision_monitor.geometry.polyhedron_sat import sat_3d
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, ConvexHull, Mesh, Polygon, Shape
 from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.query.arguments import Compound, checked_pose
 from collision_monitor.query.contact import contact
 from collision_monitor.query.convex_pairs import convex_contact
 from collision_monitor.query.mesh_pairs import mesh_overlap
+from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.shapes.planar import flat_pose
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, ConvexHull, Mesh, Polygon, Shape
 
 TESTS: Final = ("contact", "cascade", "sat", "edges")
 

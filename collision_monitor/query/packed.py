@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import inlined
-from collision_monitor.geometry.pose import Motion, Pose
-from collision_monitor.geometry.shape_table import ShapeTable, ShapeTableBuilder
-from collision_monitor.geometry.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Sphere
 from collision_monitor.narrow_phase.work_memory import WORK_SIZE
+from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.shapes.shape_table import ShapeTable, ShapeTableBuilder
+from collision_monitor.shapes.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Sphere
 
 Array = NDArray[np.float64]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Final
 
 from collision_monitor.geometry.bounded_cache import bounded_cache
-from collision_monitor.geometry.forest import Forest
-from collision_monitor.geometry.shape_table import ShapeTable, ShapeTableBuilder
-from collision_monitor.geometry.shapes import Mesh, Points, Shape
 from collision_monitor.meshes.shape_trees import shape_tree
+from collision_monitor.shapes.forest import Forest
+from collision_monitor.shapes.shape_table import ShapeTable, ShapeTableBuilder
+from collision_monitor.shapes.shapes import Mesh, Points, Shape
 
 REMEMBERED: Final = 256 << 20
 """Bytes of the trees in all remembered tables."""

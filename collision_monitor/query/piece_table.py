@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.aabb_tree import aabb_tree
 from collision_monitor.geometry.bounded_cache import bounded_cache
-from collision_monitor.geometry.convex_pieces import convex_pieces, is_convex_mesh
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shape_table import ShapeTable, ShapeTableBuilder, join, triangle_table
-from collision_monitor.geometry.shapes import ConvexHull, HalfSpace, Mesh, Polygon, Shape, array_bytes
+from collision_monitor.shapes.convex_pieces import convex_pieces, is_convex_mesh
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shape_table import ShapeTable, ShapeTableBuilder, join, triangle_table
+from collision_monitor.shapes.shapes import ConvexHull, HalfSpace, Mesh, Polygon, Shape, array_bytes
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

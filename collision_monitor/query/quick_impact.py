@@ -6,8 +6,6 @@ from itertools import product
 from math import dist, inf
 from typing import Final
 
-from collision_monitor.geometry.pose import Motion, Pose
-from collision_monitor.geometry.shapes import Mesh, Shape
 from collision_monitor.meshes.shape_trees import NEVER, have_kernels, kept_tree
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.convex_pairs import convex_contact, convex_impact
@@ -16,6 +14,8 @@ from collision_monitor.query.mesh_impact import impact_in_hulls, mesh_impact, me
 from collision_monitor.query.mesh_pairs import boxes_apart
 from collision_monitor.query.moving_pair import MotionQuery
 from collision_monitor.query.open_gap import may_be_inside
+from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.shapes.shapes import Mesh, Shape
 from collision_monitor.tolerances import GJK_TOUCHING
 
 _HERE: Final = Pose()

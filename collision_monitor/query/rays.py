@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.compound import shape_pairs
 from collision_monitor.geometry.coordinates import Array, Booleans, coordinates
-from collision_monitor.geometry.planar import flat_pose, is_planar
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.ray_casting import first_hits
 from collision_monitor.query.arguments import Compound, checked_pose
+from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.shapes.planar import flat_pose, is_planar
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.ray_casting import first_hits
 
 
 class RayHits(NamedTuple):

@@ -10,9 +10,6 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from collision_monitor.errors import TooCostlyError, UnsupportedError
-from collision_monitor.geometry.convex_pieces import is_concave_mesh
-from collision_monitor.geometry.pose import Motion
-from collision_monitor.geometry.shapes import HalfSpace, Mesh, Sphere
 from collision_monitor.meshes.shape_trees import CERTAIN, kept_tree
 from collision_monitor.prediction.bodies import Multibody
 from collision_monitor.prediction.impact_record import HIT
@@ -32,6 +29,9 @@ from collision_monitor.query.open_gap import least_gap
 from collision_monitor.query.quick_impact import quick_impact, quick_open_impact
 from collision_monitor.query.touching import follow
 from collision_monitor.records import Method
+from collision_monitor.shapes.convex_pieces import is_concave_mesh
+from collision_monitor.shapes.pose import Motion
+from collision_monitor.shapes.shapes import HalfSpace, Mesh, Sphere
 from collision_monitor.tolerances import GJK_TOUCHING
 
 ITERATIONS: Final = 1000

@@ -10,9 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import InputError, PoseError
-from collision_monitor.geometry.planar import is_planar
-from collision_monitor.geometry.pose import Motion, Pose
-from collision_monitor.geometry.shapes import HalfSpace, Mesh, Points
 from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
 from collision_monitor.prediction.impact_record import IMPACT
 from collision_monitor.query.arguments import Compound
@@ -28,6 +25,9 @@ from collision_monitor.query.time_of_impact import (
     impact_of_times,
     time_of_impact,
 )
+from collision_monitor.shapes.planar import is_planar
+from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.shapes.shapes import HalfSpace, Mesh, Points
 from collision_monitor.tolerances import GJK_TOUCHING, LARGEST_INPUT, UNIT_QUATERNION
 
 Array = NDArray[np.float64]

@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import TooCostlyError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.reach import reach
-from collision_monitor.geometry.shapes import Capsule, Circle, Cone, Cylinder, Sphere
 from collision_monitor.narrow_phase.contact_row import as_contacts
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.prediction.bodies import Multibody
 from collision_monitor.prediction.impact_record import HIT
 from collision_monitor.query.contact import contact
 from collision_monitor.query.moving_pair import MotionQuery, MovingShape, first_impacts, lay_out_pair
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.reach import reach
+from collision_monitor.shapes.shapes import Capsule, Circle, Cone, Cylinder, Sphere
 
 Array = NDArray[np.float64]
 

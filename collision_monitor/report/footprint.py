@@ -6,12 +6,12 @@ from typing import Final
 
 import numpy as np
 
-from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.qhull import qhull
-from collision_monitor.geometry.reach import reach
-from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Mesh, Points, Polygon, Shape, Triangle
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session.history.history import Floats
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.reach import reach
+from collision_monitor.shapes.shapes import Box, ConvexHull, HalfSpace, Mesh, Points, Polygon, Shape, Triangle
 
 VIEWING_DIRECTIONS: Final = 64
 """Number of directions in the plane from which round shapes are sampled."""

@@ -8,12 +8,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.pose import from_rotation_vector, multiply, rotation_matrix
-from collision_monitor.geometry.shape_table import ShapeTableBuilder, take
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.objects.models import Modelled, containing_model
 from collision_monitor.records import StateFlag
 from collision_monitor.session.history.history import Floats, History, Pair
+from collision_monitor.shapes.pose import from_rotation_vector, multiply, rotation_matrix
+from collision_monitor.shapes.shape_table import ShapeTableBuilder, take
 
 MOST_PIECE_PAIRS: Final = 64
 """Largest number of pairs of convex pieces for a distance. Beyond it, the convex hulls replace the objects."""

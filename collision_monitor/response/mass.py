@@ -11,7 +11,7 @@ from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.coordinates import Array, Indices
 from collision_monitor.geometry.polyhedra import is_closed
-from collision_monitor.geometry.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Mesh, Shape, Sphere
+from collision_monitor.shapes.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Mesh, Shape, Sphere
 
 
 class MassProperties(NamedTuple):

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import CollisionMonitorError, InputError
-from collision_monitor.geometry.mesh_file import load_mesh
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
 from collision_monitor.robots.mesh_location import FileLocator
 from collision_monitor.robots.urdf import Link
 from collision_monitor.robots.xml_tree import Element
+from collision_monitor.shapes.mesh_file import load_mesh
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
 
 
 def link_shapes(link: Link, files: FileLocator) -> tuple[list[tuple[Shape, Pose]], list[str]]:

@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Shape
 from collision_monitor.robots.kinematic_tree import KinematicTree, kinematic_tree
 from collision_monitor.robots.link_motions import link_motions
 from collision_monitor.robots.link_shapes import link_shapes
@@ -21,6 +19,8 @@ from collision_monitor.robots.srdf import Pair, disabled_pairs
 from collision_monitor.robots.touching_links import touching_links
 from collision_monitor.robots.urdf import parse_urdf
 from collision_monitor.robots.xml_tree import LARGEST_TEXT
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Shape
 
 Floats = NDArray[np.float64]
 

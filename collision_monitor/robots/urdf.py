@@ -12,8 +12,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.pose import Pose, from_rotation_vector, multiply
 from collision_monitor.robots.xml_tree import Element, parse_xml
+from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply
 
 MOST_LINKS: Final = 2000
 """Links of a robot. Humanoids with hands have 100."""

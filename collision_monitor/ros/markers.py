@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.codec import Change, Removal
-from collision_monitor.geometry.pose import Pose, rotation_matrix
-from collision_monitor.geometry.surfaces import surface_triangles
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.pipeline.catalogue import Catalogue
 from collision_monitor.ros.marker_bytes import Color, Kind, Marker, encode
+from collision_monitor.shapes.pose import Pose, rotation_matrix
+from collision_monitor.shapes.surfaces import surface_triangles
 
 _STATIC: Final[Color] = (0.55, 0.57, 0.60, 0.35)
 _CALM: Final[Color] = (0.35, 0.55, 0.85, 0.9)

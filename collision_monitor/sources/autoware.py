@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import CollisionMonitorError, InputError
-from collision_monitor.geometry.pose import Pose, rotation_matrix
-from collision_monitor.geometry.shapes import Box, Cylinder
 from collision_monitor.records import StateFlag
+from collision_monitor.shapes.pose import Pose, rotation_matrix
+from collision_monitor.shapes.shapes import Box, Cylinder
 from collision_monitor.sources.autoware_bytes import POLYGON, TrackArrays
 from collision_monitor.sources.covariances import usable_blocks, yaw_alone
 from collision_monitor.sources.frames import IDENTITY, frame_name

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.pose import Pose, multiply, rotation_matrix
-from collision_monitor.geometry.shapes import Shape
+from collision_monitor.shapes.pose import Pose, multiply, rotation_matrix
+from collision_monitor.shapes.shapes import Shape
 from collision_monitor.sources.scene_states import empty_states
 
 Floats = NDArray[np.float64]

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import CollisionMonitorError, InputError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import MOST_CLOUD_POINTS, Points
 from collision_monitor.query.points_within import points_within
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import MOST_CLOUD_POINTS, Points
 from collision_monitor.sources.frames import frame_name
 from collision_monitor.sources.mapping import Mapping
 from collision_monitor.sources.object_entry import ObjectEntry

@@ -10,8 +10,8 @@ from typing import Any, Final
 import numpy as np
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Shape
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Shape
 from collision_monitor.sources.frames import frame_name
 from collision_monitor.sources.solid_shapes import mesh_shape, plane_shape, primitive_shapes
 

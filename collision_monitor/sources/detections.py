@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import CollisionMonitorError, InputError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box
 from collision_monitor.records import StateFlag
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box
 from collision_monitor.sources.covariances import usable_blocks
 from collision_monitor.sources.frames import IDENTITY, frame_name
 from collision_monitor.sources.mapping import Mapping

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.pose import from_rotation_vector, multiply, rotation_matrix
+from collision_monitor.shapes.pose import from_rotation_vector, multiply, rotation_matrix
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 
 Floats = NDArray[np.float64]

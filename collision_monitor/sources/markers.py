@@ -6,9 +6,9 @@ import math
 from typing import Any, Final
 
 from collision_monitor.errors import CollisionMonitorError, InputError, UnsupportedError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Cylinder, Shape, Sphere
 from collision_monitor.records import StateFlag
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, Cylinder, Shape, Sphere
 from collision_monitor.sources.frames import IDENTITY, frame_name
 from collision_monitor.sources.mapping import Mapping
 from collision_monitor.sources.object_entry import ObjectEntry

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from collision_monitor.errors import CollisionMonitorError
-from collision_monitor.geometry.pose import Pose
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.carried_bodies import Body
 from collision_monitor.sources.collision_objects import (
     REMOVE,

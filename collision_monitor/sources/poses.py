@@ -7,8 +7,8 @@ from typing import Any, Final
 import numpy as np
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.pose import rotation_matrix
 from collision_monitor.records import StateFlag
+from collision_monitor.shapes.pose import rotation_matrix
 from collision_monitor.sources.covariances import Blocks, usable_blocks, yaw_alone
 from collision_monitor.sources.frames import IDENTITY, frame_name
 from collision_monitor.sources.mapping import Mapping

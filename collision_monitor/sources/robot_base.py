@@ -8,8 +8,8 @@ from typing import Any, Final, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.pose import Pose, from_rotation_vector, multiply
 from collision_monitor.robots.robot import Robot
+from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply
 from collision_monitor.sources.covariances import usable_blocks
 from collision_monitor.sources.frames import IDENTITY, FrameMotion, frame_name
 from collision_monitor.sources.poses import ODOMETRY, put_pose, worst_stddev

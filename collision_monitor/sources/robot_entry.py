@@ -22,10 +22,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.pose import Pose
 from collision_monitor.records import Model
 from collision_monitor.robots.mesh_location import FileLocator
 from collision_monitor.robots.robot import Description
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.mapping import Mapping
 from collision_monitor.sources.yaml_table import known, number, pose, table, text
 

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import CollisionMonitorError, InputError, PoseError
-from collision_monitor.geometry.pose import Pose
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
 from collision_monitor.robots import link_motions
 from collision_monitor.robots.robot import Description, Robot, make_robot
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.carried_bodies import Body, CarriedBodies
 from collision_monitor.sources.collision_objects import pose_bytes, shape_bytes
 from collision_monitor.sources.frames import FrameMotion

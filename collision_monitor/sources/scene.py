@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.codec import Change, Removal
-from collision_monitor.geometry.pose import Pose
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.frames import FrameMotion, FrameTree, MissingFrame
 from collision_monitor.sources.waiting_states import WaitingStates
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor import records
-from collision_monitor.geometry.pose import multiply, rotation_matrix
 from collision_monitor.records import StateFlag
+from collision_monitor.shapes.pose import multiply, rotation_matrix
 from collision_monitor.sources.frames import FrameMotion
 
 Floats = NDArray[np.float64]

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.shapes import Box, Capsule, Cone, Cylinder, HalfSpace, Mesh, Shape, Sphere
+from collision_monitor.shapes.shapes import Box, Capsule, Cone, Cylinder, HalfSpace, Mesh, Shape, Sphere
 from collision_monitor.sources.prisms import prism
 
 _DIMENSIONS: Final = {1: 3, 2: 1, 3: 2, 4: 2, 5: 1}

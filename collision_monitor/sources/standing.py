@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from collision_monitor.geometry.pose import Pose, multiply, rotation_matrix
+from collision_monitor.shapes.pose import Pose, multiply, rotation_matrix
 from collision_monitor.sources.frames import FrameMotion
 from collision_monitor.sources.object_entry import ObjectEntry
 from collision_monitor.sources.scene import Scene

@@ -13,8 +13,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.pose import multiply
 from collision_monitor.records import StateFlag
+from collision_monitor.shapes.pose import multiply
 
 Floats = NDArray[np.float64]
 States = NDArray[np.void]

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from collision_monitor import records
 from collision_monitor.codec.states import COVARIANCE_SIZE
 from collision_monitor.errors import PoseError
-from collision_monitor.geometry.pose import Pose, from_rotation_vector, multiply
 from collision_monitor.records import StateFlag
+from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply
 from collision_monitor.sources.twist_estimate import TwistEstimator
 
 Floats = NDArray[np.float64]

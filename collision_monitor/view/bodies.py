@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.pose import multiply, rotation_matrix
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.shapes.pose import multiply, rotation_matrix
 from collision_monitor.view.forms import PLANE, Form, Piece, pieces_of
 
 Floats = NDArray[np.float64]

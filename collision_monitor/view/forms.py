@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import ShapeError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import (
+from collision_monitor.geometry.triangulation import triangulate
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import (
     Box,
     Capsule,
     Circle,
@@ -32,8 +33,7 @@ from collision_monitor.geometry.shapes import (
     Shape,
     Sphere,
 )
-from collision_monitor.geometry.surfaces import surface_triangles
-from collision_monitor.geometry.triangulation import triangulate
+from collision_monitor.shapes.surfaces import surface_triangles
 
 Floats = NDArray[np.float64]
 Scale = tuple[float, float, float]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor import records
-from collision_monitor.geometry.pose import from_rotation_vector, multiply
 from collision_monitor.records import StateFlag
+from collision_monitor.shapes.pose import from_rotation_vector, multiply
 from collision_monitor.view.bodies import Bodies, Floats, Indices
 from collision_monitor.view.levels import Level, Pair
 
@@ -68,7 +68,7 @@ class Moment:
     def poses_at(self, rows: Indices, after: Floats) -> tuple[Floats, Floats]:
         """Return positions (k, 3) and quaternions (k, 4) `after` (k,) s from the step, as the last states move.
 
-        Linear motion with the stated acceleration and constant angular velocity, as `geometry.pose.Motion.at`.
+        Linear motion with the stated acceleration and constant angular velocity, as `shapes.pose.Motion.at`.
         """
         state, time = self.state[rows], (after + self.age[rows])[:, None]
         stated = (state["flags"] & StateFlag.ACCELERATION_VALID) != 0

@@ -9,8 +9,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.pose import rotation_matrix
 from collision_monitor.records import Phase, PredictionStatus
+from collision_monitor.shapes.pose import rotation_matrix
 from collision_monitor.view.bodies import Bodies, Floats, Indices
 from collision_monitor.view.forms import PLANE, Form
 from collision_monitor.view.labels import Label, labels

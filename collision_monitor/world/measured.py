@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.pose import from_rotation_vector, multiply
+from collision_monitor.shapes.pose import from_rotation_vector, multiply
 from collision_monitor.world.scene import Scene, States
 
 LARGEST_NOISE = 1.0

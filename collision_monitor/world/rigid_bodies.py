@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.dense_grid import box_pairs
-from collision_monitor.geometry.pose import from_rotation_vector, multiply, rotation_matrix
-from collision_monitor.geometry.shape_table import ShapeTableBuilder
-from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.narrow_phase.contact_row import DISTANCE, NORMAL, POINT_A
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.response.contact_set import Bodies, Contacts
 from collision_monitor.response.mass import mass_properties
+from collision_monitor.shapes.pose import from_rotation_vector, multiply, rotation_matrix
+from collision_monitor.shapes.shape_table import ShapeTableBuilder
+from collision_monitor.shapes.shapes import Box, Sphere
 from collision_monitor.world.box_contacts import MOST_CORNERS, face_contacts
 
 Array = NDArray[np.float64]

@@ -8,10 +8,10 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, Sphere
 from collision_monitor.world.impulse_response import PARTS
 from collision_monitor.world.response_choice import ResponseOptions
 from collision_monitor.world.responses import make_response

@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from collision_monitor.geometry.pose import from_rotation_vector, rotation_matrix
 from collision_monitor.response.bonded import groups, move_as_one
+from collision_monitor.shapes.pose import from_rotation_vector, rotation_matrix
 from collision_monitor.world.rigid_bodies import RigidBodies
 
 LONGEST: Final = 1 / 240

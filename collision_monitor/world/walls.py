@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box
 
 THICKNESS: Final = 0.2
 """Thickness of the walls (m)."""

@@ -13,8 +13,8 @@ from collision_monitor.accuracy.playback import Step
 from collision_monitor.cli.main import main
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.polyhedra import is_closed
-from collision_monitor.geometry.pose import Pose
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.world import make_scene
 from collision_monitor.world.arm import lathe
 from collision_monitor.world.scene import state_array

@@ -18,11 +18,11 @@ from collision_monitor.accuracy.reference_monitor import ReferenceMonitor
 from collision_monitor.accuracy.tradeoff import tradeoff
 from collision_monitor.cli.main import main
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.shapes import Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import PredictionStatus
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.shapes import Sphere
 from collision_monitor.world.scene import state_array
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "balanced.mcap"

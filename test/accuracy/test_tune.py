@@ -28,10 +28,10 @@ from collision_monitor.cli.main import main
 from collision_monitor.cli.parameter_file import check_parameter_file
 from collision_monitor.codec import encode_descriptions, encode_states
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, ConvexHull, HalfSpace, Sphere
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, ConvexHull, HalfSpace, Sphere
 from collision_monitor.world.scene import state_array
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "balanced.mcap"

@@ -12,10 +12,7 @@ from processor_time import within
 from collision_monitor.codec import decode_status, encode_descriptions, encode_states
 from collision_monitor.codec.descriptions import decode_descriptions
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.convex_pieces import is_convex_mesh
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Circle, ConvexHull, Cylinder, HalfSpace, Mesh, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
@@ -24,6 +21,9 @@ from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.settings_event import LIMIT, encode_settings
 from collision_monitor.records import STATE, Model
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.convex_pieces import is_convex_mesh
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, Circle, ConvexHull, Cylinder, HalfSpace, Mesh, Sphere
 
 SIDES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
 

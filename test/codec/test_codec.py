@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from collision_monitor import codec, records
 from collision_monitor.codec.status import LIVE_FIELDS
 from collision_monitor.errors import MessageError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import (
+from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import (
     Box,
     Capsule,
     Circle,
@@ -27,7 +28,6 @@ from collision_monitor.geometry.shapes import (
     Polygon,
     Sphere,
 )
-from collision_monitor.objects.description import ObjectDescription
 
 STAMP = 1_700_000_000_123_456_789
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)

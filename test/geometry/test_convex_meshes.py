@@ -10,9 +10,10 @@ import trimesh
 from scipy.spatial import ConvexHull as Qhull
 
 from collision_monitor import Mesh
-from collision_monitor.geometry import convex_pieces, qhull
-from collision_monitor.geometry.convex_pieces import is_convex_mesh
+from collision_monitor.geometry import qhull
 from collision_monitor.geometry.point_tree import PointTree
+from collision_monitor.shapes import convex_pieces
+from collision_monitor.shapes.convex_pieces import is_convex_mesh
 from collision_monitor.tolerances import HULL_DROP
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from fed import Fed
 from ros_messages import SECOND, header, message, pose, vector
 
-from collision_monitor.geometry.pose import from_rotation_vector
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.robots.robot import Robot
+from collision_monitor.shapes.pose import from_rotation_vector
 from collision_monitor.sources import Input
 
 START = 1_700_000_000 * SECOND

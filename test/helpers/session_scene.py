@@ -11,13 +11,13 @@ import numpy as np
 
 from collision_monitor import records
 from collision_monitor.codec import Removal, encode_descriptions, encode_states
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Capsule, Sphere
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorder
 from collision_monitor.session.recording.recorder import FLUSH_PERIOD
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, Capsule, Sphere
 
 NODE = "/object_monitor"
 TYPES = {

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from collision_monitor import codec, records
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.settings_event import NOW, encode_settings
 from collision_monitor.records import PredictionStatus
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Sphere
 
 IMPACT = 1.0
 """s: two balls of 0.5 m, 2 m apart, at 1 m/s."""

@@ -7,10 +7,10 @@ import pytest
 
 from collision_monitor.accuracy.playback import by_pair
 from collision_monitor.errors import ProfileError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, Sphere
 from collision_monitor.world import make_scene
 
 RATE = 20.0

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from collision_monitor import records
 from collision_monitor.errors import Refusal
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Sphere
 
 MILLISECOND = 1_000_000
 SECOND = 1_000_000_000

@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 import collision_monitor as cm
 from collision_monitor.codec import decode_descriptions, encode_descriptions
-from collision_monitor.geometry.shapes import MOST_CLOUD_POINTS
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
@@ -17,6 +16,7 @@ from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.preparation import Preparation
 from collision_monitor.records import STATE, ContactStatus, Model, PredictionStatus
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.shapes import MOST_CLOUD_POINTS
 
 SECOND = 1_000_000_000
 TORUS = trimesh.creation.torus(1.0, 0.35, major_sections=14, minor_sections=8)

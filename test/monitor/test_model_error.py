@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from collision_monitor.geometry.shapes import Box, Mesh
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.shapes import Box, Mesh
 
 
 def bracket() -> Mesh:

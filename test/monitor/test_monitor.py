@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from collision_monitor import records
 from collision_monitor.accuracy.reference_monitor import ReferenceMonitor, disagreements
 from collision_monitor.errors import InputError, PoseError, Refusal, ShapeError, UnsupportedError
-from collision_monitor.geometry.pose import Pose, from_rotation_vector, multiply, rotation_matrix
-from collision_monitor.geometry.shapes import Box, Capsule, Circle, HalfSpace, Shape, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply, rotation_matrix
+from collision_monitor.shapes.shapes import Box, Capsule, Circle, HalfSpace, Shape, Sphere
 from collision_monitor.world import make_scene
 
 SECOND = 1_000_000_000

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from collision_monitor.errors import ProfileError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Capsule, ConvexHull, Cylinder, Ellipsoid, HalfSpace, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.plain_contacts import plain_contact
 from collision_monitor.narrow_phase.contact_row import UNKNOWN
@@ -15,6 +13,8 @@ from collision_monitor.prediction.body_contact import RESULT, ContactQuery, body
 from collision_monitor.prediction.body_impact import make_scratch
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, Capsule, ConvexHull, Cylinder, Ellipsoid, HalfSpace, Sphere
 
 FEATURES = ("feature_type_a", "feature_type_b", "feature_index_a", "feature_index_b")
 POINTS = ("point_a", "point_b", "closing_speed")

@@ -12,8 +12,13 @@ import pytest
 from collision_monitor import records
 from collision_monitor.codec import Removal, encode_descriptions, encode_states
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import (
+from collision_monitor.monitor import first_impacts
+from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.pipeline.pipeline import Pipeline
+from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import (
     Box,
     Capsule,
     Circle,
@@ -27,11 +32,6 @@ from collision_monitor.geometry.shapes import (
     Shape,
     Sphere,
 )
-from collision_monitor.monitor import first_impacts
-from collision_monitor.monitor.snapshot import Snapshot
-from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.pipeline.pipeline import Pipeline
-from collision_monitor.settings.profile import Profile
 
 START, STEP = 1_000_000_000_000, 20_000_000
 Answers = list[bytes | None]

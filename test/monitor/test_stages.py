@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shape_table import ShapeTableBuilder
-from collision_monitor.geometry.shapes import Box, Capsule, HalfSpace, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.snapshot import Snapshot, Stage
 from collision_monitor.records import STATE
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shape_table import ShapeTableBuilder
+from collision_monitor.shapes.shapes import Box, Capsule, HalfSpace, Sphere
 
 STAGES = [type(stage) for stage in Monitor().stages]
 

@@ -13,12 +13,12 @@ import trimesh
 from collision_monitor import records
 from collision_monitor.accuracy.reference_monitor import ReferenceMonitor, disagreements
 from collision_monitor.errors import ProfileError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, ConvexHull, Cylinder, HalfSpace, Mesh, Points, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, ConvexHull, Cylinder, HalfSpace, Mesh, Points, Sphere
 from collision_monitor.world import make_scene
 
 SECOND = 1_000_000_000

@@ -7,12 +7,12 @@ from collections.abc import Collection
 import numpy as np
 import pytest
 
-from collision_monitor.geometry.shapes import Sphere
 from collision_monitor.monitor.adaptive_tubes import AVERAGED_STEPS, REST
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.records import PredictionStatus
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.shapes import Sphere
 from collision_monitor.world import make_scene
 
 FIRST, SECOND, OTHER = 1, 2, 3

@@ -11,8 +11,8 @@ from minkowski import rotation
 from pairs import contact, size
 
 import collision_monitor as cm
-from collision_monitor.geometry.pose import rotation_matrix
-from collision_monitor.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, HalfSpace, Sphere
+from collision_monitor.shapes.pose import rotation_matrix
+from collision_monitor.shapes.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, HalfSpace, Sphere
 
 CASES = Path(__file__).parents[3] / "shared" / "conformance" / "cases.json"
 

@@ -9,7 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from collision_monitor.geometry.shape_table import (
+from collision_monitor.narrow_phase import dispatch
+from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE
+from collision_monitor.narrow_phase.dispatch import KIND_NAMES, PAIR_TESTS, TEST_METHODS, pair_test
+from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.narrow_phase.work_memory import work_array
+from collision_monitor.shapes.shape_table import (
     BOX,
     CAPSULE,
     CIRCLE,
@@ -22,7 +27,7 @@ from collision_monitor.geometry.shape_table import (
     SPHERE,
     ShapeTableBuilder,
 )
-from collision_monitor.geometry.shapes import (
+from collision_monitor.shapes.shapes import (
     Box,
     Capsule,
     Circle,
@@ -34,11 +39,6 @@ from collision_monitor.geometry.shapes import (
     Polygon,
     Sphere,
 )
-from collision_monitor.narrow_phase import dispatch
-from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE
-from collision_monitor.narrow_phase.dispatch import KIND_NAMES, PAIR_TESTS, TEST_METHODS, pair_test
-from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.narrow_phase.work_memory import work_array
 
 SHAPES = {
     SPHERE: Sphere(0.5),

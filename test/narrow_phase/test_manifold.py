@@ -12,9 +12,9 @@ from scipy.spatial import HalfspaceIntersection
 import collision_monitor as cm
 from collision_monitor import Box, ConvexHull, HalfSpace, Mesh, Pose, Sphere, contact
 from collision_monitor.geometry.contact_features import FeaturePair
-from collision_monitor.geometry.shape_table import ShapeTableBuilder
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.narrow_phase.manifold import manifold_batch
+from collision_monitor.shapes.shape_table import ShapeTableBuilder
 
 GROUND = HalfSpace((0, 0, 1))
 

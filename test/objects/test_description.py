@@ -5,11 +5,11 @@ import math
 import pytest
 
 from collision_monitor.errors import InputError, ShapeError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ALL_GROUPS, ObjectDescription
 from collision_monitor.records import Model
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, Sphere
 
 
 def test_a_single_shape_becomes_one_pair_at_the_origin():

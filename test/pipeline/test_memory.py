@@ -15,11 +15,11 @@ from collision_monitor.codec import Removal, encode_descriptions, encode_states
 from collision_monitor.codec.cdr import REMEMBERED_STRINGS, _padded_string
 from collision_monitor.codec.parameter_event import decode_parameter_event, encode_parameter_event
 from collision_monitor.errors import MessageError, Refusal
-from collision_monitor.geometry.convex_pieces import REMEMBERED_PIECES, convex_pieces
-from collision_monitor.geometry.shapes import ConvexHull, Mesh, Sphere
 from collision_monitor.monitor import roster
 from collision_monitor.objects.description import MOST_NAME_BYTES, ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
+from collision_monitor.shapes.convex_pieces import REMEMBERED_PIECES, convex_pieces
+from collision_monitor.shapes.shapes import ConvexHull, Mesh, Sphere
 
 STAMP = 1_000_000_000_000
 BALL = Sphere(0.5)

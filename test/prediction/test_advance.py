@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 import collision_monitor as cm
 from collision_monitor._jit import kernel
-from collision_monitor.geometry.pose import from_rotation_vector, rotation_matrix
-from collision_monitor.geometry.reach import reach
-from collision_monitor.geometry.shape_table import ShapeTable, ShapeTableBuilder
 from collision_monitor.prediction.advance import Placed, advance
+from collision_monitor.shapes.pose import from_rotation_vector, rotation_matrix
+from collision_monitor.shapes.reach import reach
+from collision_monitor.shapes.shape_table import ShapeTable, ShapeTableBuilder
 
 Array = NDArray[np.float64]
 UNTIL = 2.0

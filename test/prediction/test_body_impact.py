@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.pose import from_rotation_vector, multiply, rotation_matrix
-from collision_monitor.geometry.shape_table import ShapeTableBuilder
-from collision_monitor.geometry.shapes import (
+from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.prediction.bodies import Multibody, make_bodies, make_parts
+from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
+from collision_monitor.prediction.impact_record import HIT, IMPACT, UNRESOLVED
+from collision_monitor.prediction.pair_impacts import predict_pairs
+from collision_monitor.records import ShapeType
+from collision_monitor.shapes.pose import from_rotation_vector, multiply, rotation_matrix
+from collision_monitor.shapes.shape_table import ShapeTableBuilder
+from collision_monitor.shapes.shapes import (
     Box,
     Capsule,
     Cone,
@@ -19,12 +25,6 @@ from collision_monitor.geometry.shapes import (
     Shape,
     Sphere,
 )
-from collision_monitor.narrow_phase.dispatch import contact_batch
-from collision_monitor.prediction.bodies import Multibody, make_bodies, make_parts
-from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
-from collision_monitor.prediction.impact_record import HIT, IMPACT, UNRESOLVED
-from collision_monitor.prediction.pair_impacts import predict_pairs
-from collision_monitor.records import ShapeType
 
 TOLERANCE = 1e-6
 HORIZON = 2.0

@@ -67,8 +67,8 @@ def test_boxes_that_turn_and_stay_apart_have_no_error_that_meets() -> None:
         poses, twists = [], []
         for k in range(2):
             moved = rng.normal(size=(2000, 3)) * 0.02 * k
-            turned = cm.geometry.pose.from_rotation_vector(0.03 * rng.normal(size=(2000, 3)))
-            q = cm.geometry.pose.multiply(turned, np.tile(rows["quaternion"][k], (2000, 1)))
+            turned = cm.shapes.pose.from_rotation_vector(0.03 * rng.normal(size=(2000, 3)))
+            q = cm.shapes.pose.multiply(turned, np.tile(rows["quaternion"][k], (2000, 1)))
             poses.append(np.column_stack([rows["position"][k] + moved, q]))
             off = 0.03 * k * rng.normal(size=(2000, 3))
             twists.append(np.column_stack([rows["linear"][k] + off, np.tile(rows["angular"][k], (2000, 1))]))

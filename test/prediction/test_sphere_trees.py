@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from collision_monitor.geometry.pose import Pose, from_rotation_vector
-from collision_monitor.geometry.shapes import Box, ConvexHull, Cylinder, Shape, Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.prediction.sphere_trees import LEVELS, body_tree
+from collision_monitor.shapes.pose import Pose, from_rotation_vector
+from collision_monitor.shapes.shapes import Box, ConvexHull, Cylinder, Shape, Sphere
 
 TURNED = Pose((0.3, -2.0, 5.0), tuple(from_rotation_vector(np.array([0.4, 1.1, -0.7]))))
 

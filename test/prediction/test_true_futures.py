@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 import collision_monitor as cm
-from collision_monitor.geometry.pose import from_rotation_vector, multiply
 from collision_monitor.records import STATE, StateFlag
+from collision_monitor.shapes.pose import from_rotation_vector, multiply
 
 HORIZON = 2.0
 BOX_CORNERS = np.stack(np.meshgrid([-0.25, 0.25], [-0.25, 0.25], [-0.4, 0.4]), axis=-1).reshape(-1, 3)

@@ -9,7 +9,6 @@ import pytest
 from played_session import drive_states, record_drive, record_scene, record_states
 
 from collision_monitor import Pose, Sphere, contact
-from collision_monitor.geometry.shapes import Box, HalfSpace, Polygon
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.report.assessment import assess
 from collision_monitor.report.facts import gather
@@ -17,6 +16,7 @@ from collision_monitor.report.footprint import footprint
 from collision_monitor.session import Session
 from collision_monitor.session.history.alerts import AlertOutcome, stated_error
 from collision_monitor.session.history.read_history import read_history
+from collision_monitor.shapes.shapes import Box, HalfSpace, Polygon
 from collision_monitor.world.crossing import Crossing
 
 STEP = 0.02

@@ -16,8 +16,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
 from collision_monitor import records
-from collision_monitor.geometry.shapes import Cylinder
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.shapes.shapes import Cylinder
 
 RULES = Path(__file__).parents[2] / "config/guard_rules.yaml"
 PROGRAM = "import sys; from collision_monitor.ros.executables import guard; sys.exit(guard())"

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from collision_monitor import records
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.ros.effort import MOST_THREADS
 from collision_monitor.session import Session
 from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box
 
 CUBES = 32
 MOST = 1000

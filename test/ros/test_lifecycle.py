@@ -11,11 +11,11 @@ from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 from rclpy.qos import QoSProfile
 
 from collision_monitor import records
-from collision_monitor.geometry.shapes import Sphere
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session import Session
 from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict
+from collision_monitor.shapes.shapes import Sphere
 
 START = 60.0
 MANAGED = ("--ros-args", "-p", "autostart:=false")

@@ -6,7 +6,8 @@ from rclpy.serialization import deserialize_message
 from visualization_msgs.msg import Marker as RosMarker
 from visualization_msgs.msg import MarkerArray
 
-from collision_monitor.geometry.shapes import (
+from collision_monitor.ros.marker_bytes import Kind, Marker, encode
+from collision_monitor.shapes.shapes import (
     Box,
     Capsule,
     Circle,
@@ -19,8 +20,7 @@ from collision_monitor.geometry.shapes import (
     Polygon,
     Sphere,
 )
-from collision_monitor.geometry.surfaces import surface_triangles
-from collision_monitor.ros.marker_bytes import Kind, Marker, encode
+from collision_monitor.shapes.surfaces import surface_triangles
 
 
 def test_rclpy_reads_what_was_written():

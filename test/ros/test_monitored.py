@@ -14,12 +14,12 @@ from nav_msgs.msg import Odometry
 
 from collision_monitor import codec, records
 from collision_monitor.codec import Removal
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.ros.endpoints import subscription
 from collision_monitor.session import Session
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, Sphere
 from collision_monitor.view.scene import Scene
 
 SOURCES = """

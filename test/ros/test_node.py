@@ -14,8 +14,6 @@ from visualization_msgs.msg import Marker, MarkerArray
 from collision_monitor import codec, records
 from collision_monitor.accuracy.reference_monitor import ReferenceMonitor
 from collision_monitor.codec import Removal
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.ros import executables
@@ -23,6 +21,8 @@ from collision_monitor.ros.endpoints import quality_of
 from collision_monitor.session import Session
 from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, Sphere
 from collision_monitor.world import make_scene
 from collision_monitor_msgs.msg import Contact, MonitorStatus
 

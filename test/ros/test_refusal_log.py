@@ -8,11 +8,11 @@ import pytest
 
 from collision_monitor import codec, records
 from collision_monitor.errors import Refusal
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Sphere
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.ros.refusal_log import PERIOD, RefusalLog
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Sphere
 
 SECOND = 1_000_000_000
 BALL = ((Sphere(0.5), Pose()),)

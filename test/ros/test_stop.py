@@ -13,12 +13,12 @@ import pytest
 import trimesh
 
 from collision_monitor import records
-from collision_monitor.geometry.shapes import Mesh, Sphere
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import Model
 from collision_monitor.session import Session
 from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict
+from collision_monitor.shapes.shapes import Mesh, Sphere
 
 END = 3.0
 """s: the promise is 2 s, and the tests share the machine."""

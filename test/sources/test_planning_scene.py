@@ -11,8 +11,8 @@ from played_sources import MILLISECOND, START, Played, base_row, check, transfor
 from ros_messages import header, message, point, pose
 
 from collision_monitor import Box, Cone, ConvexHull, Cylinder, HalfSpace, Mesh, Sphere
-from collision_monitor.geometry.pose import Pose, multiply, rotation_matrix
 from collision_monitor.robots.robot import Description, make_robot
+from collision_monitor.shapes.pose import Pose, multiply, rotation_matrix
 
 ROOT = Path(__file__).parents[2]
 ARM = ROOT / "examples/arm/arm.urdf"

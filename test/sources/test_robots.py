@@ -13,9 +13,9 @@ from played_sources import JOINTS, MILLISECOND, START, TF, Played, base_row, che
 from ros_messages import SECOND, definitions, header, message, pose, vector
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.pose import multiply, rotation_matrix
 from collision_monitor.records import Model, StateFlag
 from collision_monitor.robots.robot import Description, Robot, make_robot
+from collision_monitor.shapes.pose import multiply, rotation_matrix
 from collision_monitor.sources import import_bag
 from collision_monitor.sources.decoding import Decoder
 from collision_monitor.sources.feed import Feed

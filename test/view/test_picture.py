@@ -9,8 +9,11 @@ from hypothesis import strategies as st
 
 from collision_monitor import records
 from collision_monitor.codec import Removal, encode_descriptions, encode_states
-from collision_monitor.geometry.pose import Motion, Pose
-from collision_monitor.geometry.shapes import (
+from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.pipeline.pipeline import Pipeline
+from collision_monitor.records import ContactStatus, Phase, PredictionStatus, StateFlag
+from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.shapes.shapes import (
     Box,
     Capsule,
     Circle,
@@ -25,9 +28,6 @@ from collision_monitor.geometry.shapes import (
     Shape,
     Sphere,
 )
-from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.pipeline.pipeline import Pipeline
-from collision_monitor.records import ContactStatus, Phase, PredictionStatus, StateFlag
 from collision_monitor.view.bodies import MOST_FORMS, Bodies, described_pieces
 from collision_monitor.view.forms import pieces_of
 from collision_monitor.view.levels import COLORS, Level, object_levels

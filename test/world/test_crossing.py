@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from collision_monitor.geometry.shapes import Box, Capsule, Sphere
 from collision_monitor.records import StateFlag
+from collision_monitor.shapes.shapes import Box, Capsule, Sphere
 from collision_monitor.world import make_scene
 
 SCENE = make_scene("crossing")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Box, Sphere
 from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Box, Sphere
 from collision_monitor.world import make_scene
 from collision_monitor.world.impulse_response import ImpulseResponse
 from collision_monitor.world.penalty_response import PenaltyResponse

@@ -11,10 +11,10 @@ from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.bounded_cache import bounded_cache
 from collision_monitor.geometry.point_tree import PointTree
 from collision_monitor.geometry.polygons import is_convex
-from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.qhull import HEIGHTS_AT_ONCE
-from collision_monitor.geometry.shapes import ConvexHull, Mesh, Points, Polygon, Shape, Triangle, array_bytes
 from collision_monitor.geometry.triangulation import convex_parts
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import ConvexHull, Mesh, Points, Polygon, Shape, Triangle, array_bytes
 from collision_monitor.tolerances import HULL_DROP
 
 Array = NDArray[np.float64]

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import UnsupportedError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import (
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import (
     Box,
     Capsule,
     Circle,

@@ -14,7 +14,7 @@ from collision_monitor.geometry.point_in_polygon import Location, locate, locate
 from collision_monitor.geometry.points import closest_point_on_segment
 from collision_monitor.geometry.polygons import is_convex
 from collision_monitor.geometry.polyhedra import locate_in_convex_polyhedron, locate_in_polyhedron
-from collision_monitor.geometry.shapes import (
+from collision_monitor.shapes.shapes import (
     Box,
     Capsule,
     Circle,

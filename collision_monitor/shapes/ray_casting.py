@@ -12,10 +12,10 @@ import numpy as np
 
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import convex_hull
-from collision_monitor.geometry.containment import inside
 from collision_monitor.geometry.coordinates import Array, Booleans
 from collision_monitor.geometry.ray_crossings import edge_hits, face_hits
-from collision_monitor.geometry.shapes import (
+from collision_monitor.shapes.containment import inside
+from collision_monitor.shapes.shapes import (
     Box,
     Capsule,
     Circle,

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.geometry.qhull import qhull
-from collision_monitor.geometry.shapes import (
+from collision_monitor.shapes.shapes import (
     Box,
     Capsule,
     Circle,

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from collision_monitor._jit import device
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
-from collision_monitor.geometry import shapes
-from collision_monitor.geometry.forest import REACH, Forest
 from collision_monitor.geometry.polygons import corners, is_convex, is_counter_clockwise
-from collision_monitor.geometry.pose import Pose
 from collision_monitor.geometry.qhull import hull_vertices
 from collision_monitor.records import ShapeType
+from collision_monitor.shapes import shapes
+from collision_monitor.shapes.forest import REACH, Forest
+from collision_monitor.shapes.pose import Pose
 
 Array = NDArray[np.float64]
 

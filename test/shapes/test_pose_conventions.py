@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from collision_monitor.errors import PoseError
-from collision_monitor.geometry.pose import Pose
+from collision_monitor.shapes.pose import Pose
 
 angle = st.floats(-4.0, 4.0)
 

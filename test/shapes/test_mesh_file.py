@@ -10,7 +10,7 @@ import trimesh
 
 import collision_monitor as cm
 from collision_monitor.errors import ShapeError
-from collision_monitor.geometry.mesh_file import WELD
+from collision_monitor.shapes.mesh_file import WELD
 
 TORUS = trimesh.creation.torus(1.0, 0.25, major_sections=12, minor_sections=8)
 QUARTER = trimesh.transformations.rotation_matrix(np.pi / 2, (0, 0, 1), (0, 0, 0))

@@ -8,10 +8,10 @@ from numba import njit
 
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
-from collision_monitor.geometry import shapes
-from collision_monitor.geometry.pose import Pose, rotation_matrix
 from collision_monitor.geometry.qhull import hull_vertices
-from collision_monitor.geometry.shape_table import ShapeTableBuilder, bounds
+from collision_monitor.shapes import shapes
+from collision_monitor.shapes.pose import Pose, rotation_matrix
+from collision_monitor.shapes.shape_table import ShapeTableBuilder, bounds
 
 
 @njit

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import PoseError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Circle, Polygon, Shape
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Circle, Polygon, Shape
 
 PLANAR_VECTORS = {"position": slice(2, 3), "linear": slice(2, 3), "angular": slice(0, 2)}
 """Fields of records.STATE, and their components that the plane ignores."""

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from collision_monitor.errors import ShapeError
-from collision_monitor.geometry.pose import Pose
-from collision_monitor.geometry.shapes import Shape
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import Shape
 
 
 def shape_pairs(value: Any, what: str) -> tuple[tuple[Shape, Pose], ...]:

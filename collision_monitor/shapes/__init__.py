@@ -1,0 +1,1 @@
+"""Shapes: what they are, their poses, their table, the meshes of files."""
