@@ -10,7 +10,7 @@ import time
 from space_partitions import torus
 
 import collision_monitor as cm
-from collision_monitor.geometry.sphere_tree import distance_intervals, sphere_tree
+from collision_monitor.geometry.lecture.sphere_tree import distance_intervals, sphere_tree
 
 
 def main() -> None:

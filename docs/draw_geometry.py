@@ -26,9 +26,9 @@ from collision_monitor.geometry.bounding_spheres import (
     sphere_from_widest_pair,
 )
 from collision_monitor.geometry.bounding_volumes import aabb, convex_hull, kdop
+from collision_monitor.geometry.lecture.polygon_overlap import project, sat_2d
+from collision_monitor.geometry.lecture.sphere_tree import distance_intervals, sphere_tree
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume, obb_pca
-from collision_monitor.geometry.polygon_overlap import project, sat_2d
-from collision_monitor.geometry.sphere_tree import distance_intervals, sphere_tree
 from collision_monitor.geometry.triangulation import triangulate
 
 Array = NDArray[np.float64]

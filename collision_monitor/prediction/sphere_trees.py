@@ -2,8 +2,8 @@
 
 Source: slides "Time-critical collision detection" (from coarse to fine through the spheres of a tree). A tree halves a
 long body across its length, LEVELS times, and gives each piece a sphere. The pieces are those of the convex hull of
-the body. The octree of `geometry.sphere_tree` is finer and made for solids with holes, but its cells stand out too
-far: for two long hulls it needs a hundred pairs of spheres where ten suffice here (docs/tradeoff.md).
+the body. The octree of `geometry.lecture.sphere_tree` is finer and made for solids with holes, but its cells stand out
+too far: for two long hulls it needs a hundred pairs of spheres where ten suffice here (docs/tradeoff.md).
 """
 
 from __future__ import annotations

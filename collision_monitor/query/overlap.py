@@ -6,10 +6,10 @@ from typing import Final
 
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import Hull, convex_hull
-from collision_monitor.geometry.cascade import polyhedra_intersect
 from collision_monitor.geometry.coordinates import Array
-from collision_monitor.geometry.polygon_overlap import Evidence, polygons_intersect, sat_2d
-from collision_monitor.geometry.polyhedron_sat import sat_3d
+from collision_monitor.geometry.lecture.cascade import polyhedra_intersect
+from collision_monitor.geometry.lecture.polygon_overlap import Evidence, polygons_intersect, sat_2d
+from collision_monitor.geometry.lecture.polyhedron_sat import sat_3d
 from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.query.arguments import Compound, checked_pose
 from collision_monitor.query.contact import contact

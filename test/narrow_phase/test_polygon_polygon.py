@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull as Qhull
 
 from collision_monitor import Circle, Polygon, Pose, contact
-from collision_monitor.geometry.closest_points import closest_points
+from collision_monitor.geometry.lecture.closest_points import closest_points
+from collision_monitor.geometry.lecture.polygon_overlap import Evidence, polygons_intersect
 from collision_monitor.geometry.lines import LineKind
-from collision_monitor.geometry.polygon_overlap import Evidence, polygons_intersect
 
 L_SHAPE = Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)])
 

@@ -11,7 +11,8 @@ from rational import POINTS_3D
 from scipy.optimize import linprog
 
 from collision_monitor.errors import InputError, ShapeError
-from collision_monitor.geometry.bounding_tests import (
+from collision_monitor.geometry.bounding_volumes import Aabb, BoundingSphere, Obb, aabb, kdop
+from collision_monitor.geometry.lecture.bounding_tests import (
     aabb_aabb,
     circle_circle,
     closest_point_in_aabb,
@@ -22,7 +23,6 @@ from collision_monitor.geometry.bounding_tests import (
     sphere_obb,
     sphere_sphere,
 )
-from collision_monitor.geometry.bounding_volumes import Aabb, BoundingSphere, Obb, aabb, kdop
 from collision_monitor.geometry.triangulation import triangulate
 
 RADII = st.integers(0, 5)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.particle_particle import closest_approach, particle_particle
+from collision_monitor.geometry.lecture.particle_particle import closest_approach, particle_particle
 
 
 def test_both_pass_the_crossing_of_their_paths_at_one_time():

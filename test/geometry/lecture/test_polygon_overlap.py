@@ -9,8 +9,7 @@ from rational import EXPONENTS, common_points, in_polygon
 from scipy.spatial import ConvexHull
 
 from collision_monitor.errors import ShapeError
-from collision_monitor.geometry.points import closest_point_on_segment
-from collision_monitor.geometry.polygon_overlap import (
+from collision_monitor.geometry.lecture.polygon_overlap import (
     Evidence,
     contained_vertices,
     crossing_edge_pairs,
@@ -18,6 +17,7 @@ from collision_monitor.geometry.polygon_overlap import (
     project,
     sat_2d,
 )
+from collision_monitor.geometry.points import closest_point_on_segment
 from collision_monitor.geometry.triangulation import convex_parts
 
 SHIFTS = st.tuples(st.integers(-5, 5), st.integers(-5, 5))

@@ -11,7 +11,7 @@ from rational import in_polyhedron, segment_meets_triangle
 from solids import SKEWS, bar, cube, hollow, ring, u_shape
 
 from collision_monitor.errors import ShapeError
-from collision_monitor.geometry.cascade import CascadeStage, polyhedra_intersect
+from collision_monitor.geometry.lecture.cascade import CascadeStage, polyhedra_intersect
 from collision_monitor.geometry.polyhedra import mesh_edges
 
 

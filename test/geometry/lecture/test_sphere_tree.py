@@ -9,9 +9,9 @@ from solids import CONCAVE, CONVEX
 import collision_monitor as cm
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.bounding_volumes import convex_hull
+from collision_monitor.geometry.lecture.sphere_tree import distance_intervals, sphere_tree
 from collision_monitor.geometry.point_triangle import closest_point_on_triangle
 from collision_monitor.geometry.polyhedra import locate_in_polyhedron
-from collision_monitor.geometry.sphere_tree import distance_intervals, sphere_tree
 
 ROCK = convex_hull(np.random.default_rng(5).normal(size=(30, 3)) * [1.0, 0.7, 0.4])
 SOLIDS = {name: make() for name, make in {**CONVEX, **CONCAVE}.items()} | {"rock": (ROCK.vertices, ROCK.faces)}

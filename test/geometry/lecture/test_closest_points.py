@@ -8,7 +8,7 @@ from rational import POINTS_3D
 from scipy.optimize import lsq_linear
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.closest_points import closest_points
+from collision_monitor.geometry.lecture.closest_points import closest_points
 from collision_monitor.geometry.lines import LineKind
 
 LINE, RAY, SEGMENT = LineKind.LINE, LineKind.RAY, LineKind.SEGMENT

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from collision_monitor.geometry.bounding_tests import aabb_aabb
 from collision_monitor.geometry.bounding_volumes import aabb
 from collision_monitor.geometry.coordinates import Array, Indices
+from collision_monitor.geometry.lecture.bounding_tests import aabb_aabb
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.polyhedra import closed_mesh, edge_face, locate_in_polyhedron, mesh_edges
 

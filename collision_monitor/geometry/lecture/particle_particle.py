@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from collision_monitor.geometry.closest_points import closest_points
 from collision_monitor.geometry.coordinates import Array, Booleans, coordinates, numbers
+from collision_monitor.geometry.lecture.closest_points import closest_points
 from collision_monitor.geometry.lines import LineKind
 from collision_monitor.tolerances import EPSILON
 

@@ -8,7 +8,7 @@ from point_sets import rotation
 from scipy.spatial import ConvexHull as Qhull
 
 from collision_monitor.geometry.bounding_volumes import Hull, convex_hull
-from collision_monitor.geometry.polyhedron_sat import sat_3d
+from collision_monitor.geometry.lecture.polyhedron_sat import sat_3d
 
 CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 
