@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 
 import collision_monitor as cm
 from collision_monitor._jit import kernel
-from collision_monitor.prediction.body_impact import ShapePair, contact_at, make_scratch
-from collision_monitor.prediction.motion import relative_position
+from collision_monitor.impact.body_impact import ShapePair, contact_at, make_scratch
+from collision_monitor.motion.motion import relative_position
 from collision_monitor.query.impact_methods import lay_out_motions
 from collision_monitor.query.moving_pair import make_moving_shape
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from collision_monitor import Box, ConvexHull, Monitor, StepResult, records
 from collision_monitor.accuracy.reference_monitor import ReferenceMonitor
-from collision_monitor.prediction import sphere_trees
+from collision_monitor.impact import sphere_trees
 from collision_monitor.settings.profile import Profile
 from collision_monitor.world.arm import link
 

@@ -160,7 +160,7 @@ def test_no_step_with_a_budget_is_the_first_to_load_a_kernel(when: str) -> None:
     """Without the warm-up, the first step with time left loaded a kernel: 28 ms in a step of 1.6 ms."""
     program = (
         "from collision_monitor.monitor.monitor import Monitor, Profile\n"
-        "from collision_monitor.prediction import pair_impacts, sphere_trees\n"
+        "from collision_monitor.impact import pair_impacts, sphere_trees\n"
         "limited = Profile(budget_ms=1.0)\n"
         f"monitor = {when}\n"
         "print(len(pair_impacts.refine.signatures), len(sphere_trees.tighten.signatures))\n"

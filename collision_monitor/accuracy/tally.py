@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.accuracy.measurement import Errors, Measurement
 from collision_monitor.accuracy.reported import Reported, Rows, Steps
-from collision_monitor.prediction.impact_record import pair_keys
+from collision_monitor.impact.impact_record import pair_keys
 from collision_monitor.records import PredictionStatus
 from collision_monitor.session.history.alarms import Alarms
 from collision_monitor.settings.profile import Profile

@@ -16,10 +16,10 @@ from collision_monitor.alerts.rules import Rule, Rules
 from collision_monitor.alerts.scene import Scene
 from collision_monitor.alerts.selection import Classes
 from collision_monitor.codec.alerts import AlertCause, CollisionAlert, CollisionAlertArray
+from collision_monitor.impact.impact_record import ids_of_keys
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.snapshot import Facts, Snapshot
-from collision_monitor.prediction.impact_record import ids_of_keys
 
 _ARRAY: Final = "alerts"
 """Begin of the keys in a snapshot; the number of the rule follows."""

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from collision_monitor.alerts.measures import Measures
 from collision_monitor.alerts.scene import Scene
+from collision_monitor.impact.impact_record import pair_keys
 from collision_monitor.monitor.result import StepResult
-from collision_monitor.prediction.impact_record import pair_keys
 from collision_monitor.records import ContactStatus, PredictionStatus
 
 

@@ -16,10 +16,10 @@ import numpy as np
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.alerts.measures import Array, Slots
 from collision_monitor.alerts.scene import Scene
+from collision_monitor.impact.body_contact import RESULT, ContactQuery, body_contact
+from collision_monitor.impact.body_impact import make_scratch
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL
-from collision_monitor.prediction.body_contact import RESULT, ContactQuery, body_contact
-from collision_monitor.prediction.body_impact import make_scratch
-from collision_monitor.prediction.uncertainty import body_has_mesh
+from collision_monitor.uncertainty.uncertainty import body_has_mesh
 
 MOST: Final = 65
 """Most distances of a pair."""

@@ -17,8 +17,8 @@ from collision_monitor.alerts.selection import Classes, select
 from collision_monitor.alerts.thresholds import APPROACH
 from collision_monitor.alerts.traffic import post_encroachment_time, required_deceleration, time_headway
 from collision_monitor.broad_phase.dense_grid import box_pairs
+from collision_monitor.impact.impact_record import ids_of_keys, pair_keys
 from collision_monitor.monitor.candidates import filters_of, keep_checked
-from collision_monitor.prediction.impact_record import ids_of_keys, pair_keys
 
 REST_SPEED: Final = 0.05
 """m/s: two bodies none of whose points is faster rest. Trackers report about this for people who stand."""

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from collision_monitor._jit import kernel
 from collision_monitor.alerts.measures import Array, Slots
 from collision_monitor.alerts.scene import Scene
+from collision_monitor.impact.body_contact import RESULT, ContactQuery, body_contact
+from collision_monitor.impact.body_impact import CLOSING, make_scratch
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
-from collision_monitor.prediction.body_contact import RESULT, ContactQuery, body_contact
-from collision_monitor.prediction.body_impact import CLOSING, make_scratch
 
 
 class Nearest(NamedTuple):

@@ -12,6 +12,11 @@ from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.errors import InputError
+from collision_monitor.impact.body_contact import RESULT, body_contact
+from collision_monitor.impact.body_impact import Scratch, Window, body_impact
+from collision_monitor.impact.coarse_impact import coarse_impact, has_bounds
+from collision_monitor.impact.impact_record import BOUND_ONLY, CLEAR, HIT, IMPACT, holds, ids_of_keys, pair_key
+from collision_monitor.impact.pair_impacts import cover_of
 from collision_monitor.monitor.candidates import is_checked
 from collision_monitor.monitor.carried_contacts import CARRIED, Carrying, carry, has_answer, keep, no_answers, saved
 from collision_monitor.monitor.carried_triangles import APART, NONE, overlap_of_trees
@@ -23,11 +28,6 @@ from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.solid_overlap import overlap_of_solid
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.narrow_phase.contact_row import DISTANCE
-from collision_monitor.prediction.body_contact import RESULT, body_contact
-from collision_monitor.prediction.body_impact import Scratch, Window, body_impact
-from collision_monitor.prediction.coarse_impact import coarse_impact, has_bounds
-from collision_monitor.prediction.impact_record import BOUND_ONLY, CLEAR, HIT, IMPACT, holds, ids_of_keys, pair_key
-from collision_monitor.prediction.pair_impacts import cover_of
 from collision_monitor.records import Model, Phase
 
 PAIR = np.dtype(

@@ -13,6 +13,9 @@ from collision_monitor import records
 from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
+from collision_monitor.impact.body_contact import SHAPE_I, SHAPE_J, STATUS, UNSETTLED
+from collision_monitor.impact.body_impact import CLOSING
+from collision_monitor.impact.impact_record import BOUND_ONLY, HIT, TREE_BOUND, UNRESOLVED, ids_of
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.active_pairs import ActivePairs
 from collision_monitor.monitor.event_list import EventList
@@ -33,9 +36,6 @@ from collision_monitor.narrow_phase.contact_row import (
     POINT_A,
     POINT_B,
 )
-from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, UNSETTLED
-from collision_monitor.prediction.body_impact import CLOSING
-from collision_monitor.prediction.impact_record import BOUND_ONLY, HIT, TREE_BOUND, UNRESOLVED, ids_of
 from collision_monitor.records import Phase, joined
 
 PREFETCH_AHEAD: Final = 8

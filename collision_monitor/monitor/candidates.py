@@ -14,12 +14,12 @@ from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, make_hashed_grid, read_boxes, regridded, remove_boxes
 from collision_monitor.broad_phase.region import regions_overlap
 from collision_monitor.broad_phase.sorted_boxes import SortedBoxes, note_changed, overlapping, sorted_boxes
+from collision_monitor.impact.impact_record import pair_key
 from collision_monitor.monitor.roster import FIRST_CAPACITY, Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
-from collision_monitor.prediction.bodies import Bodies
-from collision_monitor.prediction.impact_record import pair_key
-from collision_monitor.prediction.motion import swept_box
+from collision_monitor.motion.bodies import Bodies
+from collision_monitor.motion.motion import swept_box
 
 MOST_TESTS: Final = 6_000
 """Up to this number of pairs of a body to predict and any body, each is tested. For more, there are the grids."""

@@ -19,6 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import inlined
+from collision_monitor.impact.body_contact import RESULT, STATUS, TOUCHING, closing_now, relative_now, widening
+from collision_monitor.impact.body_impact import CLOSING
+from collision_monitor.impact.mesh_pair import has_mesh
 from collision_monitor.monitor.carried_triangles import (
     NO_MESH,
     NONE,
@@ -29,11 +32,8 @@ from collision_monitor.monitor.carried_triangles import (
     meets_by_trees,
     turning,
 )
+from collision_monitor.motion.motion import age_of, chord_angle, position_now, turn_quaternion
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
-from collision_monitor.prediction.body_contact import RESULT, STATUS, TOUCHING, closing_now, relative_now, widening
-from collision_monitor.prediction.body_impact import CLOSING
-from collision_monitor.prediction.mesh_pair import has_mesh
-from collision_monitor.prediction.motion import age_of, chord_angle, position_now, turn_quaternion
 
 RELATIVE: Final = RESULT
 TURN_I: Final = RESULT + 3

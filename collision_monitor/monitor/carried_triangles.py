@@ -13,18 +13,7 @@ from math import sqrt
 from typing import Final
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.meshes.boxes import half_of
-from collision_monitor.meshes.depth_range import depth_range
-from collision_monitor.meshes.inside import OUTSIDE
-from collision_monitor.meshes.layout import CENTER, WIDTH
-from collision_monitor.meshes.nearest import PAIRS, PLACE_A, PLACE_B
-from collision_monitor.meshes.placing import relative, turned_back
-from collision_monitor.meshes.touching import touching
-from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
-from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.narrow_phase.vector import dot, opposite, rotate_back
-from collision_monitor.prediction.bodies import place_shape
-from collision_monitor.prediction.body_contact import (
+from collision_monitor.impact.body_contact import (
     RESULT,
     SHAPE_I,
     SHAPE_J,
@@ -35,9 +24,20 @@ from collision_monitor.prediction.body_contact import (
     relative_now,
     widening,
 )
-from collision_monitor.prediction.body_impact import CLOSING
-from collision_monitor.prediction.mesh_pair import enclosure, has_mesh, have_trees, root_of, triangles_contact
-from collision_monitor.prediction.motion import rotation_now
+from collision_monitor.impact.body_impact import CLOSING
+from collision_monitor.impact.mesh_pair import enclosure, has_mesh, have_trees, root_of, triangles_contact
+from collision_monitor.meshes.boxes import half_of
+from collision_monitor.meshes.depth_range import depth_range
+from collision_monitor.meshes.inside import OUTSIDE
+from collision_monitor.meshes.layout import CENTER, WIDTH
+from collision_monitor.meshes.nearest import PAIRS, PLACE_A, PLACE_B
+from collision_monitor.meshes.placing import relative, turned_back
+from collision_monitor.meshes.touching import touching
+from collision_monitor.motion.bodies import place_shape
+from collision_monitor.motion.motion import rotation_now
+from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
+from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.narrow_phase.vector import dot, opposite, rotate_back
 
 PLACE_I: Final = RESULT + 11
 PLACE_J: Final = RESULT + 12

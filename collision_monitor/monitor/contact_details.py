@@ -9,6 +9,8 @@ from math import inf, sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.impact.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUCHING, relative_now
+from collision_monitor.impact.mesh_pair import has_mesh
 from collision_monitor.meshes.extent import farthest
 from collision_monitor.meshes.feature import (
     ROUND_TIE,
@@ -20,6 +22,8 @@ from collision_monitor.meshes.feature import (
     vertex_at,
 )
 from collision_monitor.meshes.triangle_pair import Triangle
+from collision_monitor.motion.bodies import place_shape
+from collision_monitor.motion.motion import age_of, position_now, rotation_now
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,
     DISTANCE,
@@ -49,10 +53,6 @@ from collision_monitor.narrow_phase.vector import (
     sum_of_sizes,
 )
 from collision_monitor.narrow_phase.work_memory import P_AB, R_AB
-from collision_monitor.prediction.bodies import place_shape
-from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUCHING, relative_now
-from collision_monitor.prediction.mesh_pair import has_mesh
-from collision_monitor.prediction.motion import age_of, position_now, rotation_now
 from collision_monitor.shapes.shape_table import (
     BOX,
     CONE,

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.prediction.bodies import Bodies
+from collision_monitor.motion.bodies import Bodies
 
 MOST_PAIRS: Final = 1_000_000
 """Pairs that may meet. Each needs about 560 bytes in the monitor and its answers, and 1 to 20 µs in a step. Larger: a

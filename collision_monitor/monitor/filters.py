@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.prediction.bodies import Bodies
+from collision_monitor.motion.bodies import Bodies
 from collision_monitor.records import Method
 from collision_monitor.settings.setting import EVERYWHERE, Vector
 

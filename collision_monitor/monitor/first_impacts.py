@@ -10,13 +10,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.impact.body_impact import Scratch, make_scratch
+from collision_monitor.impact.coarse_impact import predict_coarsely
+from collision_monitor.impact.impact_record import IMPACT
+from collision_monitor.impact.pair_impacts import bound_pairs, predict_pairs, refine
 from collision_monitor.monitor.shared_work import share
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
-from collision_monitor.prediction.body_impact import Scratch, make_scratch
-from collision_monitor.prediction.coarse_impact import predict_coarsely
-from collision_monitor.prediction.impact_record import IMPACT
-from collision_monitor.prediction.pair_impacts import bound_pairs, predict_pairs, refine
 from collision_monitor.records import joined
 
 FEWEST_PAIRS_FOR_THREADS: Final = 500

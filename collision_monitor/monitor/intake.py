@@ -17,11 +17,11 @@ from collision_monitor.monitor.roster import Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.timeline import Order
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
-from collision_monitor.prediction.spread import worst_stddevs
 from collision_monitor.records import StateFlag
 from collision_monitor.settings.by_name import classes_of
 from collision_monitor.shapes.planar import flat_states
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
+from collision_monitor.uncertainty.spread import worst_stddevs
 
 ACCEPTED: Final = 0
 UNKNOWN_ID: Final = 1

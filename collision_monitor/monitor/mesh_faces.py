@@ -15,10 +15,13 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.errors import InputError
+from collision_monitor.impact.body_contact import SHAPE_I, SHAPE_J
 from collision_monitor.meshes.feature import IN_FACE, feature_in_triangle, off_triangle, tie_of
 from collision_monitor.meshes.triangle_pair import Triangle
 from collision_monitor.monitor.contact_details import core_point, origin_now
 from collision_monitor.monitor.snapshot import Snapshot, check_range
+from collision_monitor.motion.bodies import place_shape
+from collision_monitor.motion.motion import rotation_now
 from collision_monitor.narrow_phase.contact_row import (
     FACE,
     FEATURE_INDEX_A,
@@ -33,9 +36,6 @@ from collision_monitor.narrow_phase.vector import Vector, opposite, plus, rotate
 from collision_monitor.objects.closed_parts import separated
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled
-from collision_monitor.prediction.bodies import place_shape
-from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J
-from collision_monitor.prediction.motion import rotation_now
 from collision_monitor.records import Model
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shape_table import CONVEX_HULL

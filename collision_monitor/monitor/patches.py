@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel, kernel
+from collision_monitor.impact.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUCHING, closing_now, relative_now
+from collision_monitor.impact.mesh_pair import has_mesh
 from collision_monitor.monitor.active_pairs import Active
+from collision_monitor.motion.bodies import Multibody, next_pair, place_shape
+from collision_monitor.motion.motion import position_now, rotation_now
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.narrow_phase.manifold import CORNERS, manifold_batch, reduce_points
 from collision_monitor.narrow_phase.work_memory import work_array
-from collision_monitor.prediction.bodies import Multibody, next_pair, place_shape
-from collision_monitor.prediction.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUCHING, closing_now, relative_now
-from collision_monitor.prediction.mesh_pair import has_mesh
-from collision_monitor.prediction.motion import position_now, rotation_now
 from collision_monitor.records import MOST_POINTS
 from collision_monitor.shapes.shape_table import take
 from collision_monitor.tolerances import FEATURE_TIE

@@ -10,14 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from collision_monitor._jit import inlined
-from collision_monitor.narrow_phase.box_box import axis_direction, sat, touching_features
-from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A
-from collision_monitor.narrow_phase.core import half_extents
-from collision_monitor.narrow_phase.dispatch import mirror
-from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
-from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact
-from collision_monitor.narrow_phase.vector import opposite
-from collision_monitor.prediction.body_contact import (
+from collision_monitor.impact.body_contact import (
     SHAPE_I,
     SHAPE_J,
     STATUS,
@@ -27,8 +20,15 @@ from collision_monitor.prediction.body_contact import (
     relative_now,
     widening,
 )
-from collision_monitor.prediction.body_impact import CLOSING
-from collision_monitor.prediction.motion import rotation_now
+from collision_monitor.impact.body_impact import CLOSING
+from collision_monitor.motion.motion import rotation_now
+from collision_monitor.narrow_phase.box_box import axis_direction, sat, touching_features
+from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A
+from collision_monitor.narrow_phase.core import half_extents
+from collision_monitor.narrow_phase.dispatch import mirror
+from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
+from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact
+from collision_monitor.narrow_phase.vector import opposite
 from collision_monitor.shapes.shape_table import SPHERE
 from collision_monitor.tolerances import FACE_PREFERENCE, SAT_ROUND_OFF
 

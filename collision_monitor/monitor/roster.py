@@ -14,16 +14,16 @@ from collision_monitor._jit import kernel
 from collision_monitor._jit.direct import forget
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, UnsupportedError
+from collision_monitor.impact.impact_record import pair_keys
 from collision_monitor.meshes.shape_trees import shape_tree
 from collision_monitor.meshes.slot_trees import plant_trees
 from collision_monitor.monitor.mesh_faces import MeshFaces, faces_of
 from collision_monitor.monitor.mesh_snapshot import mesh_arrays, plant_meshes
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage, check_range
+from collision_monitor.motion.bodies import DERIVED, Bodies, Multibody, Parts, enlarge, make_bodies, make_parts
+from collision_monitor.motion.body_layout import lay_out_body, note_plain
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled, monitored_model
-from collision_monitor.prediction.bodies import DERIVED, Bodies, Multibody, Parts, enlarge, make_bodies, make_parts
-from collision_monitor.prediction.body_layout import lay_out_body, note_plain
-from collision_monitor.prediction.impact_record import pair_keys
 from collision_monitor.records import Model, ShapeType
 from collision_monitor.settings.by_name import Classes, value_of
 from collision_monitor.shapes.planar import flat_pose, is_planar

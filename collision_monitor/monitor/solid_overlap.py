@@ -10,6 +10,18 @@ from math import inf
 from typing import Any
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.impact.body_contact import (
+    SHAPE_I,
+    SHAPE_J,
+    STATUS,
+    TOUCHING,
+    closing_now,
+    move_to_world,
+    relative_now,
+    widening,
+)
+from collision_monitor.impact.body_impact import CLOSING
+from collision_monitor.impact.mesh_pair import has_mesh, have_trees, is_mesh, root_of
 from collision_monitor.meshes.solid import SolidMemory
 from collision_monitor.meshes.solid_range import solid_range
 from collision_monitor.monitor.carried_triangles import (
@@ -26,18 +38,6 @@ from collision_monitor.narrow_phase.dispatch import mirror
 from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
 from collision_monitor.narrow_phase.support_value import core_support
 from collision_monitor.narrow_phase.vector import dot, opposite, rotate_back
-from collision_monitor.prediction.body_contact import (
-    SHAPE_I,
-    SHAPE_J,
-    STATUS,
-    TOUCHING,
-    closing_now,
-    move_to_world,
-    relative_now,
-    widening,
-)
-from collision_monitor.prediction.body_impact import CLOSING
-from collision_monitor.prediction.mesh_pair import has_mesh, have_trees, is_mesh, root_of
 from collision_monitor.shapes.shape_table import HALF_SPACE
 
 

@@ -12,6 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
+from collision_monitor.impact.body_contact import ROUND_OFF, bounded_contact, relative_now, widening
+from collision_monitor.impact.body_impact import Window
+from collision_monitor.impact.impact_record import BOUND_ONLY, CLEAR, IMPACT, TREE_BOUND
+from collision_monitor.impact.pair_impacts import bound_impact, cover_of, is_cheap
+from collision_monitor.impact.sphere_trees import Tree, Trees, body_tree, joined_trees, tighten
 from collision_monitor.monitor.active_pairs import ActivePairs, is_predicted_anew
 from collision_monitor.monitor.budget import EXAMINE, HANDFUL, REFINE, TREES, PairBudget, StepClock, TimeBudget
 from collision_monitor.monitor.event_list import EventList, Events, sort_order
@@ -19,12 +24,7 @@ from collision_monitor.monitor.first_impacts import FirstImpacts
 from collision_monitor.monitor.roster import Roster
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
-from collision_monitor.prediction.bodies import Bodies
-from collision_monitor.prediction.body_contact import ROUND_OFF, bounded_contact, relative_now, widening
-from collision_monitor.prediction.body_impact import Window
-from collision_monitor.prediction.impact_record import BOUND_ONLY, CLEAR, IMPACT, TREE_BOUND
-from collision_monitor.prediction.pair_impacts import bound_impact, cover_of, is_cheap
-from collision_monitor.prediction.sphere_trees import Tree, Trees, body_tree, joined_trees, tighten
+from collision_monitor.motion.bodies import Bodies
 from collision_monitor.records import joined
 from collision_monitor.settings.profile import NO_BUDGET, NO_LIMIT, Profile
 

@@ -2,7 +2,7 @@
 
 A body that left its reference motion starts anew from its last state. A body that keeps its motion does not: its
 predictions are continued before they end. A stale object widens its bounds here, in `find_moved` and
-`restart_motion`; its contacts widen theirs in `prediction.body_contact.widening`.
+`restart_motion`; its contacts widen theirs in `impact.body_contact.widening`.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from collision_monitor.monitor.adaptive_tubes import FUTILE_STEPS, NARROWEST, PA
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
-from collision_monitor.prediction.motion import age_of, position_now, quaternion_to_matrix, swept_box, turn_quaternion
-from collision_monitor.prediction.spread import surface_spread, swing_radius
-from collision_monitor.prediction.turning import BLOCK, COLUMNS, make_columns, turned_away
+from collision_monitor.motion.motion import age_of, position_now, quaternion_to_matrix, swept_box, turn_quaternion
+from collision_monitor.motion.turning import BLOCK, COLUMNS, make_columns, turned_away
+from collision_monitor.uncertainty.spread import surface_spread, swing_radius
 
 FIRST_SLACK: Final = 0.5
 SHORTEST_SLACK: Final = 0.0625

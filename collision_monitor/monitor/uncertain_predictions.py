@@ -16,31 +16,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
+from collision_monitor.impact.acceleration_bounds import Intervals, widen_intervals
+from collision_monitor.impact.impact_record import holds, ids_of_keys, pair_keys, write_pair
+from collision_monitor.impact.pair_impacts import cover_of
 from collision_monitor.monitor.budget import SAMPLE, PairBudget
 from collision_monitor.monitor.shared_work import share
 from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
+from collision_monitor.motion.bodies import enlarge
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.prediction.acceleration_bounds import Intervals, widen_intervals
-from collision_monitor.prediction.bodies import enlarge
-from collision_monitor.prediction.error_samples import Workspace, make_workspace
-from collision_monitor.prediction.impact_distribution import EARLIEST, MOST_LIKELY, PROBABILITY
-from collision_monitor.prediction.impact_record import holds, ids_of_keys, pair_keys, write_pair
-from collision_monitor.prediction.likely_impacts import LEFT, likely_impacts
-from collision_monitor.prediction.near_pairs import Nearness, find_near
-from collision_monitor.prediction.normal_samples import normal_samples, sample_columns
-from collision_monitor.prediction.pair_impacts import cover_of
-from collision_monitor.prediction.plane_memory import PlaneMemory, make_plane_memory
-from collision_monitor.prediction.spread import Spread, is_uncertain, make_spread, take_spread
-from collision_monitor.prediction.uncertainty import (
+from collision_monitor.records import PREDICTION, Method, PredictionStatus
+from collision_monitor.settings.profile import Profile
+from collision_monitor.uncertainty.impact_distribution import EARLIEST, MOST_LIKELY, PROBABILITY
+from collision_monitor.uncertainty.likely_impacts import LEFT, likely_impacts
+from collision_monitor.uncertainty.near_pairs import Nearness, find_near
+from collision_monitor.uncertainty.plane_memory import PlaneMemory, make_plane_memory
+from collision_monitor.uncertainty.samples.error_samples import Workspace, make_workspace
+from collision_monitor.uncertainty.samples.normal_samples import normal_samples, sample_columns
+from collision_monitor.uncertainty.spread import Spread, is_uncertain, make_spread, take_spread
+from collision_monitor.uncertainty.uncertainty import (
     COSTLY_PARTS,
     SPINNING_PARTS,
     Sampling,
     find_divisors,
     impact_probabilities,
 )
-from collision_monitor.records import PREDICTION, Method, PredictionStatus
-from collision_monitor.settings.profile import Profile
 
 Pool = ThreadPoolExecutor | None
 """Threads that share the work; None: one thread."""

@@ -6,10 +6,10 @@ import numpy as np
 
 from collision_monitor._jit import kernel, outlined
 from collision_monitor._jit.settled import settled
+from collision_monitor.motion.motion import quaternion_to_matrix
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.dispatch import pair_contact
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.prediction.motion import quaternion_to_matrix
 from collision_monitor.query.packed import fits, load_pair
 
 

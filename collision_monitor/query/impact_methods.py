@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.errors import UnsupportedError
-from collision_monitor.prediction.bodies import Multibody, make_bodies
-from collision_monitor.prediction.body_impact import ShapePair, contact_at, make_scratch
-from collision_monitor.prediction.sphere_interval import sphere_interval
+from collision_monitor.impact.body_impact import ShapePair, contact_at, make_scratch
+from collision_monitor.impact.sphere_interval import sphere_interval
+from collision_monitor.motion.bodies import Multibody, make_bodies
 from collision_monitor.query.moving_pair import (
     MotionQuery,
     MovingShape,

@@ -8,9 +8,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import device, kernel
-from collision_monitor.prediction.body_impact import Window, body_impact
-from collision_monitor.prediction.impact_record import CLEAR, HIT
-from collision_monitor.prediction.motion import quaternion_to_matrix
+from collision_monitor.impact.body_impact import Window, body_impact
+from collision_monitor.impact.impact_record import CLEAR, HIT
+from collision_monitor.motion.motion import quaternion_to_matrix
 from collision_monitor.tolerances import EPSILON, LARGEST_INPUT, UNIT_QUATERNION
 
 _SMALLEST: Final = 1e-240

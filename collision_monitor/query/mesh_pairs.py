@@ -18,9 +18,9 @@ from collision_monitor.meshes.nearest import ANSWER, BOUNDS, MEMORY, PLACE_A, PL
 from collision_monitor.meshes.placing import relative
 from collision_monitor.meshes.shape_trees import CERTAIN, NEVER, KeptTree, have_kernels, kept_tree
 from collision_monitor.meshes.touching import touching
+from collision_monitor.motion.motion import quaternion_to_matrix
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.prediction.motion import quaternion_to_matrix
 from collision_monitor.query.packed import packed_pose
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import Shape

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import PoseError, TooCostlyError, UnsupportedError
 from collision_monitor.geometry.bounded_cache import bounded_cache
+from collision_monitor.impact.body_impact import ImpactQuery, make_scratch
+from collision_monitor.impact.impact_record import IMPACT
+from collision_monitor.impact.pair_impacts import bodies_overlap_time, predict_pairs
 from collision_monitor.meshes.shape_trees import shape_tree
+from collision_monitor.motion.bodies import Bodies, Multibody, make_bodies, make_parts
+from collision_monitor.motion.body_layout import lay_out_body
 from collision_monitor.objects.excess import PosedShapes
 from collision_monitor.objects.models import containing_model, exact_model
-from collision_monitor.prediction.bodies import Bodies, Multibody, make_bodies, make_parts
-from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
-from collision_monitor.prediction.body_layout import lay_out_body
-from collision_monitor.prediction.impact_record import IMPACT
-from collision_monitor.prediction.pair_impacts import bodies_overlap_time, predict_pairs
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.surface_pair import points_near
 from collision_monitor.shapes.compound import shape_pairs

@@ -9,11 +9,11 @@ import numpy as np
 
 from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.direct import direct
+from collision_monitor.impact.body_impact import ImpactQuery, Scratch, Window, body_impact, make_scratch
+from collision_monitor.impact.impact_record import CLEAR, HIT, IMPACT
+from collision_monitor.motion.bodies import Bodies, Multibody, Parts, make_bodies, make_parts
+from collision_monitor.motion.motion import quaternion_to_matrix
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE
-from collision_monitor.prediction.bodies import Bodies, Multibody, Parts, make_bodies, make_parts
-from collision_monitor.prediction.body_impact import ImpactQuery, Scratch, Window, body_impact, make_scratch
-from collision_monitor.prediction.impact_record import CLEAR, HIT, IMPACT
-from collision_monitor.prediction.motion import quaternion_to_matrix
 from collision_monitor.query.contact_rows import write_contact
 from collision_monitor.query.packed import fits, load_pair
 from collision_monitor.shapes.shape_table import SPHERE

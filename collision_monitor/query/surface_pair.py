@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.impact.body_impact import make_scratch
+from collision_monitor.impact.mesh_contact import mesh_contacts
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE
-from collision_monitor.prediction.body_impact import make_scratch
-from collision_monitor.prediction.mesh_contact import mesh_contacts
 from collision_monitor.query.pair_table import pair_table
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import Points, Shape

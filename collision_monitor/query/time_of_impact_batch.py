@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import InputError, PoseError
-from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
-from collision_monitor.prediction.impact_record import IMPACT
+from collision_monitor.impact.body_impact import ImpactQuery, make_scratch
+from collision_monitor.impact.impact_record import IMPACT
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.batch_result import Batch, Pairs
 from collision_monitor.query.impact_rows import ImpactTimes, impacts_of_rows, impacts_of_spheres, normalise_states

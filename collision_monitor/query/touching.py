@@ -1,7 +1,7 @@
 """First impact of two bodies that touch at the start: they part, slide, roll or rest, or they penetrate.
 
 Along a fixed direction in which two convex pieces do not overlap, the gap after a time t has a lower bound that is
-concave in t (see prediction/advance.py). Between two times, the bound is at least the smaller of its values there. If
+concave in t (see impact/advance.py). Between two times, the bound is at least the smaller of its values there. If
 it keeps the pieces from overlapping until they are apart, or for the whole horizon, touching is no impact.
 """
 
@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import TooCostlyError
+from collision_monitor.impact.impact_record import HIT
+from collision_monitor.motion.bodies import Multibody
 from collision_monitor.narrow_phase.contact_row import as_contacts
 from collision_monitor.narrow_phase.dispatch import contact_batch
-from collision_monitor.prediction.bodies import Multibody
-from collision_monitor.prediction.impact_record import HIT
 from collision_monitor.query.contact import contact
 from collision_monitor.query.moving_pair import MotionQuery, MovingShape, first_impacts, lay_out_pair
 from collision_monitor.shapes.pose import Pose

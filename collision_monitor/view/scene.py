@@ -32,10 +32,10 @@ from collision_monitor.codec.states import COVARIANCE_SIZE
 from collision_monitor.monitor.timeline import NANOSECOND
 from collision_monitor.pipeline.catalogue import Catalogue
 from collision_monitor.pipeline.settings_event import RULES
-from collision_monitor.prediction.spread import worst_stddevs
 from collision_monitor.records import StateFlag
 from collision_monitor.shapes.pose import multiply
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
+from collision_monitor.uncertainty.spread import worst_stddevs
 from collision_monitor.view.bodies import Bodies, described_pieces
 from collision_monitor.view.forms import Piece
 from collision_monitor.view.levels import Level, Pair

@@ -6,7 +6,7 @@ import numpy as np
 
 from collision_monitor._jit.alignment import aligned_zeros, columns_in_one_block
 from collision_monitor._jit.prefetch import CACHE_LINE
-from collision_monitor.prediction.bodies import LAST_STATE, make_bodies
+from collision_monitor.motion.bodies import LAST_STATE, make_bodies
 
 
 def test_columns_in_one_block_are_zeros_and_do_not_overlap() -> None:

@@ -12,12 +12,12 @@ from collision_monitor import records
 from collision_monitor.accuracy.reference_monitor import ReferenceMonitor, disagreements
 from collision_monitor.codec import encode_descriptions, encode_states
 from collision_monitor.errors import ProfileError
+from collision_monitor.impact import sphere_trees
 from collision_monitor.monitor.budget import EXAMINE, FEWEST, TREES, PairBudget, StepClock, TimeBudget
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
-from collision_monitor.prediction import sphere_trees
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import Box, ConvexHull

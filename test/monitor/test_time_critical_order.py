@@ -6,11 +6,11 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from collision_monitor.impact.impact_record import IMPACT
 from collision_monitor.monitor.active_pairs import PAIR
 from collision_monitor.monitor.event_list import count_until
 from collision_monitor.monitor.time_critical import urgency
-from collision_monitor.prediction.bodies import make_bodies
-from collision_monitor.prediction.impact_record import IMPACT
+from collision_monitor.motion.bodies import make_bodies
 
 BODIES = 12
 

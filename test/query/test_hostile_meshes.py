@@ -8,12 +8,12 @@ import pytest
 import collision_monitor as cm
 from collision_monitor import Motion, Pose
 from collision_monitor.geometry.inside import UNKNOWN
+from collision_monitor.impact.body_impact import ImpactQuery, make_scratch
+from collision_monitor.impact.impact_record import IMPACT
+from collision_monitor.impact.pair_impacts import predict_pairs
 from collision_monitor.meshes.nearest import LEAST, MEMORY, answer_row, tree_distance
 from collision_monitor.meshes.shape_trees import kept_tree
 from collision_monitor.meshes.solid import MOST_EXAMINED
-from collision_monitor.prediction.body_impact import ImpactQuery, make_scratch
-from collision_monitor.prediction.impact_record import IMPACT
-from collision_monitor.prediction.pair_impacts import predict_pairs
 from collision_monitor.query import deepest, moving_pair, touching
 from collision_monitor.query.posed import Posed
 

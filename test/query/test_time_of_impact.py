@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import collision_monitor as cm
 from collision_monitor import Motion, Pose, contact, time_of_impact
-from collision_monitor.prediction.pair_impacts import predict_pairs
+from collision_monitor.impact.pair_impacts import predict_pairs
 
 ROCK = cm.ConvexHull(np.random.default_rng(3).normal(size=(16, 3)) * 0.4)
 SOLIDS = [cm.Sphere(0.4), cm.Box((0.7, 0.9, 0.5)), cm.Capsule(0.2, 0.8), cm.Cylinder(0.4, 0.7), cm.Cone(0.5, 0.9), ROCK]

@@ -1,7 +1,7 @@
 """Collision of two particles on straight paths: both must be near the paths' closest points at the same time.
 
 (Slides "Particle-Particle Collision in 2D" and "in 3D".) This is the lecture's test for points; the prediction of
-shapes with certified times is in `prediction/`.
+shapes with certified times is in `impact/`.
 """
 
 from __future__ import annotations

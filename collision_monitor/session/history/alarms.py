@@ -20,7 +20,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.prediction.impact_record import pair_keys
+from collision_monitor.impact.impact_record import pair_keys
 from collision_monitor.records import ContactStatus, Phase, PredictionStatus
 from collision_monitor.session.history.history import History
 

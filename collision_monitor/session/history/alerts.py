@@ -8,7 +8,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.prediction.impact_record import pair_keys
+from collision_monitor.impact.impact_record import pair_keys
 from collision_monitor.records import PredictionStatus
 from collision_monitor.session.history.history import CollisionEvent, Floats, History, Pair
 

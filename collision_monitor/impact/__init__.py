@@ -1,0 +1,1 @@
+"""When two bodies first meet, and their contact now."""

@@ -1,0 +1,167 @@
+"""The deepest contact of two bodies now, from their last states."""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Any, Final, NamedTuple
+
+from collision_monitor._jit import device, inlined, outlined
+from collision_monitor.impact.body_impact import CLOSING, closing_speed
+from collision_monitor.impact.mesh_pair import shapes_within
+from collision_monitor.motion.bodies import next_pair, place_shape
+from collision_monitor.motion.motion import (
+    age_of,
+    position_now,
+    relative_position_now,
+    relative_velocity_now,
+    rotation_now,
+)
+from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
+from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.records import ContactStatus
+
+SHAPE_I: Final = CLOSING + 1
+SHAPE_J: Final = CLOSING + 2
+STATUS: Final = CLOSING + 3
+RESULT: Final = CLOSING + 4
+"""Numbers of a result row: a contact row about body i, the closing speed, the slots of the shapes, a ContactStatus."""
+
+TOUCHING: Final = int(ContactStatus.TOUCHING)
+UNSETTLED: Final = int(ContactStatus.UNRESOLVED)
+
+ROUND_OFF: Final = 1.0 + 1e-14
+"""Factor on the reach of two bounding spheres, so that no contact is lost to the rounding of their distance."""
+
+
+class ContactQuery(NamedTuple):
+    """What counts as a contact."""
+
+    margin: float  # m: pairs whose distance is at most this touch
+    stale_acceleration: float  # m/s^2: largest acceleration of a body after its last state
+
+
+class Now(NamedTuple):
+    """Body j relative to body i at one time, extrapolated from their last states."""
+
+    p: Any  # (3,): position of j's origin from i's (m)
+    v: Any  # (3,): its velocity (m/s)
+    age_i: Any  # s since the last state; 0 for static bodies
+    age_j: Any
+
+
+@inlined
+def relative_now(bodies, i, j, time):
+    """Compute body j relative to body i at `time` (s)."""
+    age_i, age_j = age_of(bodies, i, time), age_of(bodies, j, time)
+    p = (
+        relative_position_now(bodies, i, age_i, j, age_j, 0),
+        relative_position_now(bodies, i, age_i, j, age_j, 1),
+        relative_position_now(bodies, i, age_i, j, age_j, 2),
+    )
+    v = (
+        relative_velocity_now(bodies, i, age_i, j, age_j, 0),
+        relative_velocity_now(bodies, i, age_i, j, age_j, 1),
+        relative_velocity_now(bodies, i, age_i, j, age_j, 2),
+    )
+    return Now(p, v, age_i, age_j)
+
+
+@inlined
+def widening(now, stale_acceleration):
+    """Deviation (m) of both bodies by unknown accelerations. A stale object widens the bounds of its contacts here."""
+    return 0.5 * stale_acceleration * (now.age_i * now.age_i + now.age_j * now.age_j)
+
+
+@inlined
+def closing_now(bodies, i, j, now, row):
+    """Speed (m/s) at which the witness points of a contact row about body i approach."""
+    wa = (bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2])
+    wb = (bodies.angular[j, 0], bodies.angular[j, 1], bodies.angular[j, 2])
+    return closing_speed(now.v, wa, wb, now.p, row)
+
+
+@inlined
+def move_to_world(bodies, i, now, row):
+    """Move the witness points of a contact row about body i to the world's origin."""
+    for c in range(3):
+        at = position_now(bodies, i, now.age_i, c)
+        row[POINT_A + c] += at
+        row[POINT_B + c] += at
+
+
+@outlined
+def body_contact(multibody, i, j, time, query, scratch, result):
+    """Write the deepest contact of bodies i and j at `time` (s), from their last states, into a result row.
+
+    The error bound includes the excess of the bodies' models, and what they may have accelerated since their last
+    states (`widening`). A pair that may touch within its error bound counts as touching, with the status UNRESOLVED.
+    Returns (touching, number of narrow-phase tests).
+    """
+    table, parts, bodies = multibody
+    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
+    out = scratch.out
+    rotation_now(bodies, i, time, scratch.quaternion, R_i)
+    rotation_now(bodies, j, time, scratch.quaternion, R_j)
+    now = relative_now(bodies, i, j, time)
+    px, py, pz = now.p
+    widen = widening(now, query.stale_acceleration)
+    wanted = query.margin + widen
+    best = inf
+    tests = 0
+    reach = bodies.motion[i].radius + bodies.motion[j].radius + wanted
+    if px * px + py * py + pz * pz > reach * reach * ROUND_OFF:
+        return False, 0
+    a, first_b = bodies.first_shape[i], bodies.first_shape[j]
+    b = first_b
+    oa = (0.0, 0.0, 0.0)
+    while a >= 0:
+        if b == first_b:
+            oa = place_shape(table, parts, a, R_i, R_a)
+        ob = place_shape(table, parts, b, R_j, R_b)
+        pose = PairPose(R_a, R_b, (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]))
+        tests += 1
+        limit = min(wanted, best)
+        if shapes_within(table, a, b, pose, limit, out, scratch) and out[DISTANCE] < best:
+            best = out[DISTANCE]
+            for c in range(3):
+                out[POINT_A + c] += oa[c]
+                out[POINT_B + c] += oa[c]
+            for c in range(CONTACT_SIZE):
+                result[c] = out[c]
+            result[SHAPE_I], result[SHAPE_J] = a, b
+        a, b = next_pair(parts, first_b, a, b)
+    if best == inf:
+        return False, tests
+    result[CLOSING] = closing_now(bodies, i, j, now, result)
+    excess = bodies.excess[i] + bodies.excess[j]
+    result[BOUND] += widen + excess
+    certain = best + excess <= query.margin
+    if excess > 0.0 and best <= 0.0 and (bodies.concave[i] or bodies.concave[j]):
+        result[BOUND] -= best
+        certain = excess <= query.margin
+    result[STATUS] = TOUCHING if certain else UNSETTLED
+    move_to_world(bodies, i, now, result)
+    return True, tests
+
+
+@device
+def bounded_contact(bodies, i, j, now, reach, result):
+    """Write a contact from the bounding spheres alone into a result row, with the status UNRESOLVED.
+
+    Its distance is that of the centres; the true one differs by at most `reach` (m). now: the two bodies (Now).
+    """
+    distance = sqrt(now.p[0] * now.p[0] + now.p[1] * now.p[1] + now.p[2] * now.p[2])
+    result[:] = 0.0
+    result[DISTANCE] = distance
+    result[NORMAL] = 1.0
+    if distance > 0.0:
+        for c in range(3):
+            result[NORMAL + c] = now.p[c] / distance
+    for c in range(3):
+        result[POINT_A + c] = position_now(bodies, i, now.age_i, c)
+        result[POINT_B + c] = result[POINT_A + c] + now.p[c]
+    result[BOUND] = reach
+    for c in range(3):
+        result[CLOSING] -= now.v[c] * result[NORMAL + c]
+    result[SHAPE_I], result[SHAPE_J] = bodies.first_shape[i], bodies.first_shape[j]
+    result[STATUS] = UNSETTLED

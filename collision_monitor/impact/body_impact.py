@@ -1,0 +1,375 @@
+"""Time of impact of two bodies at constant twist, as an interval whose lower end is safe.
+
+Conservative advancement along a separating axis (Mirtich 1996). It follows the rotation to first order (advance.py) and
+therefore converges quadratically, while a bound by |w| r converges linearly.
+Lecture topics: "predict the time to collide", "Compute fractional time at which collision actually occurred".
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from collision_monitor._jit import device, inlined, outlined
+from collision_monitor._jit.vectors import LANES
+from collision_monitor.impact.advance import Placed, advance
+from collision_monitor.impact.impact_record import (
+    CLEAR,
+    CLOSED_FORM,
+    CONSERVATIVE_ADVANCEMENT,
+    HIT,
+    UNRESOLVED,
+    write_pair,
+)
+from collision_monitor.impact.mesh_impact import mesh_impact
+from collision_monitor.impact.mesh_pair import has_mesh, shapes_within, triangles_contact
+from collision_monitor.impact.overlap_time import overlap_time
+from collision_monitor.impact.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
+from collision_monitor.meshes.nearest import MEMORY, PLACE_A, PLACE_B, answer_row
+from collision_monitor.motion.bodies import next_pair, place_shape
+from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity, rotation_at
+from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
+from collision_monitor.narrow_phase.dispatch import separation
+from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.narrow_phase.work_memory import WORK_SIZE
+from collision_monitor.tolerances import EPSILON
+
+AT_REST: Final = (0.0, 0.0, 0.0)
+
+FARTHER: Final = 4.0
+"""Factor by which the advance along a turning axis may exceed that along an axis at rest. Larger: the bound on where
+the bodies are by then is looser. Smaller: the advance may stop short."""
+
+NO_PLACES: Final = (-1, -1)
+"""In place of the places of two triangles."""
+
+NEWTON_STEPS: Final = 12
+"""Steps towards a time of certain overlap; pairs that need more stay UNRESOLVED."""
+
+
+class ImpactQuery(NamedTuple):
+    """Query for the first time at which the gap is at most `margin`."""
+
+    margin: float  # m
+    tolerance: float  # m: gap beyond the margin at which the search ends
+    iterations: int  # largest number of distance computations for a pair of shapes
+
+
+class Window(NamedTuple):
+    """The times to search (s after the monitor's origin)."""
+
+    begin: Any
+    end: Any
+
+
+class Tube(NamedTuple):
+    """Bound on the deviation of both bodies from their reference motions: start + growth t, t (s) after the begin."""
+
+    start: Any  # m
+    growth: Any  # m/s
+
+
+class ShapePair(NamedTuple):
+    """Shape a of a body in motion A and shape b of a body in motion B."""
+
+    A: Any  # MOTION
+    B: Any
+    a: Any  # slots in the shape table
+    b: Any
+
+
+class Scratch(NamedTuple):
+    """Scratch memory of one thread, so that the kernels allocate nothing."""
+
+    rotation: Any  # (4, 3, 3)
+    quaternion: Any  # (1, 4)
+    out: Any  # (16,): a contact row, and the closing speed
+    work: Any  # (WORK_SIZE,)
+    tree: Any  # (MEMORY,), see meshes.nearest
+    answer: Any  # (ANSWER,), see there
+    triangle: Any  # (3, LANES), see meshes.solid
+
+
+CLOSING: Final = CONTACT_SIZE
+"""Column of Scratch.out with the closing speed (m/s), behind the contact row."""
+
+
+def make_scratch() -> Scratch:
+    """Make the scratch memory of one thread."""
+    return Scratch(
+        rotation=np.zeros((4, 3, 3)),
+        quaternion=np.zeros((1, 4)),
+        out=np.zeros(CLOSING + 1),
+        work=np.zeros(WORK_SIZE),
+        tree=np.zeros(MEMORY),
+        answer=answer_row(),
+        triangle=np.zeros((3, LANES)),
+    )
+
+
+@inlined
+def _turning(before, n, elapsed):
+    """Change per second, across n, of a unit vector that was `before` and is n after `elapsed` (s)."""
+    x, y, z = (n[0] - before[0]) / elapsed, (n[1] - before[1]) / elapsed, (n[2] - before[2]) / elapsed
+    along = x * n[0] + y * n[1] + z * n[2]
+    return (x - along * n[0], y - along * n[1], z - along * n[2])
+
+
+# Functions of one pair of shapes take only the table and the parts, without the bodies: a kernel passes its tuples of
+# arrays on the stack, and with the bodies' 21 arrays a sample of an uncertain pair takes 1.7 times as long (fleet of
+# 115 noisy objects).
+
+
+@outlined
+def shape_impact(table, parts, pair, window, tube, query, scratch):
+    """Find the first time in the window at which the gap between the shapes of a pair (ShapePair) is the wanted one.
+
+    The wanted gap is query.margin plus the tube, whose time begins with the window.
+    Returns (status, t, queries, guess). The gap is wider at every time before t. HIT: at t it is within query.tolerance
+    of the wanted one. CLEAR: t is the window's end. UNRESOLVED: the iterations, or the resolution of the time, ran out.
+    guess: estimated time (s) after t at which the overlap exceeds the tube, from how fast the gap closed last; 0:
+    unknown.
+    """
+    A, B, a, b = pair
+    if has_mesh(table, a, b):
+        return mesh_impact(table, parts, pair, window, tube, query, scratch)
+    begin, end = window
+    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
+    out = scratch.out
+    acceleration = (B.ax - A.ax, B.ay - A.ay, B.az - A.az)
+    w_a, w_b = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
+    n_before = AT_REST
+    t = t_before = begin
+    gap_before = inf
+    status, iteration, guess = UNRESOLVED, 0, 0.0
+    while iteration < query.iterations:
+        iteration += 1
+        rotation_at(A, t, R_i)
+        rotation_at(B, t, R_j)
+        oa = place_shape(table, parts, a, R_i, R_a)
+        ob = place_shape(table, parts, b, R_j, R_b)
+        px, py, pz = relative_position(A, B, t)
+        pose = PairPose(R_a, R_b, (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]))
+        gap = separation(table, a, b, pose, out, scratch.work)
+        gap -= query.margin + tube.start + tube.growth * (t - begin)
+        if gap <= query.tolerance:
+            if t > t_before:
+                wanted = gap + query.tolerance + 2.0 * (tube.start + tube.growth * (t - begin))
+                guess = wanted * (t - t_before) / (gap_before - gap)
+            status = HIT
+            break
+        n, v = (out[0], out[1], out[2]), relative_velocity(A, B, t)
+        at = Placed(a, b, R_a, R_b, oa, ob, (px, py, pz), v, acceleration, w_a, w_b)
+        # aim at half the tolerance, so that the last advance ends inside it
+        aim = gap - 0.5 * query.tolerance
+        d, m, until = 0.0, AT_REST, end - t
+        for turns in range(2):
+            d = max(d, advance(table, at, n, m, -tube.growth, aim, until))
+            if turns or t == t_before or d >= until:
+                break
+            m = _turning(n_before, n, t - t_before)
+            if m[0] == 0.0 and m[1] == 0.0 and m[2] == 0.0:
+                break
+            until = min(until, FARTHER * d)
+        t_before, gap_before, n_before = t, gap, n
+        if d >= end - t:
+            return CLEAR, end, iteration, guess
+        if t + d <= t:  # the time has no finer resolution
+            break
+        t += d
+    return status, t, iteration, guess
+
+
+@device
+def contact_at(table, parts, pair, t, scratch):
+    """Write the contact of a pair of shapes (ShapePair) at time t into scratch.out; return the signed distance (m).
+
+    scratch.out holds a contact row about A's origin, followed by the closing speed (m/s).
+    """
+    return _contact_at(table, parts, pair, t, NO_PLACES, scratch)
+
+
+@outlined
+def _contact_at(table, parts, pair, t, places, scratch):
+    """`contact_at`, or if there are places of two triangles (mesh_pair.py), the contact of these."""
+    A, B, a, b = pair
+    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
+    out = scratch.out
+    rotation_at(A, t, R_i)
+    rotation_at(B, t, R_j)
+    oa = place_shape(table, parts, a, R_i, R_a)
+    ob = place_shape(table, parts, b, R_j, R_b)
+    p = relative_position(A, B, t)
+    pose = PairPose(R_a, R_b, (p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]))
+    if places[0] >= 0:
+        triangles_contact(table, a, b, pose, places, out)
+    else:
+        shapes_within(table, a, b, pose, inf, out, scratch)
+    for k in range(3):
+        out[POINT_A + k] += oa[k]
+        out[POINT_B + k] += oa[k]
+    v = relative_velocity(A, B, t)
+    out[CLOSING] = closing_speed(v, (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz), p, out)
+    return out[DISTANCE]
+
+
+@inlined
+def closing_speed(v, wa, wb, p, out):
+    """Speed (m/s) at which the witness points of a contact row `out` about A's origin approach along its normal.
+
+    v, p: velocity and position of B relative to A; wa, wb: angular velocities.
+    """
+    ax, ay, az = out[POINT_A], out[POINT_A + 1], out[POINT_A + 2]
+    bx, by, bz = out[POINT_B] - p[0], out[POINT_B + 1] - p[1], out[POINT_B + 2] - p[2]
+    vx = v[0] + (wb[1] * bz - wb[2] * by) - (wa[1] * az - wa[2] * ay)
+    vy = v[1] + (wb[2] * bx - wb[0] * bz) - (wa[2] * ax - wa[0] * az)
+    vz = v[2] + (wb[0] * by - wb[1] * bx) - (wa[0] * ay - wa[1] * ax)
+    return -(vx * out[NORMAL] + vy * out[NORMAL + 1] + vz * out[NORMAL + 2])
+
+
+@device
+def _certain_overlap(table, parts, pair, start, guess, places, window, tube, query, scratch):
+    """Return a time in [start, window.end] at which a pair overlaps by more than the tube; inf: none found.
+
+    places: as for `_contact_at`; two triangles that overlap are enough.
+
+    Newton steps on the signed distance; start + guess is tried first if it lies in the interval. The contact at the
+    returned time stays in scratch.out. The tube's time begins with the window.
+    """
+    begin, end = window
+    guessed = 0.0 < guess < end - start
+    t = start + guess if guessed else start
+    for _ in range(NEWTON_STEPS):
+        distance = _contact_at(table, parts, pair, t, places, scratch)
+        excess = distance + scratch.out[BOUND] - query.margin + tube.start + tube.growth * (t - begin)
+        if excess <= 0.0:
+            return t
+        speed = scratch.out[CLOSING] - tube.growth
+        if speed > 0.0 and t < end:
+            later = min(end, t + 1.001 * (excess + query.tolerance) / speed)
+            if later == t:  # the time has no finer resolution
+                return inf
+            t = later
+        elif guessed:
+            t = start
+        else:
+            return inf
+        guessed = False
+    return inf
+
+
+@outlined
+def _first_overlap(table, parts, pair, near, window, tube, query, scratch):
+    """Return a time at which a pair of shapes certainly overlaps, infinite for none, and that of the contact found.
+
+    near: what `shape_impact` found: status, time, guess, and places as for `_contact_at`. The contact in scratch.out is
+    that at the first of these times, or at that of the impact if no triangles overlap because they are in one plane.
+    """
+    status, start, guess, places = near
+    sure = _certain_overlap(table, parts, pair, start, guess, places, window, tube, query, scratch)
+    if sure == inf and places[0] >= 0:  # the first triangles may slide off each other
+        sure = _certain_overlap(table, parts, pair, start, 0.0, NO_PLACES, window, tube, query, scratch)
+    first = sure
+    if status == HIT and has_mesh(table, pair.a, pair.b):
+        first = overlap_time(table, parts, pair, (start, sure), window, tube, query, scratch)
+    if first == sure and sure < inf:
+        return sure, sure
+    contact_at(table, parts, pair, start, scratch)
+    return first, start
+
+
+@inlined
+def tube_of(A, B, begin):
+    """The tube of two motions (MOTION) together, from `begin` on. Stale objects have widened it (tracking.py)."""
+    return Tube(
+        A.tube_0 + B.tube_0 + A.tube_1 * (begin - A.tube_time) + B.tube_1 * (begin - B.tube_time),
+        A.tube_1 + B.tube_1,
+    )
+
+
+@device
+def body_impact(multibody, i, j, window, query, scratch, event):
+    """Write the first impact of bodies i and j in the window into the IMPACT record `event`.
+
+    event.status = CLEAR if there is none. Bodies that overlap, or are within query.margin, at the begin have their
+    impact there. The reference motions and their tubes are those in `bodies`; in the record, i is the body with the
+    smaller id. Returns the number of distance queries.
+    """
+    table, parts, bodies = multibody
+    begin, end = window
+    if bodies.id[i] > bodies.id[j]:
+        i, j = j, i
+    A, B = bodies.motion[i], bodies.motion[j]
+    event.status = CLEAR
+    tube = tube_of(A, B, begin)
+    approach = approach_at(A, B, begin)
+    bent = half_acceleration(A, B) * (end - begin)  # m/s: the path deviates from its tangent by less
+    # every impact lies in the time in which the bounding spheres overlap
+    first, last = 0.0, end - begin
+    reach = A.radius + B.radius + query.margin
+    if reach < inf:
+        first, last = sphere_interval(approach.p, approach.v, reach + tube.start, tube.growth + bent, last, 1.0)
+        if first > last:
+            return 0
+    write_pair(bodies, i, j, event)
+    a, first_b = bodies.first_shape[i], bodies.first_shape[j]
+    b = first_b
+    if bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0 and reach < inf and bent == 0.0:
+        _sphere_impact(ShapePair(A, B, a, b), approach, reach, tube, window, first, event)
+        return 1
+    event.method = CONSERVATIVE_ADVANCEMENT
+    queries = 0
+    start, stop = begin + first, begin + last
+    there = Tube(tube.start + tube.growth * first, tube.growth)
+    lower, guess, places = inf, 0.0, NO_PLACES
+    while a >= 0:
+        pair = ShapePair(A, B, a, b)
+        scratch.answer[PLACE_A] = -1.0
+        status, t, n, soon = shape_impact(table, parts, pair, Window(start, stop), there, query, scratch)
+        queries += n
+        if status != CLEAR and t < lower:
+            lower, guess, places = t, soon, (int(scratch.answer[PLACE_A]), int(scratch.answer[PLACE_B]))
+            event.status = status
+            event.shape_i, event.shape_j = a, b
+            stop = t
+        a, b = next_pair(parts, first_b, a, b)
+    if event.status == CLEAR:
+        return queries
+    pair = ShapePair(A, B, event.shape_i, event.shape_j)
+    near = event.status, lower, guess, places
+    sure, seen = _first_overlap(table, parts, pair, near, window, tube, query, scratch)
+    event.lower, event.upper = lower, sure
+    event.status = HIT if sure < inf else UNRESOLVED
+    _set_geometry(event, A, seen, scratch.out)
+    return queries
+
+
+@inlined
+def _set_geometry(event, A, t, out):
+    """Set point, normal and closing speed of the impact from a contact at time t about A's origin."""
+    ta = t - A.time
+    event.point_x = A.x + (A.vx + 0.5 * A.ax * ta) * ta + 0.5 * (out[POINT_A] + out[POINT_B])
+    event.point_y = A.y + (A.vy + 0.5 * A.ay * ta) * ta + 0.5 * (out[POINT_A + 1] + out[POINT_B + 1])
+    event.point_z = A.z + (A.vz + 0.5 * A.az * ta) * ta + 0.5 * (out[POINT_A + 2] + out[POINT_B + 2])
+    event.normal_x, event.normal_y, event.normal_z = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
+    event.closing_speed = out[CLOSING]
+
+
+@inlined
+def _sphere_impact(pair, approach, reach, tube, window, first, event):
+    """Impact of two spheres, in closed form at both ends. first: the lower end (s after the window's begin)."""
+    begin, end = window
+    event.method = CLOSED_FORM
+    event.shape_i, event.shape_j = pair.a, pair.b
+    event.lower = begin + first
+    sure = inf
+    certain = reach * (1.0 - 8.0 * EPSILON) - tube.start  # the bounding radii are rounded up by nearly as much
+    if certain > 0.0:
+        sure, _ = sphere_interval(approach.p, approach.v, certain, -tube.growth, end - begin, -1.0)
+        if certain - tube.growth * sure <= 0.0:  # the tube has outgrown the spheres: no contact is certain
+            sure = inf
+    event.status = HIT if sure < inf else UNRESOLVED
+    event.upper = begin + sure if sure < inf else inf
+    meeting_of_spheres(pair.A, pair.B, approach, begin, first if sure == inf else sure, event)

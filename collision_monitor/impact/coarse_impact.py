@@ -1,0 +1,164 @@
+"""First impacts of meshes that are not due yet: only until when their boxes stay apart (`mesh_impact_tolerance`).
+
+The search of tree_impact.py or solid_impact.py, ended as soon as boxes are so small and so near that their triangles
+are within a gap of some cm. The lower end is as certain as that of a full search. A collision is certain if triangles
+meet at one of a few later times; else the upper end is open. Pairs that are due are searched again from there, with a
+gap of at least the motion in a step.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Final
+
+import numpy as np
+
+from collision_monitor._jit import device, inlined, kernel, outlined
+from collision_monitor._jit.direct import direct
+from collision_monitor._jit.prefetch import prefetch
+from collision_monitor.impact.body_impact import ShapePair, Tube, body_impact, closing_speed, tube_of
+from collision_monitor.impact.coarse_solid import solid_near, solid_overlaps
+from collision_monitor.impact.coarse_trees import TOO_MANY, Nearness, pose_at, trees_near, trees_overlap
+from collision_monitor.impact.impact_record import (
+    BOUND_ONLY,
+    CLEAR,
+    CONSERVATIVE_ADVANCEMENT,
+    HIT,
+    UNRESOLVED,
+    write_pair,
+)
+from collision_monitor.impact.mesh_pair import enclosure, has_mesh, have_trees, is_mesh
+from collision_monitor.impact.pair_impacts import PREFETCH_AHEAD, window_of
+from collision_monitor.impact.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
+from collision_monitor.meshes.inside import OUTSIDE
+from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity
+from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
+from collision_monitor.narrow_phase.vector import dot
+from collision_monitor.shapes.shape_table import HALF_SPACE
+
+TRIES: Final = (1.5, 4.0)
+"""Times after the lower end at which triangles may meet: those in which the bodies move by so many gaps."""
+
+
+@device
+def _write_hit(pair, t, event, out):
+    """Set what a certain collision at time t (s) has, from the contact of two triangles about A's origin."""
+    A, B = pair.A, pair.B
+    ta = t - A.time
+    event.upper, event.status, event.method = t, HIT, CONSERVATIVE_ADVANCEMENT
+    event.point_x = A.x + (A.vx + 0.5 * A.ax * ta) * ta + 0.5 * (out[POINT_A] + out[POINT_B])
+    event.point_y = A.y + (A.vy + 0.5 * A.ay * ta) * ta + 0.5 * (out[POINT_A + 1] + out[POINT_B + 1])
+    event.point_z = A.z + (A.vz + 0.5 * A.az * ta) * ta + 0.5 * (out[POINT_A + 2] + out[POINT_B + 2])
+    event.normal_x, event.normal_y, event.normal_z = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
+    v, p = relative_velocity(A, B, t), relative_position(A, B, t)
+    event.closing_speed = closing_speed(v, (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz), p, out)
+
+
+@inlined
+def _near(table, parts, pair, now, window, tube, query, near, scratch):
+    if have_trees(table, pair.a, pair.b):
+        return trees_near(table, parts, pair, now, window, tube, query, near, scratch)
+    ordered = (pair.A, pair.B, pair.a, pair.b) if is_mesh(table, pair.a) else (pair.B, pair.A, pair.b, pair.a)
+    return solid_near(table, parts, ordered, now, window, tube, query, near, scratch)
+
+
+@inlined
+def _overlap(table, parts, pair, t, allowed, scratch):
+    if have_trees(table, pair.a, pair.b):
+        return trees_overlap(table, parts, pair, t, allowed, scratch)
+    return solid_overlaps(table, parts, pair, t, allowed, scratch)
+
+
+@inlined
+def _together(A, B, window, margin):
+    """First and last time (s) after the begin of a window at which the bounding spheres of two motions may overlap."""
+    begin, end = window
+    tube, approach = tube_of(A, B, begin), approach_at(A, B, begin)
+    growth = tube.growth + half_acceleration(A, B) * (end - begin)
+    return sphere_interval(approach.p, approach.v, A.radius + B.radius + margin + tube.start, growth, end - begin, 1.0)
+
+
+@outlined
+def coarse_impact(multibody, i, j, window, query, near, scratch, event):
+    """Write a bound on the first impact of two bodies with `has_bounds` into the IMPACT record `event`.
+
+    event.status = CLEAR if there is none. Returns False if only a full search can tell, for example if one of the
+    bodies may be inside the other. near: Nearness; the radius of the smaller body limits its gap too.
+    """
+    table, parts, bodies = multibody
+    begin = window.begin
+    if bodies.id[i] > bodies.id[j]:
+        i, j = j, i
+    A, B = bodies.motion[i], bodies.motion[j]
+    event.status = CLEAR
+    tube, approach = tube_of(A, B, begin), approach_at(A, B, begin)
+    first, last = _together(A, B, window, query.margin)
+    if first > last:
+        return True
+    pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
+    start, stop, near = begin + first, begin + last, Nearness(min(near.tolerance, A.radius, B.radius), near.period)
+    there = Tube(tube.start + tube.growth * first, tube.growth)
+    lower, status, gap = _near(table, parts, pair, begin, (start, stop), there, query, near, scratch)
+    if status == TOO_MANY:
+        return False
+    if lower > start or status == CLEAR:
+        pose = pose_at(table, parts, pair, start, scratch)
+        if enclosure(table, pair.a, pair.b, pose, scratch) != OUTSIDE:
+            return False
+    if status == CLEAR:
+        return True
+    write_pair(bodies, i, j, event)
+    event.shape_i, event.shape_j = pair.a, pair.b
+    event.lower, event.upper, event.status, event.method = lower, inf, UNRESOLVED, BOUND_ONLY
+    v = relative_velocity(A, B, lower)
+    speed = sqrt(dot(v, v))
+    for ahead in TRIES:
+        t = lower + ahead * gap / speed if speed > 0.0 else inf
+        allowed = tube.start + tube.growth * (t - begin) - query.margin
+        if t <= stop and _overlap(table, parts, pair, t, allowed, scratch):
+            _write_hit(pair, t, event, scratch.out)
+            return True
+    meeting_of_spheres(A, B, approach, begin, lower - begin, event)
+    return True
+
+
+@inlined
+def has_bounds(multibody, i, j):
+    """Whether two bodies are one shape each, one of them a mesh or a cloud, and none of them a half-space."""
+    table, parts, bodies = multibody
+    a, b = bodies.first_shape[i], bodies.first_shape[j]
+    return (
+        has_mesh(table, a, b)
+        and parts.next[a] < 0
+        and parts.next[b] < 0
+        and table.kind[a] != HALF_SPACE
+        and table.kind[b] != HALF_SPACE
+    )
+
+
+@direct
+@kernel
+def predict_coarsely(multibody, pairs, now, query, near, events, scratch):
+    """As `predict_pairs`, but with bounds on the impacts of pairs with `has_bounds`. near: Nearness."""
+    bodies = multibody.bodies
+    n = queries = 0
+    for k in range(pairs.shape[0]):
+        ahead = min(k + PREFETCH_AHEAD, pairs.shape[0] - 1)
+        prefetch(bodies.motion, np.intp(pairs[ahead, 0]))
+        prefetch(bodies.motion, np.intp(pairs[ahead, 1]))
+        i, j = pairs[k, 0], pairs[k, 1]
+        window = window_of(bodies, i, j, now)
+        if window.begin > now and window.begin >= window.end:
+            continue
+        is_known = False
+        if has_bounds(multibody, i, j):
+            first, last = _together(bodies.motion[i], bodies.motion[j], window, query.margin)
+            if first > last:
+                continue
+            queries += 1
+            is_known = coarse_impact(multibody, i, j, window, query, near, scratch, events[n])
+        if not is_known:
+            queries += body_impact(multibody, i, j, window, query, scratch, events[n])
+        if events[n].status != CLEAR:
+            n += 1
+    return n, queries

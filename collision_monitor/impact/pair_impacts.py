@@ -1,0 +1,138 @@
+"""First impacts of many pairs of bodies: exact, or bounded by their bounding spheres."""
+
+from __future__ import annotations
+
+from math import inf, isfinite
+from typing import Final
+
+import numpy as np
+
+from collision_monitor._jit import inlined, kernel
+from collision_monitor._jit.direct import direct
+from collision_monitor._jit.prefetch import prefetch
+from collision_monitor.impact.body_impact import ShapePair, Tube, Window, body_impact, tube_of
+from collision_monitor.impact.impact_record import BOUND_ONLY, CLEAR, UNRESOLVED, write_pair
+from collision_monitor.impact.overlap_time import overlap_time
+from collision_monitor.impact.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
+from collision_monitor.motion.bodies import next_pair
+from collision_monitor.motion.motion import half_acceleration
+
+PREFETCH_AHEAD: Final = 4
+"""How many pairs ahead the motions of the bodies are prefetched."""
+
+
+@inlined
+def window_of(bodies, i, j, now):
+    """Times for which the pair has to be predicted now: from where it was predicted to, until both cover times.
+
+    Empty (begin >= end) if nothing is left to predict.
+    """
+    begin = max(now, min(bodies.motion[i].covered, bodies.motion[j].covered))
+    return Window(begin, cover_of(bodies, i, j))
+
+
+@inlined
+def cover_of(bodies, i, j):
+    """Time until which both bodies are predicted (s)."""
+    return min(bodies.motion[i].cover, bodies.motion[j].cover)
+
+
+@direct
+@kernel
+def predict_pairs(multibody, pairs, now, query, events, scratch):
+    """Write the first impacts of pairs (P, 2) until both bodies' cover times into events (IMPACT).
+
+    The search begins at `now`, or at the time until which the pair was predicted before.
+    Returns (number of impacts, number of distance queries).
+    """
+    n = queries = 0
+    for k in range(pairs.shape[0]):
+        ahead = min(k + PREFETCH_AHEAD, pairs.shape[0] - 1)
+        prefetch(multibody.bodies.motion, np.intp(pairs[ahead, 0]))
+        prefetch(multibody.bodies.motion, np.intp(pairs[ahead, 1]))
+        i, j = pairs[k, 0], pairs[k, 1]
+        window = window_of(multibody.bodies, i, j, now)
+        if window.begin > now and window.begin >= window.end:
+            continue
+        queries += body_impact(multibody, i, j, window, query, scratch, events[n])
+        if events[n].status != CLEAR:
+            n += 1
+    return n, queries
+
+
+@inlined
+def is_cheap(bodies, i, j):
+    """Whether an exact search costs no more than a bound: two spheres, or a half-space (it has no bounding sphere)."""
+    spheres = bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0
+    return spheres or not (isfinite(bodies.motion[i].radius) and isfinite(bodies.motion[j].radius))
+
+
+@inlined
+def bound_impact(bodies, i, j, window, margin, event):
+    """Write the first time in the window at which the pair's bounding spheres meet into the IMPACT record `event`.
+
+    event.status = UNRESOLVED, or CLEAR if the spheres, and therefore the bodies, do not meet.
+    """
+    begin, end = window
+    if bodies.id[i] > bodies.id[j]:
+        i, j = j, i
+    A, B = bodies.motion[i], bodies.motion[j]
+    event.status = CLEAR
+    tube = tube_of(A, B, begin)
+    approach = approach_at(A, B, begin)
+    bent = half_acceleration(A, B) * (end - begin)
+    reach = A.radius + B.radius + margin + tube.start
+    first, last = sphere_interval(approach.p, approach.v, reach, tube.growth + bent, end - begin, 1.0)
+    if first > last:
+        return
+    write_pair(bodies, i, j, event)
+    event.shape_i, event.shape_j = bodies.first_shape[i], bodies.first_shape[j]
+    event.lower, event.upper = begin + first, inf
+    event.status, event.method = UNRESOLVED, BOUND_ONLY
+    meeting_of_spheres(A, B, approach, begin, first, event)
+
+
+@kernel
+def bound_pairs(multibody, pairs, now, query, events, scratch):
+    """As `predict_pairs`, but with `bound_impact` for all pairs that are not cheap."""
+    bodies = multibody.bodies
+    n = queries = 0
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        window = window_of(bodies, i, j, now)
+        if window.begin > now and window.begin >= window.end:
+            continue
+        if is_cheap(bodies, i, j):
+            queries += body_impact(multibody, i, j, window, query, scratch, events[n])
+        else:
+            bound_impact(bodies, i, j, window, query.margin, events[n])
+        if events[n].status != CLEAR:
+            n += 1
+    return n, queries
+
+
+@kernel
+def refine(multibody, bounds, now, query, events, scratch):
+    """Write the first impacts from `now` on of the pairs of `bounds` (IMPACT) into events; as `predict_pairs`."""
+    n = queries = 0
+    for k in range(bounds.size):
+        i, j = bounds[k].i, bounds[k].j
+        window = Window(now, cover_of(multibody.bodies, i, j))
+        queries += body_impact(multibody, i, j, window, query, scratch, events[n])
+        if events[n].status != CLEAR:
+            n += 1
+    return n, queries
+
+
+@kernel
+def bodies_overlap_time(multibody, horizon, query, scratch):
+    """Least `overlap_time` (s) in [0, horizon] of the pairs of shapes of bodies 0 and 1; infinite: none found."""
+    table, parts, bodies = multibody
+    a, first_b = bodies.first_shape[0], bodies.first_shape[1]
+    b, best = first_b, inf
+    while a >= 0:
+        pair = ShapePair(bodies.motion[0], bodies.motion[1], a, b)
+        window = Window(0.0, horizon)
+        best = overlap_time(table, parts, pair, (0.0, best), window, Tube(0.0, 0.0), query, scratch)
+        a, b = next_pair(parts, first_b, a, b)
+    return best

@@ -1,0 +1,245 @@
+"""First impact of two moving trees, by conservative advancement of each pair of boxes for itself.
+
+Pairs of boxes wait in the order of the times until which they certainly stay apart. The first one is examined at its
+time: it gets a later one, or its children take its place. So pairs far apart take long steps, which are never repeated,
+and only those of the triangles that nearly meet take short ones.
+(Mirtich, 1996; Tang, Kim, Manocha, C2A: controlled conservative advancement for continuous collision detection, 2009;
+Hubbard, Collision detection for interactive graphics applications, 1995: a heap of times)
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Final
+
+from collision_monitor._jit import device, inlined, outlined
+from collision_monitor.impact.impact_record import CLEAR, HIT, UNRESOLVED
+from collision_monitor.meshes.approach import Approach, seen_from_b
+from collision_monitor.meshes.box_times import box_times
+from collision_monitor.meshes.contact import reach_in
+from collision_monitor.meshes.layout import CHILD, WIDTH
+from collision_monitor.meshes.leaf_times import leaf_time
+from collision_monitor.meshes.nearest import BOUNDS, MOST_PAIRS, PAIRS, PLACE_A, PLACE_B, opens_b, size_of
+from collision_monitor.meshes.placing import inverse, relative
+from collision_monitor.motion.bodies import place_shape
+from collision_monitor.motion.motion import relative_position, relative_velocity, rotation_at
+from collision_monitor.narrow_phase.vector import cross, dot, minus, plus, rotate_back
+from collision_monitor.shapes.shape_table import TREE
+from collision_monitor.tolerances import EPSILON
+
+KEEP: Final = 0.2
+"""A pair of boxes is kept while its next step allows a motion longer than this part of the box that would be opened.
+Larger: more boxes are opened. Smaller: more steps."""
+
+STEPS: Final = 500
+"""Pairs of boxes to examine for each distance query that is allowed, 0.15 ms. Hostile meshes, such as a million
+triangles in a point, need more than any limit; their impact is UNRESOLVED."""
+
+MOST_TURNED: Final = 1e4
+"""rad: 1,600 turns. A body that turns farther in the time of a search is faulty."""
+
+MOST_SWEPT: Final = 1e6
+"""Radii of the smaller body by which points of the other one may move as it turns. Beyond, it is faulty as well."""
+
+FEWER_STEPS: Final = 256
+"""Divisor of the STEPS for such bodies, which need more than any limit too."""
+
+SAME: Final = 0.1
+"""A pair is examined at the time of the one before unless its boxes move by more than this part of their size until its
+own time: the motion of both bodies at a time costs as much as half of the boxes that it is compared with."""
+
+ENTRY: Final = 4
+"""Numbers of a waiting pair of boxes: time, both places, and the pair of triangles that limited its last step."""
+
+HEAP: Final = 2 * MOST_PAIRS // ENTRY
+"""Most pairs of boxes that wait. The others are found again by a new search from the earliest time of any of them."""
+
+
+LEAST_DURATION: Final = 1e-300
+"""s: least duration of a search."""
+
+
+@inlined
+def times_of(window):
+    """Begin and end of a search in a window (s). The end is later than the begin, so that an instant is examined too.
+
+    Pairs of boxes wait only for times before the end. A window is an instant where the profile has no horizon.
+    """
+    begin, end = window
+    return begin, max(end, begin + EPSILON * abs(begin) + LEAST_DURATION)
+
+
+@device
+def push_pair(heap, count, t, place_a, place_b, pair):
+    """Add a pair of boxes to the heap, which begins at PAIRS; return its new length."""
+    k = count
+    while k > 0 and heap[PAIRS + ENTRY * ((k - 1) >> 1)] > t:
+        above = (k - 1) >> 1
+        for c in range(ENTRY):
+            heap[PAIRS + ENTRY * k + c] = heap[PAIRS + ENTRY * above + c]
+        k = above
+    at = PAIRS + ENTRY * k
+    heap[at], heap[at + 1], heap[at + 2], heap[at + 3] = t, place_a, place_b, pair
+    return count + 1
+
+
+@device
+def pop_first(heap, count):
+    """Remove the pair of boxes with the least time; return the new length."""
+    count -= 1
+    last = PAIRS + ENTRY * count
+    k, below = 0, 1
+    while below < count:
+        if below + 1 < count and heap[PAIRS + ENTRY * (below + 1)] < heap[PAIRS + ENTRY * below]:
+            below += 1
+        if heap[PAIRS + ENTRY * below] >= heap[last]:
+            break
+        for c in range(ENTRY):
+            heap[PAIRS + ENTRY * k + c] = heap[PAIRS + ENTRY * below + c]
+        k, below = below, 2 * below + 1
+    for c in range(ENTRY):
+        heap[PAIRS + ENTRY * k + c] = heap[last + c]
+    return count
+
+
+@inlined
+def approach_at(table, parts, pair, t, margin, growth, until, scratch):
+    """Position of shape b's origin relative to that of a in world axes (m), and the Approach of both in a's axes.
+
+    Writes the rotations of the shapes to world axes into scratch.rotation[2] and [3]. margin: gap that counts as
+    contact (m). until: time at which the search ends (s).
+    """
+    A, B, a, b = pair
+    R_a, R_b = scratch.rotation[2], scratch.rotation[3]
+    rotation_at(A, t, scratch.rotation[0])
+    rotation_at(B, t, scratch.rotation[1])
+    o_a = place_shape(table, parts, a, scratch.rotation[0], R_a)
+    o_b = place_shape(table, parts, b, scratch.rotation[1], R_b)
+    w_a, w_b = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
+    p, v = relative_position(A, B, t), relative_velocity(A, B, t)
+    # the shapes' origins turn about those of their bodies
+    turn_a, turn_b = cross(w_a, o_a), cross(w_b, o_b)
+    own = B.ax - A.ax, B.ay - A.ay, B.az - A.az
+    bend_a, bend_b = dot(w_a, w_a), dot(w_b, w_b)
+    jerk_a, jerk_b = bend_a * sqrt(bend_a), bend_b * sqrt(bend_b)
+    arm_a, arm_b = sqrt(dot(o_a, o_a)), sqrt(dot(o_b, o_b))
+    return minus(plus(p, o_b), o_a), Approach(
+        rotate_back(R_a, minus(plus(v, turn_b), turn_a)),
+        rotate_back(R_a, minus(plus(own, cross(w_b, turn_b)), cross(w_a, turn_a))),
+        rotate_back(R_a, w_a),
+        rotate_back(R_a, w_b),
+        bend_a,
+        bend_b,
+        sqrt(dot(own, own)) + bend_a * arm_a + bend_b * arm_b,
+        jerk_a,
+        jerk_b,
+        jerk_a * arm_a + jerk_b * arm_b,
+        margin + table.margin[a] + table.margin[b],
+        growth,
+        until - t,
+    )
+
+
+@inlined
+def spins(A, B, duration):
+    """Whether two bodies turn too far within a duration (s): by MOST_TURNED, or with points that move MOST_SWEPT."""
+    rate_a = sqrt(A.wx * A.wx + A.wy * A.wy + A.wz * A.wz)
+    rate_b = sqrt(B.wx * B.wx + B.wy * B.wy + B.wz * B.wz)
+    swept = rate_a * A.radius + rate_b * B.radius
+    smaller = max(min(A.radius, B.radius), 1e-3)
+    return (rate_a + rate_b) * duration > MOST_TURNED or swept * duration > MOST_SWEPT * smaller
+
+
+@inlined
+def open_box(blocks, box_a, box_b, X, move, work):
+    """Open one of two boxes: write to work[BOUNDS:] until when its members stay apart from the other box (s).
+
+    box_a, box_b: root of the tree, block, member and child of each. Returns whether it is B's box, the block of its
+    members, its size (m), and the least of these times (s).
+    """
+    (root_a, a, i, child_a), (root_b, b, j, child_b) = box_a, box_b
+    in_b = opens_b(blocks, a, i, child_a, blocks, b, j, child_b)
+    if in_b:
+        block, size = root_b + int(child_b), size_of(blocks, b, j)
+        box_times(blocks, root_a, WIDTH * a + i, blocks, root_b, block, X, move, work, BOUNDS)
+    else:
+        block, size = root_a + int(child_a), size_of(blocks, a, i)
+        back = seen_from_b(X, move)
+        box_times(blocks, root_b, WIDTH * b + j, blocks, root_a, block, inverse(X), back, work, BOUNDS)
+    soon = inf
+    for k in range(WIDTH):
+        if blocks[block, CHILD, k] != 0.0:
+            soon = min(soon, work[BOUNDS + k])
+    return in_b, block, size, soon
+
+
+@outlined
+def tree_impact(table, parts, pair, window, tube, query, scratch):
+    """`shape_impact` of two shapes with trees; scratch.answer then has the places of the triangles that meet."""
+    begin, end = times_of(window)
+    blocks, work, answer = table.blocks, scratch.tree, scratch.answer
+    root_a, root_b = int(table.size[pair.a, TREE]) - 1, int(table.size[pair.b, TREE]) - 1
+    place_a, place_b = float(WIDTH * root_a), float(WIDTH * root_b)
+    start, most = begin, query.iterations * STEPS
+    if spins(pair.A, pair.B, end - begin):
+        most //= FEWER_STEPS
+    waiting, steps, later = push_pair(work, 0, begin, place_a, place_b, -1.0), 0, end
+    now, speed = -inf, inf
+    while True:
+        if waiting == 0 or work[PAIRS] >= later:
+            if not later < end:
+                return CLEAR, end, 1 + steps // STEPS, 0.0
+            place_a, place_b = float(WIDTH * root_a), float(WIDTH * root_b)
+            start, later, waiting = later, end, push_pair(work, 0, later, place_a, place_b, -1.0)
+        t, place_a, place_b = work[PAIRS], work[PAIRS + 1], work[PAIRS + 2]
+        triangles = int(work[PAIRS + 3])
+        waiting = pop_first(work, waiting)
+        steps += 1
+        if steps > most:
+            return UNRESOLVED, t, 1 + steps // STEPS, 0.0
+        a, i, b, j = int(place_a) // WIDTH, int(place_a) % WIDTH, int(place_b) // WIDTH, int(place_b) % WIDTH
+        child_a, child_b = blocks[a, CHILD, i], blocks[b, CHILD, j]
+        is_leaf = child_a < 0.0 and child_b < 0.0
+        size = size_of(blocks, a, i)
+        size = max(size, size_of(blocks, b, j)) if is_leaf else size
+        if t != now and (t < now or not (t - now) * speed < SAME * size):
+            now = t
+            margin = query.margin + tube.start + tube.growth * (t - begin)
+            p, move = approach_at(table, parts, pair, t, margin, tube.growth, end, scratch)
+            X = relative(scratch.rotation[2], scratch.rotation[3], p)
+            speed = sqrt(dot(move.v, move.v)) + move.growth
+            speed += sqrt(move.bend_a) * reach_in(blocks, root_a) + sqrt(move.bend_b) * reach_in(blocks, root_b)
+        if is_leaf:
+            leaf_a, leaf_b = root_a - int(child_a), root_b - int(child_b)
+            d, triangles = leaf_time(
+                blocks, int(place_a), leaf_a, blocks, int(place_b), leaf_b, X, move, query.tolerance,
+                KEEP * size / speed, triangles, work,
+            )  # fmt: skip
+            if now < t and not now + d > t:  # looked at too early: again at its own time
+                waiting, now = push_pair(work, waiting, t, place_a, place_b, float(triangles)), -inf
+                continue
+            if d == 0.0:
+                answer[PLACE_A] = WIDTH * leaf_a + triangles // WIDTH
+                answer[PLACE_B] = WIDTH * leaf_b + triangles % WIDTH
+                return HIT, t, 1 + steps // STEPS, 0.0
+            if now + d <= t:  # the time has no finer resolution
+                return UNRESOLVED, t, 1 + steps // STEPS, 0.0
+            if now + d < end:
+                waiting = push_pair(work, waiting, now + d, place_a, place_b, float(triangles))
+            continue
+        in_b, block, size, soon = open_box(blocks, (root_a, a, i, child_a), (root_b, b, j, child_b), X, move, work)
+        if soon * speed > KEEP * size and now + soon > t:  # else the time has no finer resolution
+            if now + soon < end:
+                waiting = push_pair(work, waiting, now + soon, place_a, place_b, -1.0)
+            continue
+        for k in range(WIDTH):
+            time = max(t, now + work[BOUNDS + k])
+            if blocks[block, CHILD, k] != 0.0 and time < later:
+                child = float(WIDTH * block + k)
+                if waiting < HEAP:
+                    first, second = (place_a, child) if in_b else (child, place_b)
+                    waiting = push_pair(work, waiting, time, first, second, -1.0)
+                else:
+                    later = time
+                    if not later > start:
+                        return UNRESOLVED, start, 1 + steps // STEPS, 0.0

@@ -1,1 +1,0 @@
-"""Motions of bodies, and predictions of their contacts."""

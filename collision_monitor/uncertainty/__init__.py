@@ -1,0 +1,1 @@
+"""How likely two bodies meet, and when, given the errors of their states."""
