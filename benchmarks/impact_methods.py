@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 import collision_monitor as cm
 from collision_monitor.errors import UnsupportedError
-from collision_monitor.query.impact_methods import METHODS, bisection, conservative_advancement, end_of_step
+from collision_monitor.query.impact.impact_methods import METHODS, bisection, conservative_advancement, end_of_step
 
 Array = NDArray[np.float64]
 HORIZON = 2.0

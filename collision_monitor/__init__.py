@@ -55,30 +55,30 @@ _HOME = {
     "Circle": "shapes.shapes",
     "Polygon": "shapes.shapes",
     "load_mesh": "shapes.mesh_file",
-    "contact": "query.contact",
-    "Contact": "query.contact",
-    "contact_features": "query.features",
-    "overlap": "query.overlap",
-    "distance": "query.distance",
-    "contacts": "query.contacts",
-    "Contacts": "query.contacts",
-    "times_of_impact": "query.times_of_impact",
-    "contains": "query.containment",
-    "cast_ray": "query.rays",
-    "points_within": "query.points_within",
-    "RayHits": "query.rays",
-    "kdop": "query.kdop",
-    "Enclosure": "query.kdop",
+    "contact": "query.contact.contact",
+    "Contact": "query.contact.contact",
+    "contact_features": "query.contact.features",
+    "overlap": "query.contact.overlap",
+    "distance": "query.contact.distance",
+    "contacts": "query.contact.contacts",
+    "Contacts": "query.contact.contacts",
+    "times_of_impact": "query.impact.times_of_impact",
+    "contains": "query.points.containment",
+    "cast_ray": "query.points.rays",
+    "points_within": "query.points.points_within",
+    "RayHits": "query.points.rays",
+    "kdop": "query.points.kdop",
+    "Enclosure": "query.points.kdop",
     "convex_decomposition": "objects.convex_decomposition",
     "Decomposition": "objects.convex_decomposition",
-    "time_of_impact": "query.time_of_impact",
-    "Impact": "query.time_of_impact",
-    "time_of_impact_batch": "query.time_of_impact_batch",
-    "Impacts": "query.time_of_impact_batch",
-    "vertex_face_impact": "query.feature_impact",
-    "edge_edge_impact": "query.feature_impact",
-    "FeatureImpact": "query.feature_impact",
-    "plot": "query.contact_plot",
+    "time_of_impact": "query.impact.time_of_impact",
+    "Impact": "query.impact.time_of_impact",
+    "time_of_impact_batch": "query.impact.time_of_impact_batch",
+    "Impacts": "query.impact.time_of_impact_batch",
+    "vertex_face_impact": "query.impact.feature_impact",
+    "edge_edge_impact": "query.impact.feature_impact",
+    "FeatureImpact": "query.impact.feature_impact",
+    "plot": "query.contact.contact_plot",
     "CollisionMonitorError": "errors",
     "InputError": "errors",
     "ShapeError": "errors",
@@ -112,28 +112,28 @@ if TYPE_CHECKING:
     from collision_monitor.objects.convex_decomposition import Decomposition as Decomposition
     from collision_monitor.objects.convex_decomposition import convex_decomposition as convex_decomposition
     from collision_monitor.objects.description import ObjectDescription as ObjectDescription
-    from collision_monitor.query.contact import Contact as Contact
-    from collision_monitor.query.contact import contact as contact
-    from collision_monitor.query.contact_plot import plot as plot
-    from collision_monitor.query.contacts import Contacts as Contacts
-    from collision_monitor.query.contacts import contacts as contacts
-    from collision_monitor.query.containment import contains as contains
-    from collision_monitor.query.distance import distance as distance
-    from collision_monitor.query.feature_impact import FeatureImpact as FeatureImpact
-    from collision_monitor.query.feature_impact import edge_edge_impact as edge_edge_impact
-    from collision_monitor.query.feature_impact import vertex_face_impact as vertex_face_impact
-    from collision_monitor.query.features import contact_features as contact_features
-    from collision_monitor.query.kdop import Enclosure as Enclosure
-    from collision_monitor.query.kdop import kdop as kdop
-    from collision_monitor.query.overlap import overlap as overlap
-    from collision_monitor.query.points_within import points_within as points_within
-    from collision_monitor.query.rays import RayHits as RayHits
-    from collision_monitor.query.rays import cast_ray as cast_ray
-    from collision_monitor.query.time_of_impact import Impact as Impact
-    from collision_monitor.query.time_of_impact import time_of_impact as time_of_impact
-    from collision_monitor.query.time_of_impact_batch import Impacts as Impacts
-    from collision_monitor.query.time_of_impact_batch import time_of_impact_batch as time_of_impact_batch
-    from collision_monitor.query.times_of_impact import times_of_impact as times_of_impact
+    from collision_monitor.query.contact.contact import Contact as Contact
+    from collision_monitor.query.contact.contact import contact as contact
+    from collision_monitor.query.contact.contact_plot import plot as plot
+    from collision_monitor.query.contact.contacts import Contacts as Contacts
+    from collision_monitor.query.contact.contacts import contacts as contacts
+    from collision_monitor.query.contact.distance import distance as distance
+    from collision_monitor.query.contact.features import contact_features as contact_features
+    from collision_monitor.query.contact.overlap import overlap as overlap
+    from collision_monitor.query.impact.feature_impact import FeatureImpact as FeatureImpact
+    from collision_monitor.query.impact.feature_impact import edge_edge_impact as edge_edge_impact
+    from collision_monitor.query.impact.feature_impact import vertex_face_impact as vertex_face_impact
+    from collision_monitor.query.impact.time_of_impact import Impact as Impact
+    from collision_monitor.query.impact.time_of_impact import time_of_impact as time_of_impact
+    from collision_monitor.query.impact.time_of_impact_batch import Impacts as Impacts
+    from collision_monitor.query.impact.time_of_impact_batch import time_of_impact_batch as time_of_impact_batch
+    from collision_monitor.query.impact.times_of_impact import times_of_impact as times_of_impact
+    from collision_monitor.query.points.containment import contains as contains
+    from collision_monitor.query.points.kdop import Enclosure as Enclosure
+    from collision_monitor.query.points.kdop import kdop as kdop
+    from collision_monitor.query.points.points_within import points_within as points_within
+    from collision_monitor.query.points.rays import RayHits as RayHits
+    from collision_monitor.query.points.rays import cast_ray as cast_ray
     from collision_monitor.records import Model as Model
     from collision_monitor.settings.profile import Profile as Profile
     from collision_monitor.shapes.mesh_file import load_mesh as load_mesh

@@ -135,12 +135,12 @@ def warm_up_functions() -> None:
     warm_up_alerts()
     # imported here because a node, which warms up the monitor at its start, needs none of it
     from collision_monitor.detection.detector import WORTH_THREADS, Detector, default_threads
-    from collision_monitor.query.contact import contact
-    from collision_monitor.query.contacts import contacts
-    from collision_monitor.query.feature_impact import vertex_face_impact
-    from collision_monitor.query.overlap import overlap
-    from collision_monitor.query.time_of_impact import time_of_impact
-    from collision_monitor.query.time_of_impact_batch import time_of_impact_batch
+    from collision_monitor.query.contact.contact import contact
+    from collision_monitor.query.contact.contacts import contacts
+    from collision_monitor.query.contact.overlap import overlap
+    from collision_monitor.query.impact.feature_impact import vertex_face_impact
+    from collision_monitor.query.impact.time_of_impact import time_of_impact
+    from collision_monitor.query.impact.time_of_impact_batch import time_of_impact_batch
 
     box, ball = Box((1, 1, 1)), Sphere(0.5)
     for threads in sorted({1, default_threads()}):

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from collision_monitor.accuracy import exact
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.query.contact import contact
-from collision_monitor.query.time_of_impact import time_of_impact
+from collision_monitor.query.contact.contact import contact
+from collision_monitor.query.impact.time_of_impact import time_of_impact
 from collision_monitor.shapes.pose import Motion, Pose
 from collision_monitor.shapes.shapes import Box, Capsule, Sphere
 

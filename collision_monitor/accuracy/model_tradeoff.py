@@ -16,7 +16,7 @@ from collision_monitor.errors import InputError
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import containing_model, parse_model
-from collision_monitor.query.contact import contact
+from collision_monitor.query.contact.contact import contact
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import CollisionMonitorError, InputError
-from collision_monitor.query.points_within import points_within
+from collision_monitor.query.points.points_within import points_within
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import MOST_CLOUD_POINTS, Points
 from collision_monitor.sources.frames import frame_name

@@ -187,7 +187,7 @@ def test_the_reach_of_a_tree_is_that_of_its_corners():
 
 
 def test_a_point_is_inside_a_closed_surface_where_the_exact_test_says_so():
-    from collision_monitor.query.mesh_pairs import query_memory, trees_overlap
+    from collision_monitor.query.contact.mesh_pairs import query_memory, trees_overlap
 
     rng = np.random.default_rng(9)
     tree = tree_of(SURFACES["ring"], closed=True)

@@ -12,7 +12,7 @@ from collision_monitor.errors import InputError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.monitor.mesh_faces import MeshFaces
 from collision_monitor.monitor.snapshot import Snapshot
-from collision_monitor.query.features import feature_of, tie_of
+from collision_monitor.query.contact.features import feature_of, tie_of
 
 
 def ball_mesh(seed=2, n=40, radius=0.5):

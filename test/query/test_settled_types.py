@@ -12,9 +12,9 @@ from numba import typeof
 
 import collision_monitor as cm
 from collision_monitor._jit.settled import SettledFunction
-from collision_monitor.query.contact_rows import contact_row
-from collision_monitor.query.mesh_impact import _impact_in_hulls, _mesh_impact
-from collision_monitor.query.mesh_pairs import roots_apart, trees_contact, trees_overlap
+from collision_monitor.query.contact.contact_rows import contact_row
+from collision_monitor.query.contact.mesh_pairs import roots_apart, trees_contact, trees_overlap
+from collision_monitor.query.impact.mesh_impact import _impact_in_hulls, _mesh_impact
 
 TORUS = trimesh.creation.torus(1.0, 0.4, major_sections=12, minor_sections=8)
 SOUP = np.random.default_rng(1).normal(size=(60, 3))

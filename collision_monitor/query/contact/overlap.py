@@ -12,9 +12,9 @@ from collision_monitor.geometry.lecture.polygon_overlap import Evidence, polygon
 from collision_monitor.geometry.lecture.polyhedron_sat import sat_3d
 from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.query.arguments import Compound, checked_pose
-from collision_monitor.query.contact import contact
-from collision_monitor.query.convex_pairs import convex_contact
-from collision_monitor.query.mesh_pairs import mesh_overlap
+from collision_monitor.query.contact.contact import contact
+from collision_monitor.query.contact.convex_pairs import convex_contact
+from collision_monitor.query.contact.mesh_pairs import mesh_overlap
 from collision_monitor.shapes.compound import shape_pairs
 from collision_monitor.shapes.planar import flat_pose
 from collision_monitor.shapes.pose import Pose

@@ -9,7 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from collision_monitor.query.batch_result import Pairs
-from collision_monitor.query.convex_pairs import MEMORY
+from collision_monitor.query.contact.convex_pairs import MEMORY
+from collision_monitor.query.impact.pair_impact_rows import DECIDED, pair_impact_rows
+from collision_monitor.query.impact.time_of_impact import ITERATIONS, check_query, time_of_impact
+from collision_monitor.query.impact.time_of_impact_batch import Impacts, motion_of
 from collision_monitor.query.pair_arrays import (
     Progress,
     Shapes,
@@ -20,9 +23,6 @@ from collision_monitor.query.pair_arrays import (
     pose_rows,
     ranges,
 )
-from collision_monitor.query.pair_impact_rows import DECIDED, pair_impact_rows
-from collision_monitor.query.time_of_impact import ITERATIONS, check_query, time_of_impact
-from collision_monitor.query.time_of_impact_batch import Impacts, motion_of
 
 
 def times_of_impact(

@@ -14,9 +14,10 @@ from collision_monitor.impact.impact_record import HIT
 from collision_monitor.meshes.shape_trees import CERTAIN, kept_tree
 from collision_monitor.motion.bodies import Multibody
 from collision_monitor.query.arguments import Compound, finite_number, whole_number
-from collision_monitor.query.contact import Contact, contact
-from collision_monitor.query.fillings import fillings
-from collision_monitor.query.moving_pair import (
+from collision_monitor.query.contact.contact import Contact, contact
+from collision_monitor.query.contact.fillings import fillings
+from collision_monitor.query.contact.open_gap import least_gap
+from collision_monitor.query.impact.moving_pair import (
     MotionQuery,
     MovingShape,
     deep_by,
@@ -25,9 +26,8 @@ from collision_monitor.query.moving_pair import (
     lay_out_pair,
     make_moving_shape,
 )
-from collision_monitor.query.open_gap import least_gap
-from collision_monitor.query.quick_impact import quick_impact, quick_open_impact
-from collision_monitor.query.touching import follow
+from collision_monitor.query.impact.quick_impact import quick_impact, quick_open_impact
+from collision_monitor.query.impact.touching import follow
 from collision_monitor.records import Method
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.pose import Motion
@@ -110,7 +110,7 @@ def time_of_impact(
     """
     query = check_query(horizon, tolerance, separation, iterations)
     if method != "conservative_advancement":
-        from collision_monitor.query.impact_by_method import impact_by_method  # which loads the other kernels
+        from collision_monitor.query.impact.impact_by_method import impact_by_method  # which loads the other kernels
 
         duration = finite_number("step", step, positive=True)
         return impact_by_method(shape_a, motion_a, shape_b, motion_b, query, method, duration)

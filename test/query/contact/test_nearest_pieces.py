@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import collision_monitor as cm
 from collision_monitor.narrow_phase.dispatch import contact_batch
-from collision_monitor.query.nearest_pieces import ALL_PAIRS, NearestPieces
+from collision_monitor.query.contact.nearest_pieces import ALL_PAIRS, NearestPieces
 from collision_monitor.query.piece_table import PieceTable, exact_piece_table, piece_table
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shape_table import join

@@ -9,7 +9,7 @@ import collision_monitor as cm
 from collision_monitor import Pose
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.contact_features import FeaturePair, FeatureType
-from collision_monitor.query.features import feature_of
+from collision_monitor.query.contact.features import feature_of
 
 FLOOR = cm.HalfSpace((0, 0, 1))
 UPRIGHT, LYING = (0, 0, 0, 1), (np.sqrt(0.5), 0, 0, np.sqrt(0.5))  # lying: +z to -y

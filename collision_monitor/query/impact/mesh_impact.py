@@ -17,10 +17,10 @@ from collision_monitor.meshes.shape_trees import NEVER, have_kernels, kept_tree
 from collision_monitor.motion.bodies import Multibody
 from collision_monitor.motion.motion import half_acceleration
 from collision_monitor.narrow_phase.contact_row import DISTANCE
-from collision_monitor.query.contact_rows import write_contact
-from collision_monitor.query.convex_pairs import MEMORY
+from collision_monitor.query.contact.contact_rows import write_contact
+from collision_monitor.query.contact.convex_pairs import MEMORY
+from collision_monitor.query.impact.pair_impact_rows import set_motion
 from collision_monitor.query.packed import load_pair, packed_motion, packed_shape
-from collision_monitor.query.pair_impact_rows import set_motion
 from collision_monitor.query.pair_table import pair_table
 from collision_monitor.shapes.pose import Motion
 from collision_monitor.shapes.shapes import Shape

@@ -8,12 +8,12 @@ from typing import Final
 
 from collision_monitor.meshes.shape_trees import NEVER, have_kernels, kept_tree
 from collision_monitor.query.arguments import Compound
-from collision_monitor.query.convex_pairs import convex_contact, convex_impact
-from collision_monitor.query.fillings import filled_box, filled_mesh
-from collision_monitor.query.mesh_impact import impact_in_hulls, mesh_impact, mesh_impact_of_faces
-from collision_monitor.query.mesh_pairs import boxes_apart
-from collision_monitor.query.moving_pair import MotionQuery
-from collision_monitor.query.open_gap import may_be_inside
+from collision_monitor.query.contact.convex_pairs import convex_contact, convex_impact
+from collision_monitor.query.contact.fillings import filled_box, filled_mesh
+from collision_monitor.query.contact.mesh_pairs import boxes_apart
+from collision_monitor.query.contact.open_gap import may_be_inside
+from collision_monitor.query.impact.mesh_impact import impact_in_hulls, mesh_impact, mesh_impact_of_faces
+from collision_monitor.query.impact.moving_pair import MotionQuery
 from collision_monitor.shapes.pose import Motion, Pose
 from collision_monitor.shapes.shapes import Mesh, Shape
 from collision_monitor.tolerances import GJK_TOUCHING

@@ -14,10 +14,14 @@ from collision_monitor.impact.body_impact import ImpactQuery, make_scratch
 from collision_monitor.impact.impact_record import IMPACT
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.batch_result import Batch, Pairs
-from collision_monitor.query.impact_rows import ImpactTimes, impacts_of_rows, impacts_of_spheres, normalise_states
-from collision_monitor.query.moving_pair import MotionQuery, MovingShape, lay_out_pair, make_moving_shape
-from collision_monitor.query.pair_arrays import PackedShapes
-from collision_monitor.query.time_of_impact import (
+from collision_monitor.query.impact.impact_rows import (
+    ImpactTimes,
+    impacts_of_rows,
+    impacts_of_spheres,
+    normalise_states,
+)
+from collision_monitor.query.impact.moving_pair import MotionQuery, MovingShape, lay_out_pair, make_moving_shape
+from collision_monitor.query.impact.time_of_impact import (
     ITERATIONS,
     Impact,
     check_bounded,
@@ -25,6 +29,7 @@ from collision_monitor.query.time_of_impact import (
     impact_of_times,
     time_of_impact,
 )
+from collision_monitor.query.pair_arrays import PackedShapes
 from collision_monitor.shapes.planar import is_planar
 from collision_monitor.shapes.pose import Motion, Pose
 from collision_monitor.shapes.shapes import HalfSpace, Mesh, Points

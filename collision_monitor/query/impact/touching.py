@@ -19,8 +19,8 @@ from collision_monitor.impact.impact_record import HIT
 from collision_monitor.motion.bodies import Multibody
 from collision_monitor.narrow_phase.contact_row import as_contacts
 from collision_monitor.narrow_phase.dispatch import contact_batch
-from collision_monitor.query.contact import contact
-from collision_monitor.query.moving_pair import MotionQuery, MovingShape, first_impacts, lay_out_pair
+from collision_monitor.query.contact.contact import contact
+from collision_monitor.query.impact.moving_pair import MotionQuery, MovingShape, first_impacts, lay_out_pair
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.reach import reach
 from collision_monitor.shapes.shapes import Capsule, Circle, Cone, Cylinder, Sphere

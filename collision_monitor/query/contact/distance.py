@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collision_monitor.query.arguments import Compound
-from collision_monitor.query.contact import contact
-from collision_monitor.query.convex_pairs import convex_contact
+from collision_monitor.query.contact.contact import contact
+from collision_monitor.query.contact.convex_pairs import convex_contact
 from collision_monitor.shapes.pose import Pose
 
 

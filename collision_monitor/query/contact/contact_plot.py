@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from collision_monitor.query.contact import Contact
+from collision_monitor.query.contact.contact import Contact
 from collision_monitor.shapes.compound import shape_pairs
 from collision_monitor.shapes.planar import is_planar
 from collision_monitor.shapes.pose import Pose

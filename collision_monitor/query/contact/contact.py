@@ -16,12 +16,12 @@ from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B, as_contacts
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.query.arguments import Compound
-from collision_monitor.query.convex_pairs import convex_contact
-from collision_monitor.query.deepest import by_clouds, by_pieces, by_trees, locate, nearest_pieces, turn_inward
-from collision_monitor.query.mesh_pairs import mesh_contact
-from collision_monitor.query.nearest_pieces import NearestPieces
-from collision_monitor.query.open_gap import distance_of_fillings
-from collision_monitor.query.parting import parting_translation
+from collision_monitor.query.contact.convex_pairs import convex_contact
+from collision_monitor.query.contact.deepest import by_clouds, by_pieces, by_trees, locate, nearest_pieces, turn_inward
+from collision_monitor.query.contact.mesh_pairs import mesh_contact
+from collision_monitor.query.contact.nearest_pieces import NearestPieces
+from collision_monitor.query.contact.open_gap import distance_of_fillings
+from collision_monitor.query.contact.parting import parting_translation
 from collision_monitor.query.piece_table import exact_piece_table
 from collision_monitor.query.posed import check_in_plane, posed
 from collision_monitor.records import Model
@@ -112,7 +112,7 @@ class Contact:
 
     def __repr__(self) -> str:
         """Return the distance with its error and the features that are nearest, for a person."""
-        from collision_monitor.query.contact_text import contact_text
+        from collision_monitor.query.contact.contact_text import contact_text
 
         return contact_text(self)
 

@@ -11,9 +11,9 @@ from processor_time import within
 
 import collision_monitor as cm
 from collision_monitor import Motion, Pose
-from collision_monitor.query.moving_pair import make_moving_shape
-from collision_monitor.query.quick_impact import quick_impact, quick_open_impact
-from collision_monitor.query.time_of_impact import _first_possible_impact, check_query
+from collision_monitor.query.impact.moving_pair import make_moving_shape
+from collision_monitor.query.impact.quick_impact import quick_impact, quick_open_impact
+from collision_monitor.query.impact.time_of_impact import _first_possible_impact, check_query
 
 CUBE = trimesh.creation.box((2, 2, 2))
 TORUS = trimesh.creation.torus(1.0, 0.4, major_sections=12, minor_sections=8)

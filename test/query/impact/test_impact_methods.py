@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import collision_monitor as cm
-from collision_monitor.query.impact_methods import METHODS, STEP, bisection, closed_form, end_of_step, swept_sat
+from collision_monitor.query.impact.impact_methods import METHODS, STEP, bisection, closed_form, end_of_step, swept_sat
 
 A, B = cm.Box((0.7, 0.9, 0.5)), cm.Box((1.2, 0.3, 0.8))
 HORIZON = 2.0

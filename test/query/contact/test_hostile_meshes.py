@@ -14,7 +14,8 @@ from collision_monitor.impact.pair_impacts import predict_pairs
 from collision_monitor.meshes.nearest import LEAST, MEMORY, answer_row, tree_distance
 from collision_monitor.meshes.shape_trees import kept_tree
 from collision_monitor.meshes.solid import MOST_EXAMINED
-from collision_monitor.query import deepest, moving_pair, touching
+from collision_monitor.query.contact.contact import deepest
+from collision_monitor.query.impact import moving_pair, touching
 from collision_monitor.query.posed import Posed
 
 RNG = np.random.default_rng(3)
@@ -106,7 +107,7 @@ def test_only_triangles_near_a_body_on_a_terrain_are_followed_one_by_one(
     counts = []
     follow = moving_pair.in_convex_pieces
     monkeypatch.setattr(
-        "collision_monitor.query.time_of_impact.in_convex_pieces",
+        "collision_monitor.query.impact.time_of_impact.in_convex_pieces",
         lambda *arguments: counts.append(follow(*arguments)) or counts[-1],
     )
     monkeypatch.setattr(moving_pair, "MANY_FACES", 100)

@@ -17,7 +17,7 @@ from collision_monitor.geometry.round_features import (
     feature_of_outline,
 )
 from collision_monitor.query.arguments import checked_pose
-from collision_monitor.query.contact import Contact
+from collision_monitor.query.contact.contact import Contact
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import (
     Box,

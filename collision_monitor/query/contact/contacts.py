@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.query.batch_result import Batch, Pairs
-from collision_monitor.query.contact import Contact, contact, contact_of_row
-from collision_monitor.query.contact_rows import contact_rows
-from collision_monitor.query.convex_pairs import MEMORY
+from collision_monitor.query.contact.contact import Contact, contact, contact_of_row
+from collision_monitor.query.contact.contact_rows import contact_rows
+from collision_monitor.query.contact.convex_pairs import MEMORY
 from collision_monitor.query.pair_arrays import (
     Progress,
     Shapes,

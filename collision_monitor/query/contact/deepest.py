@@ -15,9 +15,9 @@ from collision_monitor.meshes.nearest import MEMORY, answer_row
 from collision_monitor.meshes.shape_trees import shape_tree
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A
 from collision_monitor.objects.models import exact_model
-from collision_monitor.query.nearest_pieces import NearestPieces
+from collision_monitor.query.contact.nearest_pieces import NearestPieces
+from collision_monitor.query.contact.surface_pair import surface_contact
 from collision_monitor.query.posed import Posed, place
-from collision_monitor.query.surface_pair import surface_contact
 from collision_monitor.records import Model
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.shapes import Capsule, ConvexHull, Mesh, Points, Sphere

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE
-from collision_monitor.query.contact_rows import contact_row
+from collision_monitor.query.contact.contact_rows import contact_row
+from collision_monitor.query.impact.pair_impact_rows import TOO_SMALL, TOUCHING, impact_memory, pair_impact_rows
 from collision_monitor.query.packed import packed_motion, packed_pose, packed_shape, pair_memory
-from collision_monitor.query.pair_impact_rows import TOO_SMALL, TOUCHING, impact_memory, pair_impact_rows
 
 Array = NDArray[np.float64]
 

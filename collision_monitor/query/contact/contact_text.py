@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.contact_features import FeatureType
-from collision_monitor.query.features import feature_of, tie_of
+from collision_monitor.query.contact.features import feature_of, tie_of
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import Box, ConvexHull, Mesh, Points, Shape
 
 if TYPE_CHECKING:
     from collision_monitor.geometry.coordinates import Array
     from collision_monitor.query.arguments import Compound
-    from collision_monitor.query.contact import Contact
+    from collision_monitor.query.contact.contact import Contact
 
 
 def contact_text(contact: Contact) -> str:

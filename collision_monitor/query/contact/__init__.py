@@ -1,0 +1,1 @@
+"""The contact of two shapes: distance, overlap, normal, points, features."""

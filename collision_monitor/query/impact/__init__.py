@@ -1,0 +1,1 @@
+"""When two moving shapes first meet."""

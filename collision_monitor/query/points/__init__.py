@@ -1,0 +1,1 @@
+"""Points, rays and bounding slabs against one shape."""
