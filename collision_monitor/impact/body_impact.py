@@ -27,7 +27,7 @@ from collision_monitor.impact.mesh_impact import mesh_impact
 from collision_monitor.impact.mesh_pair import has_mesh, shapes_within, triangles_contact
 from collision_monitor.impact.overlap_time import overlap_time
 from collision_monitor.impact.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
-from collision_monitor.meshes.nearest import MEMORY, PLACE_A, PLACE_B, answer_row
+from collision_monitor.meshes.distance.nearest import MEMORY, PLACE_A, PLACE_B, answer_row
 from collision_monitor.motion.bodies import next_pair, place_shape
 from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity, rotation_at
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B

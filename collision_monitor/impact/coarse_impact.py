@@ -30,7 +30,7 @@ from collision_monitor.impact.impact_record import (
 from collision_monitor.impact.mesh_pair import enclosure, has_mesh, have_trees, is_mesh
 from collision_monitor.impact.pair_impacts import PREFETCH_AHEAD, window_of
 from collision_monitor.impact.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
-from collision_monitor.meshes.inside import OUTSIDE
+from collision_monitor.meshes.overlap.inside import OUTSIDE
 from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity
 from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.vector import dot

@@ -10,13 +10,20 @@ from collision_monitor.impact.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.impact.mesh_pair import is_mesh, root_of
 from collision_monitor.impact.tree_impact import HEAP, approach_at, pop_first, push_pair, times_of
 from collision_monitor.meshes.boxes import half_of
-from collision_monitor.meshes.contact import reach_in
+from collision_monitor.meshes.distance.contact import reach_in
+from collision_monitor.meshes.distance.nearest import BOUNDS, PAIRS, size_of
+from collision_monitor.meshes.distance.point_range import point_range
+from collision_monitor.meshes.distance.solid import (
+    MovingSolid,
+    SolidMemory,
+    center_of,
+    leaf_solid_time,
+    reach_along,
+    solid_time,
+)
+from collision_monitor.meshes.distance.solid_range import solid_range
 from collision_monitor.meshes.layout import CHILD, WIDTH
-from collision_monitor.meshes.nearest import BOUNDS, PAIRS, size_of
 from collision_monitor.meshes.placing import inverse, place_point, relative
-from collision_monitor.meshes.point_range import point_range
-from collision_monitor.meshes.solid import MovingSolid, SolidMemory, center_of, leaf_solid_time, reach_along, solid_time
-from collision_monitor.meshes.solid_range import solid_range
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.narrow_phase.contact_row import BOUND, POINT_A, POINT_B
 from collision_monitor.narrow_phase.core import core_length

@@ -12,11 +12,11 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.impact.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.impact.mesh_pair import root_of, triangles_contact
 from collision_monitor.impact.tree_impact import HEAP, approach_at, open_box, pop_first, push_pair, times_of
-from collision_monitor.meshes.contact import reach_in
-from collision_monitor.meshes.depth_range import depth_range
+from collision_monitor.meshes.advance.leaf_times import leaf_time
+from collision_monitor.meshes.distance.contact import reach_in
+from collision_monitor.meshes.distance.depth_range import depth_range
+from collision_monitor.meshes.distance.nearest import BOUNDS, PAIRS, PLACE_A, PLACE_B, size_of
 from collision_monitor.meshes.layout import CENTER, CHILD, HALF, WIDTH
-from collision_monitor.meshes.leaf_times import leaf_time
-from collision_monitor.meshes.nearest import BOUNDS, PAIRS, PLACE_A, PLACE_B, size_of
 from collision_monitor.meshes.placing import place_point, relative
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, POINT_A, POINT_B

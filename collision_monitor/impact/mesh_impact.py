@@ -7,8 +7,8 @@ from collision_monitor.impact.impact_record import CLEAR, HIT, UNRESOLVED
 from collision_monitor.impact.mesh_pair import enclosure, have_trees, is_mesh
 from collision_monitor.impact.solid_impact import solid_impact
 from collision_monitor.impact.tree_impact import approach_at, tree_impact
-from collision_monitor.meshes.inside import INSIDE, OUTSIDE
-from collision_monitor.meshes.nearest import PLACE_A
+from collision_monitor.meshes.distance.nearest import PLACE_A
+from collision_monitor.meshes.overlap.inside import INSIDE, OUTSIDE
 from collision_monitor.narrow_phase.pair_pose import PairPose
 
 

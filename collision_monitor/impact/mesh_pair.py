@@ -5,14 +5,19 @@ from __future__ import annotations
 from math import inf, sqrt
 
 from collision_monitor._jit import device, inlined, outlined
-from collision_monitor.meshes.contact import FARTHER, OPEN, tree_contact
-from collision_monitor.meshes.feature import feature_in_triangle, number_in_hull, off_triangle, triangle_feature
-from collision_monitor.meshes.inside import INSIDE, OUTSIDE, is_either_in, locate
+from collision_monitor.meshes.distance.contact import FARTHER, OPEN, tree_contact
+from collision_monitor.meshes.distance.feature import (
+    feature_in_triangle,
+    number_in_hull,
+    off_triangle,
+    triangle_feature,
+)
+from collision_monitor.meshes.distance.nearest import PLACE_A, PLACE_B, nearest, triangle_at
+from collision_monitor.meshes.distance.solid import SolidMemory, solid_contact
 from collision_monitor.meshes.layout import CLOSED, FACE, MOST_PARTS, PARTS, WIDTH
-from collision_monitor.meshes.nearest import PLACE_A, PLACE_B, nearest, triangle_at
+from collision_monitor.meshes.overlap.inside import INSIDE, OUTSIDE, is_either_in, locate
+from collision_monitor.meshes.overlap.touching import contact_of_places
 from collision_monitor.meshes.placing import inverse, relative
-from collision_monitor.meshes.solid import SolidMemory, solid_contact
-from collision_monitor.meshes.touching import contact_of_places
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,
     DISTANCE,
@@ -175,7 +180,7 @@ def _name_feature(table, s, place, x, n, out, side):
 
 @device
 def triangles_contact(table, a, b, pose, places, out):
-    """Write the contact of two triangles of shapes with trees, at places as in `meshes.nearest`."""
+    """Write the contact of two triangles of shapes with trees, at places as in `meshes.distance.nearest`."""
     X = relative(pose.R_A, pose.R_B, pose.p)
     depth, n, x = contact_of_places(table.blocks, places[0], table.blocks, places[1], X)
     n, margins = rotate(pose.R_A, n), table.margin[a] + table.margin[b]

@@ -22,11 +22,11 @@ from collision_monitor.impact.tree_impact import (
     spins,
     times_of,
 )
-from collision_monitor.meshes.contact import reach_in
+from collision_monitor.meshes.distance.contact import reach_in
+from collision_monitor.meshes.distance.nearest import BOUNDS, PAIRS, size_of
+from collision_monitor.meshes.distance.solid import MovingSolid, SolidMemory, box_time, leaf_solid_time
 from collision_monitor.meshes.layout import CHILD, WIDTH
-from collision_monitor.meshes.nearest import BOUNDS, PAIRS, size_of
 from collision_monitor.meshes.placing import relative
-from collision_monitor.meshes.solid import MovingSolid, SolidMemory, box_time, leaf_solid_time
 from collision_monitor.narrow_phase.core import core_length
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.vector import dot

@@ -14,12 +14,12 @@ from typing import Final
 
 from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.impact.impact_record import CLEAR, HIT, UNRESOLVED
-from collision_monitor.meshes.approach import Approach, seen_from_b
-from collision_monitor.meshes.box_times import box_times
-from collision_monitor.meshes.contact import reach_in
+from collision_monitor.meshes.advance.approach import Approach, seen_from_b
+from collision_monitor.meshes.advance.box_times import box_times
+from collision_monitor.meshes.advance.leaf_times import leaf_time
+from collision_monitor.meshes.distance.contact import reach_in
+from collision_monitor.meshes.distance.nearest import BOUNDS, MOST_PAIRS, PAIRS, PLACE_A, PLACE_B, opens_b, size_of
 from collision_monitor.meshes.layout import CHILD, WIDTH
-from collision_monitor.meshes.leaf_times import leaf_time
-from collision_monitor.meshes.nearest import BOUNDS, MOST_PAIRS, PAIRS, PLACE_A, PLACE_B, opens_b, size_of
 from collision_monitor.meshes.placing import inverse, relative
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import relative_position, relative_velocity, rotation_at

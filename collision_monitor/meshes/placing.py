@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from collision_monitor._jit import inlined
+from collision_monitor.meshes.distance.triangle_pair import Triangle
 from collision_monitor.meshes.layout import AXES
-from collision_monitor.meshes.triangle_pair import Triangle
 from collision_monitor.narrow_phase.vector import Vector
 
 

@@ -3,7 +3,7 @@
 The depth of two solids changes by at most the distance that the origins move relative to each other, plus the angle
 that each body turns times its radius. It is at least the depth of any pair of their triangles. So one pair of triangles
 that meets proves the contact, and bounds the distance from above; the last answer bounds it from both sides. The middle
-of this range is reported. A new answer is a range too (meshes/depth_range.py): to find all pairs of triangles that meet
+of this range is reported. A new answer is a range too (meshes/distance/depth_range.py): to find all pairs of triangles that meet
 takes much longer.
 """
 
@@ -27,12 +27,12 @@ from collision_monitor.impact.body_contact import (
 from collision_monitor.impact.body_impact import CLOSING
 from collision_monitor.impact.mesh_pair import enclosure, has_mesh, have_trees, root_of, triangles_contact
 from collision_monitor.meshes.boxes import half_of
-from collision_monitor.meshes.depth_range import depth_range
-from collision_monitor.meshes.inside import OUTSIDE
+from collision_monitor.meshes.distance.depth_range import depth_range
+from collision_monitor.meshes.distance.nearest import PAIRS, PLACE_A, PLACE_B
 from collision_monitor.meshes.layout import CENTER, WIDTH
-from collision_monitor.meshes.nearest import PAIRS, PLACE_A, PLACE_B
+from collision_monitor.meshes.overlap.inside import OUTSIDE
+from collision_monitor.meshes.overlap.touching import touching
 from collision_monitor.meshes.placing import relative, turned_back
-from collision_monitor.meshes.touching import touching
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import rotation_now
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B

@@ -11,8 +11,7 @@ from typing import Any, Final
 from collision_monitor._jit import device, inlined
 from collision_monitor.impact.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUCHING, relative_now
 from collision_monitor.impact.mesh_pair import has_mesh
-from collision_monitor.meshes.extent import farthest
-from collision_monitor.meshes.feature import (
+from collision_monitor.meshes.distance.feature import (
     ROUND_TIE,
     feature_in_triangle,
     number_in_hull,
@@ -21,7 +20,8 @@ from collision_monitor.meshes.feature import (
     tie_of,
     vertex_at,
 )
-from collision_monitor.meshes.triangle_pair import Triangle
+from collision_monitor.meshes.distance.triangle_pair import Triangle
+from collision_monitor.meshes.extent import farthest
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import age_of, position_now, rotation_now
 from collision_monitor.narrow_phase.contact_row import (
@@ -160,7 +160,7 @@ def _of_polygon(table: Any, s: int, n: Vector) -> tuple[float, float]:
 
 @device
 def _of_hull(table: Any, s: int, x: Vector, n: Vector, reach: float, work: Any) -> tuple[float, float]:
-    """Feature of a hull, numbered as in meshes/feature.py; work: scratch of GJK.
+    """Feature of a hull, numbered as in meshes/distance/feature.py; work: scratch of GJK.
 
     A hull has no list of faces. The vertices that span the point nearest to one above x are those of its face.
     """

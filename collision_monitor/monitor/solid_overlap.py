@@ -1,6 +1,6 @@
 """Contacts of meshes with cylinders, cones, ellipsoids and half-spaces, within the `distance_tolerance`.
 
-The search for the deepest triangle ends when the depth is known within the tolerance (meshes/solid_range.py), which
+The search for the deepest triangle ends when the depth is known within the tolerance (meshes/distance/solid_range.py), which
 takes so much less than the answer that nothing is carried over to the next step.
 """
 
@@ -22,8 +22,8 @@ from collision_monitor.impact.body_contact import (
 )
 from collision_monitor.impact.body_impact import CLOSING
 from collision_monitor.impact.mesh_pair import has_mesh, have_trees, is_mesh, root_of
-from collision_monitor.meshes.solid import SolidMemory
-from collision_monitor.meshes.solid_range import solid_range
+from collision_monitor.meshes.distance.solid import SolidMemory
+from collision_monitor.meshes.distance.solid_range import solid_range
 from collision_monitor.monitor.carried_triangles import (
     NONE,
     WHOLE,

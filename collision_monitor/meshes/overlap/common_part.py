@@ -6,7 +6,7 @@ from math import inf, sqrt
 from typing import Any, NamedTuple
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.meshes.triangle_pair import Triangle, corner, normal
+from collision_monitor.meshes.distance.triangle_pair import Triangle, corner, normal
 from collision_monitor.narrow_phase.vector import Vector, along, cross, direction, dot, minus, plus, scaled
 
 

@@ -12,16 +12,16 @@ from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor._jit.vectors import LANES
-from collision_monitor.meshes.approach import Approach, time_until
+from collision_monitor.meshes.advance.approach import Approach, time_until
 from collision_monitor.meshes.boxes import half_of
-from collision_monitor.meshes.contact import reach_in
-from collision_monitor.meshes.feature import tie_of, triangle_feature
+from collision_monitor.meshes.distance.contact import reach_in
+from collision_monitor.meshes.distance.feature import tie_of, triangle_feature
+from collision_monitor.meshes.distance.nearest import NEAR_A, triangle_at
+from collision_monitor.meshes.distance.point_solid import point_distance
+from collision_monitor.meshes.distance.triangle_pair import Triangle
 from collision_monitor.meshes.layout import CENTER, CHILD, FACE, RADIUS, WIDTH
-from collision_monitor.meshes.nearest import NEAR_A, triangle_at
+from collision_monitor.meshes.overlap.touching import repeats
 from collision_monitor.meshes.placing import Placing, inverse, place_point, relative, turn_back, turned_back
-from collision_monitor.meshes.point_solid import point_distance
-from collision_monitor.meshes.touching import repeats
-from collision_monitor.meshes.triangle_pair import Triangle
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,
     CONTACT_SIZE,

@@ -11,7 +11,7 @@ from numba.extending import intrinsic
 
 from collision_monitor._jit import device, inlined
 from collision_monitor._jit.lanes import Lanes, store
-from collision_monitor.meshes.approach import STRETCH, Approach
+from collision_monitor.meshes.advance.approach import STRETCH, Approach
 from collision_monitor.meshes.boxes import Block, inner, seen_from
 from collision_monitor.meshes.layout import AXES, CENTER, REACH, ROWS, WIDTH
 from collision_monitor.meshes.placing import turned_back

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel, device, inlined, kernel
-from collision_monitor.meshes.box_fit import CONTAINED
+from collision_monitor.meshes.build.box_fit import CONTAINED
 from collision_monitor.meshes.layout import (
     AXES,
     BOXES,

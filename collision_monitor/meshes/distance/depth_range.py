@@ -11,9 +11,7 @@ from typing import Any, Final
 
 from collision_monitor._jit import device
 from collision_monitor.meshes.boxes import box_separations, triangle_bounds
-from collision_monitor.meshes.layout import CHILD, RADIUS, WIDTH
-from collision_monitor.meshes.leaf_planes import may_cross
-from collision_monitor.meshes.nearest import (
+from collision_monitor.meshes.distance.nearest import (
     BOUNDS,
     NEAR_A,
     NEAR_B,
@@ -23,8 +21,10 @@ from collision_monitor.meshes.nearest import (
     push_nearest_last,
     triangle_at,
 )
+from collision_monitor.meshes.layout import CHILD, RADIUS, WIDTH
+from collision_monitor.meshes.overlap.leaf_planes import may_cross
+from collision_monitor.meshes.overlap.touching import OPEN, contact_of_places, meet, repeats
 from collision_monitor.meshes.placing import Placing, inverse, place_triangle
-from collision_monitor.meshes.touching import OPEN, contact_of_places, meet, repeats
 
 MOST_LEAVES: Final = 2_000
 """Most pairs of leaves to examine, about 1 ms; hostile meshes need more, and get the full answer."""

@@ -15,15 +15,15 @@ from numba.extending import intrinsic
 
 from collision_monitor._jit import device
 from collision_monitor._jit.lanes import Lanes, load, store
-from collision_monitor.meshes.approach import Approach, time_until
+from collision_monitor.meshes.advance.approach import Approach, time_until
+from collision_monitor.meshes.advance.box_times import curvature_until, times_open
 from collision_monitor.meshes.below import is_all_above_zero
-from collision_monitor.meshes.box_times import curvature_until, times_open
 from collision_monitor.meshes.boxes import Block, inner
+from collision_monitor.meshes.distance.leaf_bounds import least_of_pairs
+from collision_monitor.meshes.distance.nearest import toward, triangle_at
+from collision_monitor.meshes.distance.triangle_pair import closest_points
 from collision_monitor.meshes.layout import CORNERS, RADIUS, WIDTH
-from collision_monitor.meshes.leaf_bounds import least_of_pairs
-from collision_monitor.meshes.nearest import toward, triangle_at
 from collision_monitor.meshes.placing import Placing, place_triangle, turn_back
-from collision_monitor.meshes.triangle_pair import closest_points
 from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus, opposite
 
 SHARE: Final = 0.7

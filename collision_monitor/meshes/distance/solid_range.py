@@ -10,12 +10,12 @@ from math import inf
 from typing import Any, Final
 
 from collision_monitor._jit import inlined, outlined
+from collision_monitor.meshes.distance.nearest import NEAR_A, triangle_at
+from collision_monitor.meshes.distance.point_range import point_range
+from collision_monitor.meshes.distance.solid import SolidMemory, center_of, push_box, reach_along, triangle_contact
 from collision_monitor.meshes.layout import CHILD, RADIUS, WIDTH
-from collision_monitor.meshes.nearest import NEAR_A, triangle_at
+from collision_monitor.meshes.overlap.touching import repeats
 from collision_monitor.meshes.placing import inverse, place_point, relative
-from collision_monitor.meshes.point_range import point_range
-from collision_monitor.meshes.solid import SolidMemory, center_of, push_box, reach_along, triangle_contact
-from collision_monitor.meshes.touching import repeats
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, write
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.vector import Vector, along, dot, minus, opposite, rotate, sum_of_sizes

@@ -7,9 +7,7 @@ from typing import Any, Final
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.meshes.boxes import box_separations, triangle_bounds
-from collision_monitor.meshes.layout import CHILD, FACE, RADIUS, WIDTH
-from collision_monitor.meshes.leaf_planes import may_cross, may_touch
-from collision_monitor.meshes.nearest import (
+from collision_monitor.meshes.distance.nearest import (
     BOUNDS,
     NEAR_A,
     NEAR_B,
@@ -20,8 +18,10 @@ from collision_monitor.meshes.nearest import (
     push_nearest_last,
     triangle_at,
 )
+from collision_monitor.meshes.distance.triangle_pair import Triangle, closest_points, crossing_point
+from collision_monitor.meshes.layout import CHILD, FACE, RADIUS, WIDTH
+from collision_monitor.meshes.overlap.leaf_planes import may_cross, may_touch
 from collision_monitor.meshes.placing import inverse, place_triangle, relative
-from collision_monitor.meshes.triangle_pair import Triangle, closest_points, crossing_point
 from collision_monitor.narrow_phase.vector import Vector, along, cross, dot, minus
 from collision_monitor.tolerances import PARALLEL_SIN2
 

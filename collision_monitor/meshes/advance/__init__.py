@@ -1,0 +1,1 @@
+"""Times until which moving boxes and triangles stay apart."""

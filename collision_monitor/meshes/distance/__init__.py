@@ -1,0 +1,1 @@
+"""Nearest and deepest places of trees, and of trees and convex solids."""
