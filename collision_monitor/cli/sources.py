@@ -73,7 +73,7 @@ def sources_command(args: argparse.Namespace) -> int:
 
 def _check(path: Path, seconds: float) -> int:
     from collision_monitor.ros.process import ros_context, stay_on_this_machine
-    from collision_monitor.sources.mapping import load_mapping
+    from collision_monitor.sources.ground.mapping import load_mapping
 
     with usage():
         mapping = load_mapping(path)

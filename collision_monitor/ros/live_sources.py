@@ -20,7 +20,7 @@ from collision_monitor.ros.line_report import Level, LineReport
 from collision_monitor.ros.names import is_topic_name
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage
-from collision_monitor.sources.tf_objects import TRANSFORMS
+from collision_monitor.sources.messages.tf_objects import TRANSFORMS
 
 SEARCH_PERIOD: Final = 0.2
 """s between two looks at the graph for topics of the file."""

@@ -23,7 +23,7 @@ from collision_monitor.settings.names import nearest_name
 from collision_monitor.settings.parameter_file import OTHER_PARAMETERS, PARAMETERS_BY_RCLPY
 from collision_monitor.settings.profile import Profile
 from collision_monitor.settings.setting import Setting
-from collision_monitor.sources.mapping import Mapping, load_mapping
+from collision_monitor.sources.ground.mapping import Mapping, load_mapping
 
 T = TypeVar("T", str, int, float, bool, str | int | float)
 

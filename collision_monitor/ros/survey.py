@@ -18,9 +18,9 @@ from collision_monitor.ros.line_report import LineReport
 from collision_monitor.ros.live_sources import LiveSources, quality_of_all
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Mapping
-from collision_monitor.sources.frames import frame_name
+from collision_monitor.sources.ground.frames import frame_name
 from collision_monitor.sources.kinds import BY_TYPE
-from collision_monitor.sources.robot_template import is_of_robot
+from collision_monitor.sources.robot.robot_template import is_of_robot
 
 LOOK_PERIOD: Final = 0.2
 """s between two looks at the graph: DDS discovers publishers one after the other."""

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from collision_monitor.sources.decoding import Decoder
 from collision_monitor.sources.feed import Feed, Input
-from collision_monitor.sources.mapping import Mapping, load_mapping
-from collision_monitor.sources.source import RawMessage
+from collision_monitor.sources.ground.mapping import Mapping, load_mapping
+from collision_monitor.sources.ground.source import RawMessage
 
 if TYPE_CHECKING:
     from collision_monitor.sources.importing import Imported, import_bag

@@ -13,7 +13,7 @@ from typing import Any
 
 from collision_monitor.errors import SessionError
 from collision_monitor.sources.bag_limits import check_bag, salvage_hint, unpack_message
-from collision_monitor.sources.source import RawMessage
+from collision_monitor.sources.ground.source import RawMessage
 
 
 class Bag:

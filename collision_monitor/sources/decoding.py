@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from collision_monitor.errors import MessageError
-from collision_monitor.sources.autoware_bytes import HASHES, read_tracks
+from collision_monitor.sources.messages.autoware_bytes import HASHES, read_tracks
 
 
 class Decoder:

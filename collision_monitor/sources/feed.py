@@ -14,16 +14,16 @@ from collision_monitor.codec import Change, encode_descriptions, encode_states
 from collision_monitor.errors import InputError, MessageError
 from collision_monitor.monitor.timeline import Order, Progress, Timeline
 from collision_monitor.pipeline.topics import Topic
-from collision_monitor.sources.frames import frame_name
+from collision_monitor.sources.ground.frames import frame_name
+from collision_monitor.sources.ground.mapping import HEADER, Mapping
+from collision_monitor.sources.ground.object_entry import ObjectEntry
+from collision_monitor.sources.ground.scene import Scene
+from collision_monitor.sources.ground.source import RawMessage, Source
+from collision_monitor.sources.ground.waiting_states import Step
 from collision_monitor.sources.kinds import BY_TYPE, SECTIONS
-from collision_monitor.sources.mapping import HEADER, Mapping
-from collision_monitor.sources.object_entry import ObjectEntry
-from collision_monitor.sources.robot_source import RobotSource
-from collision_monitor.sources.scene import Scene
-from collision_monitor.sources.source import RawMessage, Source
-from collision_monitor.sources.standing import StandingObjects
-from collision_monitor.sources.tf_objects import TRANSFORMS, FrameSource
-from collision_monitor.sources.waiting_states import Step
+from collision_monitor.sources.messages.standing import StandingObjects
+from collision_monitor.sources.messages.tf_objects import TRANSFORMS, FrameSource
+from collision_monitor.sources.robot.robot_source import RobotSource
 
 MAX_TIME_STEP: Final = 10.0
 """s by which a stamp may jump; a larger jump needs a second message, as in the monitor."""

@@ -21,9 +21,9 @@ from collision_monitor.settings.profile import Profile
 from collision_monitor.sources.bag import Bag
 from collision_monitor.sources.decoding import Decoder
 from collision_monitor.sources.feed import STATIC, Feed, Input
+from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.kinds import BY_TYPE
-from collision_monitor.sources.mapping import Mapping
-from collision_monitor.sources.tf_objects import TRANSFORMS
+from collision_monitor.sources.messages.tf_objects import TRANSFORMS
 
 _INPUTS: Final = (Topic.STATES, Topic.SHAPES)
 _REPEATED: Final = (Topic.MONITORED_STATES.path, Topic.MONITORED_SHAPES.path)

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from collision_monitor.sources.autoware import PREDICTED, TRACKED, AutowareSource
-from collision_monitor.sources.clouds import CLOUD, SCAN, CloudSource
-from collision_monitor.sources.detections import DETECTIONS, DetectionSource
-from collision_monitor.sources.footprints import FOOTPRINT, FootprintSource
-from collision_monitor.sources.mapping import Mapping
-from collision_monitor.sources.markers import MARKER, MARKERS, MarkerSource
-from collision_monitor.sources.object_entry import ObjectEntry
-from collision_monitor.sources.planning_scene import COLLISION_OBJECT, PLANNING_SCENE, planning_world
-from collision_monitor.sources.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE, PoseSource
-from collision_monitor.sources.robot_section import make_robots
-from collision_monitor.sources.source import Source
-from collision_monitor.sources.tf_objects import TRANSFORMS, FrameSource
+from collision_monitor.sources.ground.mapping import Mapping
+from collision_monitor.sources.ground.object_entry import ObjectEntry
+from collision_monitor.sources.ground.source import Source
+from collision_monitor.sources.messages.autoware import PREDICTED, TRACKED, AutowareSource
+from collision_monitor.sources.messages.clouds import CLOUD, SCAN, CloudSource
+from collision_monitor.sources.messages.detections import DETECTIONS, DetectionSource
+from collision_monitor.sources.messages.footprints import FOOTPRINT, FootprintSource
+from collision_monitor.sources.messages.markers import MARKER, MARKERS, MarkerSource
+from collision_monitor.sources.messages.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE, PoseSource
+from collision_monitor.sources.messages.tf_objects import TRANSFORMS, FrameSource
+from collision_monitor.sources.robot.planning_scene import COLLISION_OBJECT, PLANNING_SCENE, planning_world
+from collision_monitor.sources.robot.robot_section import make_robots
 
 BY_TYPE: Final[dict[str, Callable[[ObjectEntry, str, Mapping], Source]]] = {
     ODOMETRY: PoseSource,

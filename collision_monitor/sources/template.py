@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final, NamedTuple
 
-from collision_monitor.sources.autoware import PREDICTED, TRACKED
-from collision_monitor.sources.clouds import CLOUD, SCAN
-from collision_monitor.sources.detections import DETECTIONS
-from collision_monitor.sources.footprints import FOOTPRINT
-from collision_monitor.sources.markers import MARKER, MARKERS
-from collision_monitor.sources.planning_scene import COLLISION_OBJECT, PLANNING_SCENE
-from collision_monitor.sources.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE
-from collision_monitor.sources.robot_template import robot_lines
+from collision_monitor.sources.messages.autoware import PREDICTED, TRACKED
+from collision_monitor.sources.messages.clouds import CLOUD, SCAN
+from collision_monitor.sources.messages.detections import DETECTIONS
+from collision_monitor.sources.messages.footprints import FOOTPRINT
+from collision_monitor.sources.messages.markers import MARKER, MARKERS
+from collision_monitor.sources.messages.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE
+from collision_monitor.sources.robot.planning_scene import COLLISION_OBJECT, PLANNING_SCENE
+from collision_monitor.sources.robot.robot_template import robot_lines
 
 _ENTRIES: Final = {
     ODOMETRY: "shape: {box: [1.0, 0.7, 0.5]}",

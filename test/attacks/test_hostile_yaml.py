@@ -20,7 +20,7 @@ from collision_monitor.settings.profile import Profile
 from collision_monitor.settings.yaml_entry import YamlEntry
 from collision_monitor.settings.yaml_file import DEEPEST, LARGEST, NODES, read_yaml
 from collision_monitor.sources.bag import Bag
-from collision_monitor.sources.yaml_table import number, pose
+from collision_monitor.sources.ground.yaml_table import number, pose
 
 SECONDS = 2.0
 """Processor time to refuse a file."""

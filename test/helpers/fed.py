@@ -12,7 +12,7 @@ from foreign_messages import decoder
 from collision_monitor.codec import Change, ObjectStateArray, decode_descriptions, decode_states
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.sources import Feed, Input, RawMessage
-from collision_monitor.sources.mapping import make_mapping
+from collision_monitor.sources.ground.mapping import make_mapping
 
 
 class Fed:

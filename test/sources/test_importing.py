@@ -42,7 +42,7 @@ from collision_monitor.session import Recorded, Session
 from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict
 from collision_monitor.sources import import_bag
-from collision_monitor.sources.mapping import make_mapping
+from collision_monitor.sources.ground.mapping import make_mapping
 
 STEP = 20_000_000
 CUBE, SPHERE, CYLINDER, LINE_STRIP = 1, 2, 3, 4

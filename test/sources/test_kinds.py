@@ -27,10 +27,10 @@ from scipy.spatial.transform import Rotation
 
 from collision_monitor.errors import InputError
 from collision_monitor.records import StateFlag
-from collision_monitor.sources.clouds import cloud_points, scan_points, thinned
-from collision_monitor.sources.covariances import usable_blocks
-from collision_monitor.sources.frames import FrameMotion
-from collision_monitor.sources.scene_states import squares
+from collision_monitor.sources.ground.covariances import usable_blocks
+from collision_monitor.sources.ground.frames import FrameMotion
+from collision_monitor.sources.ground.scene_states import squares
+from collision_monitor.sources.messages.clouds import cloud_points, scan_points, thinned
 
 STEP = 50_000_000
 SPHERE = {"sphere": 1.0}

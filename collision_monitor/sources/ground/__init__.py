@@ -1,0 +1,1 @@
+"""What all sources share: frames, tracks, states that wait, entries of the sources file."""

@@ -1,0 +1,65 @@
+"""Shapes of shape_msgs as shapes of the monitor, and shapes at another scale."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from collision_monitor.errors import InputError
+from collision_monitor.shapes.shapes import Box, Capsule, Cone, Cylinder, HalfSpace, Mesh, Shape, Sphere
+from collision_monitor.sources.ground.prisms import prism
+
+_DIMENSIONS: Final = {1: 3, 2: 1, 3: 2, 4: 2, 5: 1}
+"""Numbers of a SolidPrimitive by its type: BOX, SPHERE, CYLINDER, CONE, PRISM."""
+
+
+def primitive_shapes(primitive: Any) -> list[Shape]:
+    """Return the shapes of a shape_msgs/SolidPrimitive; a concave prism becomes several. Raises InputError, ShapeError.
+
+    CYLINDER and CONE hold [height, radius], ours [radius, height].
+    """
+    kind, values = int(primitive.type), np.asarray(primitive.dimensions, np.float64)
+    if kind not in _DIMENSIONS:
+        raise InputError(f"SolidPrimitive: expected a type from 1 (BOX) to 5 (PRISM), got {kind}")
+    if len(values) != _DIMENSIONS[kind]:
+        raise InputError(f"SolidPrimitive of type {kind}: expected {_DIMENSIONS[kind]} dimensions, got {len(values)}")
+    if kind == 1:
+        return [Box(values)]
+    if kind == 2:
+        return [Sphere(values[0])]
+    if kind == 3:
+        return [Cylinder(values[1], values[0])]
+    if kind == 4:
+        return [Cone(values[1], values[0])]
+    if not values[0] > 0.0:
+        raise InputError(f"SolidPrimitive of type 5: expected a positive height, got {values[0]}")
+    outline = np.array([(p.x, p.y) for p in primitive.polygon.points], np.float64).reshape(-1, 2)
+    return [shape for shape, _ in prism(outline, -values[0] / 2, values[0] / 2)]
+
+
+def mesh_shape(mesh: Any) -> Shape:
+    """Return the shape of a shape_msgs/Mesh. Raises ShapeError."""
+    vertices = np.array([(p.x, p.y, p.z) for p in mesh.vertices]).reshape(-1, 3)
+    return Mesh(vertices, np.array([t.vertex_indices for t in mesh.triangles], np.int64).reshape(-1, 3))
+
+
+def plane_shape(plane: Any) -> Shape:
+    """Return the solid below a shape_msgs/Plane a x + b y + c z + d = 0, seen along its normal. Raises ShapeError."""
+    a, b, c, d = np.asarray(plane.coef, np.float64)
+    return HalfSpace((a, b, c), -d)
+
+
+def scaled(shape: Shape, factor: float) -> Shape:
+    """Return a shape scaled about its origin, a mesh about the mean of its vertices. Raises ShapeError."""
+    match shape:
+        case Box(size):
+            return Box([factor * s for s in size])
+        case Sphere(radius):
+            return Sphere(factor * radius)
+        case Cylinder(radius, length) | Capsule(radius, length) | Cone(radius, length):
+            return type(shape)(factor * radius, factor * length)
+        case Mesh(vertices, faces):
+            centre = vertices.mean(axis=0)
+            return Mesh(centre + factor * (vertices - centre), faces)
+    raise InputError(f"scale: expected a shape of a URDF, got {type(shape).__name__}")

@@ -1,0 +1,48 @@
+"""The interface between a source and the pipeline.
+
+A source takes messages of its topics and writes what they hold into the `Scene`: descriptions, removals and states in
+the monitor's frame. The `Feed` gives it the messages, decides when a step is made, and turns the scene into
+ObjectDescriptionArray and ObjectStateArray bytes. Neither knows whether a message came from DDS or from a bag.
+
+A further kind of source is one class with these four members, and one line in `kinds.py`: in `BY_TYPE` if an entry of
+`objects:` uses it, by the type of its topic; in `SECTIONS` if it has a section of the sources file of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Protocol
+
+from collision_monitor.sources.ground.scene import Scene
+
+
+class RawMessage(NamedTuple):
+    """A message as DDS or a bag delivers it: CDR bytes, and the time of receipt in ns."""
+
+    topic: str
+    type: str
+    data: bytes
+    received: int
+
+
+class Source(Protocol):
+    """Converts the messages of its topics."""
+
+    @property
+    def topics(self) -> Mapping[str, tuple[str, ...]]:
+        """The types that each topic may carry, such as `{"/joint_states": ("sensor_msgs/msg/JointState",)}`."""
+
+    def begin(self, scene: Scene) -> None:
+        """Describe what is known before the first message. Called once. Raises InputError, SessionError."""
+
+    def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
+        """Process a decoded message. What cannot be used is given to `scene.refuse`; nothing is raised.
+
+        stamp_ns: the message's stamp, or its time of receipt if it has none or the file selects it.
+        """
+
+    def settle(self, now_ns: int, scene: Scene) -> None:
+        """Write what waits, and remove what has expired. Called before each step, with the step's stamp.
+
+        A source of many messages for each step decodes them in `take` and computes states here.
+        """

@@ -1,0 +1,1 @@
+"""One file a message type: its bytes in, objects and states out."""

@@ -1,0 +1,179 @@
+"""autoware TrackedObjects and PredictedObjects: all tracks of a topic.
+
+The twist is along the axes of the object. The tracks keep their ids by UUID, and vanish after `forget_after`. A track
+changes its shape a little with every message; it is described again only when it has left its described shape, which is
+larger than the measured one by up to `shape_tolerance`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.errors import CollisionMonitorError, InputError
+from collision_monitor.records import StateFlag
+from collision_monitor.shapes.pose import Pose, rotation_matrix
+from collision_monitor.shapes.shapes import Box, Cylinder
+from collision_monitor.sources.ground.covariances import usable_blocks, yaw_alone
+from collision_monitor.sources.ground.frames import IDENTITY, frame_name
+from collision_monitor.sources.ground.mapping import Mapping
+from collision_monitor.sources.ground.object_entry import ObjectEntry
+from collision_monitor.sources.ground.prisms import prism
+from collision_monitor.sources.ground.scene import Scene
+from collision_monitor.sources.ground.scene_states import carry, empty_states, turn_twists, turned_triangles
+from collision_monitor.sources.ground.track_shapes import Measured, held_by, rounded_up, still_held
+from collision_monitor.sources.ground.tracks import Track, TrackTable
+from collision_monitor.sources.messages.autoware_bytes import POLYGON, TrackArrays
+
+TRACKED: Final = "autoware_perception_msgs/msg/TrackedObjects"
+PREDICTED: Final = "autoware_perception_msgs/msg/PredictedObjects"
+
+_BOX, _CYLINDER = 0, 1
+_NO_ORIENTATION = 0
+_LABELS: Final = (
+    *("unknown", "car", "truck", "bus", "trailer", "motorcycle", "bicycle", "pedestrian", "animal", "hazard"),
+    *("over_drivable", "under_drivable"),
+)
+
+
+Found = tuple[Track, int]
+"""A track and its row in a message."""
+
+
+class AutowareSource:
+    """The tracks of one entry, with the shapes in the messages or with the entry's `each`."""
+
+    def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
+        entry.allow_only(("covariance", "forget_after", "min_existence", "shape_tolerance", "each"), message_type)
+        if entry.shapes:
+            raise InputError(f"{entry.name}, shape: {message_type} holds many objects; `each` is the shape of each")
+        self.topics = {entry.topic: (message_type,)}
+        self._entry = entry
+        self._tracks = TrackTable(entry.forget_after)
+        self._number = 0
+
+    def begin(self, scene: Scene) -> None:
+        """See Source. A track is described when it appears."""
+
+    def take(self, topic: str, content: TrackArrays, stamp_ns: int, scene: Scene) -> None:
+        """See Source."""
+        entry = self._entry
+        frame = scene.locate(entry.name, frame_name(content.header.frame_id), stamp_ns)
+        wanted = ~(content.existence < entry.min_existence)  # NaN: not known
+        seen: dict[bytes, int] = {}
+        for row in np.flatnonzero(wanted).tolist():
+            if content.uuids[row] in seen:
+                text = f"UUID {content.uuids[row].hex()}: expected it once in a message, got it twice"
+                scene.refuse(entry.name, text)
+            else:
+                seen[content.uuids[row]] = row
+        if frame is None:  # they stay, and become stale
+            self._tracks.touch(seen, stamp_ns)
+            return
+        found = [(self._track(key, content.labels[row], stamp_ns, scene), row) for key, row in seen.items()]
+        kept = self._described([(track, row) for track, row in found if track is not None], content, scene)
+        if kept:
+            states, covariance = self._states(kept, content, scene)
+            given = covariance if frame is IDENTITY else carry(states, frame, covariance)
+            scene.observe(states, stamp_ns, given)
+
+    def settle(self, now_ns: int, scene: Scene) -> None:
+        """See Source."""
+        self._tracks.expire(now_ns, scene)
+
+    def _track(self, key: bytes, label: int, stamp_ns: int, scene: Scene) -> Track | None:
+        if key not in self._tracks:
+            self._number += 1
+        word = _LABELS[label] if label < len(_LABELS) else f"label{label}"
+        return self._tracks.get(key, f"{self._entry.name}_{word}_{self._number}", stamp_ns, scene)
+
+    def _described(self, found: list[Found], content: TrackArrays, scene: Scene) -> list[Found]:
+        """Describe the tracks that are new or have left their described shapes. Return those that are described."""
+        entry, tolerance = self._entry, self._entry.shape_tolerance
+        kinds, sizes = _measured(content)
+        before = [track.shape for track, _ in found]
+        if entry.each:
+            still = np.array([shape is not None for shape in before])
+        else:
+            rows = np.array([row for _, row in found], np.int64)
+            still = still_held(before, kinds[rows], sizes[rows], tolerance)
+        kept = []
+        for (track, row), held in zip(found, still.tolist(), strict=True):
+            if held or self._describe(track, (int(kinds[row]), sizes[row]), content.footprints.get(row), scene):
+                kept.append((track, row))
+        return kept
+
+    def _describe(self, track: Track, measured: Measured, corners: Any, scene: Scene) -> bool:
+        """Describe one track. Return whether it is described."""
+        entry, tolerance = self._entry, self._entry.shape_tolerance
+        if measured[0] == POLYGON and not entry.each:
+            measured = POLYGON, np.column_stack([corners[:, :2], np.full(len(corners), measured[1][2])])
+            if track.shape is not None and held_by(track.shape, measured, tolerance):
+                return True
+        described = rounded_up(measured, tolerance)
+        try:
+            shapes, padding = (entry.each, 0.0) if entry.each else _shapes(described, tolerance)
+            scene.describe(entry.describe(track.object_id, track.name, shapes, extra_padding=padding))
+        except CollisionMonitorError as error:
+            scene.refuse(entry.name, f"{track.name}: {error}")
+            return track.shape is not None
+        track.shape = described
+        return True
+
+    def _states(self, kept: list[Found], content: TrackArrays, scene: Scene) -> tuple[Any, Any]:
+        """Return states in the frame of the message, with covariances or None."""
+        states = empty_states([track.object_id for track, _ in kept])
+        rows = np.array([row for _, row in kept])
+        poses, twists, acceleration = content.pose[rows], content.twist[rows], content.acceleration[rows]
+        standing = content.stationary[rows]
+        twists[standing], acceleration[standing] = 0.0, 0.0
+        states["position"], states["quaternion"] = poses[:, :3], poses[:, 3:]
+        states["quaternion"][content.orientation[rows] == _NO_ORIENTATION] = 0.0, 0.0, 0.0, 1.0
+        states["linear"], states["angular"], states["acceleration"] = twists[:, :3], twists[:, 3:], acceleration
+        states["flags"][acceleration.any(1)] = StateFlag.ACCELERATION_VALID
+        covariance = self._covariances(states, content, rows, scene) if self._entry.covariance else None
+        turn_twists(states)
+        return states, covariance
+
+    def _covariances(
+        self, states: Any, content: TrackArrays, rows: NDArray[np.int64], scene: Scene
+    ) -> NDArray[np.float64] | None:
+        pose = usable_blocks(content.pose_covariance[rows])
+        twist = usable_blocks(content.twist_covariance[rows])
+        wrong = int((~(pose.valid & twist.valid)).sum())
+        if wrong:
+            text = "covariance: expected symmetric matrices without negative eigenvalues; it was ignored"
+            scene.refuse(self._entry.name, text, wrong)
+        states["orientation_stddev"], states["angular_velocity_stddev"] = pose.stddev, twist.stddev
+        states["flags"][yaw_alone(pose, twist, states["quaternion"])] |= np.uint32(StateFlag.YAW_ONLY)
+        joined: NDArray[np.float64] = np.nan_to_num(np.concatenate([pose.linear, twist.linear], axis=1))
+        if not joined.any():
+            return None
+        joined[:, 6:] = turned_triangles(rotation_matrix(states["quaternion"]), joined)[:, 6:]
+        return joined
+
+
+def _measured(content: TrackArrays) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """Return kinds (N,) and sizes (N, 3). A box without orientation counts as the cylinder about it."""
+    kinds, sizes = content.kind.copy(), content.size.copy()
+    around = (kinds == _BOX) & (content.orientation == _NO_ORIENTATION)
+    kinds[around] = _CYLINDER
+    sizes[around, :2] = np.hypot(sizes[around, 0], sizes[around, 1])[:, None]
+    return kinds, sizes
+
+
+def _shapes(described: tuple[int, NDArray[np.float64]], tolerance: float) -> tuple[Any, float]:
+    """Return shapes and how far the object may exceed them. Raises ShapeError, InputError."""
+    kind, numbers = described
+    if kind == POLYGON:
+        height = float(numbers[0, 2]) if len(numbers) else 0.0
+        if not height > 0.0:
+            raise InputError(f"dimensions.z: expected a height above 0, got {height}")
+        return prism(numbers[:, :2], -height / 2, height / 2), tolerance
+    if kind == _BOX:
+        return ((Box(numbers), Pose()),), 0.0
+    if kind == _CYLINDER:
+        return ((Cylinder(max(numbers[:2]) / 2, numbers[2]), Pose()),), 0.0
+    raise InputError(f"shape.type: expected 0 (box), 1 (cylinder) or 2 (polygon), got {kind}")

@@ -1,0 +1,168 @@
+"""sensor_msgs LaserScan and PointCloud2: the points of a scan as one static object, replaced by each message.
+
+A scan holds no speeds, and its points are taken as of one time. The pose of the sensor's frame at the message's stamp
+places them in the monitor's frame.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.errors import CollisionMonitorError, InputError
+from collision_monitor.query.points.points_within import points_within
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import MOST_CLOUD_POINTS, Points
+from collision_monitor.sources.ground.frames import frame_name
+from collision_monitor.sources.ground.mapping import Mapping
+from collision_monitor.sources.ground.object_entry import ObjectEntry
+from collision_monitor.sources.ground.scene import Scene
+from collision_monitor.sources.ground.yaml_table import known
+
+SCAN: Final = "sensor_msgs/msg/LaserScan"
+CLOUD: Final = "sensor_msgs/msg/PointCloud2"
+
+Floats = NDArray[np.float64]
+
+MOST_POINTS: Final = 4 * MOST_CLOUD_POINTS
+"""Points of a message, before those without a place are dropped and the others are thinned."""
+
+_FORMATS: Final = {7: "f4", 8: "f8"}
+"""NumPy's names of PointField's float types."""
+
+
+class CloudSource:
+    """The scan of one entry: points of the entry's `radius`, thinned to one for each cube of its `voxel`.
+
+    Points on the objects that `without` names are left out: those of the robot that carries the sensor.
+    """
+
+    def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
+        entry.allow_only(("radius", "voxel", "min_range", "max_range", "without", "clearance"), message_type)
+        if entry.shapes:
+            raise InputError(f"{entry.name}, shape: {message_type} brings its own points; `radius` is theirs")
+        for each in entry.without:
+            known(each, [*(other.name for other in mapping.sources), *mapping.robots], f"{entry.name}, without")
+        self.topics = {entry.topic: (message_type,)}
+        self._entry = entry
+
+    def begin(self, scene: Scene) -> None:
+        """See Source. The first scan describes the object."""
+
+    def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
+        """See Source."""
+        entry = self._entry
+        frame = scene.locate(entry.name, frame_name(content.header.frame_id), stamp_ns)
+        if frame is None:
+            return
+        try:
+            points, lost = cloud_points(content) if hasattr(content, "point_step") else scan_points(content)
+        except InputError as error:
+            scene.refuse(entry.name, str(error))
+            return
+        scene.points_dropped[entry.name] += lost
+        squared = (points**2).sum(1)
+        points = points[(squared >= entry.min_range**2) & (squared <= entry.max_range**2)]
+        points, radius = thinned(points, entry.voxel, entry.radius)
+        if not len(points):  # nothing is there, as far as the scan says
+            scene.remove(entry.object_id)
+            return
+        try:
+            cloud, at = Points(points, radius), Pose(frame.position, frame.quaternion)
+            kept = ~self._on_robot(cloud, at, stamp_ns, scene)
+            if not kept.any():
+                scene.remove(entry.object_id)
+                return
+            if not kept.all():
+                cloud = Points(points[kept], radius)
+            scene.describe(entry.describe(shapes=((cloud, Pose()),), at=at))
+        except CollisionMonitorError as error:
+            scene.refuse(entry.name, str(error))
+
+    def _on_robot(self, cloud: Points, at: Pose, stamp_ns: int, scene: Scene) -> NDArray[np.bool_]:
+        """Which points (N,) are on an object that is left out. Raises InputError if it is not known where one is."""
+        on = np.zeros(len(cloud.points), np.bool_)
+        for name in self._entry.without:
+            objects = scene.placed(name, stamp_ns)
+            if not objects:
+                raise InputError(f"without: the pose of {name} is not known at the stamp of this scan")
+            for description, pose in objects:
+                limit = self._entry.clearance + description.padding
+                on |= points_within(cloud, at, description.shapes, pose, limit)
+        return on
+
+    def settle(self, now_ns: int, scene: Scene) -> None:
+        """See Source."""
+
+
+def scan_points(scan: Any) -> tuple[Floats, int]:
+    """Return the points (N, 3) in m of a LaserScan in its frame, and the number of NaN; beams may meet nothing."""
+    ranges = np.asarray(scan.ranges, np.float64)
+    angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges))
+    met = (ranges >= scan.range_min) & (ranges <= scan.range_max) & np.isfinite(angles)
+    distance, angle = ranges[met], angles[met]
+    points = np.column_stack([distance * np.cos(angle), distance * np.sin(angle), np.zeros(len(distance))])
+    return points, int(np.count_nonzero(np.isnan(ranges)))
+
+
+def cloud_points(cloud: Any) -> tuple[Floats, int]:
+    """Return the finite points (N, 3) in m of a PointCloud2 in its frame, and the number of the others.
+
+    Raises InputError if it has no x, y and z.
+    """
+    fields = {each.name: each for each in cloud.fields}
+    missing = [name for name in "xyz" if name not in fields or fields[name].datatype not in _FORMATS]
+    if missing:
+        there = ", ".join(f"{each.name} ({each.datatype})" for each in cloud.fields) or "none"
+        raise InputError(f"fields: expected x, y and z of FLOAT32 (7) or FLOAT64 (8), got {there}")
+    count = cloud.width * cloud.height
+    if count > MOST_POINTS:
+        raise InputError(f"expected at most {MOST_POINTS} points, got {count}")
+    data = np.asarray(cloud.data, np.uint8)
+    least = cloud.width * cloud.point_step
+    if cloud.row_step < least or len(data) < cloud.height * cloud.row_step:
+        raise InputError(
+            f"data: expected {cloud.height} rows of {least} bytes, got row_step {cloud.row_step} and {len(data)} bytes"
+        )
+    order = ">" if cloud.is_bigendian else "<"
+    formats = [order + _FORMATS[fields[name].datatype] for name in "xyz"]
+    try:
+        dtype = np.dtype(
+            {
+                "names": ["x", "y", "z"],
+                "formats": formats,
+                "offsets": [fields[name].offset for name in "xyz"],
+                "itemsize": cloud.point_step,
+            }
+        )
+    except ValueError as error:
+        raise InputError(f"fields: expected offsets within point_step {cloud.point_step}: {error}") from None
+    rows = data[: cloud.height * cloud.row_step].reshape(cloud.height, cloud.row_step)[:, :least]
+    raw = np.ascontiguousarray(rows).reshape(-1).view(dtype)
+    points = np.empty((count, 3))
+    with np.errstate(invalid="ignore"):  # a signalling NaN
+        for k, name in enumerate("xyz"):
+            points[:, k] = raw[name]
+    finite = np.isfinite(points).all(1)
+    return (points, 0) if finite.all() else (points[finite], int(count - np.count_nonzero(finite)))
+
+
+def thinned(points: Floats, voxel: float, radius: float) -> tuple[Floats, float]:
+    """Return the centres of the cubes of edge `voxel` (m) that hold points, and a radius that holds the points' balls.
+
+    voxel 0: the points and the radius themselves.
+    """
+    if not voxel or not len(points):
+        return points, radius
+    low = points.min(0)
+    cells = np.floor((points - low) / voxel)
+    extent = cells.max(0) + 1.0
+    if extent.prod() >= 2.0**62:  # a cube has no number then
+        return points, radius
+    whole, size = cells.astype(np.int64), extent.astype(np.int64)
+    numbers = (whole[:, 0] * size[1] + whole[:, 1]) * size[2] + whole[:, 2]
+    _, first = np.unique(numbers, return_index=True)
+    return low + (cells[np.sort(first)] + 0.5) * voxel, radius + 0.5 * math.sqrt(3.0) * voxel

@@ -1,0 +1,53 @@
+"""Static objects of the sources file: each stands at its pose in its frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from collision_monitor.shapes.pose import Pose, multiply, rotation_matrix
+from collision_monitor.sources.ground.frames import FrameMotion
+from collision_monitor.sources.ground.object_entry import ObjectEntry
+from collision_monitor.sources.ground.scene import Scene
+
+
+class StandingObjects:
+    """Describes the static objects as soon as tf_static connects their frames with the monitor's."""
+
+    def __init__(self, entries: list[ObjectEntry]) -> None:
+        self.topics: Mapping[str, tuple[str, ...]] = {}
+        self._waiting = entries
+
+    def begin(self, scene: Scene) -> None:
+        """See Source. Describes the objects in the monitor's frame."""
+        ours = [entry for entry in self._waiting if entry.frame in ("", scene.frame)]
+        self._waiting = [entry for entry in self._waiting if entry not in ours]
+        for entry in ours:
+            scene.describe(entry.describe(at=entry.pose or Pose()))
+
+    def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
+        """See Source. It has no topics."""
+
+    def settle(self, now_ns: int, scene: Scene) -> None:
+        """See Source. Describes the objects whose frames are known by now."""
+        placed = []
+        for entry in self._waiting:
+            frame = scene.frames.motion(scene.frame, entry.frame, now_ns)
+            if isinstance(frame, FrameMotion) and not frame.moving:
+                scene.describe(entry.describe(at=_placed(frame, entry.pose or Pose())))
+                placed.append(entry)
+        if placed:
+            self._waiting = [entry for entry in self._waiting if entry not in placed]
+
+    def misplaced(self, scene: Scene) -> list[str]:
+        """Return the reason for each object that is not described yet."""
+        return [
+            f"{entry.name}: expected static transforms from {scene.frame!r} to {entry.frame!r}; "
+            f"there are frames {', '.join(scene.frames.names) or 'none'}"
+            for entry in self._waiting
+        ]
+
+
+def _placed(frame: FrameMotion, pose: Pose) -> Pose:
+    position = frame.position + rotation_matrix(frame.quaternion) @ pose.position
+    return Pose(position, multiply(frame.quaternion, pose.quaternion))

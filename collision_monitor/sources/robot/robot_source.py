@@ -1,0 +1,294 @@
+"""A robot as a source: each link with shapes is an object, moved by the joints and by the base."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Table
+from contextlib import suppress
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.errors import CollisionMonitorError, InputError, PoseError
+from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.records import StateFlag
+from collision_monitor.robots import link_motions
+from collision_monitor.robots.robot import Description, Robot, make_robot
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.sources.ground.frames import FrameMotion
+from collision_monitor.sources.ground.mapping import Mapping
+from collision_monitor.sources.ground.scene import Scene
+from collision_monitor.sources.ground.solid_shapes import scaled
+from collision_monitor.sources.robot.carried_bodies import Body, CarriedBodies
+from collision_monitor.sources.robot.collision_objects import pose_bytes, shape_bytes
+from collision_monitor.sources.robot.joint_table import JointTable
+from collision_monitor.sources.robot.link_rules import LinkRules, allowed_contacts
+from collision_monitor.sources.robot.robot_base import BaseMotion, FixedBase, at_links, robot_base
+from collision_monitor.sources.robot.robot_entry import RobotEntry
+
+Floats = NDArray[np.float64]
+
+JOINT_STATE: Final = "sensor_msgs/msg/JointState"
+TEXT: Final = "std_msgs/msg/String"
+
+_SHOWN: Final = 8
+
+_STDDEVS: Final = ("position_stddev", "orientation_stddev", "velocity_stddev", "angular_velocity_stddev")
+
+
+class RobotSource:
+    """The links of one robot. fleet: all robots of the file, to which the joints of a shared topic may belong."""
+
+    def __init__(self, entry: RobotEntry, mapping: Mapping, fleet: list[RobotSource]) -> None:
+        self.name = entry.name
+        self.robot: Robot | None = None
+        self.attached: dict[str, Body] = {}
+        self._entry = entry
+        self._max_age = mapping.max_age
+        self._base = robot_base(entry, mapping.frame, mapping.max_age)
+        self._joints: JointTable
+        self._fleet = fleet
+        self._urdf, self._srdf = entry.urdf, entry.srdf
+        self._links: dict[str, Body] = {}
+        self._ids: dict[str, int] = {}
+        self._rules = LinkRules()
+        self._described: dict[int, Any] = {}
+        self._place: tuple[float, ...] | None = None  # of a base at rest
+        self._standing: dict[int, Pose] = {}  # poses of the links that are rigid with it
+        self._moving = CarriedBodies((), ())
+        self._needs = np.zeros((0, 0), np.bool_)
+        self._unknown_joints: set[str] = set()
+        topics = {entry.joint_states: (JOINT_STATE,), entry.urdf_topic: (TEXT,), entry.srdf_topic: (TEXT,)}
+        self.topics: Table[str, tuple[str, ...]] = {
+            topic: types for topic, types in {**topics, **self._base.topics}.items() if topic
+        }
+        link_motions.load()
+        if entry.urdf is not None:
+            try:
+                self._make(entry.urdf)
+            except InputError as error:
+                raise InputError(f"{entry.name}, urdf: {error}") from None
+
+    # -- Source
+
+    def begin(self, scene: Scene) -> None:
+        """See Source."""
+        if self.robot is not None:
+            self._report_problems(self.robot, scene)
+            self._show(scene)
+
+    def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
+        """See Source."""
+        if topic in (self._entry.urdf_topic, self._entry.srdf_topic):
+            self._take_text(topic, content.data, scene)
+        elif self.robot is None:
+            scene.refuse(self.name, f"a message of {topic} came before its URDF on {self._entry.urdf_topic}")
+        elif topic in self._base.topics:
+            self._base.take(content, stamp_ns, self.robot, scene)
+        else:
+            self._refuse_unknown(content.name, scene)
+            if (reason := self._joints.take(content, stamp_ns)) is not None:
+                scene.refuse(self.name, f"{topic}: {reason}")
+
+    def moved_by(self, content: Any, scene: Scene) -> Any:
+        """Return the header of the transform in a TFMessage that moves the base; None if there is none."""
+        return None if self.robot is None else self._base.moved_by(content, self.robot, scene)
+
+    def settle(self, now_ns: int, scene: Scene) -> None:
+        """See Source. Observes the bodies about which there is news."""
+        if self.robot is None or not (self._base.fresh or self._joints.fresh.any()):
+            return
+        base_is_fresh, fresh = self._base.fresh, self._joints.fresh.copy()
+        base = self._base.motion(now_ns, self.robot, scene)
+        values, known, speed_known = self._joints.at(now_ns)
+        if base is None:
+            return
+        poses, twists = self.robot.motions(values, base.row)
+        if self._finds_standing(base, poses):
+            self._describe(scene)
+        due = (self._needs & fresh).any(axis=1) | base_is_fresh
+        lacking = self._needs & ~known
+        chosen = np.flatnonzero(due & ~lacking.any(axis=1))
+        if (due & lacking.any(axis=1)).any():
+            names = [self.robot.tree.joints[j] for j in np.flatnonzero(lacking[due].any(axis=0))]
+            topic = self._entry.joint_states or "no topic: give `joint_states`"
+            more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+            joints = f"{', '.join(names[:_SHOWN])}{more}"
+            scene.refuse(self.name, f"expected positions of {joints} on {topic} not older than max_age")
+        if len(chosen):
+            self._observe(chosen, base, poses, twists, speed_known, now_ns, scene)
+
+    # -- for a planning scene
+
+    @property
+    def link_ids(self) -> dict[str, int]:
+        """The objects of the links with shapes, by the links' names."""
+        return {link: body.object_id for link, body in self._links.items()}
+
+    def carry(self, bodies: dict[str, Body], rules: LinkRules, scene: Scene) -> None:
+        """Carry these bodies, by name, from now on, and no others; use these rules for them and for the links.
+
+        The caller removes the objects that are not carried any more.
+        """
+        for body in self.attached.values():
+            self._described.pop(body.object_id, None)
+        self.attached, self._rules = bodies, rules
+        self._show(scene)
+
+    def link_motion(self, link: str, now_ns: int, scene: Scene) -> FrameMotion | None:
+        """Return the motion of a link in the monitor's frame; None if there is no such link or it is not known."""
+        if self.robot is None or link not in self.robot.tree.links:
+            return None
+        row = self.robot.tree.links.index(link)
+        fresh, base_is_fresh = self._joints.fresh.copy(), self._base.fresh
+        values, known, _ = self._joints.at(now_ns)
+        base = self._base.motion(now_ns, self.robot, scene)
+        self._joints.fresh, self._base.fresh = fresh, base_is_fresh
+        if base is None or not known[self.robot.tree.needs[row]].all():
+            return None
+        poses, twists = self.robot.motions(values, base.row)
+        return FrameMotion(poses[row, :3], poses[row, 3:], twists[row, :3], twists[row, 3:], moving=True)
+
+    # -- descriptions
+
+    def _take_text(self, topic: str, text: str, scene: Scene) -> None:
+        if topic == self._entry.urdf_topic:
+            self._urdf = Description(text, topic)
+        else:
+            self._srdf = Description(text, topic)
+        if self._urdf is None:
+            return
+        try:
+            robot = self._make(self._urdf)
+        except InputError as error:
+            scene.refuse(self.name, str(error))
+            return
+        for name in [name for name, body in self.attached.items() if body.link not in robot.tree.links]:
+            self._forget(self.attached.pop(name), scene)
+        self._report_problems(robot, scene)
+        self._show(scene)
+
+    def _forget(self, body: Body, scene: Scene) -> None:
+        scene.remove(body.object_id)
+        self._described.pop(body.object_id, None)
+
+    def _report_problems(self, robot: Robot, scene: Scene) -> None:
+        for problem in robot.problems:
+            scene.refuse(self.name, problem)
+
+    def _make(self, urdf: Description) -> Robot:
+        robot = make_robot(urdf, self._srdf, self._entry.packages)
+        for link in self._entry.allowed:
+            if link not in robot.links:
+                raise InputError(f"{self.name}, allowed: expected a link with shapes, got {link!r:.80}")
+        if self.robot is None or self.robot.tree.joints != robot.tree.joints:
+            self._joints = JointTable(robot.tree, self._max_age)
+        self.robot = robot
+        return robot
+
+    def _show(self, scene: Scene) -> None:
+        """Describe the bodies that are new or have changed, and remove the links that are gone."""
+        robot = self.robot
+        assert robot is not None
+        for link in sorted(self._links.keys() - set(robot.links)):
+            self._forget(self._links[link], scene)
+        for link in robot.links:
+            if link not in self._ids:
+                self._ids[link] = scene.new_id()
+        self._links = {
+            link: Body(self._ids[link], f"{self.name}/{link}", link, shapes)
+            for link, shapes in zip(robot.links, robot.shapes, strict=True)
+        }
+        self._base.fresh, self._place = True, None
+        self._standing = {}
+        if isinstance(self._base, FixedBase):  # its links stand from the start
+            base = self._base.motion(0, robot, scene)
+            self._finds_standing(base, robot.motions(self._joints.at(0)[0], base.row)[0])
+            self._base.fresh = True
+        self._describe(scene)
+
+    def _describe(self, scene: Scene) -> None:
+        assert self.robot is not None
+        rules, bodies = self._rules, [*self._links.values(), *self.attached.values()]
+        allowed = allowed_contacts(self.robot, self._links, self.attached, self._entry.allowed, rules)
+        for body in bodies:
+            is_link = body is self._links.get(body.link)
+            at = self._standing.get(body.object_id)
+            scale = rules.scale.get(body.link, 1.0) if is_link else 1.0
+            padding = self._entry.padding + (rules.padding.get(body.link, 0.0) if is_link else 0.0)
+            facts = scale, padding, allowed[body.object_id], at and pose_bytes(at), shape_bytes(body.shapes)
+            if self._described.get(body.object_id) == facts:
+                continue
+            try:
+                scene.describe(self._description(body, scale, padding, allowed[body.object_id], at))
+            except CollisionMonitorError as error:
+                scene.refuse(self.name, str(error))
+                continue
+            self._described[body.object_id] = facts
+        moving = [it for it in bodies if it.object_id in self._described and it.object_id not in self._standing]
+        self._moving = CarriedBodies(moving, self.robot.tree.links)
+        self._needs = self.robot.tree.needs[self._moving.rows]
+
+    def _description(
+        self, body: Body, scale: float, padding: float, allowed: tuple[int, ...], at: Pose | None
+    ) -> ObjectDescription:
+        entry = self._entry
+        return ObjectDescription(
+            body.object_id,
+            [(shape if scale == 1.0 else scaled(shape, scale), pose) for shape, pose in body.shapes],
+            name=body.name,
+            static=at is not None,
+            pose=at,
+            group=entry.group,
+            mask=entry.mask,
+            padding=padding,
+            model=entry.model,
+            allowed=allowed,
+        )
+
+    # -- states
+
+    def _finds_standing(self, base: BaseMotion, poses: Floats) -> bool:
+        """Find the bodies that are rigid with a base at rest, which are static objects. Return whether it changed."""
+        assert self.robot is not None
+        place = None if base.motion.moving else (*base.motion.position, *base.motion.quaternion)
+        if place == self._place:
+            return False
+        self._place = place
+        self._standing = {}
+        for body in (*self._links.values(), *self.attached.values()) if place is not None else ():
+            row = self.robot.tree.links.index(body.link)
+            if not self.robot.tree.needs[row].any():
+                with suppress(PoseError):  # too far away; the states of such a link are refused
+                    self._standing[body.object_id] = Pose(poses[row, :3], poses[row, 3:]) @ body.offset
+        return True
+
+    def _observe(
+        self,
+        chosen: NDArray[np.intp],
+        base: BaseMotion,
+        poses: Floats,
+        twists: Floats,
+        speed_known: NDArray[np.bool_],
+        now_ns: int,
+        scene: Scene,
+    ) -> None:
+        states = self._moving.states(poses, twists)[chosen]
+        if base.stddev.any():
+            stddevs = at_links(base, states["position"] - base.motion.position)
+            for field_name, column in zip(_STDDEVS, stddevs.T, strict=True):
+                states[field_name] = column
+        unknown = (self._needs[chosen] & ~speed_known).any(axis=1) | (not base.motion.twist_known)
+        states["flags"][unknown] |= np.uint32(StateFlag.TWIST_UNKNOWN)
+        scene.observe(states, now_ns)
+
+    def _refuse_unknown(self, names: Any, scene: Scene) -> None:
+        """Count each joint once that no robot of the file has."""
+        assert self.robot is not None
+        for name in names:
+            if name not in self.robot.known_joints and name not in self._unknown_joints:
+                if len(self._unknown_joints) < 1000:
+                    self._unknown_joints.add(name)
+                if not any(other.robot is not None and name in other.robot.known_joints for other in self._fleet):
+                    topic = self._entry.joint_states
+                    scene.refuse(self.name, f"expected joints of its URDF on {topic}, got {name!r:.80}")
