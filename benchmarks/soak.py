@@ -32,7 +32,7 @@ from collision_monitor.accuracy.reference_monitor import ReferenceMonitor, disag
 from collision_monitor.codec import Removal, decode_status, encode_descriptions, encode_states
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.settings_event import encode_settings

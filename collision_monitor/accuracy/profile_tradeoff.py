@@ -17,7 +17,7 @@ from collision_monitor.accuracy.scope import compared, unfiltered
 from collision_monitor.accuracy.tally import Tally, compare_reports
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.monitor.timeline import NANOSECOND
+from collision_monitor.monitor.state.timeline import NANOSECOND
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session.history.alarms import Contacts
 from collision_monitor.settings.profile import Profile

@@ -19,7 +19,7 @@ from collision_monitor.codec.alerts import AlertCause, CollisionAlert, Collision
 from collision_monitor.impact.impact_record import ids_of_keys
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
-from collision_monitor.monitor.snapshot import Facts, Snapshot
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot
 
 _ARRAY: Final = "alerts"
 """Begin of the keys in a snapshot; the number of the rule follows."""

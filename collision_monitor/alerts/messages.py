@@ -12,7 +12,7 @@ from collision_monitor.alerts.measures import COLUMNS, Measures
 from collision_monitor.alerts.rules import Rule
 from collision_monitor.alerts.thresholds import LEVELS
 from collision_monitor.codec.alerts import AlertCause, CollisionAlert
-from collision_monitor.monitor.timeline import NANOSECOND
+from collision_monitor.monitor.state.timeline import NANOSECOND
 
 NameOf = Callable[[int], str]
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.alerts.measures import Array, Slots
 from collision_monitor.monitor.filters import bodies_in, is_bounded
-from collision_monitor.monitor.roster import Roster
+from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.settings.profile import Profile
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from collision_monitor.alerts.measures import Array, Measures, Slots
 from collision_monitor.alerts.rules import ANY, Rule, Rules
 from collision_monitor.alerts.scene import Scene
-from collision_monitor.monitor.roster import Roster
+from collision_monitor.monitor.state.roster import Roster
 
 Mask = NDArray[np.bool_]
 

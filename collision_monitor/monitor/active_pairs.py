@@ -18,14 +18,22 @@ from collision_monitor.impact.coarse_impact import coarse_impact, has_bounds
 from collision_monitor.impact.impact_record import BOUND_ONLY, CLEAR, HIT, IMPACT, holds, ids_of_keys, pair_key
 from collision_monitor.impact.pair_impacts import cover_of
 from collision_monitor.monitor.candidates import is_checked
-from collision_monitor.monitor.carried_contacts import CARRIED, Carrying, carry, has_answer, keep, no_answers, saved
-from collision_monitor.monitor.carried_triangles import APART, NONE, overlap_of_trees
-from collision_monitor.monitor.contact_details import complete_contact
+from collision_monitor.monitor.contacts.carried_contacts import (
+    CARRIED,
+    Carrying,
+    carry,
+    has_answer,
+    keep,
+    no_answers,
+    saved,
+)
+from collision_monitor.monitor.contacts.carried_triangles import APART, NONE, overlap_of_trees
+from collision_monitor.monitor.contacts.contact_details import complete_contact
+from collision_monitor.monitor.contacts.plain_contacts import plain_contact
+from collision_monitor.monitor.contacts.solid_overlap import overlap_of_solid
 from collision_monitor.monitor.event_list import NO_EVENTS
-from collision_monitor.monitor.plain_contacts import plain_contact
-from collision_monitor.monitor.roster import Roster
-from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
-from collision_monitor.monitor.solid_overlap import overlap_of_solid
+from collision_monitor.monitor.state.roster import Roster
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.narrow_phase.contact_row import DISTANCE
 from collision_monitor.records import Model, Phase

@@ -18,12 +18,12 @@ from collision_monitor.impact.body_impact import CLOSING
 from collision_monitor.impact.impact_record import BOUND_ONLY, HIT, TREE_BOUND, UNRESOLVED, ids_of
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.active_pairs import ActivePairs
+from collision_monitor.monitor.contacts.mesh_faces import name_mesh_features
+from collision_monitor.monitor.contacts.patches import with_patches
 from collision_monitor.monitor.event_list import EventList
-from collision_monitor.monitor.mesh_faces import name_mesh_features
-from collision_monitor.monitor.patches import with_patches
 from collision_monitor.monitor.result import StepResult, StepStatus
-from collision_monitor.monitor.roster import count_bodies
-from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.state.roster import count_bodies
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,

@@ -15,8 +15,8 @@ from collision_monitor.broad_phase.hashed_grid import HashedGrid, make_hashed_gr
 from collision_monitor.broad_phase.region import regions_overlap
 from collision_monitor.broad_phase.sorted_boxes import SortedBoxes, note_changed, overlapping, sorted_boxes
 from collision_monitor.impact.impact_record import pair_key
-from collision_monitor.monitor.roster import FIRST_CAPACITY, Roster
-from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.state.roster import FIRST_CAPACITY, Roster
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.motion.bodies import Bodies
 from collision_monitor.motion.motion import swept_box

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor.impact.impact_record import BOUND_ONLY, HIT, IMPACT, UNRESOLVED, holds
-from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.motion.bodies import Bodies
 from collision_monitor.records import joined
 

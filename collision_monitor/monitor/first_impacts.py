@@ -15,7 +15,7 @@ from collision_monitor.impact.coarse_impact import predict_coarsely
 from collision_monitor.impact.impact_record import IMPACT
 from collision_monitor.impact.pair_impacts import bound_pairs, predict_pairs, refine
 from collision_monitor.monitor.shared_work import share
-from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.records import joined
 

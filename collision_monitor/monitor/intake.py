@@ -13,9 +13,9 @@ from collision_monitor._jit import device, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor.errors import InputError, Refusal
 from collision_monitor.monitor.result import Refused
-from collision_monitor.monitor.roster import Roster
-from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
-from collision_monitor.monitor.timeline import Order
+from collision_monitor.monitor.state.roster import Roster
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.state.timeline import Order
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.records import StateFlag
 from collision_monitor.settings.by_name import classes_of

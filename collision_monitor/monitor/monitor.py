@@ -20,12 +20,12 @@ from collision_monitor.monitor.event_list import NO_EVENTS, EventList, both
 from collision_monitor.monitor.first_impacts import FirstImpacts
 from collision_monitor.monitor.intake import Intake
 from collision_monitor.monitor.result import StepResult
-from collision_monitor.monitor.roster import Roster
 from collision_monitor.monitor.scene_plan import ScenePlan, scene_plan
-from collision_monitor.monitor.snapshot import Snapshot, Stage
+from collision_monitor.monitor.state.roster import Roster
+from collision_monitor.monitor.state.snapshot import Snapshot, Stage
+from collision_monitor.monitor.state.timeline import Order, Progress, Timeline
 from collision_monitor.monitor.step_context import KernelSettings, StepContext
 from collision_monitor.monitor.time_critical import TimeCritical
-from collision_monitor.monitor.timeline import Order, Progress, Timeline
 from collision_monitor.monitor.tracking import Tracking
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.objects.description import ObjectDescription

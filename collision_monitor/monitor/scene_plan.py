@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.hashed_grid import GRID_LEVELS, LEVEL_OFFSET, HashedGrid
-from collision_monitor.monitor.roster import Roster
+from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.narrow_phase.dispatch import KIND_NAMES, TEST_METHODS, pair_test
 from collision_monitor.shapes.shape_table import MESH, POINTS
 

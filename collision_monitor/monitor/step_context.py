@@ -12,7 +12,7 @@ from collision_monitor.impact.body_contact import ContactQuery
 from collision_monitor.impact.body_impact import ImpactQuery
 from collision_monitor.impact.coarse_trees import Nearness
 from collision_monitor.monitor.result import Work
-from collision_monitor.monitor.roster import Roster
+from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.settings.by_name import classes_of
 from collision_monitor.settings.profile import Profile
 

@@ -21,8 +21,8 @@ from collision_monitor.monitor.active_pairs import ActivePairs, is_predicted_ane
 from collision_monitor.monitor.budget import EXAMINE, HANDFUL, REFINE, TREES, PairBudget, StepClock, TimeBudget
 from collision_monitor.monitor.event_list import EventList, Events, sort_order
 from collision_monitor.monitor.first_impacts import FirstImpacts
-from collision_monitor.monitor.roster import Roster
-from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.state.roster import Roster
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.motion.bodies import Bodies
 from collision_monitor.records import joined

@@ -18,7 +18,7 @@ from collision_monitor._jit.direct import direct
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, put_box, remove_boxes
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.adaptive_tubes import FUTILE_STEPS, NARROWEST, PATIENCE, Unrest, fit_width, widest_tube
-from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.motion.motion import age_of, position_now, quaternion_to_matrix, swept_box, turn_quaternion

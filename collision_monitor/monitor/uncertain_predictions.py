@@ -21,7 +21,7 @@ from collision_monitor.impact.impact_record import holds, ids_of_keys, pair_keys
 from collision_monitor.impact.pair_impacts import cover_of
 from collision_monitor.monitor.budget import SAMPLE, PairBudget
 from collision_monitor.monitor.shared_work import share
-from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.motion.bodies import enlarge
 from collision_monitor.objects.description import ObjectDescription

@@ -31,7 +31,7 @@ from collision_monitor.codec.states import COVARIANCE_SIZE
 from collision_monitor.errors import InputError, MessageError, Refusal
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.pipeline.catalogue import Catalogue
 from collision_monitor.pipeline.frames import is_in_frame
 from collision_monitor.pipeline.preparation import Preparation

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.node import Node
 
 from collision_monitor.errors import SessionError
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.pipeline.topics import RECORDED, Topic
 from collision_monitor.session import Recording, Splitting
 

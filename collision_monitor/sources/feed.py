@@ -12,7 +12,7 @@ import numpy as np
 
 from collision_monitor.codec import Change, encode_descriptions, encode_states
 from collision_monitor.errors import InputError, MessageError
-from collision_monitor.monitor.timeline import Order, Progress, Timeline
+from collision_monitor.monitor.state.timeline import Order, Progress, Timeline
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.sources.ground.frames import frame_name
 from collision_monitor.sources.ground.mapping import HEADER, Mapping

@@ -17,7 +17,7 @@ from collision_monitor.codec import (
     decode_states,
 )
 from collision_monitor.errors import MessageError, SessionError
-from collision_monitor.monitor.timeline import NANOSECOND
+from collision_monitor.monitor.state.timeline import NANOSECOND
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.records import Phase
 from collision_monitor.session.history.growing_rows import LEAST_LEFT, available_memory

@@ -29,7 +29,7 @@ from collision_monitor.codec import (
 )
 from collision_monitor.codec.alerts import AlertLevel
 from collision_monitor.codec.states import COVARIANCE_SIZE
-from collision_monitor.monitor.timeline import NANOSECOND
+from collision_monitor.monitor.state.timeline import NANOSECOND
 from collision_monitor.pipeline.catalogue import Catalogue
 from collision_monitor.pipeline.settings_event import RULES
 from collision_monitor.records import StateFlag

@@ -20,7 +20,7 @@ from well_formed import faults_of_contacts, faults_of_predictions
 
 from collision_monitor.codec import decode_contacts, decode_descriptions, decode_predictions, decode_status
 from collision_monitor.errors import MessageError
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.pipeline.pipeline import Outputs, Pipeline
 from collision_monitor.pipeline.preparation import Preparation
 from collision_monitor.pipeline.settings_event import encode_settings

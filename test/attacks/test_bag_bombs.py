@@ -22,8 +22,8 @@ from rosbags.rosbag2 import StoragePlugin
 from session_child import reset, resident
 
 from collision_monitor.errors import InputError, SessionError
-from collision_monitor.monitor import snapshot
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.state import snapshot
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.session.mcap.layout import HEAD, MAGIC
 from collision_monitor.sources.bag import Bag
 from collision_monitor.sources.decoding import Decoder

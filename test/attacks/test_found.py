@@ -14,7 +14,7 @@ from collision_monitor.codec.descriptions import decode_descriptions
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.preparation_cost import Budget
 from collision_monitor.pipeline.pipeline import Pipeline

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 import collision_monitor as cm
 from collision_monitor.codec import decode_descriptions, encode_descriptions
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.preparation import Preparation

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import collision_monitor as cm
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.records import ContactStatus, Model, PredictionStatus
 from collision_monitor.settings.profile import Profile
 

@@ -9,7 +9,7 @@ import pytest
 
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
-from collision_monitor.monitor.snapshot import Snapshot, Stage
+from collision_monitor.monitor.state.snapshot import Snapshot, Stage
 from collision_monitor.records import STATE
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose

@@ -15,7 +15,7 @@ from collision_monitor.codec import Removal, encode_descriptions, encode_states
 from collision_monitor.codec.cdr import REMEMBERED_STRINGS, _padded_string
 from collision_monitor.codec.parameter_event import decode_parameter_event, encode_parameter_event
 from collision_monitor.errors import MessageError, Refusal
-from collision_monitor.monitor import roster
+from collision_monitor.monitor.state import roster
 from collision_monitor.objects.description import MOST_NAME_BYTES, ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.shapes.convex_pieces import REMEMBERED_PIECES, convex_pieces

@@ -12,7 +12,7 @@ import trimesh
 from collision_monitor import ConvexHull, HalfSpace, Mesh, Polygon, Pose, Sphere
 from collision_monitor.codec import Removal, decode_contacts, decode_status, encode_descriptions, encode_states
 from collision_monitor.errors import Refusal
-from collision_monitor.monitor import roster
+from collision_monitor.monitor.state import roster
 from collision_monitor.objects.description import MOST_SHAPES, ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.preparation import STAYS, Preparation

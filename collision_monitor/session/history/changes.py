@@ -9,7 +9,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from collision_monitor.monitor.timeline import NANOSECOND
+from collision_monitor.monitor.state.timeline import NANOSECOND
 from collision_monitor.records import Phase
 from collision_monitor.session.history.alarms import Alarms, alarms_of
 from collision_monitor.session.history.alerts import AlertOutcome, alerts_of

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.impact.impact_record import pair_keys
-from collision_monitor.monitor.timeline import NANOSECOND
+from collision_monitor.monitor.state.timeline import NANOSECOND
 from collision_monitor.records import ContactStatus, Phase
 from collision_monitor.session.history.history import CollisionEvent, Floats, History
 

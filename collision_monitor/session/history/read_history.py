@@ -24,7 +24,7 @@ from collision_monitor.codec import (
     decode_status,
 )
 from collision_monitor.errors import MessageError, SessionError
-from collision_monitor.monitor.timeline import NANOSECOND
+from collision_monitor.monitor.state.timeline import NANOSECOND
 from collision_monitor.pipeline.pipeline import Outputs, Pipeline
 from collision_monitor.pipeline.settings_event import LIMIT, NOW, RULES
 from collision_monitor.session.history.collisions import find_collisions

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from operator import itemgetter
 from typing import Final, NamedTuple
 
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 
 _OVERHEAD: Final = 128

@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import Final
 
 from collision_monitor.errors import SessionError
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session.mcap.layout import SEQUENCE_MASK
 from collision_monitor.session.mcap.rosbag2 import RECORDED_TYPES

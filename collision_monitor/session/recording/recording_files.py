@@ -14,7 +14,7 @@ from typing import Final
 
 from collision_monitor.codec import encode_descriptions
 from collision_monitor.errors import SessionError
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.session.mcap.layout import NUMBER, RECORDING, REPEATED, SEQUENCE_MASK

@@ -8,7 +8,7 @@ from enum import Enum
 from typing import Any
 
 from collision_monitor.errors import InputError, SessionError
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.provenance import provenance
 from collision_monitor.session.mcap.layout import SEQUENCE_HALF, SEQUENCE_MASK

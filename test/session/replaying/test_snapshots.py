@@ -16,7 +16,7 @@ from session_scene import CONTACTS, STEP, record
 from collision_monitor.cli.main import main
 from collision_monitor.codec import decode_contacts, encode_contacts
 from collision_monitor.errors import InputError, SessionError
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorded, Session, Splitting
 from collision_monitor.session.mcap.definitions import definition

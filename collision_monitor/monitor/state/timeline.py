@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final
 
-from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 
 NANOSECOND: Final = 1e-9
 

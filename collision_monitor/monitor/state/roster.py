@@ -17,9 +17,9 @@ from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.impact.impact_record import pair_keys
 from collision_monitor.meshes.build.shape_trees import shape_tree
 from collision_monitor.meshes.build.slot_trees import plant_trees
-from collision_monitor.monitor.mesh_faces import MeshFaces, faces_of
-from collision_monitor.monitor.mesh_snapshot import mesh_arrays, plant_meshes
-from collision_monitor.monitor.snapshot import Facts, Snapshot, Stage, check_range
+from collision_monitor.monitor.contacts.mesh_faces import MeshFaces, faces_of
+from collision_monitor.monitor.state.mesh_snapshot import mesh_arrays, plant_meshes
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.motion.bodies import DERIVED, Bodies, Multibody, Parts, enlarge, make_bodies, make_parts
 from collision_monitor.motion.body_layout import lay_out_body, note_plain
 from collision_monitor.objects.description import ObjectDescription

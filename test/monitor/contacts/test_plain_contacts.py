@@ -8,8 +8,8 @@ import pytest
 from collision_monitor.errors import ProfileError
 from collision_monitor.impact.body_contact import RESULT, ContactQuery, body_contact
 from collision_monitor.impact.body_impact import make_scratch
+from collision_monitor.monitor.contacts.plain_contacts import plain_contact
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.monitor.plain_contacts import plain_contact
 from collision_monitor.narrow_phase.contact_row import UNKNOWN
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile

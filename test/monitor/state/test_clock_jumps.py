@@ -14,7 +14,7 @@ from collision_monitor import records
 from collision_monitor.errors import Refusal
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import Sphere

@@ -18,8 +18,8 @@ from collision_monitor.errors import InputError
 from collision_monitor.impact.body_contact import SHAPE_I, SHAPE_J
 from collision_monitor.meshes.distance.feature import IN_FACE, feature_in_triangle, off_triangle, tie_of
 from collision_monitor.meshes.distance.triangle_pair import Triangle
-from collision_monitor.monitor.contact_details import core_point, origin_now
-from collision_monitor.monitor.snapshot import Snapshot, check_range
+from collision_monitor.monitor.contacts.contact_details import core_point, origin_now
+from collision_monitor.monitor.state.snapshot import Snapshot, check_range
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import rotation_now
 from collision_monitor.narrow_phase.contact_row import (

@@ -22,7 +22,7 @@ from collision_monitor._jit import inlined
 from collision_monitor.impact.body_contact import RESULT, STATUS, TOUCHING, closing_now, relative_now, widening
 from collision_monitor.impact.body_impact import CLOSING
 from collision_monitor.impact.mesh_pair import has_mesh
-from collision_monitor.monitor.carried_triangles import (
+from collision_monitor.monitor.contacts.carried_triangles import (
     NO_MESH,
     NONE,
     PLACE_I,

@@ -24,7 +24,7 @@ from collision_monitor.impact.body_impact import CLOSING
 from collision_monitor.impact.mesh_pair import has_mesh, have_trees, is_mesh, root_of
 from collision_monitor.meshes.distance.solid import SolidMemory
 from collision_monitor.meshes.distance.solid_range import solid_range
-from collision_monitor.monitor.carried_triangles import (
+from collision_monitor.monitor.contacts.carried_triangles import (
     NONE,
     WHOLE,
     apart_or_none,

@@ -13,7 +13,7 @@ from collision_monitor import records
 from collision_monitor.codec import Removal, encode_descriptions, encode_states
 from collision_monitor.errors import InputError
 from collision_monitor.monitor import first_impacts
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.settings.profile import Profile

@@ -10,8 +10,8 @@ import collision_monitor as cm
 from collision_monitor import Pose
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.bounding_volumes import convex_hull
-from collision_monitor.monitor.mesh_faces import MeshFaces
-from collision_monitor.monitor.snapshot import Snapshot
+from collision_monitor.monitor.contacts.mesh_faces import MeshFaces
+from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.query.contact.features import feature_of, tie_of
 
 

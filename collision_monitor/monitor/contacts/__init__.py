@@ -1,0 +1,1 @@
+"""The contacts of a step: plain, carried over, their features and their patches."""
