@@ -21,7 +21,7 @@ from collision_monitor.ros.process import StopRequest, ros_context, stay_on_this
 
 if TYPE_CHECKING:
     from collision_monitor.cli.live_table import Picture
-    from collision_monitor.ros.viewer import Viewer
+    from collision_monitor.ros.listening.viewer import Viewer
 
 START_PATIENCE = 180.0
 """Time for the monitor to answer (s). Its first start on a machine may have to compile the kernels."""
@@ -126,7 +126,7 @@ def _watch(args: argparse.Namespace, session: Path, stop: StopRequest) -> bool:
     if args.objects is not None:
         scene += ["--objects", str(args.objects)]
     with Child("run", "--record", str(session), *_settings(args)) as monitor, ros_context([]):
-        from collision_monitor.ros.viewer import Viewer
+        from collision_monitor.ros.listening.viewer import Viewer
 
         viewer = Viewer()
         _wait_for_answer(viewer, monitor, stop)

@@ -12,7 +12,7 @@ from collision_monitor.cli.quantities import positive
 from collision_monitor.cli.usage import usage
 
 if TYPE_CHECKING:
-    from collision_monitor.ros.survey import TopicFacts
+    from collision_monitor.ros.listening.survey import TopicFacts
 
 DESCRIPTION = """\
 List the topics on the ROS graph that the monitor understands, with their types, rates and frames, and
@@ -59,7 +59,7 @@ def sources_command(args: argparse.Namespace) -> int:
         return _check(args.check, args.seconds)
     stay_on_this_machine()
     with ros_context(["collision-monitor"]):
-        from collision_monitor.ros.survey import survey
+        from collision_monitor.ros.listening.survey import survey
         from collision_monitor.sources.template import NOTHING
 
         found = survey(args.seconds)
@@ -79,7 +79,7 @@ def _check(path: Path, seconds: float) -> int:
         mapping = load_mapping(path)
     stay_on_this_machine()
     with ros_context(["collision-monitor"]):
-        from collision_monitor.ros.survey import check
+        from collision_monitor.ros.listening.survey import check
 
         lines = check(mapping, seconds)
     good = True

@@ -139,7 +139,7 @@ def _view_live(args: argparse.Namespace, stop: StopRequest) -> None:
 
     stay_on_this_machine()
     with ros_context(["collision-monitor", *(["--ros-args", *args.ros_args] if args.ros_args else [])]):
-        from collision_monitor.ros.scene_listener import SceneListener
+        from collision_monitor.ros.listening.scene_listener import SceneListener
 
         with usage():
             listener = SceneListener(monitor, take)

@@ -40,7 +40,7 @@ def _run(body: Callable[[StopRequest], None], args: Sequence[str] | None) -> int
 
 
 def _monitor(stop: StopRequest) -> None:
-    from collision_monitor.ros.monitor_node import MonitorNode
+    from collision_monitor.ros.monitor.monitor_node import MonitorNode
 
     node = MonitorNode(stop)
     stop.on_stuck = node.save
@@ -53,7 +53,7 @@ def _monitor(stop: StopRequest) -> None:
 
 
 def _guard(stop: StopRequest) -> None:
-    from collision_monitor.ros.guard_node import GuardNode
+    from collision_monitor.ros.guard.guard_node import GuardNode
 
     node = GuardNode()
     spin(node, stop)

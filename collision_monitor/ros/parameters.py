@@ -17,7 +17,7 @@ from rclpy.node import Node
 from collision_monitor.alerts.rules import Rules
 from collision_monitor.errors import InputError, ProfileError, SessionError
 from collision_monitor.pipeline.settings_event import PROFILE, RULES
-from collision_monitor.ros.diagnostics import DiagnosticsParameters
+from collision_monitor.ros.health.diagnostics import DiagnosticsParameters
 from collision_monitor.session import ONE_FILE, Splitting
 from collision_monitor.settings.names import nearest_name
 from collision_monitor.settings.parameter_file import OTHER_PARAMETERS, PARAMETERS_BY_RCLPY

@@ -15,7 +15,7 @@ class Blocked(importlib.abc.MetaPathFinder):
 
 sys.meta_path.insert(0, Blocked())
 import rclpy
-from collision_monitor.ros.monitor_node import MonitorNode
+from collision_monitor.ros.monitor.monitor_node import MonitorNode
 from collision_monitor.ros.process import StopRequest
 rclpy.init(args=["--ros-args", *sys.argv[1:]])
 node = MonitorNode(StopRequest())

@@ -10,7 +10,7 @@ from collision_monitor import codec, records
 from collision_monitor.errors import Refusal
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.ros.refusal_log import PERIOD, RefusalLog
+from collision_monitor.ros.health.refusal_log import PERIOD, RefusalLog
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import Sphere
 

@@ -14,7 +14,7 @@ from typing import Final
 
 from collision_monitor.codec import MonitorStatus
 from collision_monitor.errors import Refusal
-from collision_monitor.ros.line_report import Level, LineReport
+from collision_monitor.ros.health.line_report import Level, LineReport
 from collision_monitor.session import Recording
 
 HISTORY: Final = 10

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rclpy.publisher import Publisher
 
 from collision_monitor.pipeline.pipeline import Pipeline
-from collision_monitor.ros.node_recording import NodeRecording
+from collision_monitor.ros.monitor.node_recording import NodeRecording
 from collision_monitor.settings.profile import Profile
 
 

@@ -6,7 +6,7 @@ from collision_monitor import records
 from collision_monitor.codec import encode_descriptions, encode_states
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
-from collision_monitor.ros.markers import MarkerView
+from collision_monitor.ros.monitor.markers import MarkerView
 from collision_monitor.shapes.shapes import Sphere
 
 

@@ -8,11 +8,11 @@ from typing import Final
 
 from rclpy.subscription import Subscription
 
-from collision_monitor.ros.backlog import Backlog
-from collision_monitor.ros.effort import Effort
 from collision_monitor.ros.endpoints import take_waiting
-from collision_monitor.ros.refusal_log import RefusalLog
-from collision_monitor.ros.step_times import StepTimes
+from collision_monitor.ros.health.refusal_log import RefusalLog
+from collision_monitor.ros.health.step_times import StepTimes
+from collision_monitor.ros.monitor.backlog import Backlog
+from collision_monitor.ros.monitor.effort import Effort
 from collision_monitor.settings.profile import Profile
 
 LOOK_PERIOD: Final = 1_000_000_000

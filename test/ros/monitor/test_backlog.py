@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from collision_monitor import codec, records
-from collision_monitor.ros.backlog import Backlog, without_outdated
+from collision_monitor.ros.monitor.backlog import Backlog, without_outdated
 
 MS = 1_000_000
 

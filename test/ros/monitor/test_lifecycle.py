@@ -41,7 +41,7 @@ def state(team):
 
 def undocumented(team):
     """Topics and services of the node that docs/node.md does not name; all nodes have /rosout and /parameter_events."""
-    page = (Path(__file__).parents[2] / "docs" / "node.md").read_text()
+    page = (Path(__file__).parents[3] / "docs" / "node.md").read_text()
     node = ("object_monitor", "/")
     names = [name for name, _ in team.node.get_publisher_names_and_types_by_node(*node)]
     names += [name for name, _ in team.node.get_subscriber_names_and_types_by_node(*node)]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from collision_monitor.codec import AlertLevel, CollisionAlert
-from collision_monitor.ros.speed_limit import Braking, RobotPose, Twist2, verdict
+from collision_monitor.ros.guard.speed_limit import Braking, RobotPose, Twist2, verdict
 
 BRAKING = Braking(deceleration=1.5, reaction=0.2, clearance=0.1)
 NAN = math.nan

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from collision_monitor.codec import Change, Removal
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.pipeline.catalogue import Catalogue
-from collision_monitor.ros.marker_bytes import Color, Kind, Marker, encode
+from collision_monitor.ros.monitor.marker_bytes import Color, Kind, Marker, encode
 from collision_monitor.shapes.pose import Pose, rotation_matrix
 from collision_monitor.shapes.surfaces import surface_triangles
 

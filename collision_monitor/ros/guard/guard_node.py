@@ -22,8 +22,8 @@ from collision_monitor import codec
 from collision_monitor.errors import CollisionMonitorError, InputError, MessageError
 from collision_monitor.pipeline.topics import GUARD_STATE, NODE, Topic
 from collision_monitor.ros.endpoints import subscription
+from collision_monitor.ros.guard.speed_limit import PASSES, Braking, RobotPose, Twist2, Verdict, verdict
 from collision_monitor.ros.parameters import ParameterReader
-from collision_monitor.ros.speed_limit import PASSES, Braking, RobotPose, Twist2, Verdict, verdict
 
 PERIOD: Final = 0.05
 """s between two looks at the age of everything; a held stop is repeated so often."""

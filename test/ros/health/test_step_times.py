@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from collision_monitor.ros.step_times import StepTimes
+from collision_monitor.ros.health.step_times import StepTimes
 
 MS = 1_000_000
 

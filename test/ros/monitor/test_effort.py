@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from collision_monitor.ros.effort import LEVELS, MOST_THREADS, PATIENCE, Effort
+from collision_monitor.ros.monitor.effort import LEVELS, MOST_THREADS, PATIENCE, Effort
 from collision_monitor.settings.profile import MOST_NAME, Profile
 
 

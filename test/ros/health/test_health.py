@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from collision_monitor.codec import MonitorStatus
-from collision_monitor.ros.health import HISTORY, Facts, History, Level, Report, reports
-from collision_monitor.ros.line_report import LineReport
+from collision_monitor.ros.health.health import HISTORY, Facts, History, Level, Report, reports
+from collision_monitor.ros.health.line_report import LineReport
 from collision_monitor.session import Recording
 
 GOOD = {"step": 9, "objects": 3, "latency": 0.002, "rate": 50.0, "step_duration_p99": 0.001}

@@ -22,24 +22,24 @@ from collision_monitor.pipeline.preparation import Preparation
 from collision_monitor.pipeline.shape_intake import TakenShapes
 from collision_monitor.pipeline.topics import STATUS_PERIOD, Topic
 from collision_monitor.records import Phase
-from collision_monitor.ros.contact_readers import ContactReaders
 from collision_monitor.ros.endpoints import answer_publisher, subscription
-from collision_monitor.ros.health import Facts
-from collision_monitor.ros.keeping_up import KeepingUp
-from collision_monitor.ros.markers import MarkerView
-from collision_monitor.ros.monitored import Monitored
+from collision_monitor.ros.health.health import Facts
+from collision_monitor.ros.health.refusal_log import RefusalLog, named
+from collision_monitor.ros.health.status_line import status_line
+from collision_monitor.ros.health.step_peaks import StepPeaks
+from collision_monitor.ros.health.step_times import StepTimes
+from collision_monitor.ros.monitor.contact_readers import ContactReaders
+from collision_monitor.ros.monitor.keeping_up import KeepingUp
+from collision_monitor.ros.monitor.markers import MarkerView
+from collision_monitor.ros.monitor.monitored import Monitored
+from collision_monitor.ros.monitor.node_recording import NodeRecording
 from collision_monitor.ros.name_conflict import NameConflict
-from collision_monitor.ros.node_recording import NodeRecording
 from collision_monitor.ros.parameters import MonitorParameters
-from collision_monitor.ros.refusal_log import RefusalLog, named
-from collision_monitor.ros.status_line import status_line
-from collision_monitor.ros.step_peaks import StepPeaks
-from collision_monitor.ros.step_times import StepTimes
 from collision_monitor.settings.profile import Profile
 from collision_monitor.warm_up import warm_up_alerts
 
 if TYPE_CHECKING:
-    from collision_monitor.ros.live_sources import LiveSources
+    from collision_monitor.ros.monitor.live_sources import LiveSources
     from collision_monitor.sources import Input, Mapping
 
 WATCHDOG_PERIOD: Final = 0.5
@@ -142,7 +142,7 @@ class Monitoring:
         """Return the sources of the file, if one is given; their inputs take the way of the node's own topics."""
         if mapping is None:
             return None
-        from collision_monitor.ros.live_sources import LiveSources
+        from collision_monitor.ros.monitor.live_sources import LiveSources
 
         def take(given: Input) -> None:
             (self._take_step if given.topic is Topic.STATES else self._on_shapes)(given.data)

@@ -10,7 +10,7 @@ import pytest
 
 from collision_monitor import records
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.ros.effort import MOST_THREADS
+from collision_monitor.ros.monitor.effort import MOST_THREADS
 from collision_monitor.session import Session
 from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict

@@ -6,7 +6,7 @@ from rclpy.serialization import deserialize_message
 from visualization_msgs.msg import Marker as RosMarker
 from visualization_msgs.msg import MarkerArray
 
-from collision_monitor.ros.marker_bytes import Kind, Marker, encode
+from collision_monitor.ros.monitor.marker_bytes import Kind, Marker, encode
 from collision_monitor.shapes.shapes import (
     Box,
     Capsule,

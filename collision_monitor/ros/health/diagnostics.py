@@ -15,7 +15,7 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from collision_monitor.ros.health import Report
+from collision_monitor.ros.health.health import Report
 
 TOPIC: Final = "/diagnostics"
 HARDWARE_ID: Final = "none"

@@ -1,0 +1,1 @@
+"""The guard between a planner and a base."""

@@ -1,0 +1,1 @@
+"""Subscribers: what is on the graph, and what a monitor publishes."""

@@ -1,0 +1,1 @@
+"""The node that monitors: its subscriptions, answers, sources, settings and load."""
