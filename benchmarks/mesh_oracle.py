@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import collision_monitor as cm
-from collision_monitor.cli.progress import progress_bar
+from collision_monitor.cli.output.progress import progress_bar
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.shapes.shape_table import ShapeTableBuilder, join, triangle_table
 from collision_monitor.world.arm import lathe

@@ -34,7 +34,7 @@ from scipy.spatial import ConvexHull as Qhull
 from scipy.spatial.transform import Rotation
 
 import collision_monitor as cm
-from collision_monitor.cli.progress import progress_bar
+from collision_monitor.cli.output.progress import progress_bar
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.shapes.shape_table import ShapeTableBuilder, take

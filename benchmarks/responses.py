@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.cli.progress import progress_bar
+from collision_monitor.cli.output.progress import progress_bar
 from collision_monitor.report.footprint import footprint
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import Box, Sphere

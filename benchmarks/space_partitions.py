@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.bsp_tree import bsp_tree, locate_in_bsp_tree
 from collision_monitor.broad_phase.partitions import PARTITIONS
-from collision_monitor.cli.progress import progress_bar
+from collision_monitor.cli.output.progress import progress_bar
 from collision_monitor.geometry.polyhedra import locate_in_polyhedron
 
 Array = NDArray[np.float64]

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from collision_monitor.accuracy.detection_time import WARM_UP_FRAMES
-from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.quantities import positive, whole
-from collision_monitor.cli.usage import UsageError, usage
+from collision_monitor.cli.options.quantities import positive, whole
+from collision_monitor.cli.options.usage import UsageError, usage
+from collision_monitor.cli.output.exit_codes import ExitCode
 
 HARD_SPHERES = ("hard-spheres", "hard_spheres")
 

@@ -8,11 +8,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from collision_monitor.cli.engines import add_engine, engine_of
-from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.output_file import add_force, check_outputs, writing
-from collision_monitor.cli.progress import progress_bar
-from collision_monitor.cli.usage import check_profiles, given_rules, usage
+from collision_monitor.cli.options.engines import add_engine, engine_of
+from collision_monitor.cli.options.usage import check_profiles, given_rules, usage
+from collision_monitor.cli.output.exit_codes import ExitCode
+from collision_monitor.cli.output.output_file import add_force, check_outputs, writing
+from collision_monitor.cli.output.progress import progress_bar
 
 if TYPE_CHECKING:
     from collision_monitor.session.history.check import Checked

@@ -10,11 +10,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.missing import missing_lines
-from collision_monitor.cli.progress import session_bar
-from collision_monitor.cli.quantities import not_negative, whole
-from collision_monitor.cli.usage import UsageError, check_profiles
+from collision_monitor.cli.options.quantities import not_negative, whole
+from collision_monitor.cli.options.usage import UsageError, check_profiles
+from collision_monitor.cli.output.exit_codes import ExitCode
+from collision_monitor.cli.output.missing import missing_lines
+from collision_monitor.cli.output.progress import session_bar
 
 if TYPE_CHECKING:
     from collision_monitor.session.history.changes import Changes, Event, EventChange

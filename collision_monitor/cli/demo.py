@@ -11,16 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from collision_monitor.cli.child import PATIENCE, Child, ProcessError
-from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.output_file import add_force, check_outputs, writing
-from collision_monitor.cli.quantities import positive, whole
-from collision_monitor.cli.usage import usage
+from collision_monitor.cli.options.quantities import positive, whole
+from collision_monitor.cli.options.usage import usage
+from collision_monitor.cli.output.exit_codes import ExitCode
+from collision_monitor.cli.output.output_file import add_force, check_outputs, writing
 from collision_monitor.errors import InputError
 from collision_monitor.ros.domain import free_domain
 from collision_monitor.ros.process import StopRequest, ros_context, stay_on_this_machine
 
 if TYPE_CHECKING:
-    from collision_monitor.cli.live_table import Picture
+    from collision_monitor.cli.output.live_table import Picture
     from collision_monitor.ros.listening.viewer import Viewer
 
 START_PATIENCE = 180.0
@@ -192,7 +192,7 @@ def _show(viewer: Viewer, scene: str, children: list[Child], stop: StopRequest) 
 
 def _picture(viewer: Viewer, scene: str, elapsed: float) -> Picture:
     from collision_monitor import codec
-    from collision_monitor.cli.live_table import Picture
+    from collision_monitor.cli.output.live_table import Picture
 
     return Picture(
         title=f"collision_monitor, scene {scene}",

@@ -8,10 +8,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.output_file import add_force, check_outputs, check_picture, writing
-from collision_monitor.cli.progress import progress_bar
-from collision_monitor.cli.quantities import whole
+from collision_monitor.cli.options.quantities import whole
+from collision_monitor.cli.output.exit_codes import ExitCode
+from collision_monitor.cli.output.output_file import add_force, check_outputs, check_picture, writing
+from collision_monitor.cli.output.progress import progress_bar
 
 if TYPE_CHECKING:
     from collision_monitor.accuracy.extremes import WorstCase

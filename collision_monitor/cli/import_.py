@@ -11,9 +11,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.output_file import add_force
-from collision_monitor.cli.usage import check_profiles, given_rules, usage
+from collision_monitor.cli.options.usage import check_profiles, given_rules, usage
+from collision_monitor.cli.output.exit_codes import ExitCode
+from collision_monitor.cli.output.output_file import add_force
 
 if TYPE_CHECKING:
     from collision_monitor.sources import Imported

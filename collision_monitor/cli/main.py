@@ -10,10 +10,10 @@ from keyword import iskeyword
 from typing import Final
 
 from collision_monitor._version import VERSION
-from collision_monitor.cli.error_line import print_error
-from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.output_streams import accept_any_text, discard_output
-from collision_monitor.cli.usage import UsageError
+from collision_monitor.cli.options.usage import UsageError
+from collision_monitor.cli.output.error_line import print_error
+from collision_monitor.cli.output.exit_codes import ExitCode
+from collision_monitor.cli.output.output_streams import accept_any_text, discard_output
 from collision_monitor.errors import CollisionMonitorError
 
 COMMANDS: Final = (

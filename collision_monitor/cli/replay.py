@@ -12,12 +12,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from collision_monitor.cli.engines import RAY, add_engine, engine_of
-from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.output_file import add_force, check_outputs
-from collision_monitor.cli.progress import progress_bar
-from collision_monitor.cli.quantities import not_negative, positive
-from collision_monitor.cli.usage import UsageError, usage
+from collision_monitor.cli.options.engines import RAY, add_engine, engine_of
+from collision_monitor.cli.options.quantities import not_negative, positive
+from collision_monitor.cli.options.usage import UsageError, usage
+from collision_monitor.cli.output.exit_codes import ExitCode
+from collision_monitor.cli.output.output_file import add_force, check_outputs
+from collision_monitor.cli.output.progress import progress_bar
 
 if TYPE_CHECKING:
     from collision_monitor.session import Session

@@ -6,10 +6,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.output_file import add_force
-from collision_monitor.cli.progress import session_bar
-from collision_monitor.cli.usage import check_profiles, given_rules
+from collision_monitor.cli.options.usage import check_profiles, given_rules
+from collision_monitor.cli.output.exit_codes import ExitCode
+from collision_monitor.cli.output.output_file import add_force
+from collision_monitor.cli.output.progress import session_bar
 
 DESCRIPTION = """\
 Write one HTML page about a session: the verdict, a timeline, predicted against actual times of

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from collision_monitor.cli.parameter_file import check_parameter_file
-from collision_monitor.cli.quantities import positive, size
-from collision_monitor.cli.ros_arguments import parameters
-from collision_monitor.cli.usage import UsageError, given_rules, usage
+from collision_monitor.cli.options.parameter_file import check_parameter_file
+from collision_monitor.cli.options.quantities import positive, size
+from collision_monitor.cli.options.ros_arguments import parameters
+from collision_monitor.cli.options.usage import UsageError, given_rules, usage
 from collision_monitor.errors import SessionError
 from collision_monitor.ros.executables import monitor
 from collision_monitor.session.output_file import check_recording

@@ -8,8 +8,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.output_file import add_force
+from collision_monitor.cli.output.exit_codes import ExitCode
+from collision_monitor.cli.output.output_file import add_force
 
 EPILOG = """\
 Messages in a chunk with a correct checksum are copied. Complete messages in a chunk with a wrong

@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.quantities import positive
-from collision_monitor.cli.usage import usage
+from collision_monitor.cli.options.quantities import positive
+from collision_monitor.cli.options.usage import usage
+from collision_monitor.cli.output.exit_codes import ExitCode
 
 if TYPE_CHECKING:
     from collision_monitor.ros.listening.survey import TopicFacts

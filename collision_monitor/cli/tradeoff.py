@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.accuracy.default_scenes import DEFAULT_SCENES
-from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.missing import print_missing
-from collision_monitor.cli.output_file import add_force, check_outputs, check_picture, writing
-from collision_monitor.cli.progress import progress_anywhere, progress_bar
-from collision_monitor.cli.quantities import not_negative, positive, whole
-from collision_monitor.cli.usage import UsageError, check_profiles, check_unused, usage
+from collision_monitor.cli.options.quantities import not_negative, positive, whole
+from collision_monitor.cli.options.usage import UsageError, check_profiles, check_unused, usage
+from collision_monitor.cli.output.exit_codes import ExitCode
+from collision_monitor.cli.output.missing import print_missing
+from collision_monitor.cli.output.output_file import add_force, check_outputs, check_picture, writing
+from collision_monitor.cli.output.progress import progress_anywhere, progress_bar
 
 if TYPE_CHECKING:
     from collision_monitor.accuracy.inputs import Workload

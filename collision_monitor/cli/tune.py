@@ -11,12 +11,12 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
-from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.missing import print_missing
-from collision_monitor.cli.output_file import add_force, check_outputs, check_picture, writing
-from collision_monitor.cli.progress import progress_anywhere
-from collision_monitor.cli.quantities import positive, whole
-from collision_monitor.cli.usage import usage
+from collision_monitor.cli.options.quantities import positive, whole
+from collision_monitor.cli.options.usage import usage
+from collision_monitor.cli.output.exit_codes import ExitCode
+from collision_monitor.cli.output.missing import print_missing
+from collision_monitor.cli.output.output_file import add_force, check_outputs, check_picture, writing
+from collision_monitor.cli.output.progress import progress_anywhere
 
 if TYPE_CHECKING:
     from collision_monitor.accuracy.demands import Demands

@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from collision_monitor.cli.exit_codes import ExitCode
-from collision_monitor.cli.progress import session_bar
-from collision_monitor.cli.quantities import whole
-from collision_monitor.cli.usage import UsageError, check_profiles, usage
+from collision_monitor.cli.options.quantities import whole
+from collision_monitor.cli.options.usage import UsageError, check_profiles, usage
+from collision_monitor.cli.output.exit_codes import ExitCode
+from collision_monitor.cli.output.progress import session_bar
 from collision_monitor.errors import MessageError
 from collision_monitor.pipeline.topics import NODE
 from collision_monitor.ros.process import StopRequest, ros_context, stay_on_this_machine

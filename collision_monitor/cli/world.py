@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from collision_monitor.cli.quantities import not_negative, positive, whole
-from collision_monitor.cli.ros_arguments import parameters
-from collision_monitor.cli.usage import UsageError, usage
+from collision_monitor.cli.options.quantities import not_negative, positive, whole
+from collision_monitor.cli.options.ros_arguments import parameters
+from collision_monitor.cli.options.usage import UsageError, usage
 from collision_monitor.pipeline.topics import NODE
 from collision_monitor.ros.executables import world
 from collision_monitor.world.response_choice import METHODS

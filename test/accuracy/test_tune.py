@@ -25,7 +25,7 @@ from collision_monitor.accuracy.profile_tradeoff import exact_answers, profile_t
 from collision_monitor.accuracy.tiles import MOST_TRUTHS, Recording
 from collision_monitor.accuracy.tune import explain, parameter_file, space_of, tune
 from collision_monitor.cli.main import main
-from collision_monitor.cli.parameter_file import check_parameter_file
+from collision_monitor.cli.options.parameter_file import check_parameter_file
 from collision_monitor.codec import encode_descriptions, encode_states
 from collision_monitor.errors import InputError
 from collision_monitor.objects.description import ObjectDescription

@@ -4,7 +4,7 @@ import numpy as np
 from rich.console import Console
 
 from collision_monitor import codec, records
-from collision_monitor.cli.live_table import Picture
+from collision_monitor.cli.output.live_table import Picture
 from collision_monitor.records import Phase, PredictionStatus
 
 NAMES = ["robot_1", "rack_7", "person_3"]

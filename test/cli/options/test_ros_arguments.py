@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import rclpy
 
-from collision_monitor.cli.ros_arguments import parameters
+from collision_monitor.cli.options.ros_arguments import parameters
 
 
 @pytest.mark.parametrize(

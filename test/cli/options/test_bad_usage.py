@@ -11,13 +11,13 @@ from typing import Any
 import pytest
 
 from collision_monitor.cli.main import main, make_parser
-from collision_monitor.cli.parameter_file import check_parameter_file
+from collision_monitor.cli.options.parameter_file import check_parameter_file
 from collision_monitor.errors import InputError
 from collision_monitor.session import many
 
 PROGRAM = Path(sys.executable).with_name("collision-monitor")
-GOLDEN = Path(__file__).parents[1] / "golden" / "balanced.mcap"
-EXAMPLE = Path(__file__).parents[2] / "config" / "monitor.yaml"
+GOLDEN = Path(__file__).parents[2] / "golden" / "balanced.mcap"
+EXAMPLE = Path(__file__).parents[3] / "config" / "monitor.yaml"
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,8 @@ from collision_monitor.cli.main import main
 from collision_monitor.errors import SessionError
 from collision_monitor.session.output_file import check_output
 
-GOLDEN = Path(__file__).parents[1] / "golden" / "balanced.mcap"
-RULES = Path(__file__).parents[2] / "config" / "rules.yaml"
+GOLDEN = Path(__file__).parents[2] / "golden" / "balanced.mcap"
+RULES = Path(__file__).parents[3] / "config" / "rules.yaml"
 Run = Callable[..., tuple[int, str]]
 
 COMMANDS = {

@@ -10,7 +10,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import Final
 
-from collision_monitor.cli.usage import UsageError
+from collision_monitor.cli.options.usage import UsageError
 from collision_monitor.errors import InputError
 from collision_monitor.session.output_file import check_output
 

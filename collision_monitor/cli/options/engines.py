@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Final
 
-from collision_monitor.cli.quantities import whole
-from collision_monitor.cli.usage import UsageError
+from collision_monitor.cli.options.quantities import whole
+from collision_monitor.cli.options.usage import UsageError
 
 if TYPE_CHECKING:
     from collision_monitor.session.many import Engine
