@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from collision_monitor.response.two_bodies import collide
-from collision_monitor.world.collision_response import bounce_between_walls
 from collision_monitor.world.hard_spheres.simulation import HardSpheres, carnahan_starling
 from collision_monitor.world.hard_spheres.starting_points import overlapping
 from collision_monitor.world.hard_spheres.time_step import step_spheres
+from collision_monitor.world.rigid.collision_response import bounce_between_walls
 
 Array = NDArray[np.float64]
 PACKINGS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45)

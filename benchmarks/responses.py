@@ -21,14 +21,14 @@ from collision_monitor.report.footprint import footprint
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import Box, Sphere
 from collision_monitor.world import make_scene
-from collision_monitor.world.impulse_response import ImpulseResponse
-from collision_monitor.world.penalty_response import PenaltyResponse
 from collision_monitor.world.pendulums import Pendulums
-from collision_monitor.world.response_choice import METHODS
-from collision_monitor.world.responses import Response
-from collision_monitor.world.rigid_bodies import RigidBodies
-from collision_monitor.world.rigid_scene import RigidScene
-from collision_monitor.world.stick_response import StickResponse
+from collision_monitor.world.rigid.impulse_response import ImpulseResponse
+from collision_monitor.world.rigid.penalty_response import PenaltyResponse
+from collision_monitor.world.rigid.response_choice import METHODS
+from collision_monitor.world.rigid.responses import Response
+from collision_monitor.world.rigid.rigid_bodies import RigidBodies
+from collision_monitor.world.rigid.rigid_scene import RigidScene
+from collision_monitor.world.rigid.stick_response import StickResponse
 
 Array = NDArray[np.float64]
 SCENES: Final = ("billiards", "slope", "pile", "pendulums")

@@ -10,7 +10,7 @@ from collision_monitor.cli.options.ros_arguments import parameters
 from collision_monitor.cli.options.usage import UsageError, usage
 from collision_monitor.pipeline.topics import NODE
 from collision_monitor.ros.executables import world
-from collision_monitor.world.response_choice import METHODS
+from collision_monitor.world.rigid.response_choice import METHODS
 
 DESCRIPTION = """\
 Publish a simulated scene on this ROS domain: the shapes of the objects once, then their states at

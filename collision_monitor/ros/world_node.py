@@ -19,7 +19,7 @@ from collision_monitor.ros.names import check_node_name
 from collision_monitor.ros.parameters import ParameterReader
 from collision_monitor.ros.process import WAKE_UP, StopRequest
 from collision_monitor.world import make_scene, scene_names
-from collision_monitor.world.response_choice import METHODS
+from collision_monitor.world.rigid.response_choice import METHODS
 
 PARAMETERS = (
     "scene", "objects", "rate", "duration", "seed", "path", "noise", "restitution", "gravity", "response", "monitor",

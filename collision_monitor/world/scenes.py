@@ -14,7 +14,7 @@ from collision_monitor.world.clutter import Clutter
 from collision_monitor.world.crossing import Crossing
 from collision_monitor.world.fleet import Fleet
 from collision_monitor.world.measured import Measured
-from collision_monitor.world.response_choice import AS_USUAL, ResponseChoice
+from collision_monitor.world.rigid.response_choice import AS_USUAL, ResponseChoice
 from collision_monitor.world.scene import Scene
 from collision_monitor.world.swarm import Swarm
 from collision_monitor.world.trajectory import Trajectory

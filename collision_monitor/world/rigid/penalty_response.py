@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from collision_monitor._jit import kernel
-from collision_monitor.world.rigid_bodies import RigidBodies
+from collision_monitor.world.rigid.rigid_bodies import RigidBodies
 
 DEPTH: Final = 0.02
 """Penetration at the fastest impact that the scene expects, as part of the smallest half extent."""

@@ -10,12 +10,12 @@ from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import Box, Sphere
 from collision_monitor.world import make_scene
-from collision_monitor.world.impulse_response import ImpulseResponse
-from collision_monitor.world.penalty_response import PenaltyResponse
-from collision_monitor.world.response_choice import METHODS
-from collision_monitor.world.rigid_bodies import RigidBodies
+from collision_monitor.world.rigid.impulse_response import ImpulseResponse
+from collision_monitor.world.rigid.penalty_response import PenaltyResponse
+from collision_monitor.world.rigid.response_choice import METHODS
+from collision_monitor.world.rigid.rigid_bodies import RigidBodies
+from collision_monitor.world.rigid.stick_response import StickResponse
 from collision_monitor.world.slope import ANGLE
-from collision_monitor.world.stick_response import StickResponse
 
 SCENES = ("billiards", "slope", "pile", "pendulums")
 

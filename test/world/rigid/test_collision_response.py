@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from collision_monitor.world.collision_response import bounce_between_walls
+from collision_monitor.world.rigid.collision_response import bounce_between_walls
 
 
 @given(st.floats(0, 1), st.floats(-50, 50), st.floats(1e-3, 1.0))

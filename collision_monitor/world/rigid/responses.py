@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from collision_monitor.world.impulse_response import PARTS, ImpulseResponse
-from collision_monitor.world.penalty_response import PenaltyResponse
-from collision_monitor.world.response_choice import ResponseOptions
-from collision_monitor.world.rigid_bodies import RigidBodies
-from collision_monitor.world.stick_response import StickResponse
+from collision_monitor.world.rigid.impulse_response import PARTS, ImpulseResponse
+from collision_monitor.world.rigid.penalty_response import PenaltyResponse
+from collision_monitor.world.rigid.response_choice import ResponseOptions
+from collision_monitor.world.rigid.rigid_bodies import RigidBodies
+from collision_monitor.world.rigid.stick_response import StickResponse
 
 
 class Response(Protocol):

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from collision_monitor.errors import InputError
 
 METHODS: Final = ("impulse", "penalty", "damped", "stick")
-"""Names of the methods, which world/responses.py implements."""
+"""Names of the methods, which world/rigid/responses.py implements."""
 
 EARTH: Final = 9.81
 """Usual gravity (m/s²)."""

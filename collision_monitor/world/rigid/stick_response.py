@@ -8,7 +8,7 @@ import numpy as np
 
 from collision_monitor.response.bonded import groups, move_as_one
 from collision_monitor.shapes.pose import from_rotation_vector, rotation_matrix
-from collision_monitor.world.rigid_bodies import RigidBodies
+from collision_monitor.world.rigid.rigid_bodies import RigidBodies
 
 LONGEST: Final = 1 / 240
 """Longest substep (s)."""

@@ -12,8 +12,8 @@ from collision_monitor.response.bonded import groups
 from collision_monitor.response.contact_set import Bodies
 from collision_monitor.response.resting import hold_contacts
 from collision_monitor.response.simultaneous import bodies_collide_together
-from collision_monitor.world.box_contacts import MOST_CORNERS
-from collision_monitor.world.rigid_bodies import RigidBodies, Touching
+from collision_monitor.world.rigid.box_contacts import MOST_CORNERS
+from collision_monitor.world.rigid.rigid_bodies import RigidBodies, Touching
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import Box, Sphere
-from collision_monitor.world.impulse_response import PARTS
-from collision_monitor.world.response_choice import ResponseOptions
-from collision_monitor.world.responses import make_response
-from collision_monitor.world.rigid_bodies import RigidBodies
+from collision_monitor.world.rigid.impulse_response import PARTS
+from collision_monitor.world.rigid.response_choice import ResponseOptions
+from collision_monitor.world.rigid.responses import make_response
+from collision_monitor.world.rigid.rigid_bodies import RigidBodies
 from collision_monitor.world.scene import Array, Scene, States, state_array
 
 GROUND: Final = 2

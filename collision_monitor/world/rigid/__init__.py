@@ -1,0 +1,1 @@
+"""Rigid bodies of the scenes, and how they respond when they meet."""
