@@ -23,12 +23,12 @@ from typing import Any
 import numpy as np
 from rich.progress import Progress
 
-from collision_monitor.accuracy.front import Front, front_settings, measure_front
-from collision_monitor.accuracy.front_picture import Peer, draw_fronts
 from collision_monitor.accuracy.inputs import Workload, simulated
 from collision_monitor.accuracy.playback import Step
-from collision_monitor.accuracy.profile_tradeoff import exact_answers
 from collision_monitor.accuracy.reported import Reported
+from collision_monitor.accuracy.tradeoff.profile_tradeoff import exact_answers
+from collision_monitor.accuracy.tuning.front import Front, front_settings, measure_front
+from collision_monitor.accuracy.tuning.front_picture import Peer, draw_fronts
 from collision_monitor.objects.models import containing_model
 from collision_monitor.records import PredictionStatus
 from collision_monitor.settings.profile import Profile

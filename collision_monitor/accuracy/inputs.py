@@ -7,8 +7,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from collision_monitor.accuracy.default_scenes import DEFAULT_DURATION, DEFAULT_SCENES, STATE_NOISE, TRACK_SCENE
 from collision_monitor.accuracy.playback import Step
+from collision_monitor.accuracy.tradeoff.default_scenes import (
+    DEFAULT_DURATION,
+    DEFAULT_SCENES,
+    STATE_NOISE,
+    TRACK_SCENE,
+)
 from collision_monitor.codec import decode_descriptions, decode_states
 from collision_monitor.errors import InputError, MessageError
 from collision_monitor.objects.description import ObjectDescription

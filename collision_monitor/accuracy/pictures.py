@@ -10,7 +10,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from collision_monitor.accuracy.extremes import SWEEPS, WorstCase
-from collision_monitor.accuracy.measurement import Measurement, labels_of_models
+from collision_monitor.accuracy.tradeoff.measurement import Measurement, labels_of_models
 
 MOST_IN_LEGEND: Final = 4
 """Largest number of points that a panel names within its axes. A longer legend stands beside the panel."""

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from collision_monitor.accuracy.default_scenes import DEFAULT_SCENES
+from collision_monitor.accuracy.tradeoff.default_scenes import DEFAULT_SCENES
 from collision_monitor.cli.options.quantities import not_negative, positive, whole
 from collision_monitor.cli.options.usage import UsageError, check_profiles, check_unused, usage
 from collision_monitor.cli.output.exit_codes import ExitCode
@@ -21,7 +21,7 @@ from collision_monitor.cli.output.progress import progress_anywhere, progress_ba
 
 if TYPE_CHECKING:
     from collision_monitor.accuracy.inputs import Workload
-    from collision_monitor.accuracy.measurement import Measurement
+    from collision_monitor.accuracy.tradeoff.measurement import Measurement
 
 DESCRIPTION = """\
 Measure the time and the errors of each profile. Every profile runs on scenes, or on a recorded
@@ -112,9 +112,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def tradeoff_command(args: argparse.Namespace) -> int:
     """Run the command and return the exit code. Raises UsageError, InputError, SessionError."""
-    from collision_monitor.accuracy.front import summaries
     from collision_monitor.accuracy.inputs import recorded
-    from collision_monitor.accuracy.tradeoff import tradeoff
+    from collision_monitor.accuracy.tradeoff.tradeoff import tradeoff
+    from collision_monitor.accuracy.tuning.front import summaries
     from collision_monitor.objects.models import parse_model
     from collision_monitor.settings.profile import Profile
     from collision_monitor.world.trajectory import track_files
@@ -177,7 +177,7 @@ def _scenes(args: argparse.Namespace) -> Iterator[Workload]:
 
 def _measure_fronts(args: argparse.Namespace, inputs: Iterable[Workload]) -> int:
     """Print the rows of many settings for each scene, and what there is to trade."""
-    from collision_monitor.accuracy.front import front_settings, measure_front
+    from collision_monitor.accuracy.tuning.front import front_settings, measure_front
 
     fronts = []
     for work in inputs:
@@ -193,7 +193,7 @@ def _measure_fronts(args: argparse.Namespace, inputs: Iterable[Workload]) -> int
         _print_table(rows)
         print("\n".join(each.summary() for each in fronts))
     if args.png:
-        from collision_monitor.accuracy.front_picture import draw_fronts
+        from collision_monitor.accuracy.tuning.front_picture import draw_fronts
 
         with writing(args.png):
             draw_fronts({each.label: [each] for each in fronts}, args.png)
@@ -202,7 +202,7 @@ def _measure_fronts(args: argparse.Namespace, inputs: Iterable[Workload]) -> int
 
 def _compare_impact_methods(args: argparse.Namespace, inputs: Iterable[Workload]) -> int:
     """Print a row for each scene and way to find a time of impact."""
-    from collision_monitor.accuracy.impact_tradeoff import METHODS, impact_tradeoff
+    from collision_monitor.accuracy.tradeoff.impact_tradeoff import METHODS, impact_tradeoff
 
     rows = []
     for work in inputs:
@@ -235,7 +235,7 @@ def _print_table(rows: Sequence[Measurement]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from collision_monitor.accuracy.measurement import labels_of_models
+    from collision_monitor.accuracy.tradeoff.measurement import labels_of_models
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     headings = ("scene", "profile\nor model", "ms/step", "µs/pair", "alarms", "false", "beyond", "missed")

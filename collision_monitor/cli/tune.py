@@ -19,8 +19,8 @@ from collision_monitor.cli.output.output_file import add_force, check_outputs, c
 from collision_monitor.cli.output.progress import progress_anywhere
 
 if TYPE_CHECKING:
-    from collision_monitor.accuracy.demands import Demands
-    from collision_monitor.accuracy.halving import Trial
+    from collision_monitor.accuracy.tuning.demands import Demands
+    from collision_monitor.accuracy.tuning.halving import Trial
     from collision_monitor.settings.profile import Profile
 
 EPILOG = """\
@@ -85,10 +85,10 @@ def add_parser(subparsers: Any) -> None:
 
 def tune_command(args: argparse.Namespace) -> int:
     """Run the command and return the exit code. Raises UsageError, InputError, SessionError."""
-    from collision_monitor.accuracy.demands import Demands
     from collision_monitor.accuracy.inputs import recorded
-    from collision_monitor.accuracy.search_time import plan_search
-    from collision_monitor.accuracy.tune import parameter_file, space_of, tune
+    from collision_monitor.accuracy.tuning.demands import Demands
+    from collision_monitor.accuracy.tuning.search_time import plan_search
+    from collision_monitor.accuracy.tuning.tune import parameter_file, space_of, tune
     from collision_monitor.session import Session
 
     with usage():
@@ -118,8 +118,8 @@ def tune_command(args: argparse.Namespace) -> int:
     else:
         print("\n".join([*_as_text(found.trials, chosen, demands), "", *found.reasons]))
     if args.png:
-        from collision_monitor.accuracy.front import Front
-        from collision_monitor.accuracy.front_picture import draw_fronts
+        from collision_monitor.accuracy.tuning.front import Front
+        from collision_monitor.accuracy.tuning.front_picture import draw_fronts
 
         front = Front([each.measurement for each in found.trials], fixed_us=float("nan"))
         with writing(args.png):

@@ -15,15 +15,15 @@ import pytest
 import session_scene
 import yaml
 
-from collision_monitor.accuracy import search_time
-from collision_monitor.accuracy.candidates import Space, models_of, with_threads
-from collision_monitor.accuracy.demands import Demands
-from collision_monitor.accuracy.halving import Trial, rungs_of
 from collision_monitor.accuracy.inputs import Workload, recorded
-from collision_monitor.accuracy.measurement import Errors
-from collision_monitor.accuracy.profile_tradeoff import exact_answers, profile_tradeoff
-from collision_monitor.accuracy.tiles import MOST_TRUTHS, Recording
-from collision_monitor.accuracy.tune import explain, parameter_file, space_of, tune
+from collision_monitor.accuracy.tradeoff.measurement import Errors
+from collision_monitor.accuracy.tradeoff.profile_tradeoff import exact_answers, profile_tradeoff
+from collision_monitor.accuracy.tuning import search_time
+from collision_monitor.accuracy.tuning.candidates import Space, models_of, with_threads
+from collision_monitor.accuracy.tuning.demands import Demands
+from collision_monitor.accuracy.tuning.halving import Trial, rungs_of
+from collision_monitor.accuracy.tuning.tiles import MOST_TRUTHS, Recording
+from collision_monitor.accuracy.tuning.tune import explain, parameter_file, space_of, tune
 from collision_monitor.cli.main import main
 from collision_monitor.cli.options.parameter_file import check_parameter_file
 from collision_monitor.codec import encode_descriptions, encode_states
@@ -34,7 +34,7 @@ from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import Box, ConvexHull, HalfSpace, Sphere
 from collision_monitor.world.scene import state_array
 
-GOLDEN = Path(__file__).parents[1] / "golden" / "balanced.mcap"
+GOLDEN = Path(__file__).parents[2] / "golden" / "balanced.mcap"
 PROGRAM = Path(sys.executable).with_name("collision-monitor")
 
 

@@ -10,8 +10,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.accuracy.measurement import Errors, Measurement
 from collision_monitor.accuracy.playback import Played, Step, contacts_by_pair, play
+from collision_monitor.accuracy.tradeoff.measurement import Errors, Measurement
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription

@@ -17,10 +17,10 @@ from typing import Any, Final, Self
 import numpy as np
 
 from collision_monitor.accuracy.playback import Step, play
-from collision_monitor.accuracy.profile_tradeoff import Progress, contacts_of, exact_answers, measure_profile
 from collision_monitor.accuracy.reported import Reported
 from collision_monitor.accuracy.scope import compared
-from collision_monitor.accuracy.tally import Tally
+from collision_monitor.accuracy.tradeoff.profile_tradeoff import Progress, contacts_of, exact_answers, measure_profile
+from collision_monitor.accuracy.tuning.tally import Tally
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session.history.alarms import Contacts

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 
-from collision_monitor.accuracy.default_scenes import MESH_SCENE
-from collision_monitor.accuracy.front import fixed_part
 from collision_monitor.accuracy.inputs import Workload
-from collision_monitor.accuracy.measurement import Measurement
-from collision_monitor.accuracy.model_tradeoff import COMPARED_STEPS, MODELS, model_tradeoff
-from collision_monitor.accuracy.profile_tradeoff import profile_tradeoff
+from collision_monitor.accuracy.tradeoff.default_scenes import MESH_SCENE
+from collision_monitor.accuracy.tradeoff.measurement import Measurement
+from collision_monitor.accuracy.tradeoff.model_tradeoff import COMPARED_STEPS, MODELS, model_tradeoff
+from collision_monitor.accuracy.tradeoff.profile_tradeoff import profile_tradeoff
+from collision_monitor.accuracy.tuning.front import fixed_part
 from collision_monitor.settings.profile import Profile
 
 ProgressBar = Callable[[str, int], AbstractContextManager[Callable[[int], None]]]

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
-from collision_monitor.accuracy.front import Front, error_of
+from collision_monitor.accuracy.tuning.front import Front, error_of
 
 MARKS: Final = {"fast": "v", "balanced": "s", "exact": "D"}
 COLOURS: Final = ("#1f6fb4", "#d1571f", "#3a923a")

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.accuracy.measurement import Errors, Measurement
 from collision_monitor.accuracy.reported import Reported, Rows, Steps
+from collision_monitor.accuracy.tradeoff.measurement import Errors, Measurement
 from collision_monitor.impact.impact_record import pair_keys
 from collision_monitor.records import PredictionStatus
 from collision_monitor.session.history.alarms import Alarms

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from collision_monitor.accuracy.model_tradeoff import model_tradeoff
 from collision_monitor.accuracy.playback import Step
+from collision_monitor.accuracy.tradeoff.model_tradeoff import model_tradeoff
 from collision_monitor.cli.main import main
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.polyhedra import is_closed

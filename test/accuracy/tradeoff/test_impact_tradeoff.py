@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from collision_monitor.accuracy.impact_tradeoff import METHODS
+from collision_monitor.accuracy.tradeoff.impact_tradeoff import METHODS
 from collision_monitor.cli.main import main
 
 ARGUMENTS = ["tradeoff", "--scene", "crossing", "--seconds", "1", "--impact-methods"]

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from collision_monitor.accuracy.inputs import Workload
 from collision_monitor.accuracy.playback import Step
-from collision_monitor.accuracy.profile_tradeoff import profile_tradeoff
 from collision_monitor.accuracy.reference_monitor import ReferenceMonitor
-from collision_monitor.accuracy.tradeoff import tradeoff
+from collision_monitor.accuracy.tradeoff.profile_tradeoff import profile_tradeoff
+from collision_monitor.accuracy.tradeoff.tradeoff import tradeoff
 from collision_monitor.cli.main import main
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.monitor import Monitor
@@ -25,7 +25,7 @@ from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.shapes import Sphere
 from collision_monitor.world.scene import state_array
 
-GOLDEN = Path(__file__).parents[1] / "golden" / "balanced.mcap"
+GOLDEN = Path(__file__).parents[2] / "golden" / "balanced.mcap"
 TWO = [ObjectDescription(1, Sphere(0.5)), ObjectDescription(2, Sphere(0.5))]
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Final
 
-from collision_monitor.accuracy.measurement import Measurement
+from collision_monitor.accuracy.tradeoff.measurement import Measurement
 from collision_monitor.errors import InputError
 from collision_monitor.settings.profile import Profile
 

@@ -9,12 +9,12 @@ from typing import Final
 
 import yaml
 
-from collision_monitor.accuracy.candidates import Space, models_of
-from collision_monitor.accuracy.demands import Demands
-from collision_monitor.accuracy.halving import Halving, Trial
 from collision_monitor.accuracy.inputs import Workload
-from collision_monitor.accuracy.search_time import RUN_SECONDS, runs_of
-from collision_monitor.accuracy.tiles import Recording, workers
+from collision_monitor.accuracy.tuning.candidates import Space, models_of
+from collision_monitor.accuracy.tuning.demands import Demands
+from collision_monitor.accuracy.tuning.halving import Halving, Trial
+from collision_monitor.accuracy.tuning.search_time import RUN_SECONDS, runs_of
+from collision_monitor.accuracy.tuning.tiles import Recording, workers
 from collision_monitor.settings.parameter_file import PARAMETER_SECTION
 from collision_monitor.settings.profile import Profile
 

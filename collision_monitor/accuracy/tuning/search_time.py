@@ -9,12 +9,12 @@ from typing import Final
 
 import numpy as np
 
-from collision_monitor.accuracy.candidates import FACTORS, Space
-from collision_monitor.accuracy.halving import FINALISTS, HOPS, ROUNDS, rungs_of
 from collision_monitor.accuracy.inputs import Workload
 from collision_monitor.accuracy.playback import play
-from collision_monitor.accuracy.profile_tradeoff import exact_answers
-from collision_monitor.accuracy.tiles import tiles_of
+from collision_monitor.accuracy.tradeoff.profile_tradeoff import exact_answers
+from collision_monitor.accuracy.tuning.candidates import FACTORS, Space
+from collision_monitor.accuracy.tuning.halving import FINALISTS, HOPS, ROUNDS, rungs_of
+from collision_monitor.accuracy.tuning.tiles import tiles_of
 from collision_monitor.monitor.monitor import Monitor
 
 RUN_SECONDS: Final = 0.4

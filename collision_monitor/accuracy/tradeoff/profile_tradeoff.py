@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from collision_monitor.accuracy.measurement import Measurement
 from collision_monitor.accuracy.playback import Step, play
 from collision_monitor.accuracy.reference_monitor import ReferenceMonitor
 from collision_monitor.accuracy.reported import Reported
 from collision_monitor.accuracy.scope import compared, unfiltered
-from collision_monitor.accuracy.tally import Tally, compare_reports
+from collision_monitor.accuracy.tradeoff.measurement import Measurement
+from collision_monitor.accuracy.tuning.tally import Tally, compare_reports
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.state.timeline import NANOSECOND

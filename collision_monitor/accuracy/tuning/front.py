@@ -8,12 +8,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from collision_monitor.accuracy.candidates import ANY_ERROR, Space, models_of
-from collision_monitor.accuracy.demands import Demands
 from collision_monitor.accuracy.inputs import Workload
-from collision_monitor.accuracy.measurement import Measurement
 from collision_monitor.accuracy.playback import FEWEST_STEPS, play
-from collision_monitor.accuracy.profile_tradeoff import Progress, contacts_of, exact_answers, measure_profile
+from collision_monitor.accuracy.tradeoff.measurement import Measurement
+from collision_monitor.accuracy.tradeoff.profile_tradeoff import Progress, contacts_of, exact_answers, measure_profile
+from collision_monitor.accuracy.tuning.candidates import ANY_ERROR, Space, models_of
+from collision_monitor.accuracy.tuning.demands import Demands
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.settings.profile import Profile
 

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from collision_monitor.accuracy.demands import Demands
 from collision_monitor.accuracy.scope import wanted, with_horizon
+from collision_monitor.accuracy.tuning.demands import Demands
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import containing_model, shape_class

@@ -10,11 +10,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.accuracy.candidates import Space, with_threads
-from collision_monitor.accuracy.measurement import Measurement
 from collision_monitor.accuracy.playback import play
-from collision_monitor.accuracy.tally import Tally
-from collision_monitor.accuracy.tiles import Workers
+from collision_monitor.accuracy.tradeoff.measurement import Measurement
+from collision_monitor.accuracy.tuning.candidates import Space, with_threads
+from collision_monitor.accuracy.tuning.tally import Tally
+from collision_monitor.accuracy.tuning.tiles import Workers
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.settings.profile import NO_BUDGET, Profile
 

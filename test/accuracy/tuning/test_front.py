@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
-from collision_monitor.accuracy.front import Front, error_of, front_settings, measure_front
-from collision_monitor.accuracy.front_picture import draw_fronts
 from collision_monitor.accuracy.inputs import simulated
+from collision_monitor.accuracy.tuning.front import Front, error_of, front_settings, measure_front
+from collision_monitor.accuracy.tuning.front_picture import draw_fronts
 from collision_monitor.cli.main import main
 
 

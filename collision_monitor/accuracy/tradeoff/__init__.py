@@ -1,0 +1,1 @@
+"""Time and errors of profiles, models and methods."""
