@@ -3,8 +3,8 @@
 The depth of two solids changes by at most the distance that the origins move relative to each other, plus the angle
 that each body turns times its radius. It is at least the depth of any pair of their triangles. So one pair of triangles
 that meets proves the contact, and bounds the distance from above; the last answer bounds it from both sides. The middle
-of this range is reported. A new answer is a range too (meshes/distance/depth_range.py): to find all pairs of triangles that meet
-takes much longer.
+of this range is reported. A new answer is a range too (meshes/distance/depth_range.py): to find all pairs of
+triangles that meet takes much longer.
 """
 
 from __future__ import annotations

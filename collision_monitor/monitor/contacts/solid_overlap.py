@@ -1,7 +1,8 @@
 """Contacts of meshes with cylinders, cones, ellipsoids and half-spaces, within the `distance_tolerance`.
 
-The search for the deepest triangle ends when the depth is known within the tolerance (meshes/distance/solid_range.py), which
-takes so much less than the answer that nothing is carried over to the next step.
+The search for the deepest triangle ends when the depth is known within the tolerance
+(meshes/distance/solid_range.py), which takes so much less than the answer that nothing is carried over to the next
+step.
 """
 
 from __future__ import annotations
