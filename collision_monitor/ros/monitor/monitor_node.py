@@ -17,8 +17,8 @@ from collision_monitor.errors import CollisionMonitorError
 from collision_monitor.pipeline.topics import NODE
 from collision_monitor.ros.bond import ManagerBond
 from collision_monitor.ros.entities import Entities
-from collision_monitor.ros.health.diagnostics import Diagnostics
 from collision_monitor.ros.health import health
+from collision_monitor.ros.health.diagnostics import Diagnostics
 from collision_monitor.ros.managed import Managed
 from collision_monitor.ros.monitor.live_rules import LiveRules
 from collision_monitor.ros.monitor.live_settings import LiveSettings
