@@ -14,7 +14,7 @@ import pickle
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import llvmlite.binding as llvm
 from numba.core.caching import NullCache
@@ -24,6 +24,10 @@ from numba.core.serialize import dumps
 
 from collision_monitor._jit.cache import folder
 from collision_monitor._jit.libraries import Callee, DeviceLibrary, LoadedKernel, OutlinedLibrary, callees
+
+
+_UNREADABLE: Final = (OSError, EOFError, ValueError, pickle.UnpicklingError, ImportError, AttributeError)
+"""What reading a file of the cache raises; the last two if a class of its arguments has moved or is gone."""
 
 
 class KernelCache(NullCache):  # type: ignore[misc]
@@ -47,7 +51,7 @@ class KernelCache(NullCache):  # type: ignore[misc]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled function, or None if it has to be compiled."""
-        with contextlib.suppress(OSError, EOFError, ValueError, pickle.UnpicklingError):
+        with contextlib.suppress(*_UNREADABLE):
             data = self._file(sig, target_context).read_bytes()
             digest, data = data[:16], data[16:]
             if hashlib.blake2b(data, digest_size=16).digest() == digest:  # not cut off by a full disk

@@ -18,7 +18,7 @@ from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.impact.body_impact import ShapePair, Tube, body_impact, closing_speed, tube_of
 from collision_monitor.impact.coarse_solid import solid_near, solid_overlaps
-from collision_monitor.impact.coarse_trees import TOO_MANY, Nearness, pose_at, trees_near, trees_overlap
+from collision_monitor.impact.coarse_trees import TOO_MANY, SearchEnd, pose_at, trees_near, trees_overlap
 from collision_monitor.impact.impact_record import (
     BOUND_ONLY,
     CLEAR,
@@ -96,7 +96,7 @@ def coarse_impact(multibody, i, j, window, query, near, scratch, event):
     if first > last:
         return True
     pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
-    start, stop, near = begin + first, begin + last, Nearness(min(near.tolerance, A.radius, B.radius), near.period)
+    start, stop, near = begin + first, begin + last, SearchEnd(min(near.tolerance, A.radius, B.radius), near.period)
     there = Tube(tube.start + tube.growth * first, tube.growth)
     lower, status, gap = _near(table, parts, pair, begin, (start, stop), there, query, near, scratch)
     if status == TOO_MANY:

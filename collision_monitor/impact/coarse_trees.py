@@ -39,7 +39,7 @@ TOO_MANY: Final = 253
 """In place of a status: more pairs of boxes wait than there is room for."""
 
 
-class Nearness(NamedTuple):
+class SearchEnd(NamedTuple):
     """How near two bodies have to be, so that their search ends."""
 
     tolerance: Any  # m: largest gap; 0: every search is a full one

@@ -29,7 +29,7 @@ from collision_monitor.records import PREDICTION, Method, PredictionStatus
 from collision_monitor.settings.profile import Profile
 from collision_monitor.uncertainty.impact_distribution import EARLIEST, MOST_LIKELY, PROBABILITY
 from collision_monitor.uncertainty.likely_impacts import LEFT, likely_impacts
-from collision_monitor.uncertainty.near_pairs import Nearness, find_near
+from collision_monitor.uncertainty.near_pairs import NearPairRange, find_near
 from collision_monitor.uncertainty.plane_memory import PlaneMemory, make_plane_memory
 from collision_monitor.uncertainty.samples.error_samples import Workspace, make_workspace
 from collision_monitor.uncertainty.samples.normal_samples import normal_samples, sample_columns
@@ -227,7 +227,7 @@ class UncertainPredictions(Stage):
     def _near(self, step: StepContext) -> Records:
         """Return the entries of the pairs that could meet within the horizon."""
         p, found = step.profile, np.empty(len(self.entries), np.int64)
-        nearness = Nearness(sigmas_for(p.min_probability), step.settings.impact.margin, p.horizon, p.stale_acceleration)
+        nearness = NearPairRange(sigmas_for(p.min_probability), step.settings.impact.margin, p.horizon, p.stale_acceleration)
         count = find_near(step.roster.multibody, self.spread, self.entries, step.now, nearness, found)
         return self.entries[found[:count]]
 

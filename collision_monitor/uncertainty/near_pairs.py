@@ -16,7 +16,7 @@ from collision_monitor.shapes.shape_table import BOX
 from collision_monitor.uncertainty.spread import is_uncertain, surface_spread, swing_radius
 
 
-class Nearness(NamedTuple):
+class NearPairRange(NamedTuple):
     """What counts as near."""
 
     sigmas: float  # standard deviations by which the spheres grow

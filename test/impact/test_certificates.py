@@ -10,7 +10,7 @@ import collision_monitor as cm
 from collision_monitor.monitor.uncertain_predictions import ENTRY, sigmas_for
 from collision_monitor.records import STATE
 from collision_monitor.settings.profile import Profile
-from collision_monitor.uncertainty.near_pairs import Nearness, find_near
+from collision_monitor.uncertainty.near_pairs import NearPairRange, find_near
 from collision_monitor.uncertainty.samples.error_samples import make_workspace
 from collision_monitor.uncertainty.samples.normal_samples import normal_samples
 from collision_monitor.uncertainty.uncertainty import Sampling, impact_probabilities
@@ -22,7 +22,7 @@ def left_out(monitor: cm.Monitor, pairs: NDArray[np.int32]) -> NDArray[np.float6
     p, roster, spread = Profile(), monitor.roster, monitor._uncertain.spread
     entries, found = np.zeros(len(pairs), ENTRY), np.empty(len(pairs), np.int64)
     entries["i"], entries["j"] = pairs.T
-    nearness = Nearness(sigmas_for(p.min_probability), p.contact_margin, p.horizon, p.stale_acceleration)
+    nearness = NearPairRange(sigmas_for(p.min_probability), p.contact_margin, p.horizon, p.stale_acceleration)
     count = find_near(roster.multibody, spread, entries, 0.0, nearness, found)
     far = np.setdiff1d(np.arange(len(pairs)), found[:count])
     assert 0 < count < len(pairs)
