@@ -15,7 +15,7 @@ import numpy as np
 
 import collision_monitor as cm
 from collision_monitor.codec import encode_descriptions
-from collision_monitor.meshes.build.cloud_tree import cloud_tree
+from collision_monitor.meshes.trees.cloud_tree import cloud_tree
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.preparation import Preparation

@@ -59,7 +59,7 @@ def maker(kind: str) -> Callable[[Any, Any], Any]:
         return make_coal
 
     import collision_monitor as cm
-    from collision_monitor.meshes.build.shape_trees import shape_tree
+    from collision_monitor.meshes.trees.shape_trees import shape_tree
 
     def make_mesh(vertices: Any, faces: Any) -> Any:
         mesh = cm.Mesh(vertices, faces)

@@ -146,7 +146,7 @@ def measure(surface: Surface, rows: Array) -> dict[str, Any]:
     import fcl
 
     import collision_monitor as cm
-    from collision_monitor.meshes.build.shape_trees import made_tree
+    from collision_monitor.meshes.trees.shape_trees import made_tree
 
     mesh = cm.Mesh(surface.vertices, surface.faces)
     tree, ours = timed(lambda: made_tree(mesh))

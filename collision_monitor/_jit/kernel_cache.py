@@ -25,7 +25,6 @@ from numba.core.serialize import dumps
 from collision_monitor._jit.cache import folder
 from collision_monitor._jit.libraries import Callee, DeviceLibrary, LoadedKernel, OutlinedLibrary, callees
 
-
 _UNREADABLE: Final = (OSError, EOFError, ValueError, pickle.UnpicklingError, ImportError, AttributeError)
 """What reading a file of the cache raises; the last two if a class of its arguments has moved or is gone."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from collision_monitor.geometry.bounded_cache import bounded_cache
-from collision_monitor.meshes.build.shape_trees import shape_tree
+from collision_monitor.meshes.trees.shape_trees import shape_tree
 from collision_monitor.shapes.forest import Forest
 from collision_monitor.shapes.shape_table import ShapeTable, ShapeTableBuilder
 from collision_monitor.shapes.shapes import Mesh, Points, Shape

@@ -202,7 +202,7 @@ class ShapeTableBuilder:
         """Add a shape at a pose in its object's frame, enlarged by `margin` (m); return its slot.
 
         corners: the `hull_vertices` of a ConvexHull, if they are known already. tree: of a mesh or a cloud, which is
-        needed (`meshes.build.shape_trees`).
+        needed (`meshes.trees.shape_trees`).
         Raises UnsupportedError for a kind without kernels, ShapeError for an invalid margin.
         """
         if not (np.isfinite(margin) and margin >= 0.0):

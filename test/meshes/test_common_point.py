@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from collision_monitor._jit import kernel
-from collision_monitor.meshes.build.shape_trees import made_tree
 from collision_monitor.meshes.distance.nearest import MEMORY
 from collision_monitor.meshes.distance.triangle_pair import Triangle
 from collision_monitor.meshes.overlap.common_part import common_part, is_flat, normal_of
 from collision_monitor.meshes.overlap.common_point import common_ball
 from collision_monitor.meshes.placing import relative
+from collision_monitor.meshes.trees.shape_trees import made_tree
 from collision_monitor.shapes.shapes import Mesh
 
 Array = NDArray[np.float64]

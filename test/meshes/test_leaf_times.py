@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 from collision_monitor._jit import kernel
 from collision_monitor.meshes.advance.approach import Approach
 from collision_monitor.meshes.advance.leaf_times import leaf_time
-from collision_monitor.meshes.build.tree import tree_of
 from collision_monitor.meshes.distance.nearest import MEMORY
 from collision_monitor.meshes.distance.triangle_pair import Triangle, closest_points
 from collision_monitor.meshes.layout import CHILD, WIDTH
 from collision_monitor.meshes.placing import Placing
+from collision_monitor.meshes.trees.tree import tree_of
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from collision_monitor._jit import kernel
 from collision_monitor.impact.body_impact import make_scratch
-from collision_monitor.meshes.build.shape_trees import made_tree
 from collision_monitor.meshes.distance.point_range import point_range
 from collision_monitor.meshes.distance.solid import SolidMemory, solid_contact
 from collision_monitor.meshes.distance.solid_range import solid_range
+from collision_monitor.meshes.trees.shape_trees import made_tree
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.shapes.shape_table import ShapeTable, ShapeTableBuilder

@@ -7,10 +7,10 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 
-from collision_monitor.meshes.build.cloud_tree import cloud_tree
-from collision_monitor.meshes.build.tree import tree_of
 from collision_monitor.meshes.layout import AXES, CENTER, CHILD, CORNERS, HALF, RADIUS, WIDTH
 from collision_monitor.meshes.supports import reach_along, support_bounds
+from collision_monitor.meshes.trees.cloud_tree import cloud_tree
+from collision_monitor.meshes.trees.tree import tree_of
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ from collision_monitor._jit.direct import forget
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.impact.impact_record import pair_keys
-from collision_monitor.meshes.build.shape_trees import shape_tree
-from collision_monitor.meshes.build.slot_trees import plant_trees
+from collision_monitor.meshes.trees.shape_trees import shape_tree
+from collision_monitor.meshes.trees.slot_trees import plant_trees
 from collision_monitor.monitor.contacts.mesh_faces import MeshFaces, faces_of
 from collision_monitor.monitor.state.mesh_snapshot import mesh_arrays, plant_meshes
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, check_range

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from collision_monitor.geometry.inside import UNKNOWN, locate_in_surface
 from collision_monitor.geometry.point_in_polygon import Location
-from collision_monitor.meshes.build.shape_trees import shape_tree
 from collision_monitor.meshes.distance.contact import APART, OPEN, contact_of_trees, in_root_box, reach_of
 from collision_monitor.meshes.distance.nearest import MEMORY, answer_row
+from collision_monitor.meshes.trees.shape_trees import shape_tree
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A
 from collision_monitor.objects.models import exact_model
 from collision_monitor.query.contact.nearest_pieces import NearestPieces

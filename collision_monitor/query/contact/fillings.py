@@ -15,7 +15,7 @@ import numpy as np
 from collision_monitor.geometry.bounded_cache import bounded_cache
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
-from collision_monitor.meshes.build.shape_trees import kept_tree
+from collision_monitor.meshes.trees.shape_trees import kept_tree
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import Box, ConvexHull, Mesh, Shape, array_bytes
 from collision_monitor.tolerances import ROUNDED_UP

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.settled import settled
 from collision_monitor.meshes.boxes import box_separations
-from collision_monitor.meshes.build.shape_trees import CERTAIN, NEVER, KeptTree, have_kernels, kept_tree
 from collision_monitor.meshes.distance.contact import APART, tree_contact
 from collision_monitor.meshes.distance.nearest import ANSWER, BOUNDS, MEMORY, PLACE_A, PLACE_B
 from collision_monitor.meshes.overlap.inside import OUTSIDE, is_either_in
 from collision_monitor.meshes.overlap.touching import touching
 from collision_monitor.meshes.placing import relative
+from collision_monitor.meshes.trees.shape_trees import CERTAIN, NEVER, KeptTree, have_kernels, kept_tree
 from collision_monitor.motion.motion import quaternion_to_matrix
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose

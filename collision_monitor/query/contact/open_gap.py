@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 
 from collision_monitor.geometry.point_in_polygon import Location
-from collision_monitor.meshes.build.shape_trees import trees_of_pair
 from collision_monitor.meshes.distance.contact import OPEN
+from collision_monitor.meshes.trees.shape_trees import trees_of_pair
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE
 from collision_monitor.query.contact.deepest import by_clouds, by_pieces, by_trees, contact_by_trees, locate
 from collision_monitor.query.contact.fillings import fillings

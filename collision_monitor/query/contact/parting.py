@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
-from collision_monitor.meshes.build.shape_trees import shape_tree
 from collision_monitor.meshes.extent import extents
+from collision_monitor.meshes.trees.shape_trees import shape_tree
 from collision_monitor.query.posed import Posed
 from collision_monitor.shapes.planar import is_planar
 from collision_monitor.shapes.reach import reach

@@ -11,9 +11,9 @@ from collision_monitor._jit.settled import settled
 from collision_monitor.impact.body_impact import ImpactQuery, ShapePair, Tube, Window, body_impact, shape_impact
 from collision_monitor.impact.impact_record import CLEAR, HIT
 from collision_monitor.impact.sphere_interval import approach_at, sphere_interval
-from collision_monitor.meshes.build.shape_trees import NEVER, have_kernels, kept_tree
 from collision_monitor.meshes.distance.nearest import LEAST, PLACE_A, PLACE_B
 from collision_monitor.meshes.layout import FACE, WIDTH
+from collision_monitor.meshes.trees.shape_trees import NEVER, have_kernels, kept_tree
 from collision_monitor.motion.bodies import Multibody
 from collision_monitor.motion.motion import half_acceleration
 from collision_monitor.narrow_phase.contact_row import DISTANCE

@@ -13,7 +13,7 @@ from collision_monitor.geometry.bounded_cache import bounded_cache
 from collision_monitor.impact.body_impact import ImpactQuery, make_scratch
 from collision_monitor.impact.impact_record import IMPACT
 from collision_monitor.impact.pair_impacts import bodies_overlap_time, predict_pairs
-from collision_monitor.meshes.build.shape_trees import shape_tree
+from collision_monitor.meshes.trees.shape_trees import shape_tree
 from collision_monitor.motion.bodies import Bodies, Multibody, make_bodies, make_parts
 from collision_monitor.motion.body_layout import lay_out_body
 from collision_monitor.objects.excess import PosedShapes

@@ -6,7 +6,7 @@ from itertools import product
 from math import dist, inf
 from typing import Final
 
-from collision_monitor.meshes.build.shape_trees import NEVER, have_kernels, kept_tree
+from collision_monitor.meshes.trees.shape_trees import NEVER, have_kernels, kept_tree
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.contact.convex_pairs import convex_contact, convex_impact
 from collision_monitor.query.contact.fillings import filled_box, filled_mesh

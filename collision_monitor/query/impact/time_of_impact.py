@@ -11,7 +11,7 @@ import numpy as np
 
 from collision_monitor.errors import TooCostlyError, UnsupportedError
 from collision_monitor.impact.impact_record import HIT
-from collision_monitor.meshes.build.shape_trees import CERTAIN, kept_tree
+from collision_monitor.meshes.trees.shape_trees import CERTAIN, kept_tree
 from collision_monitor.motion.bodies import Multibody
 from collision_monitor.query.arguments import Compound, finite_number, whole_number
 from collision_monitor.query.contact.contact import Contact, contact

@@ -11,9 +11,9 @@ from collision_monitor.geometry.inside import UNKNOWN
 from collision_monitor.impact.body_impact import ImpactQuery, make_scratch
 from collision_monitor.impact.impact_record import IMPACT
 from collision_monitor.impact.pair_impacts import predict_pairs
-from collision_monitor.meshes.build.shape_trees import kept_tree
 from collision_monitor.meshes.distance.nearest import LEAST, MEMORY, answer_row, tree_distance
 from collision_monitor.meshes.distance.solid import MOST_EXAMINED
+from collision_monitor.meshes.trees.shape_trees import kept_tree
 from collision_monitor.query.contact.contact import deepest
 from collision_monitor.query.impact import moving_pair, touching
 from collision_monitor.query.posed import Posed

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.bounding_volumes import convex_hull
-from collision_monitor.meshes.build.cloud_tree import cloud_tree
 from collision_monitor.meshes.distance.contact import reach_of
-from collision_monitor.meshes.build.tree import tree_of
+from collision_monitor.meshes.trees.cloud_tree import cloud_tree
+from collision_monitor.meshes.trees.tree import tree_of
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.shapes import Box, Capsule, ConvexHull, Mesh, Points, Shape, Sphere, Triangle
 

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel, device, inlined, kernel
-from collision_monitor.meshes.build.box_fit import CONTAINED, fit_box
 from collision_monitor.meshes.layout import (
     BOXES,
     CHILD,
@@ -34,6 +33,7 @@ from collision_monitor.meshes.layout import (
     WIDTH,
 )
 from collision_monitor.meshes.supports import REACHES
+from collision_monitor.meshes.trees.box_fit import CONTAINED, fit_box
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.meshes.build.shape_trees import made_tree
+from collision_monitor.meshes.trees.shape_trees import made_tree
 from collision_monitor.shapes.shape_table import BOX, CAPSULE, CONVEX_HULL, MESH, SPHERE, TREE, ShapeTableBuilder
 from collision_monitor.shapes.shapes import Box, Capsule, ConvexHull, Sphere, Triangle
 

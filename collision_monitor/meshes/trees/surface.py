@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.meshes.layout import CHILD, CLOSED, CORNERS, FACE, FIRST_PART, MOST_PARTS, PARTS, WIDTH
-from collision_monitor.meshes.build.tree import tree_of
+from collision_monitor.meshes.trees.tree import tree_of
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""Trees over triangles and points, made once for each shape."""
